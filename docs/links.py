@@ -1,8 +1,10 @@
-"""Check that every link within the built documentation leads to a page, a file or a heading that exists.
+"""Check that every link within the built documentation leads to a page, a file or a heading that exists, and that no
+output of an example holds an address in memory, which would differ at each build.
 
 python docs/links.py          # after .ci/docs; tells page and link; exit status 1 if one leads nowhere
 """
 
+import re
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
@@ -27,14 +29,17 @@ class Page(HTMLParser):
 
 
 def faults(built: Path) -> list[str]:
-    """Links that lead nowhere, each with its page."""
+    """Links that lead nowhere and outputs that name an address, each with its page."""
     pages: dict[Path, Page] = {}
+    found = []
     for path in sorted(built.rglob("*.html")):
         if path.parent.name == "_static":  # the theme's own
             continue
         pages[path] = Page()
-        pages[path].feed(path.read_text(encoding="utf-8"))
-    found = []
+        text = path.read_text(encoding="utf-8")
+        pages[path].feed(text)
+        if re.search(r" object at 0x[0-9a-f]{6}", text):
+            found.append(f"{path.relative_to(built)}: an output holds an address in memory")
     for path, page in pages.items():
         for link in sorted(set(page.links)):
             parts = urlsplit(link)

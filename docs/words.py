@@ -22,7 +22,10 @@ SPELLINGS = {
     r"ruleset": "law", r"random seed": "seed", r"trajector(?:y|ies) file": "recording", r"config(?: file)?": "scenario",
     r"parameter file": "scenario", r"utili[sz]e": "use", r"leverage": "use", r"in order to": "to",
 }  # fmt: skip
-ALLOWED = {"glossary.md": {"latency", "flight logs"}, "tracks.md": {"flight logs"}}
+ALLOWED = {"glossary.md": {"latency", "flight logs"}, "tracks.md": {"flight logs"}, "README.md": {"flight logs"}}
+BESIDE = (
+    "README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", "paper/paper.md",
+)  # fmt: skip
 # what no message says → how each kind of fault is worded (decision 0084)
 WORDINGS = {
     r"\bis no key\b|\bno such (?:key|order parameter|paper|option|model|section|metric|part)\b": "NAME: unknown KIND",
@@ -49,7 +52,9 @@ def main() -> int:
 def pages() -> list[Path]:
     """Texts written by hand: pages, and examples with their comments."""
     scripts = [path for folder in ("gallery", "notebooks", "tours") for path in sorted((DOCS / folder).glob("*.py"))]
-    return [*sorted(DOCS.glob("*.md")), *sorted((DOCS / "equations").glob("*.md")), *scripts]
+    beside = [DOCS.parent / name for name in BESIDE if (DOCS.parent / name).is_file()]
+    own = [path for folder in (".", "equations", "decisions") for path in sorted((DOCS / folder).glob("*.md"))]
+    return [*own, *scripts, *beside]
 
 
 def faults_of(path: Path) -> Iterator[str]:
@@ -59,11 +64,16 @@ def faults_of(path: Path) -> Iterator[str]:
         for wrong, right in SPELLINGS.items():
             for match in re.finditer(rf"\b{wrong}\b", text, re.IGNORECASE):
                 if match[0].lower() not in allowed:
-                    yield f"{path.relative_to(DOCS)}:{line}: {match[0]!r}: write {right}"
+                    yield f"{told(path)}:{line}: {match[0]!r}: write {right}"
         for sentence in re.split(r"(?<=[.!?:;])\s+", text):
             count = len(re.findall(r"[A-Za-zÀ-ž0-9][\w'’.-]*", sentence))
             if count > LONGEST:
-                yield f"{path.relative_to(DOCS)}:{line}: a sentence of {count} words: {sentence[:60]} ..."
+                yield f"{told(path)}:{line}: a sentence of {count} words: {sentence[:60]} ..."
+
+
+def told(path: Path) -> str:
+    """A path as messages name it: from the documentation, or from the repository."""
+    return str(path.relative_to(DOCS if path.is_relative_to(DOCS) else DOCS.parent))
 
 
 def wording_faults(path: Path) -> Iterator[str]:

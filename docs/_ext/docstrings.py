@@ -21,11 +21,11 @@ def listed(lines: list[str]) -> None:
     within = False
     for line, above, below in zip(lines, ["", *lines[:-1]], [*lines[1:], ""], strict=True):
         match = ITEM.fullmatch(line)
-        if match and (within or not above.strip()) and not below.startswith(" "):
+        if match and (within or not above.strip() and not below.startswith(" ")):
             result.append(f"* ``{match[1].replace('`', '')}``: {match[2]}")
             within = True
-        elif within and line and line[0].islower() and not line.startswith("nan "):
-            result.append(f"  {line}")
+        elif within and line and (line[0].islower() or line[0] == " ") and not line.startswith("nan "):
+            result.append(f"  {line.strip()}")
         else:
             result += ["", line] if within and line else [line]
             within = False

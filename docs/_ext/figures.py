@@ -1,4 +1,6 @@
-"""Pictures of an executed example: every Matplotlib figure that it has bound to a name, drawn without pyplot."""
+"""Pictures of an executed example: every Matplotlib figure that it has bound to a name, alone or in a list, drawn
+without pyplot.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,7 +20,8 @@ def scrape(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any])
     """Save the figures that are new since the block before, and say where."""
     seen = block_vars["example_globals"].setdefault("__figures_seen__", set())
     names = []
-    for value in list(block_vars["example_globals"].values()):
+    bound = list(block_vars["example_globals"].values())
+    for value in [item for held in bound for item in (held if isinstance(held, list) else [held])]:
         if isinstance(value, Figure) and id(value) not in seen:
             seen.add(id(value))
             path = next(block_vars["image_path_iterator"])

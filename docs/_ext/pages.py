@@ -11,6 +11,7 @@ from inspect import getsource
 from typing import Any
 
 import kinds
+import pictures
 from repository import repository
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
@@ -22,35 +23,18 @@ PAPERS = {
     "vicsek_1995": "vicsek_1995", "couzin_2002": "couzin_2002", "kidger": "kidger", "dimock_2003": "dimock_2003",
     "formation": "kidger",
 }  # fmt: skip
-PICTURES = {
-    "vasarhelyi_2018": "10_trajectories", "viragh_2014": "17_two_laws", "reynolds_1987": "50_boids",
-    "vicsek_1995": "20_vicsek", "couzin_2002": "21_couzin_mill", "kidger": "30_city", "formation": "40_display",
-    "dimock_2003": "51_formation_flight", "chen_2014": "25_predator_and_prey",
-}  # fmt: skip
-
-LOW_AND_HIGH = "25_low_and_high"  # draws all order parameters but these, which tell of whole flights or scenes
-DRAWN = {
-    "14_transfer": ("f_speed", "f_coll", "f_disc", "f_cluster", "f_wall", "f_corr", "fitness"),
-    "16_obstacles": ("n_contacts", "touching"),
-    "30_city": ("goals_reached", "goals", "time_to_goal", "f_goals", "f_env", "n_env_coll", "avoiding", "n_avoid"),
-    "31_rays": ("rays",),
-    "32_flocked": ("flocked", "time_to_flock", "n_clusters", "n_stragglers"),
-    "50_boids": ("f_collision", "cns_ext", "cns_pol", "quality", "cns_ext_groups", "cns_pol_groups", "quality_groups"),
-    "51_formation_flight": ("power", "power_most", "power_solo", "saving", "crowding", "unrest", "stable"),
-    "21_couzin_mill": ("volume",),
-}
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Write the pages before sphinx looks for them."""
-    app.connect("config-inited", lambda *_: write_all(), priority=1)
+    app.connect("config-inited", lambda app, _: write_all(pictures.executed(app)), priority=1)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
-def write_all() -> None:
-    """Write every generated page."""
-    models()
-    order_parameters()
+def write_all(drawn: bool = False) -> None:
+    """Write every generated page, with pictures of the gallery if it is `drawn`."""
+    models(drawn)
+    order_parameters(drawn)
     robots()
     kinds.faults()
     kinds.topologies()
@@ -67,8 +51,8 @@ def equations(name: str) -> dict[str, str]:
     return dict(zip(parts[1::2], parts[2::2], strict=True))
 
 
-def models() -> None:
-    """A page for each model: docstring, equations beside code, parameters, presets, what reproduces."""
+def models(drawn: bool) -> None:
+    """A page for each model: docstring, picture, equations beside code, parameters, presets, what reproduces."""
     from airflock.scenarios.files import load
     from airflock.scenarios.files import presets as known
     from airflock.scenarios.keys import keys as keys_of
@@ -90,9 +74,8 @@ def models() -> None:
         if missing:
             raise ExtensionError(f"equations/{name}.md: no function {', '.join(missing)} in the model")
         pieces = [f"# `{name}`\n\n**{plain(title)}**\n\n{prose(rest)}\n"]
-        pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/models/{name}.py`. ")
-        if name in PICTURES:
-            pieces.append(f"[A picture of it](/generated/gallery/{PICTURES[name]}) is in the gallery.\n")
+        pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/models/{name}.py`.\n\n")
+        pieces.append(pictures.shown(pictures.OF_MODEL[name], 1, "A picture of it", there=drawn))
         pieces.append("\n## Equations beside code\n")
         for rule, text in written.items():
             code = functions[rule]
@@ -128,8 +111,8 @@ def _reproduced(name: str) -> str:
     return f"Every number that was compared with the publication, hit or miss, is on the page of {link}."
 
 
-def order_parameters() -> None:
-    """Definition, unit, range and reference of every order parameter."""
+def order_parameters(drawn: bool) -> None:
+    """Definition, unit, range, reference and a picture of low and high of every order parameter."""
     from airflock.metrics import fitness_dimock, fitness_kidger, fitness_vasarhelyi, registry
 
     known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
@@ -151,6 +134,7 @@ def order_parameters() -> None:
         raise ExtensionError(f"order_parameters.toml and metrics/registry.py differ in {', '.join(wrong)}")
     import sys
 
+    pairs = pictures.pairs()
     pieces = [
         "# Order parameters\n\nWhat a flight is scored with. The key `metrics.kind` picks a set; "
         "`airflock keys metrics` lists their parameters.\n\n",
@@ -176,23 +160,15 @@ def order_parameters() -> None:
             reference = plain((module.__doc__ or "").strip().split("\n\n")[0].replace("\n", " "))
         rows = [("unit", unit or "none"), ("range", about["range"]), ("sets", ", ".join(f"`{k}`" for k in sets[name]))]
         rows += [("where some are absent", absent[name])] if name in absent else []
-        rows += [("defined in", f"`{home.__module__}`: {reference}")] if reference else []
+        if not reference and "source" not in about:
+            raise ExtensionError(f"order parameter {name}: say where it comes from: source in order_parameters.toml")
+        rows.append(("defined in", f"`{home.__module__}`: {reference}") if reference else ("source", about["source"]))
         pieces.append(table(("property", "value"), rows))
         pieces.append(f"\n{about['reads']}\n" if "reads" in about else "")
-        pieces.append(f"\n{_drawn(name)}\n")
+        if name not in pairs:
+            raise ExtensionError(f"order parameter {name}: no example of the gallery shows it low and high")
+        pieces.append("\n" + pictures.shown(*pairs[name], f"{name}, low and high", there=drawn))
     put("order_parameters.md", "".join(pieces))
-
-
-def _drawn(name: str) -> str:
-    """Where the gallery shows an order parameter."""
-    if f'"{name}"' in (DOCS / "gallery" / f"{LOW_AND_HIGH}.py").read_text(encoding="utf-8"):
-        return f"[A picture of low and high](/generated/gallery/{LOW_AND_HIGH}) shows two flocks with their values."
-    if name == "present":
-        return "It has no picture: it is 1 if all are there, 0.5 if half of the agents dropped out at the start."
-    example = next((example for example, names in DRAWN.items() if name in names), "")
-    if not example:
-        raise ExtensionError(f"order parameter {name}: no example of the gallery shows it")
-    return f"[A picture](/generated/gallery/{example}) in the gallery shows it."
 
 
 def _names(found: Iterable[str]) -> str:

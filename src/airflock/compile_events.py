@@ -1,11 +1,17 @@
-"""Numba's passes as they begin, to hear Ctrl-C and to say what is waited for. Imported once something may compile."""
+"""Numba's passes as they begin, to hear Ctrl-C; and what is said to whoever waits for the compiler."""
 
-import time
-from collections.abc import Callable
+import multiprocessing
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from numba.core.event import Event, Listener
 
 from airflock.threads import heed
+
+COMPILING = "compiling … (only once for this kind of flight; later flights start at once)"
+PATIENCE = 1.0  # s
 
 
 class Heeding(Listener):  # type: ignore[misc]  # Numba has no types
@@ -19,20 +25,27 @@ class Heeding(Listener):  # type: ignore[misc]  # Numba has no types
         """Nothing; the next pass is asked."""
 
 
-class Telling(Listener):  # type: ignore[misc]  # Numba has no types
-    """Calls `tell` once, when compiling has taken longer than `patience`, s."""
+@contextmanager
+def told_if_long() -> Iterator[None]:
+    """Say once that something is compiled, if it takes longer than PATIENCE, to a person who waits for it."""
+    if not _watched():
+        yield
+        return
+    told = threading.Timer(PATIENCE, _say)
+    told.daemon = True
+    told.start()
+    try:
+        yield
+    finally:
+        told.cancel()
 
-    def __init__(self, tell: Callable[[], None], patience: float = 1.0):
-        self.tell, self.patience = tell, patience
-        self.begun: float | None = None
-        self.told = False
 
-    def on_start(self, event: Event) -> None:
-        """Look at the clock as a pass begins."""
-        self.begun = time.monotonic() if self.begun is None else self.begun
-        if not self.told and time.monotonic() - self.begun >= self.patience:
-            self.told = True
-            self.tell()
+def _watched() -> bool:
+    """Whether a person sees what this thread says: at a terminal or in a notebook, and not of one of many workers."""
+    main = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
+    return main and ("ipykernel" in sys.modules or sys.stderr.isatty())
 
-    def on_end(self, event: Event) -> None:
-        """Nothing; the next pass is asked."""
+
+def _say() -> None:
+    sys.stderr.write(f"{COMPILING}\n")
+    sys.stderr.flush()

@@ -82,20 +82,25 @@ def path_of(path: Any) -> Path:
     """The name of a file as a path. Raises RecordingError for what is no name."""
     if not isinstance(path, (str, os.PathLike)):
         raise RecordingError(f"{bounded(repr(path), 80)} is not a name of a file; give a text or a Path")
-    return Path(path)
+    return own_path(path)
+
+
+def own_path(name: str | os.PathLike[str]) -> Path:
+    """A path as a person writes it: ~ is the home folder, also where no shell has put it in."""
+    return Path(os.path.expanduser(name))
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
     """Whether a path from outside is that of a file; a path that cannot be one (too long, a NUL inside) is not."""
     try:
-        return stat.S_ISREG(os.stat(path).st_mode)
+        return stat.S_ISREG(own_path(path).stat().st_mode)
     except (OSError, ValueError):
         return False
 
 
 def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
     """Text of a regular file in UTF-8, with or without a byte order mark; raises TextError or OSError."""
-    source = Path(path)
+    source = own_path(path)
     if not stat.S_ISREG(source.stat().st_mode):  # a named pipe would wait for ever
         raise TextError("is not a regular file")
     with source.open("rb") as file:

@@ -43,6 +43,36 @@ def test_each_instant_is_that_of_those_who_are_there(recording, share):
     assert values["phi_vel"] == pytest.approx(np.mean([row["phi_vel"] for row in alone]), rel=1e-5)
 
 
+@pytest.mark.parametrize("kind", ["vasarhelyi", "kidger", "order", "groups", "zapotecatl", "contacts"])
+@pytest.mark.parametrize("share", [0.007, 0.2])
+def test_every_order_parameter_of_an_instant_is_that_of_those_who_are_there(recording, kind, share):
+    """With one who lands early; and what plain formulas say of them."""
+    missing = np.random.default_rng(5).random((len(recording.time), 8)) < share
+    missing[40:, 3] = True
+    settings = {"metrics.kind": kind}
+    course = measure(without(recording, missing), settings)[1].drop(
+        columns=["n_coll", "time_to_flock"], errors="ignore"
+    )
+    place, speed = (
+        recording[name].transpose("time", "space", "keypoint", "individual").values[:, :, 0].astype(float)
+        for name in ("position", "velocity")
+    )
+    for number, gone in enumerate(missing):
+        there = np.flatnonzero(~gone)
+        alone = measure(recording.isel(time=[number], individual=there), settings)[1]
+        np.testing.assert_allclose(course.iloc[number], alone[course.columns].iloc[0], rtol=1e-6, atol=1e-6)
+        if not speed[number].any():  # before they start nobody has a heading
+            continue
+        p, v = place[number][:, there], speed[number][:, there]
+        apart = np.linalg.norm(p[:, :, None] - p[:, None], axis=0) + np.diag(np.full(len(there), np.inf))
+        plain = {
+            "phi_vel": np.hypot(*v).mean(), "polarisation": np.hypot(*(v / np.hypot(*v)).mean(axis=1)),
+            "r_min": apart.min(), "r_min_mean": apart.min(axis=1).mean(),
+        }  # fmt: skip
+        for name in set(plain) & set(course.columns):
+            assert course[name].iloc[number] == pytest.approx(plain[name], rel=1e-5, abs=2e-6), name
+
+
 def test_one_who_lands_early_leaves_the_others_their_scores(recording):
     missing = np.zeros((len(recording.time), 8), bool)
     missing[20:, 3] = True

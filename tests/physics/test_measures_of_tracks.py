@@ -84,6 +84,19 @@ def test_two_halves_that_part_are_correlated_within_and_anticorrelated_across():
     assert 1.0 < correlation.correlation_length(recording(place, speed), 1.0) < 10.0
 
 
+@pytest.mark.parametrize("length", [1.0, 40.0])
+def test_a_line_that_is_sheared_is_correlated_over_a_known_length(length):
+    """Where velocity grows along a line of length L, the correlation is ((L - r)² - 3 r²)/L²: 0 at L/(1 + √3)."""
+    along = np.linspace(0.0, length, 997)
+    place = np.stack([along, 0.0 * along])[None].repeat(2, axis=0)
+    speed = np.stack([0.0 * along, 5.0 + 0.3 * along])[None].repeat(2, axis=0)
+    course = correlation.velocity_correlation(recording(place, speed), length / 50.3, 0.9 * length)
+    r = course.index.to_numpy()
+    np.testing.assert_allclose(course, ((length - r) ** 2 - 3.0 * r**2) / length**2, atol=0.02)
+    found = correlation.correlation_length(recording(place, speed), length / 50.3)
+    assert found == pytest.approx(length / (1.0 + np.sqrt(3.0)), rel=0.01)
+
+
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 1000), st.floats(-3.0, 3.0))
 def test_turning_and_shifting_the_world_changes_nothing(seed, angle):

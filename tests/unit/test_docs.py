@@ -41,6 +41,12 @@ def test_the_check_of_words_finds_what_is_wrong(tmp_path, monkeypatch, name, tex
     assert told.startswith(fault)
 
 
+def test_decisions_and_the_front_pages_are_held_to_the_words_too():
+    names = {path.name for path in words.pages()}
+    assert {"README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "paper.md", "glossary.md"} <= names
+    assert {path.name for path in (DOCS / "decisions").glob("*.md")} <= names
+
+
 def test_code_and_equations_are_no_words(tmp_path, monkeypatch):
     monkeypatch.setattr(words, "DOCS", tmp_path)
     path = tmp_path / "a.md"
@@ -62,11 +68,50 @@ def test_every_order_parameter_has_formula_and_range():
     assert all(entry["formula"] and entry["range"] for entry in known.values())
 
 
+def test_every_order_parameter_is_shown_by_two_flocks_that_differ_in_it(monkeypatch):
+    pytest.importorskip("sphinx")
+    monkeypatch.syspath_prepend(str(DOCS / "_ext"))
+    from pictures import LOW_AND_HIGH, OF_MODEL, pairs
+
+    found = pairs()
+    assert set(found) == {name for kind in registry.SETS.values() for name in registry.reports(kind)}
+    assert set(OF_MODEL) == set(MODELS)
+    assert all((DOCS / "gallery" / f"{example}.py").is_file() for example in OF_MODEL.values())
+    source = (DOCS / "gallery" / f"{LOW_AND_HIGH[0]}.py").read_text(encoding="utf-8")
+    example = {}
+    exec(source.partition("def drawn(")[0], example)  # the flocks and how they are measured; nothing is drawn
+    for names, *flocks in example["PAIRS"]:
+        one, other = (example["measured"](*flock) for flock in flocks)
+        assert [name for name in names if f"{one[name]:.3g}" == f"{other[name]:.3g}"] == []
+
+
 def test_a_tour_takes_less_than_thirty_lines_of_the_user_s_own():
     for path in (DOCS / "tours").glob("*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         lines = {line for node in tree.body[1:] for line in range(node.lineno, node.end_lineno + 1)}
         assert len(lines) <= 30, path.name
+
+
+def test_the_glossary_has_each_term_once_in_order_and_the_words_of_the_papers():
+    text = (DOCS / "glossary.md").read_text(encoding="utf-8")
+    terms = re.findall(r"^(\w[\w ]*)\n  \S", text, re.M)
+    assert terms == sorted(set(terms), key=lambda term: term.replace("_", " "))
+    # words of the papers, and of the commands that a user types
+    assert {"shill agent", "friction", "phi_lap", "braking curve", "percept", "fault", "fleet", "certificate"} <= set(
+        terms
+    )
+    assert not any(re.fullmatch(wrong, term) for wrong in words.SPELLINGS for term in terms)
+
+
+def test_terms_are_found_at_the_head_of_a_sentence_and_in_the_plural_but_not_in_keys(monkeypatch):
+    pytest.importorskip("sphinx")
+    monkeypatch.syspath_prepend(str(DOCS / "_ext"))
+    from terms import pattern_of, term_of
+
+    known = {"agent", "shill agent", "radio", "v_flock"}
+    text = "Agents turn to a shill agent. A radio, not radio.delay, and v_flock; reagent and V_flocked are none."
+    found = [term_of(match[1], known) for match in pattern_of(known).finditer(text)]
+    assert found == ["agent", "shill agent", "radio", "v_flock"]
 
 
 def test_a_link_that_leads_nowhere_is_told(tmp_path):
@@ -81,18 +126,32 @@ def test_a_link_that_leads_nowhere_is_told(tmp_path):
     ]
 
 
+def test_an_output_that_differs_at_each_build_is_told(tmp_path):
+    (tmp_path / "a.html").write_text("<pre>&lt;Legend object at 0x7f21a8a66ed0&gt;</pre>", encoding="utf-8")
+    assert links.faults(tmp_path) == ["a.html: an output holds an address in memory"]
+
+
 def test_meanings_of_names_become_a_list_and_sections_stay(monkeypatch):
     pytest.importorskip("sphinx")
     monkeypatch.syspath_prepend(str(DOCS / "_ext"))
     from docstrings import listed
 
-    lines = ["Lines.", "", "width    : of a bin, m: a tenth,", "or less", "far, near : m", "nan where none.", ""]
+    lines = [
+        "Lines.",
+        "",
+        "width    : of a bin, m: a tenth,",
+        "or less",
+        "far, near : m,",
+        "            or",
+        "nan where none.",
+        "",
+    ]
     section = ["Parameters", "----------", "name : str", "    A name."]
     listed(lines)
     kept = list(section)
     listed(kept)
     assert lines == [
         "Lines.", "", "* ``width``: of a bin, m: a tenth,", "  or less",
-        "* ``far, near``: m", "", "nan where none.", "",
+        "* ``far, near``: m,", "  or", "", "nan where none.", "",
     ]  # fmt: skip
     assert kept == section

@@ -80,7 +80,8 @@ def test_both_layouts_of_movement_come_back(recording, tmp_path, old):
     with xr.open_dataset(path, engine="h5netcdf") as opened:
         assert ("individuals" in opened.dims) == old and opened.attrs["ds_type"] == "poses"
     back = airflock.load_tracks(path)
-    np.testing.assert_array_equal(back["position"].values, recording["position"].values)
+    for name in ("position", "velocity", "command"):  # the last two were left out: velocities came back differentiated
+        np.testing.assert_array_equal(back[name].values, recording[name].values)
 
 
 def test_a_saved_import_is_a_recording(recording, tmp_path):

@@ -1,6 +1,7 @@
 """Identify: truths that come back, and what logs cannot say is refused with the reason."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,13 +9,14 @@ import pytest
 
 import airflock
 from airflock.core import random
+from airflock.core.parameters import Quantity, declarations
 from airflock.errors import RecordingError, ScenarioError
 from airflock.identify import body, hills, packets, periods, synthetic
 from airflock.identify import sensors as standing
 from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of_recording
 from airflock.identify.plan import flight_card
-from airflock.identify.run import HARDER, UNITS, Number, identify
+from airflock.identify.run import HARDER, UNITS, Number, identify, read_heard
 from airflock.radios import links
 from airflock.sensors import langevin
 from processes import called
@@ -236,6 +238,33 @@ def test_delay_and_clocks_come_back_from_packets_of_both_directions():
     assert "one direction only" in packets.fit_delay(one_way).reason
 
 
+def test_what_is_wrong_with_a_table_of_packets_is_told_by_column_and_row(tmp_path):
+    """Words, nan and inf ended in a fault of the program; microseconds were taken for seconds."""
+    heard = heard_by(links.Parameters(kind="links"), count=3000)[0]
+    wrong = heard.astype({"t": object, "got": int})
+    wrong.loc[10, "t"] = "soon"
+    wrong.loc[11, "distance"] = np.inf
+    wrong.loc[12, "got"] = 3
+    wrong.loc[10, "got"] = 1
+    wrong.to_csv(tmp_path / "heard.csv", index=False)
+    with pytest.raises(RecordingError) as fault:
+        read_heard(tmp_path / "heard.csv")
+    assert str(fault.value).splitlines() == [
+        f"{tmp_path}/heard.csv: column t, row 12: soon is not a number",
+        f"{tmp_path}/heard.csv: column distance, row 13: inf is not a number",
+        f"{tmp_path}/heard.csv: column got, row 14: 3 is not 0 or 1",
+    ]
+    with pytest.raises(RecordingError, match="give t and stamp in s: divide them by 1e6"):
+        packets.checked(heard.assign(t=1e6 * heard["t"], stamp=1e6 * heard["stamp"]))
+    unheard = heard.assign(stamp=heard["stamp"].where(heard["got"] > 0))  # what never came has no stamp
+    assert len(packets.checked(unheard)) == len(heard)
+    heard.to_csv(tmp_path / "comma.csv", index=False, sep=";", decimal=",")
+    with pytest.raises(RecordingError, match="has ; between its columns"):
+        read_heard(tmp_path / "comma.csv")
+    with pytest.raises(RecordingError, match="none.csv: no such file"):
+        read_heard(tmp_path / "none.csv")
+
+
 def test_the_curve_of_reception_comes_back():
     k = links.Parameters(kind="links", near=22.0, far=55.0, received_near=0.95, received_far=0.35)
     found = packets.fit_links(heard_by(k)[0], 0.2, k)
@@ -246,6 +275,21 @@ def test_the_curve_of_reception_comes_back():
     near = heard_by(k)[0]
     near = near[near["distance"] < 40.0]
     assert {"far", "received_far"} <= set(packets.fit_links(near, 0.2, k).refused)  # both lie beyond what was flown
+
+
+@pytest.mark.parametrize("error", [0.0, 3.0])
+def test_the_end_of_the_range_is_not_taken_for_the_curve(error):
+    """Nothing is heard beyond 80 m: `far` came out at 82 ± 1 m instead of 50, without a word."""
+    k = links.Parameters(kind="links", near=20.0, far=50.0, received_near=0.95, received_far=0.4)
+    heard = heard_by(k)[0]
+    heard.loc[heard["distance"] > 80.0, "got"] = 0
+    heard["distance"] = np.abs(heard["distance"] + np.random.default_rng(1).normal(0.0, error, len(heard)))
+    found = packets.fit_links(heard, 0.2, k)
+    assert found.notes[0].startswith("no packet from beyond")
+    for name in set(LINKS) - set(found.refused):
+        assert found.value[name] == pytest.approx(getattr(k, name), rel=0.12), name
+    assert not packets.fit_links(heard_by(k)[0], 0.2, k).notes  # no range, and none is made up
+    assert not packets.fit_links(heard[heard["distance"] < 70.0], 0.2, k).notes
 
 
 def test_entries_of_a_table_come_back_within_their_intervals():
@@ -331,6 +375,24 @@ def test_the_file_that_identify_writes_flies_with_those_numbers(fleet, tmp_path)
         airflock.load(str(tmp_path / "odd.toml"))
 
 
+def test_every_number_that_identify_tells_has_the_unit_of_the_scenario(fleet, tmp_path):
+    """A file with `sensors.scale`, in m, could be written and not flown."""
+    import tomlkit
+
+    truth, found, _ = fleet
+    for key, unit in UNITS.items():
+        section, name = key.split(".")
+        record = truth.parameters if section == "model" else getattr(truth, section)
+        declared = {name: one.unit for name, one, _ in declarations(record) if isinstance(one, Quantity)}
+        assert unit == declared.get(name, unit), key
+    numbers = {key: replace(one, reason="", value=known) for key, one in found.numbers.items() if (known := one.like)}
+    numbers = {key: replace(one, low=0.9 * one.value, high=1.1 * one.value) for key, one in numbers.items()}
+    whole = replace(found, numbers=numbers)
+    (tmp_path / "whole.toml").write_text(tomlkit.dumps(whole.document(uncertain=True)))
+    back = airflock.load(str(tmp_path / "whole.toml"))
+    assert "sensors.scale" in numbers and back.sensors.scale == pytest.approx(truth.sensors.scale)
+
+
 def test_conservative_numbers_make_a_flight_harder(fleet):
     _, found, _ = fleet
     plain, hard, harder = found.settings(), found.settings(0.95), found.settings(0.999)
@@ -366,7 +428,8 @@ def test_all_faults_of_the_command_are_told_at_once(tmp_path):
     assert done.returncode == 2 and len(lines) == 4 and all(line.startswith("airflock: ") for line in lines)
     assert any("did you mean vasarhelyi_2018/real_" in line for line in lines)
     done = called(*command, "--like", "vasarhelyi_2018/real_6ms")
-    assert done.returncode == 2 and "has no velocity" in done.stderr and len(done.stderr.splitlines()) == 1
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
+    assert "a.csv: a has no velocity" in done.stderr
 
 
 def test_logs_without_commands_say_so_and_write_nothing(tmp_path):

@@ -1,6 +1,7 @@
 """Infer: the law that made the tracks is found, walks at random are nobody's law, and bad input is one line."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -242,6 +243,11 @@ def test_the_best_is_named_with_its_doubts():
     assert "would explain 30%" in verdict_of([law("a", 400.0, 0.3, [1.0, 2.0])])[1]
     assert verdict_of([law("a", 8.0, 0.0, [1.0, 2.0])])[0] is None  # within two standard errors
     assert verdict_of([law("a", 18.0, 0.0, [1.0, 2.0])])[0] is None  # less than so many numbers bring by chance
+    unsure = verdict_of([replace(law("a", 11168.0, 0.0, [1.0, 2.0]), error=8965.0)])  # one span brings most of it
+    assert unsure[0] is None and unsure[1] == (
+        "none of these explains the tracks better than going straight on for sure: a is ahead in 100% of the spans, "
+        "but its gain of 11168 is less than 2 standard errors (8965); longer tracks would tell"
+    )
 
 
 def test_the_command_says_all_that_is_wrong_in_lines(tmp_path, monkeypatch):

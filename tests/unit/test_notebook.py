@@ -1,9 +1,11 @@
 """The Python names as a notebook uses them: names instead of scenarios, laws by name, seeds that can be one."""
 
+import pickle
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import airflock
@@ -14,6 +16,7 @@ from airflock.evolve.store import Store
 from airflock.evolve.study import load_study
 from airflock.evolve.winner import conclude
 from airflock.executors.in_process import InProcess
+from airflock.metrics import registry
 from airflock.recordings.measures import milling
 from processes import called
 
@@ -130,9 +133,32 @@ def test_a_sweep_over_a_single_value_is_told_to_give_a_list(short, value):
         airflock.sweep(short, {"radio.delay": value})
 
 
+def test_scores_show_units_and_meanings_in_their_heads_and_stay_a_dataframe(short):
+    table = airflock.score(short, seeds=2)
+    page = table._repr_html_()
+    assert '<th title="mean speed">phi_vel<br>m/s</th>' in page and "<br>&nbsp;</th>" in page  # phi_corr has no unit
+    assert page.count("<th title=") == len(table.columns) and f"{table['phi_vel'].iloc[0]:.6f}" in page
+    part = table[["phi_vel", "n_coll"]].round(3)
+    assert part._repr_html_().count("<th title=") == 2  # of a part, what it holds
+    assert type(table["phi_vel"]) is pd.Series and table.equals(pd.DataFrame(table))
+    assert "units" in pickle.loads(pickle.dumps(table)).attrs
+    swept = airflock.sweep(short, {"radio.delay": [0.2]}, seeds=1)
+    assert "<th>radio.delay</th>" in swept._repr_html_() and "mean speed" in swept._repr_html_()
+    with pd.option_context("display.notebook_repr_html", False):
+        assert table._repr_html_() is None
+
+
 def test_courses_say_their_units(short):
     course = airflock.over_time(airflock.simulate(short, device="python"))
     assert course.attrs["units"]["phi_vel"] == "m/s" and "speed" in course.attrs["meanings"]["phi_vel"]
+
+
+@pytest.mark.parametrize("kind", sorted(registry.SETS))
+def test_every_column_over_time_says_its_unit_and_meaning(short, kind):
+    """Sums that make up an order parameter, such as those of Eq. 15, had none."""
+    course = airflock.over_time(airflock.simulate(short, device="python"), {"metrics.kind": kind})
+    assert set(course.attrs["units"]) == set(course.attrs["meanings"]) == set(course.columns)
+    assert all(course.attrs["meanings"].values())
 
 
 def test_measures_of_groups_are_found_by_tab():

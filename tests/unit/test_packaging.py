@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 
 import airflock
+from airflock.scenarios.laws import MODELS
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -23,11 +24,14 @@ def test_the_conda_recipe_needs_what_pip_installs():
         assert f'version = "{airflock.__version__}"' in (ROOT / "conda" / name).read_text(encoding="utf-8")
 
 
-def test_the_citation_names_this_version_and_every_publication_of_a_shipped_paper():
+def test_the_citation_names_this_version_and_the_publication_of_every_law():
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"\nversion: {airflock.__version__}\n" in citation
-    for word in ("Optimized flocking of autonomous drones", "coordinated motion in flocks", "bird flocks", "Kidger"):
-        assert word in citation
+    bibliography = (ROOT / "references.bib").read_text(encoding="utf-8")
+    for name in (set(MODELS) | {"zapotecatl_2016"}) - {"formation"}:  # formation is ours
+        (entry,) = re.findall(rf"^@\w+\{{{name},(.*?)^}}", bibliography, re.M | re.S)
+        (title,) = re.findall(r"^\s*title\s*= \{(.+)\}", entry, re.M)
+        assert title.split("Swarms")[0].lower() in citation.lower(), name
 
 
 def test_every_extra_stands_in_the_table_of_the_documentation():
@@ -38,3 +42,13 @@ def test_every_extra_stands_in_the_table_of_the_documentation():
         "lint",
         "dev",
     }  # for who works on Airflock
+
+
+def test_the_paper_names_as_many_laws_as_there_are_and_cites_each_publication():
+    text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
+    written = dict(zip(("eight", "nine", "ten", "eleven", "twelve"), range(8, 13), strict=True))
+    (laws,) = re.findall(r"(\w+) laws come with the package", text)
+    assert written[laws.lower()] == len(MODELS)
+    cited = set(re.findall(r"@(\w+)", text))
+    assert set(MODELS) - {"formation"} <= cited  # formation is ours
+    assert cited <= set(re.findall(r"^@\w+\{(\w+),", (ROOT / "references.bib").read_text(encoding="utf-8"), re.M))

@@ -99,6 +99,9 @@ def test_the_folder_holds_what_to_fly_what_was_shown_and_a_report(done):
     assert identity(load(folder / "tuned.toml")) == identity(found.scenario)
     told = tomllib.loads((folder / "certificate.toml").read_text())
     assert told["shown"] == found.shown and told["flights"]["identity"] == identity(found.scenario)
+    shown = found._repr_html_()
+    assert "tuned.toml</b>, in " in shown and "<td>model.p_rep</td>" in shown
+    assert all(verdict.limit.text.replace("<", "&lt;") in shown for verdict in found.certificate.verdicts)
     page = (folder / "report.html").read_text()
     for text in ("What was assumed", "model.p_rep", "on fresh seeds", *found.certificate.statements, "@page"):
         assert text.replace("<", "&lt;").replace(">", "&gt;") in page or text in page

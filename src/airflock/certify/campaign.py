@@ -72,7 +72,7 @@ class Campaign:
         """Numbers of the world of one flight, uniform in their intervals; the seed alone decides them."""
         if not self.intervals:
             return {}
-        drawn = np.random.default_rng(seed).random(len(self.intervals))
+        drawn = np.random.default_rng(seed).random(len(self.intervals)).tolist()  # plain numbers, for what is printed
         return {
             key: low + (high - low) * x for (key, (low, high)), x in zip(self.intervals.items(), drawn, strict=True)
         }

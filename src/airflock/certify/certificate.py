@@ -15,6 +15,7 @@ from airflock.certify.hazard import Hazard
 from airflock.certify.seeds import COUNT, seed
 from airflock.evolve.folder import plain, write
 from airflock.limits.bounds import per_hour
+from airflock.untrusted import own_path
 
 FORMAT = 1
 LOOK = ("flights", "events", "above", "below", "low", "high")
@@ -84,7 +85,15 @@ class Certificate:
         return found
 
     def document(self) -> dict[str, Any]:
-        """The certificate as plain values: what certificate.toml holds."""
+        """The certificate as plain values: what certificate.toml holds.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
+        >>> airflock.certify(short, "n_coll<1 at 90%", flights=100).document()["flights"]["count"]
+        100
+        """
         c, step = self.campaign, max(1, min(CHECKED, len(self.rows) // FEWEST))
         digests = [digest(row) for row in self.rows]
         made = {
@@ -118,12 +127,31 @@ class Certificate:
         return sealed(plain(made))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write certificate.toml, complete or not at all."""
-        write(Path(path), self.document(), "A certificate of Airflock; check it with: airflock certify FILE --check")
-        return Path(path)
+        """Write certificate.toml to `path`, complete or not at all.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
+        >>> airflock.certify(short, "n_coll<1 at 90%", flights=100).save("certificate.toml").name
+        'certificate.toml'
+        """
+        target = own_path(path)
+        write(target, self.document(), "A certificate of Airflock; check it with: airflock certify FILE --check")
+        return target
 
     def check(self, threads: int | None = None) -> Any:
-        """Fly one flight in a hundred again and compare the bits; see `airflock.certify.check.checked`."""
+        """Fly one flight in a hundred again and compare the bits; see `airflock.certify.check.checked`.
+
+        threads : of the flights, all processors by default
+
+        Examples
+        --------
+        >>> import airflock
+        >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
+        >>> airflock.certify(short, "n_coll<1 at 90%", flights=100).check().same
+        True
+        """
         from airflock.certify.check import checked
 
         return checked(self.document(), "certificate", scenario=self.campaign.scenario, threads=threads)

@@ -17,7 +17,7 @@ from airflock.limits.bounds import look
 from airflock.limits.limit import read_all
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
-from airflock.untrusted import from_outside, read_toml
+from airflock.untrusted import from_outside, own_path, read_toml
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,23 @@ def check(
 ) -> Checked:
     """Check a certificate file.
 
+    path    : of certificate.toml; threads : of the flights, all processors by default
+    trust   : whether a law in a Python file that the scenario names may run
+    done    : called after each flight
+
     Raises StudyError where the file is no certificate, of another format, version or scenario than it says.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> from airflock.certify.check import check
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
+    >>> path = airflock.certify(short, "n_coll<1 at 90%", flights=100).save("certificate.toml")
+    >>> check(path).same
+    True
     """
     with from_outside(path, StudyError):
-        document = read_toml(Path(path))
+        document = read_toml(own_path(path))
     return checked(document, str(path), threads=threads, trust=trust, done=done)
 
 

@@ -17,6 +17,7 @@ from airflock.evolve.folder import read
 from airflock.executors import Executor, Flight
 from airflock.executors.cluster import Cluster
 from airflock.executors.in_process import InProcess
+from airflock.untrusted import own_path
 
 PILOT = 16  # flights that tell how many there is time for
 
@@ -25,7 +26,7 @@ PILOT = 16  # flights that tell how many there is time for
 def folder_of(folder: str | os.PathLike[str] | None) -> Iterator[Path]:
     """The folder of flights: the one that is given, or one that is gone afterwards."""
     if folder is not None:
-        yield Path(folder)
+        yield own_path(folder)
         return
     with tempfile.TemporaryDirectory(prefix="airflock-certify-") as made:
         yield Path(made)

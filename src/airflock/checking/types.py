@@ -12,7 +12,7 @@ from airflock.atomic import write
 from airflock.cache import cache_trouble, usual_folder
 from airflock.checking.annotations import TypedCopy, typed_copy
 from airflock.errors import RuleError
-from airflock.untrusted import from_outside, read_text
+from airflock.untrusted import from_outside, own_path, read_text
 
 PACKAGE = Path(airflock.__file__).parent
 SCALAR = ("core/maths.py",)  # every function of these takes and gives plain numbers
@@ -109,10 +109,10 @@ def check_types(files: str | Path | Sequence[str | Path], *, out: str | Path | N
     """
     if not isinstance(files, Iterable) and not isinstance(files, Path):
         raise RuleError(f"{files!r} is not a file of rules; give its name, or a list of names")
-    names = [str(file) for file in ([files] if isinstance(files, (str, Path)) else files)]
+    names = [str(own_path(file)) for file in ([files] if isinstance(files, (str, Path)) else files)]
     copies = _copies(names)
     if out is not None:
-        _put(copies, Path(out))
+        _put(copies, own_path(out))
     faults = {TypeFault(name, line, text) for name, copy in copies.items() for line, text in copy.unknown}
     faults |= set(_told(copies))
     return TypeReport({name: copy.rules for name, copy in copies.items()}, tuple(sorted(faults)))

@@ -132,7 +132,7 @@ def certify(
     assert campaign is not None
     tables.say_notes(campaign.scenario.notes)
     if scheduler is None:
-        options.compile_aloud(campaign.flown, precision, device)
+        options.compile_first(campaign.flown, precision, device)
     flying = {"scheduler": scheduler, "threads": threads, "timeout": timeout}
     _end(_flown(campaign, seconds, out, resume, flying, also, quiet=as_json), out, plot, as_json)
 

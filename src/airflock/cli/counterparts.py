@@ -148,6 +148,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.identify(files, "vasarhelyi_2018/real_6ms")', "identify",
         {
             "files": "what", "like": "like", "heard": "heard", "standing": "standing", "same_clock": "same_clock",
+            "begin": "begin", "end": "end",
             "accept": "accept", "changes": "airflock.load", **TABLE,
             "out": "airflock.identify.run.Identified.document",
             **dict.fromkeys(("conservative", "uncertain"), "airflock.identify.run.Identified.document"),

@@ -38,6 +38,8 @@ def identify(
     unit: imports.Unit = "",
     time_unit: imports.TimeUnit = "",
     axes: imports.Axes = "",
+    begin: imports.Begin = None,
+    end: imports.End = None,
     same_clock: imports.SameClock = False,
     accept: imports.Accept = None,
     decimal: imports.Decimal = ".",
@@ -74,8 +76,9 @@ def identify(
             map=how, unit=unit, time_unit=time_unit, axes=axes, decimal=decimal, delimiter=delimiter, done=done
         )
         result = find(
-            files, scenario, heard=packets, standing=ground, same_clock=same_clock, options=reading, accept=accept or ()
-        )
+            files, scenario, heard=packets, standing=ground, same_clock=same_clock, options=reading,
+            accept=accept or (), begin=begin, end=end,
+        )  # fmt: skip
     if out is not None and not result.settings():
         raise AirflockError(
             "\n".join([f"{out}: not written: no number can be identified from these logs", *_reasons(result)])

@@ -31,6 +31,8 @@ Axes = Annotated[
     str, typer.Option(help="enu, or ned where x is north and z down.", show_default="enu; ned for fields of PX4")
 ]
 SameClock = Annotated[bool, typer.Option("--same-clock", help="The clocks of all files agree.")]
+Begin = Annotated[float | None, typer.Option(help="First instant to keep, s.", show_default=False)]
+End = Annotated[float | None, typer.Option(help="Last instant to keep, s.", show_default=False)]
 Accept = Annotated[
     list[str] | None,
     typer.Option(metavar="KIND", help="Keep what looks wrong: absent, axes, down, duplicates, height, jumps, time."),
@@ -76,8 +78,8 @@ def import_tracks(
     bridge: Annotated[
         float, typer.Option(help="Longest gap to bridge, s; in longer gaps the individual counts as absent.")
     ] = 1.0,
-    begin: Annotated[float | None, typer.Option(help="First instant to keep, s.", show_default=False)] = None,
-    end: Annotated[float | None, typer.Option(help="Last instant to keep, s.", show_default=False)] = None,
+    begin: Begin = None,
+    end: End = None,
     same_clock: SameClock = False,
     accept: Accept = None,
     decimal: Decimal = ".",

@@ -59,13 +59,12 @@ def plot(
 
     settings = options.settings(changes, agents, duration)
     window: dict[str, Any] = {"start": begin, "stop": end}
-    with options.compiling_told():
-        if what.lower().endswith(".nc"):
-            figure = picture(what, kind, settings=settings, law=law, trust=trust, **window)
-        else:
-            scenario = load(what, settings, law, trust=trust)
-            tables.say_notes(scenario.notes)
-            figure = picture(scenario, kind, seed=seed, **window)
+    if what.lower().endswith(".nc"):
+        figure = picture(what, kind, settings=settings, law=law, trust=trust, **window)
+    else:
+        scenario = load(what, settings, law, trust=trust)
+        tables.say_notes(scenario.notes)
+        figure = picture(scenario, kind, seed=seed, **window)
     save_figure(figure, out)
     tables.say(f"saved {out}")
 
@@ -110,14 +109,13 @@ def video(
 
     settings = options.settings(changes, agents, duration)
     ffmpeg()  # before anything flies, as all that can be refused
-    with options.compiling_told():
-        if what.lower().endswith(".nc"):
-            recording = flight_of(what, seed, settings, law, trust=trust)
-        else:
-            scenario = load(what, settings, law, trust=trust)
-            tables.say_notes(scenario.notes)
-            check_chart(chart, courses(scenario) if chart else [], scenario.name)
-            recording = flight_of(scenario, seed)
+    if what.lower().endswith(".nc"):
+        recording = flight_of(what, seed, settings, law, trust=trust)
+    else:
+        scenario = load(what, settings, law, trust=trust)
+        tables.say_notes(scenario.notes)
+        check_chart(chart, courses(scenario) if chart else [], scenario.name)
+        recording = flight_of(scenario, seed)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
     with named(what), options.progress("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, space=space, chart=chart, **choice)
@@ -151,14 +149,13 @@ def replay(
     from airflock.scenarios.files import load
 
     settings = options.settings(changes, agents, duration)
-    with options.compiling_told():
-        if what.lower().endswith(".nc"):
-            recording = flight_of(what, seed, settings, law, trust=trust)
-        else:
-            scenario = load(what, settings, law, trust=trust)
-            tables.say_notes(scenario.notes)
-            check_colour(scenario, colour)
-            recording = flight_of(scenario, seed)
+    if what.lower().endswith(".nc"):
+        recording = flight_of(what, seed, settings, law, trust=trust)
+    else:
+        scenario = load(what, settings, law, trust=trust)
+        tables.say_notes(scenario.notes)
+        check_colour(scenario, colour)
+        recording = flight_of(scenario, seed)
     with named(what):
         replay_page = make_replay(recording, rate=rate, colour=colour)
     replay_page.save(page)

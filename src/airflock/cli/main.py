@@ -34,7 +34,7 @@ from airflock.cli import (
     types,
     watch,
 )
-from airflock.cli.usage import usage_fault
+from airflock.cli.usage import at_home, usage_fault
 from airflock.cli.verb import Verb
 from airflock.errors import AirflockError, bounded, bounded_lines, printable, reason
 
@@ -57,7 +57,7 @@ class Verbs(TyperGroup):
         **extra: Any,
     ) -> Any:
         """Run a command line; raise an AirflockError where it is wrong."""
-        words = sys.argv[1:] if args is None else list(args)
+        words = [at_home(word) for word in (sys.argv[1:] if args is None else args)]
         try:
             result = super().main(words, prog_name, complete_var, False, windows_expand_args, **extra)
         except typer.Abort as stop:

@@ -14,7 +14,6 @@ from airflock.suffixes import suffix_fault
 from airflock.untrusted import from_outside, is_file, toml_value
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-COMPILING = "compiling … (only once for this kind of flight; later flights start at once)"
 Where = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset's name or a scenario file.", show_default=False)
 ]
@@ -144,41 +143,14 @@ def tell_time(scenarios: Sequence[Any], threads: int | None, device: str) -> Non
         say(f"note: {note} on {min(threads or cores(), cores())} cores")
 
 
-def compile_aloud(scenario: Any, precision: int, device: str) -> None:
-    """Compile what flies a scenario on the processor before anything flies; tell a terminal if it takes over 1 s."""
+def compile_first(scenario: Any, precision: int, device: str) -> None:
+    """Compile what flies a scenario on the processor before a bar on the terminal begins, whose rate is of flights."""
     import sys
-    from threading import Timer
 
-    if device != "cpu" or not sys.stderr.isatty():
-        return
+    if device == "cpu" and sys.stderr.isatty():
+        from airflock.engine import compile_for
 
-    from airflock.cli.tables import say
-    from airflock.engine import compile_for
-
-    told = Timer(1.0, say, [COMPILING])
-    told.daemon = True
-    told.start()
-    try:
         compile_for(scenario, precision=precision)
-    finally:
-        told.cancel()
-
-
-@contextmanager
-def compiling_told() -> Iterator[None]:
-    """Tell a terminal, once, if what is done meanwhile compiles for longer than 1 s."""
-    import sys
-
-    if not sys.stderr.isatty():
-        yield
-        return
-    from numba.core.event import install_listener
-
-    from airflock.cli.tables import say
-    from airflock.compile_events import Telling
-
-    with install_listener("numba:run_pass", Telling(lambda: say(COMPILING))):
-        yield
 
 
 @contextmanager

@@ -51,7 +51,7 @@ def run(
     if scheduler is None:
         device = picked(flights, device, precision=precision, say=tables.say)
         options.tell_time(flights, threads, device)
-        options.compile_aloud(found, precision, device)
+        options.compile_first(found, precision, device)
     chosen: dict[str, Any] = {"scheduler": scheduler, "threads": threads, "precision": precision, "device": device}
     with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:
         rows = scores(flights, numbers, **chosen, done=done)
@@ -143,7 +143,7 @@ def score(
         from airflock.recordings.lengths import in_bodies
 
         changed = in_bodies(body_length) | changed
-    with options.compiling_told(), Opening(files[0]) as first:  # another process opens it while this one imports
+    with Opening(files[0]) as first:  # another process opens it while this one imports
         if groups:
             _tell_groups([first, *files[1:]], files, changed, trust, as_json)
             return

@@ -66,7 +66,7 @@ def sweep(
     numbers = sound_seeds(range(first_seed, first_seed + seeds))
     if scheduler is None:
         options.tell_time([found for found in scenarios for _ in numbers], threads, device)
-        options.compile_aloud(scenarios[0], precision, device)
+        options.compile_first(scenarios[0], precision, device)
     with options.progress(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
         chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
         tidy = flown(points, scenarios, numbers, **chosen, say=tables.say, scheduler=scheduler)

@@ -77,7 +77,7 @@ def tune(
     options.refuse(faults)
     assert base is not None
     tables.say_notes(base.notes)
-    options.compile_aloud(base, 32, "cpu")
+    options.compile_first(base, 32, "cpu")
     what: Any = base if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
     if like is not None:

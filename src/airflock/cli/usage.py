@@ -1,6 +1,7 @@
 """What is wrong with a command line, as one line in the words of every other fault."""
 
 import math
+import os
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -10,6 +11,12 @@ from airflock.spelling import meant
 PLACES = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
 ALIKE = 0.75  # of options, as in `spelling.meant`: both begin with --, and --budget is not --quiet
 ONE_SEED = "--seed"  # written for the seed of a flight, one letter from --seeds, which says how many fly
+
+
+def at_home(word: str) -> str:
+    """A word of a command line, ~ being the home folder, also where a shell leaves it in: --save=~/flight.nc."""
+    option, equals, value = word.partition("=")
+    return f"{option}={os.path.expanduser(value)}" if equals else os.path.expanduser(word)
 
 
 def usage_fault(fault: Any, words: Sequence[str]) -> str:

@@ -101,6 +101,11 @@ def quantity(
     dataclasses.Field
         To be assigned in the body of a frozen dataclass derived from `airflock.Parameters`.
 
+    Raises
+    ------
+    ParameterError
+        By the record, when it is made with a word that is none of the options.
+
     Examples
     --------
     >>> import airflock
@@ -155,6 +160,11 @@ def choice(default: str, options: tuple[str, ...], *, meaning: str, source: str 
     -------
     dataclasses.Field
         To be assigned in the body of a frozen dataclass derived from `airflock.Parameters`.
+
+    Raises
+    ------
+    ParameterError
+        By the record, when it is made with a value outside the range, or with what is not a number.
 
     Examples
     --------

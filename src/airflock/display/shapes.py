@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from airflock.errors import AirflockError, SceneError
+from airflock.untrusted import own_path
 
 Points = NDArray[np.float64]
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".gif")
@@ -34,7 +35,7 @@ def points_of(shape: str, count: int, spacing: float = 3.0, height: float = 15.0
 
     Raises AirflockError where the file is missing, of another kind, too large, damaged or empty.
     """
-    path = Path(shape)
+    path = own_path(shape)
     rng = np.random.default_rng(seed)
     kind = path.suffix.lower()
     if kind in IMAGES or kind in MESHES:

@@ -25,6 +25,13 @@ class Actions(Readings):
         """Let all agents perceive and decide at the present step without moving; `command` may then overrule them.
 
         Raises FlightError between decisions, and where agents decide and move one after another.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.sense().commands.shape  # all have decided, and nobody has moved
+        (2, 100)
         """
         if self._state.plan.sequential:
             raise FlightError("sense: with update = 'sequential' each agent moves before the next one perceives")
@@ -47,6 +54,13 @@ class Actions(Readings):
 
         value : one number per axis, m/s, m/s² or a direction, as the law commands; for several agents one such row
                 for all of them, or one for each: (agent, axis)
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.command(0, [3.0, 0.0]).commands[:, 0].tolist()
+        [3.0, 0.0]
         """
         numbers, unit = self._those(agent), COMMANDS.get(self.scenario.model.command, "")
         given = vectors("command", value, len(numbers), self.scenario.dimensions, unit)
@@ -56,12 +70,19 @@ class Actions(Readings):
         return self
 
     def change(self, settings: Mapping[str, Any], *, wait: bool = True) -> Self:
-        """Set keys of the scenario anew, such as {"model.p_rep": 0.2}; from the next step or decision on.
+        """Set keys of the scenario anew by `settings`, such as {"model.p_rep": 0.2}; from the next step or decision on.
 
         Everything that a scenario file says may change but agents, dimensions, dt and start. A new window of scores
         begins. Where other text must be compiled, `wait` says whether to wait for it; if not, the flight goes on under
         the old scenario until the next `advance` after the new one is ready.
         Raises ScenarioError, and the flight is as it was.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.advance(0.5).change({"model.p_rep": 0.2}).scenario.parameters.p_rep
+        0.2
         """
         settings = keyed(settings, self.scenario.name)
         return self._change(settings, Event(self.step, "change", settings), wait)
@@ -77,6 +98,14 @@ class Actions(Readings):
         """Add to the velocity of an agent, or of several: a gust, a collision, a hand.
 
         velocity : m/s, one number per axis, at most 1000; for several agents one such row for all, or one for each
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> before = flight.advance(0.5).state
+        >>> [round(float(v), 3) for v in (flight.push(0, [1.0, 0.0]).state - before)[2:, 0]]
+        [1.0, 0.0]
         """
         numbers = self._those(agent)
         given = vectors("velocity", velocity, len(numbers), self.scenario.dimensions, "m/s")
@@ -92,6 +121,13 @@ class Actions(Readings):
         position : m, one number per axis, up to 1e6; for several agents one row for each: (agent, axis)
 
         Raises FlightError for a place inside what stands in the scene. A periodic box holds every place.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.place(0, [10.0, -20.0]).state[:2, 0].tolist()
+        [10.0, -20.0]
         """
         numbers = self._those(agent)
         given = vectors("position", position, len(numbers), self.scenario.dimensions, "m")
@@ -120,6 +156,13 @@ class Actions(Readings):
         numbers : of the kind, such as share=0.2; lasts (s), number (how many, drawn); or group instead of agents
         wait   : as in `change`
         Raises ScenarioError, and the flight is as it was.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.advance(0.5).fault("motor", agents=3, share=0.2).advance(0.5).faults[0]["agent"]
+        3
         """
         whom = {} if agents is None else {"agents": [*agents] if isinstance(agents, Iterable) else [agents]}
         given = keyed({"kind": kind, **whom, **numbers}, self.scenario.name)
@@ -132,6 +175,13 @@ class Actions(Readings):
         """Let an agent, or several, drop out: landed or failed. From now on nobody meets, hears, feels or counts them.
 
         reason : for the list of events
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> int(flight.remove(3, "landed").present.sum())
+        99
         """
         numbers = self._those(agent)
         self._course.begin()
@@ -144,6 +194,13 @@ class Actions(Readings):
         """Let an agent that is absent join, as agents join at the start: the others know at once where it is.
 
         position, velocity : one number per axis, m and m/s; by default at rest
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> int(flight.remove(3).add(3, [0.0, 0.0]).present.sum())
+        100
         """
         number = agent_number(agent, self.agents)
         if self.present[number]:

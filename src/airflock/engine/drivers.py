@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from airflock.engine import interpreted
 from airflock.engine.passes.driver import flight
@@ -41,22 +42,27 @@ def is_compiled(driver: ModuleType) -> bool:
 
 def flying(driver: ModuleType, model: str) -> AbstractContextManager[None]:
     """Around calls of a driver: `compiling`, if it has to be compiled first."""
-    return nullcontext() if is_loaded(driver) else compiling(model)
+    return calling(driver.advance, model)
+
+
+def calling(function: Any, model: str) -> AbstractContextManager[None]:
+    """Around calls of a function of a driver: `compiling`, if it has to be compiled first."""
+    return nullcontext() if getattr(function, "overloads", True) else compiling(model)
 
 
 @contextmanager
 def compiling(model: str) -> Iterator[None]:
     """Turn what the compiler says of a rule into one line; an interruption is heard after each of its passes.
 
-    Raises RuleError, GivenUp.
+    Whoever waits for it at a terminal or in a notebook is told. Raises RuleError, GivenUp.
     """
     from numba.core.errors import NumbaError
     from numba.core.event import install_listener
 
-    from airflock.compile_events import Heeding
+    from airflock.compile_events import Heeding, told_if_long
 
     try:
-        with install_listener("numba:run_pass", Heeding()):
+        with install_listener("numba:run_pass", Heeding()), told_if_long():
             yield
     except NumbaError as fault:
         lines = [line.strip() for line in str(fault).splitlines()]

@@ -86,6 +86,13 @@ class Flight(Actions):
         """Have its driver compiled, and fly nothing; in any thread, while nothing else is asked of it. Returns it.
 
         aside : by another process, so that no other thread of this one is held up meanwhile
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.compile().ready
+        True
         """
         self._course.compile(aside)
         return self
@@ -95,6 +102,13 @@ class Flight(Actions):
 
         Raises FlightError where the flight is over, where the agents find no place at the start, and where a state
         stops being finite.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.advance(0.5).advance(steps=1).step
+        51
         """
         count = self._count(seconds, steps)
         if self.over:
@@ -145,6 +159,14 @@ class Flight(Actions):
         """Fly to the end, take the last sample, and return the scores of the last window.
 
         Of a flight that was never changed these are the scores of the closed flight.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+        >>> values = airflock.open(short, seed=1).finish()
+        >>> bool(values["phi_vel"] == airflock.score(short, seeds=[1])["phi_vel"].iloc[0])
+        True
         """
         while not self.over:  # a change on the way may make it longer
             self._fly_to(self._course.steps)
@@ -153,13 +175,29 @@ class Flight(Actions):
         return self.scores()
 
     def scores(self) -> dict[str, Any]:
-        """Order parameters and fitness of the window since the last change, up to now."""
+        """Order parameters and fitness of the window since the last change, up to now.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.advance(1.0).scores()["n_coll"]
+        0.0
+        """
         return self.scenario.judged(self._state.values())
 
     def look(self, agent: int) -> View:
         """What an agent perceives, and the parts of its command.
 
         Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> view = flight.advance(1.0).look(3)
+        >>> view.agent, len(view.heard) == len(view.met)
+        (3, True)
         """
         self._course.take_over()
         self._course.begin()
@@ -173,7 +211,17 @@ class Flight(Actions):
         return found
 
     def event(self, kind: str, /, **data: Any) -> "Flight":
-        """Do what an event says: the method of the same name."""
+        """Do what an event says: the method of the same name.
+
+        kind : change, fault, push, place, command, remove, add or branch; data : the arguments of that method
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.advance(0.5).event("change", **{"model.p_rep": 0.2}).scenario.parameters.p_rep
+        0.2
+        """
         if kind == "change":
             return self.change(data)
         if kind == "fault":
@@ -189,13 +237,29 @@ class Flight(Actions):
         return done
 
     def snapshot(self) -> Snapshot:
-        """Keep the present moment, to go back to with `restore`."""
+        """Keep the present moment, to go back to with `restore`.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.advance(0.5).snapshot()
+        <Snapshot of vasarhelyi_2018/4ms, seed 1, at 0.5 s>
+        """
         return self._course.snapshot()
 
     def restore(self, snapshot: Snapshot) -> "Flight":
         """Go back (or on) to a moment of this flight or of a branch of it.
 
         Raises FlightError for a moment of another scenario, seed, precision, start or version.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> moment = flight.advance(0.5).snapshot()
+        >>> flight.advance(0.5).restore(moment).time
+        0.5
         """
         self._course.restore(snapshot)
         self._planned = []
@@ -205,6 +269,14 @@ class Flight(Actions):
         """Another flight that goes on from here.
 
         world : the same (default) meets the same noise, another one an independent future
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> twin = flight.advance(0.5).branch()
+        >>> (twin.advance(0.5).state == flight.advance(0.5).state).all()  # the same noise: the same bits
+        np.True_
         """
         twin = copy(self)
         twin._course, twin._planned = self._course.twin(), list(self._planned)
@@ -213,7 +285,15 @@ class Flight(Actions):
         return twin
 
     def again(self) -> "Flight":
-        """The same flight from its start, with the same events to come."""
+        """The same flight from its start, with the same events to come.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+        >>> flight.advance(0.5).again().time
+        0.0
+        """
         scenario, seed, precision, start = self.origin
         return Flight(
             scenario,

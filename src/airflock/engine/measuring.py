@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine import interpreted
+from airflock.engine.drivers import calling
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.driver import replay
 from airflock.engine.plan import Plan
@@ -64,11 +65,12 @@ def measured(
     series = np.full((frames.shape[0], len(own["values"])), np.nan)
 
     def measure(first: int, part: NDArray[Any]) -> None:
-        driver.measure_frames(
-            first, tables.row, own["whole"], tables.edges, tables.spans, state.scene, own["work"], own["memory"],
-            own["labels"], own["values"], own["sums"], np.ascontiguousarray(part, real), series, real.type(period),
-            *state.scratch, *state.cells,
-        )  # fmt: skip
+        with calling(driver.measure_frames, plan.model.name):
+            driver.measure_frames(
+                first, tables.row, own["whole"], tables.edges, tables.spans, state.scene, own["work"], own["memory"],
+                own["labels"], own["values"], own["sums"], np.ascontiguousarray(part, real), series, real.type(period),
+                *state.scratch, *state.cells,
+            )  # fmt: skip
 
     if present is None or present.all():
         measure(0, frames)

@@ -67,7 +67,7 @@ class Readings:
 
     @property
     def agents(self) -> int:
-        """Number of agents."""
+        """Number of agents, those that are absent included."""
         return int(self.scenario.agents)
 
     @property

@@ -11,7 +11,7 @@ from airflock.limits.limit import Limit, read_all
 from airflock.scenarios.own_code import own_module
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
-from airflock.untrusted import is_file
+from airflock.untrusted import is_file, own_path
 
 KEYS = ("maximise", "minimise", "limits", "over_seeds", "quantile", "own", "source", "note")
 
@@ -88,7 +88,7 @@ def _own(name: Any, folder: Path | None, trust: bool) -> tuple[dict[str, Own], s
     """Functions of a user's own file by name, a hash of its text, and faults."""
     if name is None:
         return {}, "", []
-    path = Path(str(name)) if folder is None else folder / str(name)
+    path = own_path(str(name)) if folder is None else folder / own_path(str(name))
     if path.suffix != ".py" or not is_file(path):
         return {}, "", [f"objective.own = {name!r}: no such Python file"]
     try:

@@ -26,6 +26,7 @@ from airflock.executors.cluster import Cluster, fly_on_their_cpu
 from airflock.executors.in_process import InProcess
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
+from airflock.untrusted import own_path
 
 
 class Interrupted(StudyError):
@@ -122,7 +123,7 @@ def evolve(
     >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
     True
     """
-    folder = Path(out)
+    folder = own_path(out)
     study, _ = asked_for(
         what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust, fast=fast,
         folder=folder if resume else None,

@@ -22,7 +22,7 @@ from airflock.scenarios import formats, schema
 from airflock.scenarios.files import presets, tells_of_study
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
-from airflock.untrusted import TextError, from_outside, is_file, read_toml
+from airflock.untrusted import TextError, from_outside, is_file, own_path, read_toml
 
 KEYS = ("title", "scenario", "scenarios", "over_scenarios", "set", "space", "objective", "search")
 LAYOUT = 1  # of the study folder; raised whenever an older folder could not be continued
@@ -138,7 +138,7 @@ def shipped() -> dict[str, Path]:
 
 def is_study(name: str | os.PathLike[str]) -> bool:
     """Whether a name is that of a study, rather than of a scenario; a preset's name is the preset's."""
-    path = Path(name)
+    path = own_path(name)
     if str(name) in shipped() and str(name) not in presets():
         return True
     if path.suffix != ".toml" or not is_file(path):
@@ -167,7 +167,7 @@ def load_study(
     """
     known = shipped()
     text = str(name)
-    path = known.get(text) or Path(text)
+    path = known.get(text) or own_path(text)
     document: Mapping[str, Any] = {}
     with from_outside(path):
         if path.suffix == ".toml" and is_file(path):

@@ -81,7 +81,17 @@ class Result:
         return portrait.result_html(self)
 
     def document(self) -> dict[str, Any]:
-        """The result as plain values, for result.toml and --json."""
+        """The result as plain values, for result.toml and --json.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+        >>> vary = {"model": {"p_rep": {"low": 0.0, "high": 1.0}}}
+        >>> few = {"population": 4, "generations": 2, "pool": 2, "top": 1, "final_seeds": 2}
+        >>> airflock.evolve(short, "study", space=vary, **few).document()["fitness"]["seeds"]
+        2
+        """
         return {
             "scenario": self.scenario.name,
             "fitness": {

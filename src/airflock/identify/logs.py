@@ -74,10 +74,10 @@ def logs_of(tracks: list[Track], standing: tuple[float, float] | None = None) ->
     """
     if not tracks:
         raise RecordingError("no tracks to identify from")
-    lacking = [track.name for track in tracks if not track.has(VELOCITY)]
+    lacking = [f"{track.source}: {track.name}" for track in tracks if not track.has(VELOCITY)]
     if lacking:
         raise RecordingError(
-            f"{lacking[0]}: has no velocity, and a differentiated one contains the future; log it, or map vx and vy"
+            f"{lacking[0]} has no velocity, and a differentiated one contains the future; log it, or map vx and vy"
         )
     axes = 3 if all("cz" in t.columns and "vz" in t.columns and "z" in t.columns for t in tracks) else 2
     parts: list[list[Any]] = []

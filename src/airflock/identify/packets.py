@@ -16,9 +16,13 @@ from airflock.radios import links, table
 
 OF_TABLE = tuple(f"radio.received_{n}" for n in range(table.ENTRIES))
 COLUMNS = ("receiver", "sender", "t", "stamp")
+NUMBERS = ("t", "stamp", "distance", "got", "fast", "slow")
+OLDEST = 60.0  # s; no radio brings packets so late (radio.delay ends at 30 s)
 # half of an interval, relative, beyond which a number is not told
 WIDEST = {"near": 0.15, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
 FEW = 500  # rows below which no curve is fitted
+EXPECTED = 20.0  # packets that a curve would still bring; where none came, the radio's range ends before
+INSIDE = 0.9  # share of that end within which a curve is fitted, for distances are measured with errors
 MANY = 20  # packets due in a metre of distance, above which pairs count as having flown there
 
 
@@ -72,15 +76,37 @@ def _kernel() -> Any:
     return kernel
 
 
-def checked(heard: pd.DataFrame) -> pd.DataFrame:
-    """A table of packets with the columns that are needed; raises RecordingError otherwise."""
+def checked(heard: pd.DataFrame, where: str = "heard") -> pd.DataFrame:
+    """A table of packets with the columns that are needed; raises RecordingError otherwise, with every fault.
+
+    where : its name in faults; rows are counted as an editor does, the header being the first
+    """
     lacking = [name for name in COLUMNS if name not in heard]
     if lacking:
         raise RecordingError(
-            f"heard: no column {', '.join(lacking)}; give receiver, sender, t (receiver's clock, s), "
+            f"{where}: no column {', '.join(lacking)}; give receiver, sender, t (receiver's clock, s), "
             "stamp (sender's clock, s), and for reception distance (m) and got (0 or 1, one row per decision and pair)"
         )
-    return heard
+    numbers = {name: pd.to_numeric(heard[name], errors="coerce") for name in NUMBERS if name in heard}
+    came = numbers["got"] > 0 if "got" in numbers else pd.Series(True, heard.index)
+    faults = []
+    for name, values in numbers.items():
+        needed = came if name in ("t", "stamp") else pd.Series(True, heard.index)  # what never came has no stamp
+        bad = needed & ~np.isfinite(values.astype(float))
+        odd, what = (~values.isin([0, 1]), "0 or 1") if name == "got" else (bad, "a number")
+        if odd.any():
+            row = int(np.flatnonzero(odd)[0])
+            faults.append(f"{where}: column {name}, row {row + 2}: {heard[name].iloc[row]} is not {what}")
+    if faults:
+        raise RecordingError("\n".join(faults))
+    found = heard.assign(**numbers)
+    late = fit_delay(found)
+    if not late.reason and late.value > OLDEST:
+        raise RecordingError(
+            f"{where}: packets are {late.value:.3g} s old when they come; give t and stamp in s: divide them by 1e6 "
+            "if they count microseconds, by 1e3 if milliseconds"
+        )
+    return found
 
 
 @dataclass
@@ -146,7 +172,9 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
         )
         empty.refused = dict.fromkeys(LINKS, reason)
         return empty
-    due = _due(heard, period, k)
+    every = _due(heard, period, k)
+    end = range_of(every)
+    due = every[every["distance"] <= INSIDE * end]
     d, n, g = (due[name].to_numpy(float) for name in ("distance", "due", "got"))
     fast, slow = due["fast"].to_numpy(float), due["slow"].to_numpy(float)
     kernel = _kernel()
@@ -166,14 +194,32 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
     for other in others:  # a second hill of the likelihood belongs to the interval as well
         for name, (low, high) in intervals(loss, other).items():
             interval[name] = min(low, interval[name][0]), max(high, interval[name][1])
-    found = RadioFit(value, interval, {}, [], _pictured(due.assign(model=1.0 - curve(z))))
-    found.refused = _refused(found, len(heard))
+    fitted = 1.0 - kernel(*(every[name].to_numpy(float) for name in ("distance", "fast", "slow")), Curve(*unpacked(z)))
+    shown = _pictured(every.assign(model=np.where(every["distance"] <= end, fitted, 0.0)))
+    notes = [f"no packet from beyond {end:.0f} m, where the curve would bring some: the radio's range"]
+    found = RadioFit(value, interval, {}, notes if np.isfinite(end) else [], shown)
+    found.refused = _refused(found, shown[shown["distance"] <= INSIDE * end], len(heard))
     return found
 
 
-def _refused(fit: RadioFit, rows: int) -> dict[str, str]:
-    """Numbers of a reception curve that so many rows cannot tell, and why not."""
-    flown = fit.bins["distance"][fit.bins["due"] > MANY]
+def range_of(due: pd.DataFrame) -> float:
+    """Distance (m) beyond which nothing is heard although reception would still allow it; infinite if there is none.
+
+    due : packets due and got by distance. Power falls with the square of the distance, and reception no faster.
+    """
+    some = due[due["got"] > 0]
+    if not len(some):
+        return float("inf")
+    last = float(some["distance"].max())
+    edge = due[(due["distance"] > INSIDE * last) & (due["distance"] <= last)]
+    beyond = due[due["distance"] > last]
+    share = float(edge["got"].sum() / edge["due"].sum())
+    return last if float((share * beyond["due"] * (last / beyond["distance"]) ** 2).sum()) > EXPECTED else float("inf")
+
+
+def _refused(fit: RadioFit, bins: pd.DataFrame, rows: int) -> dict[str, str]:
+    """Numbers of a reception curve that so many rows cannot tell, and why not; bins: those that it was fitted to."""
+    flown = bins["distance"][bins["due"] > MANY]
     closest, farthest = (float(flown.min()), float(flown.max())) if len(flown) else (0.0, 0.0)
     refused: dict[str, str] = {}
     if fit.interval["near"][0] < closest:

@@ -17,10 +17,12 @@ from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of, logs_of_recording
 from airflock.recordings.imports.load import read_tracks
 from airflock.recordings.imports.track import Findings, Options
+from airflock.recordings.packed import refuse_packed
 from airflock.scenarios.files import loaded
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.sensors import langevin
+from airflock.untrusted import is_file, own_path
 
 # key → whether a larger number makes a flight harder
 HARDER = {
@@ -30,7 +32,7 @@ HARDER = {
 }  # fmt: skip
 UNITS = {
     "body.tau": "s", "body.a_max": "m/s^2", "body.noise": "m^2/s^3", "sensors.period": "s", "sensors.noise": "m^2/s^2",
-    "sensors.damping": "1/s", "sensors.scale": "m", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
+    "sensors.damping": "1/s", "sensors.scale": "m s^(1/2)", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
     "radio.received_near": "1", "radio.received_far": "1", "model.v_max": "m/s",
 }  # fmt: skip
 HARDER |= dict.fromkeys(packets.OF_TABLE, False)
@@ -156,6 +158,8 @@ def identify(
     same_clock: bool = False,
     options: Options | None = None,
     accept: Iterable[str] = (),
+    begin: float | None = None,
+    end: float | None = None,
 ) -> Identified:
     """Numbers of a scenario from flight logs, with 95 % intervals, and reasons where logs cannot tell.
 
@@ -176,6 +180,8 @@ def identify(
         How files are read (`airflock.recordings.imports.track.Options`), as in `load_tracks`.
     accept : iterable of str
         Kinds of faults that are meant so, as in `load_tracks`.
+    begin, end : float, optional
+        Window of time of the files that is used, s.
 
     Returns
     -------
@@ -204,7 +210,7 @@ def identify(
     if not isinstance(scenario.sensors, langevin.Parameters):
         raise AirflockError(f"{scenario.name}: its sensor is {scenario.sensor.name}; identify knows langevin alone")
     findings = Findings(frozenset([accept] if isinstance(accept, str) else accept))
-    logs, comparable, sources = _logs(what, options or Options(), findings, standing, same_clock)
+    logs, comparable, sources = _logs(what, options or Options(), findings, standing, same_clock, (begin, end))
     if heard is not None:
         logs, aligned = _on_one_clock(logs, packets.checked(heard))
         comparable = comparable or aligned
@@ -226,6 +232,8 @@ def identify(
     period, interval, reason = periods.decision_period(logs)
     numbers.add("sensors.period", period, interval, "changes of commands", reason)
     links = _radio(heard, numbers)
+    if links is not None and links.notes:
+        notes += [f"{note}; {numbers.known('radio.range'):g} m in --like, which is kept" for note in links.notes]
     most, reason = periods.largest_command(logs, numbers.known("model.v_flock"))
     if hasattr(scenario.parameters, "v_max"):
         numbers.add("model.v_max", most, (0.995 * most, most), "largest command", reason)
@@ -234,13 +242,18 @@ def identify(
 
 
 def _logs(
-    what: Any, options: Options, findings: Findings, standing: tuple[float, float] | None, same_clock: bool
+    what: Any,
+    options: Options,
+    findings: Findings,
+    standing: tuple[float, float] | None,
+    same_clock: bool,
+    window: tuple[float | None, float | None],
 ) -> tuple[Logs, bool, list[str]]:
     if isinstance(what, Logs):
         return what, same_clock, []
     if isinstance(what, xr.Dataset):
         return logs_of_recording(what), bool(what.attrs.get("airflock_comparable", 1)), []
-    tracks, _ = read_tracks(what, options, findings, same_clock=True)
+    tracks, _ = read_tracks(what, options, findings, same_clock=True, begin=window[0], end=window[1])
     sources = sorted({track.source for track in tracks})
     comparable = same_clock or len(sources) == 1 or all(track.clock == "utc" for track in tracks)
     return logs_of(tracks, standing), comparable, sources
@@ -303,7 +316,14 @@ def _short(value: float) -> float:
 
 def read_heard(path: Any) -> pd.DataFrame:
     """Read a table of packets (CSV); raises RecordingError for what is none."""
+    place = own_path(path)
+    if not is_file(place):
+        raise RecordingError(f"{path}: no such file")
+    refuse_packed(place)
     try:
-        return packets.checked(pd.read_csv(path, skipinitialspace=True))
+        table = pd.read_csv(place, skipinitialspace=True)
     except (OSError, ValueError, pd.errors.ParserError) as fault:
         raise RecordingError(f"{path}: is not a table of packets: {str(fault).splitlines()[0]}") from fault
+    if len(table.columns) == 1 and ";" in str(table.columns[0]):
+        raise RecordingError(f"{path}: has ; between its columns; write it with commas, and points in its numbers")
+    return packets.checked(table, str(path))

@@ -20,6 +20,7 @@ from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
+from airflock.untrusted import own_path
 from airflock.world.place import half_sizes
 
 STEP = 0.025  # s; longest motion step
@@ -152,7 +153,7 @@ def _base(what: str | Scenario, settings: Mapping[str, Any], trust: bool) -> Sce
         open_air = {"model": {"kind": str(what)}, "world": {"arena": "none"}, "radio": {"delay": 0.0}}
         open_air["start"] = {"kind": "ball", "separation": 0.0}
         return make(open_air, str(what), settings, trust=trust or str(what).endswith(".py"))
-    if what not in presets() and not Path(what).is_file():
+    if what not in presets() and not own_path(what).is_file():
         hint = meant(what, [*MODELS, *presets()], f"; laws: {', '.join(MODELS)}", lead="; ", cutoff=0.4)
         raise ScenarioError([f"{what}: no such law, preset or file{hint}"])
     return load(what, settings, trust=trust)

@@ -135,7 +135,7 @@ def verdict_of(laws: list[Law]) -> tuple[Law | None, str]:
     """
     first = laws[0]
     if not _explains(first):
-        return None, "none of these explains the tracks better than going straight on"
+        return None, f"none of these explains the tracks better than going straight on{_perhaps(first)}"
     as_well = [law for law in rivals(laws, SIMPLER) if _explains(law)]
     best = min([first, *as_well], key=lambda law: len(law.numbers))  # of equally many the first
     missed = (
@@ -149,6 +149,16 @@ def verdict_of(laws: list[Law]) -> tuple[Law | None, str]:
     if beside := rivals(laws)[:1]:
         return best, f"{best.name} explains the tracks best, but {beside[0].name} cannot be told from it{missed}"
     return best, f"{best.name} explains the tracks best{missed}"
+
+
+def _perhaps(law: Law) -> str:
+    """What is said of a law that is ahead in most spans, but by gains that differ too much to be sure of."""
+    if law.gain <= law.price or law.ahead < MOST:
+        return ""
+    return (
+        f" for sure: {law.name} is ahead in {law.ahead:.0%} of the spans, but its gain of {law.gain:.0f} is less than "
+        f"{SURE:g} standard errors ({law.error:.0f}); longer tracks would tell"
+    )
 
 
 def _explains(law: Law) -> bool:

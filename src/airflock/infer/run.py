@@ -22,6 +22,7 @@ from airflock.infer.tracks import Scale, Tracks, scale_of, tracks_of
 from airflock.recordings.files import load_recording
 from airflock.recordings.imports.load import load_tracks
 from airflock.scenarios.scenario import Scenario
+from airflock.untrusted import own_path
 
 RACES = 3  # from places drawn anew, of a law that is searched deeper
 LAWS = ("couzin_2002", "reynolds_1987", "vicsek_1995", "vasarhelyi_2018")
@@ -200,7 +201,7 @@ def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
         elif str(each).endswith(".nc"):
             recordings.append((str(each), load_recording(each)))
         else:
-            recordings.append((str(each), _read(Path(each))))
+            recordings.append((str(each), _read(own_path(each))))
     if not recordings:
         raise RecordingError("no tracks to infer a law from")
     return recordings
@@ -211,7 +212,7 @@ def _read(path: Path) -> xr.Dataset:
     try:
         return load_tracks(path)
     except RecordingError as fault:
-        if not path.is_file():
+        if not path.is_file() or " --" not in str(fault):  # it is nothing that an option would mend
             raise
         raise RecordingError(
             f"{fault}\n{path}: infer takes no options of import: airflock import {path.name} ... --save tracks.nc, "

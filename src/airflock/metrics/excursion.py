@@ -13,6 +13,7 @@ REPORTS = {
     "phi_wall": ("m", "mean excursion of agents that are outside"),
     "clearance": ("m", "smallest distance to walls and obstacles; below 0: outside"),
 }
+COURSES = {"out": ("m", "sum of the distances of those outside"), "outside": ("", "number of agents outside")}
 
 REDUCE = {"clearance": "min"}
 OVER_TIME = {"out": "sum", "outside": "sum", "clearance": "min"}

@@ -25,6 +25,10 @@ REPORTS = {
     "quality_groups": ("", "quality of groups"),
     "local_density": ("1/m² or 1/m³", "density of agents around an agent"),
 }
+COURSES = {
+    "extension_groups": ("m", "extension within groups"),
+    "polarization_groups": ("rad", "polarization within groups"),
+}
 
 REDUCE = {"nearest2": "min", "largest": "max"}
 

@@ -8,9 +8,10 @@ figures were counted so. Everything else is as in `quality`.
 
 from typing import NamedTuple
 
-from airflock.metrics.quality import REPORTS, Agent, Sample, angle_from, offset_from, sample, total
+from airflock.metrics.quality import COURSES, REPORTS, Agent, Sample, angle_from, offset_from, sample, total
 
 __all__ = [
+    "COURSES",
     "REPORTS",
     "VIOLATES",
     "Agent",

@@ -18,6 +18,10 @@ REPORTS = {
     "cns_pol": ("", "consistency in polarization"),
     "quality": ("", "quality of the flock, 1 is best"),
 }
+COURSES = {
+    "extension": ("m", "mean distance to the centre"),
+    "polarization": ("rad", "mean angle to the mean heading, 0 is aligned"),
+}
 
 REDUCE = {"nearest2": "min"}
 

@@ -12,6 +12,11 @@ REPORTS = {
     "unrest": ("m/s", "RMS velocity relative to the flock's mean, after t_settle"),
     "stable": ("", "1 if unrest is below v_settle"),
 }
+COURSES = {
+    "late": ("", "1 after t_settle"),
+    "motion": ("m²/s²", "mean squared velocity relative to the flock's mean, after t_settle"),
+    "allowed": ("m²/s²", "v_settle squared"),
+}
 
 
 class Pair(NamedTuple):

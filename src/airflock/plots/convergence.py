@@ -13,7 +13,17 @@ def convergence(
     """Fitness over generations.
 
     table     : one row a candidate: run, generation, and the column `objective` (nan: failed)
-    objective : what is drawn; what : title; ax : axes to draw into, instead of a new figure
+    objective : what is drawn; maximise: whether more of it is better
+    what      : title; ax : axes to draw into, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import pandas as pd
+    >>> table = pd.DataFrame({"run": 0, "generation": [0, 0, 1, 1], "model.p_rep": [0.1, 0.2, 0.3, 0.2],
+    ...                       "model.r0_rep": [20.0, 25.0, 30.0, 25.0], "fitness": [0.1, 0.4, 0.2, 0.5]})
+    >>> airflock.plots.convergence(table, "fitness").axes[0].get_xlabel()
+    'generation'
     """
     figure, axes = style.place(ax, 5.6, 3.4)
     for i, (run, rows) in enumerate(table.groupby("run")):

@@ -8,7 +8,17 @@ from airflock.plots import style
 
 
 def stood(show: Show, titles: list[str], *, ax: Axes | None = None) -> Figure:
-    """Every shape from the south, at the end of its leg; drones that failed are not shown."""
+    """Every shape from the south, at the end of its leg; drones that failed are not shown.
+
+    titles : one for each shape; ax : axes of a grid, whose place the panels take, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> show = airflock.display(["AIR"], 20)
+    >>> len(airflock.plots.stood(show, ["AIR"]).axes)
+    1
+    """
     count = len(show.formed)
     figure, panels = style.panels(ax, 1, count, 2.6 * count, 2.8, background=style.NIGHT, layout="")
     for axes, title, formed, frame in zip(panels[0], titles, show.formed, show.ends, strict=True):

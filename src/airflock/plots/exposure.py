@@ -49,6 +49,14 @@ def exposure(
     start, stop : window of time, s; by default the last 30 s
     fading      : time after which a trail has faded to 37 %, s; by default half the window
     ax          : axes to draw into, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> recording = airflock.simulate(short)
+    >>> airflock.plots.exposure(recording, stop=1.0).axes[0].get_aspect()
+    1.0
     """
     shown = paths_of(recording, start, stop, last=WINDOW)
     world = world_of(recording)

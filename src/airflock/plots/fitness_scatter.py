@@ -25,7 +25,18 @@ def fitness_scatter(
     table     : one row a candidate: generation, a column for each key of `units`, and `objective`
     units     : key of a parameter → its unit
     best      : the chosen parameters, a line in each panel
-    ax        : axes of a grid, whose place the panels take, instead of a new figure
+    what      : title; ax : axes of a grid, whose place the panels take, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import pandas as pd
+    >>> table = pd.DataFrame({"run": 0, "generation": [0, 0, 1, 1], "model.p_rep": [0.1, 0.2, 0.3, 0.2],
+    ...                       "model.r0_rep": [20.0, 25.0, 30.0, 25.0], "fitness": [0.1, 0.4, 0.2, 0.5]})
+    >>> units = {"model.p_rep": "1/s", "model.r0_rep": "m"}
+    >>> figure = airflock.plots.fitness_scatter(table, units, "fitness")
+    >>> [axes.get_xlabel() for axes in figure.axes[:2]]
+    ['model.p_rep (1/s)', 'model.r0_rep (m)']
     """
     rows = -(-len(units) // COLUMNS)
     columns = min(COLUMNS, len(units))

@@ -30,6 +30,14 @@ def flocked(
     start, stop : window of time, s; settings : keys that replace those the recording was flown with
     smooth      : window of the means of shares, s, as in `series`
     ax          : axes of a grid, whose place the panels take, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("kidger/final_2d", {"agents": 4, "duration": 2.0})
+    >>> recording = airflock.simulate(short)
+    >>> len(airflock.plots.flocked(recording).axes)
+    2
     """
     values, course = measure(recording, settings)
     if "flocked" not in course:

@@ -36,6 +36,14 @@ def heatmap(
     value    : order parameter drawn: its mean over the rows of a point; with one key also ±1 standard deviation
     scenario : what was swept, for the title and for the units of its model's keys
     ax       : axes to draw into, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> swept = airflock.sweep(short, {"radio.delay": [0.2, 0.4]}, seeds=2)
+    >>> airflock.plots.heatmap(swept, ["radio.delay"], "phi_vel", scenario=short).axes[0].get_xlabel()
+    'radio.delay (s)'
     """
     missing = [name for name in (*keys, value) if name not in table.columns]
     if missing:

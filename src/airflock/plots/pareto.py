@@ -16,7 +16,16 @@ def pareto(
     """One panel for each pair of objectives.
 
     table : one row a candidate, a column for each objective; front : rows of the front, by position
+    what  : title; objectives: columns that are drawn
     ax    : axes of a grid, whose place the panels take, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import pandas as pd
+    >>> table = pd.DataFrame({"phi_vel": [3.0, 4.0, 3.5], "phi_corr": [0.9, 0.5, 0.6]})
+    >>> airflock.plots.pareto(table, [0, 1], ["phi_vel", "phi_corr"]).axes[0].get_xlabel()
+    'phi_vel'
     """
     pairs = list(combinations(objectives, 2))
     figure, panels = style.panels(ax, 1, len(pairs), 3.6 * len(pairs) + 0.4, 3.4, layout="")

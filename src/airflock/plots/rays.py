@@ -40,8 +40,16 @@ def cast_at(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[Ray], t
 def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, ax: Axes | None = None) -> Figure:
     """Rays of one agent from above: red where they met something, green the first free one, black what was flown.
 
-    start : instant, s; by default the one at which this agent cast most rays in the flight's first 20 s
-    ax    : axes to draw into, instead of a new figure
+    recording : of a law that casts rays, m and m/s; agent : whose rays
+    start     : instant, s; by default the one at which this agent cast most rays in the flight's first 20 s
+    ax        : axes to draw into, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> city = airflock.simulate(airflock.load("kidger/city", {"agents": 4, "duration": 2.0}))
+    >>> len(airflock.plots.rays(city, start=1.0).axes)
+    1
     """
     count = recording.sizes["individual"]
     if not 0 <= agent < count:

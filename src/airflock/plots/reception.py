@@ -18,6 +18,14 @@ def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | N
 
     heard : a recording with `age` or a table of packets, as `airflock.recordings.reception` takes it
     bins  : of distance; ax : axes of a grid, whose place the panels take, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> lossy = {"agents": 5, "duration": 10.0, "radio.kind": "links"}
+    >>> heard = airflock.simulate(airflock.load("vasarhelyi_2018/4ms", lossy), keep=("heard",))
+    >>> airflock.plots.received(heard, bins=4).axes[1].get_xlabel()
+    'distance (m)'
     """
     table = reception(heard, bins)
     shown = table[table["count"] >= min(FEW, int(table["count"].max()))]

@@ -32,10 +32,17 @@ def rules(
 ) -> Figure:  # fmt: skip
     """Repulsion, largest allowed velocity difference and alignment, or each term of the law by its own word; walls.
 
+    scenario   : whose law is drawn, with its numbers
     difference : velocity difference of the pair, m/s; by default the model's preferred speed
     speed      : at which an agent flies towards a wall, m/s; by default the same
     farthest   : largest distance drawn, m; by default a quarter beyond the interaction range
     ax         : axes of a grid, whose place the panels take, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> len(airflock.plots.rules(airflock.load("vasarhelyi_2018/4ms")).axes)
+    3
     """
     model, p = scenario.model, scenario.parameters
     if model.neighbour is None and model.boundary is None:

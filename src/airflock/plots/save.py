@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from airflock.atomic import atomic
 from airflock.errors import AirflockError, RecordingError
 from airflock.suffixes import PICTURES, suffix_fault
+from airflock.untrusted import own_path
 
 # no dates: the same figure gives the same file
 DATES: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
@@ -24,7 +25,16 @@ class PictureError(RecordingError):
 def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: float = 200.0) -> Path:
     """Write a figure as .png, .pdf or .svg; raises PictureError and leaves nothing behind.
 
+    path       : of the picture; its ending says of which kind it is
     resolution : dots per inch of .png, and of what is drawn as pixels within the others
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> recording = airflock.simulate(short)
+    >>> airflock.plots.save_figure(airflock.plots.trajectories(recording), "flight.png").name
+    'flight.png'
     """
     with complete_or_absent(path, PICTURES) as temporary:
         ending, content = temporary.suffix.lower(), io.BytesIO()
@@ -33,13 +43,13 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
             facecolor=figure.get_facecolor(), bbox_inches="tight", pad_inches=0.08,
         )  # fmt: skip
         temporary.write_bytes(content.getvalue())  # no buffer of it: Python 3.12 crashes where an error holds one
-    return Path(path)
+    return own_path(path)
 
 
 @contextmanager
 def complete_or_absent(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Iterator[Path]:
     """Yield a temporary path to write to, renamed at the end; every fault on the way is one line."""
-    target = Path(path)
+    target = own_path(path)
     fault = suffix_fault(target, endings)
     if fault:
         raise PictureError(fault)

@@ -49,9 +49,17 @@ def through(
 ) -> Figure:
     """Paths through what stands in the scene, coloured by speed; stars mark the goals.
 
+    recording   : flown among buildings, trees or boxes, m and m/s
     start, stop : window of time, s; by default the whole flight
     space       : solid and lit, obliquely from above, instead of ground plans; what a solid hides is drawn faintly
     ax          : axes to draw into, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> city = airflock.simulate(airflock.load("kidger/city", {"agents": 4, "duration": 2.0}))
+    >>> airflock.plots.through(city).axes[0].get_xlabel()
+    'east (m)'
     """
     scenario, shown = flown_with(recording), paths_of(recording, start, stop)
     if scenario is None:

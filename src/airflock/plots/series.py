@@ -38,6 +38,14 @@ def series(
     alone, by default a two-hundredth of what is shown
     settings    : keys such as {"metrics.r_cluster": 60.0} that replace those the recording was flown with
     ax          : axes of a grid, whose place the panels take, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> recording = airflock.simulate(short)
+    >>> len(airflock.plots.series(recording).axes)
+    3
     """
     course = _window(over_time(recording, settings), start, stop)
     if "flocked" in course:
@@ -135,7 +143,17 @@ def rotations(
 ) -> Figure:
     """phi_LAP of several flights on one axis (Fig. 4 D): circling is near ±1, diagonal flight near 0.
 
-    flights : label → recording
+    flights     : label → recording
+    start, stop : window of time, s; ax : axes to draw into, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> flights = {f"seed {seed}": airflock.simulate(short, seed=seed) for seed in (1, 2)}
+    >>> labels = [line.get_label() for line in airflock.plots.rotations(flights).axes[0].lines]
+    >>> "seed 1" in labels and "seed 2" in labels
+    True
     """
     figure, axes = style.place(ax, 7.0, 2.6, layout="constrained")
     for number, (label, recording) in enumerate(flights.items()):

@@ -27,7 +27,18 @@ def slices(
     table  : one row a candidate: a column for each key of `bounds`, and `objective`
     bounds : key of a parameter → range that is drawn
     best   : the chosen parameters, a cross in each map
+    what   : title; maximise: whether more of the objective is better
     ax     : axes of a grid, whose place the panels take, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import pandas as pd
+    >>> table = pd.DataFrame({"run": 0, "generation": [0, 0, 1, 1], "model.p_rep": [0.1, 0.2, 0.3, 0.2],
+    ...                       "model.r0_rep": [20.0, 25.0, 30.0, 25.0], "fitness": [0.1, 0.4, 0.2, 0.5]})
+    >>> bounds = {"model.p_rep": (0.0, 1.0), "model.r0_rep": (10.0, 40.0)}
+    >>> airflock.plots.slices(table, bounds, "fitness").axes[0].get_ylabel()
+    'r0_rep'
     """
     keys = list(bounds)
     n = max(len(keys) - 1, 1)

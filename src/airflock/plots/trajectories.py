@@ -56,6 +56,14 @@ def trajectories(
     highlight   : False highlights none
     colour      : speed, heading (in the plane) or agent; auto: speed, unless all fly equally fast
     ax          : axes to draw into, in space with projection="3d", instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> recording = airflock.simulate(short)
+    >>> airflock.plots.trajectories(recording, agent=2).axes[0].get_aspect()
+    1.0
     """
     if colour not in COLOURS:
         raise AirflockError(f"colour = {colour!r} is none of {', '.join(COLOURS)}")

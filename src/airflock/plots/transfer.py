@@ -17,6 +17,13 @@ def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Fig
 
     scenario : draws them with its v_flock, tolerances and units; without it, in units of their own parameters
     ax       : axes of a grid, whose place the panels take, instead of a new figure
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> len(airflock.plots.transfer(short).axes)
+    3
     """
     figure, grid = style.panels(ax, 1, 3, 7.4, 2.5, sharey=True)
     panels = grid[0]

@@ -19,6 +19,7 @@ from airflock.plots.flight import window
 from airflock.plots.save import PictureError, complete_or_absent, positive
 from airflock.recordings.layout import check
 from airflock.suffixes import VIDEOS
+from airflock.untrusted import own_path
 
 Array = NDArray[Any]
 # GIF: a palette for each frame, because one for all would need all frames in memory
@@ -99,7 +100,7 @@ def video(
         finally:
             film.close()
         _complete(temporary, len(instants))
-    return Path(path)
+    return own_path(path)
 
 
 def ffmpeg() -> Any:

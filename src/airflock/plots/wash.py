@@ -89,6 +89,13 @@ def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None =
 
     start : instant, s; by default the last one; ax : axes to draw into, instead of a new figure
     Raises RecordingError for a recording in a plane, or of more than 60 birds.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> birds = airflock.simulate(airflock.load("dimock_2003/published", {"duration": 1.0}))
+    >>> len(airflock.plots.wash(birds).axes) > 0
+    True
     """
     scenario, shown = flown_with(recording), paths_of(recording)
     if scenario is None or shown.position.shape[1] == 2:

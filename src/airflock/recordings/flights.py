@@ -118,6 +118,11 @@ def recording_of(flight: Flight) -> xr.Dataset:
         As `airflock.simulate` returns it. Its attribute airflock_events holds what was done to the flight; with
         scenario and seed it gives the same bits.
 
+    Raises
+    ------
+    FlightError
+        Where the flight keeps no frames.
+
     Examples
     --------
     >>> import airflock

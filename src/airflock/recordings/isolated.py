@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from airflock.errors import RecordingError
+from airflock.recordings.packed import refuse_packed, refuse_pickle
 from airflock.untrusted import from_outside, is_file, path_of
 
 LEAST_TIME = 15.0  # s of a processor that a file of any size may take
@@ -51,6 +52,9 @@ class Opening:
             raise RecordingError(
                 f"{self.path}: holds tracks, not a recording: airflock import {self.path.name} --save FILE.nc"
             )
+        with from_outside(self.path, RecordingError):
+            refuse_packed(self.path)
+            refuse_pickle(self.path)
         self.how = how
         self.limit = LEAST_TIME + self.path.stat().st_size / PACES.get(how, PACE) if limit is None else limit
         most = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 4

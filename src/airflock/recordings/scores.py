@@ -24,6 +24,7 @@ from airflock.recordings.attributes import check_format, flown_with_own_law, mea
 from airflock.recordings.layout import frames_of
 from airflock.recordings.lengths import in_bodies, unsaid
 from airflock.recordings.own_kinds import missing_kinds, with_files
+from airflock.recordings.score_table import described
 from airflock.scenarios.change import variant
 from airflock.scenarios.document import keyed
 from airflock.scenarios.families import Given
@@ -165,10 +166,8 @@ def between_frames(recording: xr.Dataset, scenario: Scenario) -> str:
 
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """A table with units and meanings of its columns among its attributes."""
-    known = reports(scenario.measures)
-    table.attrs["units"] = {name: known[name][0] for name in table.columns if name in known}
-    table.attrs["meanings"] = {name: known[name][1] for name in table.columns if name in known}
-    return table
+    of_courses = {name: about for each in scenario.measures.metrics for name, about in each.courses.items()}
+    return described(table, of_courses | dict(reports(scenario.measures)))
 
 
 def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> pd.DataFrame:
@@ -187,8 +186,7 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, 
     -------
     pandas.DataFrame
         One row per frame that is measured, with the time in s as index, and one column per order parameter;
-        `attrs["units"]` and `attrs["meanings"]` say what they are. `outside` counts who is outside of the arena or in
-        an obstacle, `out` adds up how far (m).
+        `attrs["units"]` and `attrs["meanings"]` say what they are (a set of your own says it in REPORTS and COURSES).
 
     Raises
     ------

@@ -10,6 +10,7 @@ import pandas as pd
 from airflock.errors import ScenarioError, gathering
 from airflock.executors.scores import scores
 from airflock.metrics.registry import numbers_of, reports
+from airflock.recordings.score_table import described
 from airflock.scenarios import short_keys
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
@@ -140,9 +141,7 @@ def flown(
     rows = scores(flights, [seed for _, _, seed in jobs], **options)
     table = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
     known = {name: told for found in scenarios for name, told in reports(found.measures).items()}
-    for place, about in (("units", 0), ("meanings", 1)):
-        table.attrs[place] = {name: known[name][about] for name in table.columns if name in known}
-    return table
+    return described(table, known)
 
 
 def shown(asked: str | None, scenarios: Sequence[Scenario]) -> str:

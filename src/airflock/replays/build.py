@@ -31,6 +31,7 @@ from airflock.spelling import meant
 from airflock.stage import colours, shades
 from airflock.stage.scene import Stage, stage_of
 from airflock.suffixes import PAGES, suffix_fault
+from airflock.untrusted import own_path
 
 RATE = 10.0  # frames per second that are kept at most; the page draws between them
 MOST_EVENTS = 500
@@ -47,7 +48,7 @@ class Replay:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the page as .html."""
-        target = Path(path)
+        target = own_path(path)
         wrong = suffix_fault(target, PAGES)
         if wrong:
             raise RecordingError(wrong)

@@ -8,7 +8,7 @@ from airflock.core.parameters import number_names
 from airflock.core.radio import Packets
 from airflock.core.vectors import overruled
 from airflock.errors import ScenarioError
-from airflock.untrusted import is_file
+from airflock.untrusted import is_file, own_path
 
 OF_ITS_OWN = ("published", "title")  # what a paper published of a file and what the file is called: not of another
 LONGEST = 10  # files in a chain of extends
@@ -76,7 +76,7 @@ def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     for section, key in (*kinds, ("scene", "file")):
         table = result.get(section)
         name = _plain(table.get(key)) if isinstance(table, Mapping) else None
-        if isinstance(name, str) and name and not Path(name).is_absolute() and is_file(folder / name):
+        if isinstance(name, str) and name and not own_path(name).is_absolute() and is_file(folder / name):
             result[section] = {**table, key: str((folder / name).absolute())}  # type: ignore[dict-item]
     faults, groups = result.get("faults"), result.get("groups")
     if isinstance(faults, list):

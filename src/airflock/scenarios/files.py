@@ -19,7 +19,7 @@ from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
-from airflock.untrusted import FormatError, from_outside, is_file, read_toml
+from airflock.untrusted import FormatError, from_outside, is_file, own_path, read_toml
 
 IMPORTED = "not a scenario; airflock import makes a recording of it (in Python: airflock.load_tracks)"
 NO_SCENARIO = {  # files that stand beside scenarios, by their ending: what they are, and what takes them
@@ -125,7 +125,7 @@ def load(
     airflock.errors.ScenarioError: vasarhelyi_2018/4ms: radio.delay = 60 s lies outside [0, 30] s
     """
     text = str(name)
-    where = text if text in presets() else str(Path(text))
+    where = text if text in presets() else str(own_path(text))
     with from_outside(where):
         document, folder = _read(where, None)
         document, base = extended(document, where, folder, _read)
@@ -136,7 +136,7 @@ def load(
         notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
         document, settings, told, wrong = with_ground(document, keyed(settings, where), folder)
         if flown is not None:
-            kind = str(Path(law).absolute()) if str(law).endswith(".py") else flown.name
+            kind = str(own_path(law).absolute()) if str(law).endswith(".py") else flown.name
             document = {**document, "model": {"kind": kind}, "published": {}}
         return make(
             document, where, settings, folder=folder, given=given, notes=notes + told, known_faults=wrong, trust=trust
@@ -146,7 +146,7 @@ def load(
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     """Document of a preset or of a file, looked for in a folder, in today's format, and the folder that it lies in."""
     known = presets()
-    path = known.get(name) or (Path(name) if folder is None else folder / name)
+    path = known.get(name) or (own_path(name) if folder is None else folder / own_path(name))
     if not is_file(path):
         # the name of a file is meant as a preset only where the two are much alike
         word, alike = (name, 0.4) if path.suffix != ".toml" else (name.removesuffix(".toml"), 0.7)

@@ -9,7 +9,7 @@ from typing import Any
 
 from airflock.errors import ScenarioError
 from airflock.scenes.outlines import ground_of
-from airflock.untrusted import is_file
+from airflock.untrusted import is_file, own_path
 
 FROM_FILE = ("world.file", "world.simplify")
 GIVEN = ("corners", "obstacles", "heights")  # what the file says, and the scenario cannot say as well
@@ -31,7 +31,7 @@ def with_ground(
     if not isinstance(name, str) or not name:
         return dict(document), settings, (), ()
     faults = [f"world.{key}: is given, and world.file as well; take one of them out" for key in GIVEN if key in world]
-    path = Path(name) if is_file(name) or folder is None else folder / name
+    path = own_path(name) if is_file(name) or folder is None else folder / own_path(name)
     faults += [] if is_file(path) else [f"world.file = {name!r}: no such file"]
     simplify = world.get("simplify", 0.0)
     if isinstance(simplify, bool) or not isinstance(simplify, (int, float)) or not 0.0 <= simplify <= 1000.0:

@@ -16,7 +16,7 @@ from types import FunctionType, ModuleType
 from airflock.core.contract import Model
 from airflock.errors import RuleError, ScenarioError, bounded
 from airflock.spelling import raised
-from airflock.untrusted import is_file
+from airflock.untrusted import is_file, own_path
 
 
 def own_code(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
@@ -24,8 +24,8 @@ def own_code(key: str, name: str, folder: Path | None = None, *, trust: bool) ->
 
     Raises what `own_module` raises.
     """
-    beside = Path(name) if folder is None else folder / name
-    return own_module(beside if is_file(beside) else Path(name), f"{key} = {name!r}", trust=trust)
+    beside = own_path(name) if folder is None else folder / own_path(name)
+    return own_module(beside if is_file(beside) else own_path(name), f"{key} = {name!r}", trust=trust)
 
 
 def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:

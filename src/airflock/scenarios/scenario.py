@@ -197,7 +197,15 @@ class Scenario:
         return replace(self, groups=(), faults=()) if self.groups or self.faults else self
 
     def in_flight(self, seed: int) -> "Scenario":
-        """The scenario of one flight: where scene.draw = "flight", with the scene that this flight draws."""
+        """The scenario of one flight: where scene.draw = "flight", with the scene that this flight draws.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> city = airflock.load("kidger/city", {"scene.draw": "flight"})
+        >>> city.in_flight(1).scene.seed != city.in_flight(2).scene.seed  # each seed its own city
+        True
+        """
         if self.scene.draw == "once":
             return self
         own = {"seed": random.words(seed, random.SCENE, 0, 0, int(self.scene.seed))[0] >> 1, "draw": "once"}
@@ -230,7 +238,14 @@ class Scenario:
         return self.drains and self.ground is not None
 
     def stands(self) -> Scene:
-        """What stands in the world; for a model that casts, polygons are walls of it too."""
+        """What stands in the world; for a model that casts, polygons are walls of it too.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> len(airflock.load("vasarhelyi_2018/4ms").stands().lists) > 0
+        True
+        """
         polygons = self.world.obstacles
         if self.world.arena == "polygon":
             polygons = (self.world.corners, *polygons)
@@ -239,7 +254,14 @@ class Scenario:
         return scene_of(self.scene, self.dimensions, polygons, self.world.heights)
 
     def waypoints(self) -> Any:
-        """Goals in their order (goal, 3), m."""
+        """Goals in their order (goal, 3), m.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> airflock.load("kidger/city").waypoints().shape[1]
+        3
+        """
         return waypoints(self.goals, self.scene, self.dimensions)
 
     def measured_by(self) -> metric_parameters.Parameters:
@@ -283,7 +305,14 @@ class Scenario:
         return complete(self.silence, float(speed(self.parameters)) if speed is not None else 0.0, self.radio.delay)
 
     def separation(self) -> float:
-        """Smallest distance of two agents at the start, m."""
+        """Smallest distance of two agents at the start, m.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> airflock.load("vasarhelyi_2018/4ms", {"start.separation": 7.0}).separation()
+        7.0
+        """
         given = self.start.separation
         return start_separation(self.model, self.parameters, self.start, self.world) if given is None else given
 

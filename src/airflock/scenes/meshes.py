@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from airflock.errors import SceneError
 from airflock.scenes.headers import check_header
 from airflock.scenes.tree import segments, triangles
-from airflock.untrusted import from_outside
+from airflock.untrusted import from_outside, own_path
 from airflock.world import scenery
 from airflock.world.shapes import CLOSED
 
@@ -26,7 +26,7 @@ def load_mesh(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float6
 
 
 def _loaded(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    mesh = read(Path(p.file))
+    mesh = read(own_path(p.file))
     notes = []
     corners = np.asarray(mesh.vertices, float) * p.unit
     if p.up == "y":

@@ -12,6 +12,7 @@ from airflock.mavlink.frames import Stream
 from airflock.mavlink.keys import read_key
 from airflock.onboard.card import Card, read_card
 from airflock.onboard.ports import Port, Serial, open_port
+from airflock.untrusted import own_path
 
 RADIOS = (f"udp:{WATCHED[0]}:{WATCHED[1]}",)  # where fleets in software are heard
 
@@ -59,7 +60,7 @@ def watch_fleet(
 
     Raises CardError for card, key and radios, all faults at once, and StudioError for a port in use.
     """
-    found, secret, heard = opened(Path(card), Path(key) if key else None, radios)
+    found, secret, heard = opened(own_path(card), own_path(key) if key else None, radios)
     try:
         if time.time() >= found.expires:
             say(f"note: {card} has expired; its drones no longer start")

@@ -15,7 +15,7 @@ from airflock.identify.run import Identified, identify, read_heard
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
-from airflock.untrusted import from_outside, json_object, read_text
+from airflock.untrusted import from_outside, json_object, own_path, read_text
 
 SCENARIO, TOLD = "identified.toml", "identified.json"
 Paths = Sequence[str | os.PathLike[str]]
@@ -69,7 +69,7 @@ def _asked(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) ->
 
 def _hash(path: str | os.PathLike[str]) -> str:
     try:
-        with open(path, "rb") as stream:
+        with own_path(path).open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()[:12]
     except OSError as fault:
         raise RecordingError(f"{path}: {fault.strerror or fault}") from fault

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,11 @@ class Tuned:
 
     def __repr__(self) -> str:
         return f"<Tuned {self.folder / TUNED}: fitness {self.result.fitness:.3f}; {self.certificate!r}>"
+
+    def _repr_html_(self) -> str:
+        """Which file to fly, what its certificate says of the limits, and its keys, for a notebook."""
+        head = f"<p><b>{escape(str(self.folder / TUNED))}</b>, in {self.seconds:.0f} s</p>"
+        return head + self.certificate._repr_html_() + self.scenario._repr_html_()
 
     def document(self) -> dict[str, Any]:
         """What was found as plain values, for --json."""

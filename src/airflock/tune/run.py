@@ -21,6 +21,7 @@ from airflock.tune.plan import plan_of
 from airflock.tune.result import Tuned
 from airflock.tune.stages import Note, certificate, hardening, rate_of, search
 from airflock.tune.start import has_walls, start_of
+from airflock.untrusted import own_path
 
 STAGES = "search", "hardening", "certificate", "report"
 
@@ -97,7 +98,7 @@ def tune(
     began = time.monotonic()
     if not 0.0 < budget < math.inf:
         raise StudyError(f"budget = {budget:g} s is not positive")
-    folder = Path(out)
+    folder = own_path(out)
     mine, logs = _mine(folder, scenario, like, heard, settings, trust)
     start, notes = start_of(mine)
     limits = list(limit) or usual_limits(start)

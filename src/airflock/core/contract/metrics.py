@@ -30,6 +30,7 @@ class Metric:
     survey    : rule of the whole flock like a model's `flock`: fills the columns of Shared that `agent` may read;
               `workspace` of any of n, q, wing gives its scratch
     reports : of every order parameter that comes out: its unit and what it means
+    courses : the same of each field of Sample that is no order parameter by itself (COURSES)
     total   : from the combined values of a whole flight to named order parameters; by default they are these
     violates : truths of `airflock.check_metric` that do not hold for it, and why (VIOLATES)
     """
@@ -59,6 +60,7 @@ class Metric:
     total: Callable[..., dict[str, float]] | None = None
     reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     violates: Mapping[str, str] = field(default_factory=dict)
+    courses: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
@@ -146,6 +148,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
         over_time=dict(found.get("OVER_TIME", {})),
         reports=dict(found.get("REPORTS", {})),
         violates=dict(found.get("VIOLATES", {})),
+        courses=dict(found.get("COURSES", {})),
         clock=clock,
         **{key: found[key] for key in records if key in found},
     )

@@ -8,16 +8,17 @@ import xarray as xr
 from airflock import atomic
 from airflock.recordings.layout import DIMENSIONS, check
 
+STATES = ("position", "velocity", "command")
 PLURAL = {"keypoint": "keypoints", "individual": "individuals"}
 
 
 def to_movement(recording: xr.Dataset, *, old: bool = False) -> xr.Dataset:
-    """Dataset with position and confidence, (time, space, keypoint, individual), and the attributes of poses.
+    """Dataset with position, confidence and the attributes of poses; velocity and command beside, where there are any.
 
     old : the dimensions keypoints and individuals, as `movement` up to 0.16 asks for
     """
     check(recording)
-    found = recording[["position"]].transpose(*DIMENSIONS)
+    found = recording[[name for name in STATES if name in recording]].transpose(*DIMENSIONS)
     if "confidence" in recording:
         found["confidence"] = recording["confidence"].transpose("time", "keypoint", "individual")
     else:

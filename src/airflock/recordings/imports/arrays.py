@@ -34,13 +34,9 @@ def read_array(
     found = []
     for number in range(values.shape[1]):
         own = values[:, number].astype(float) * scale
-        there = np.isfinite(own).all(axis=1)
-        columns = {axis: own[there, c] for c, axis in enumerate(POSITION[: own.shape[1]])}
+        columns = {axis: own[:, c] for c, axis in enumerate(POSITION[: own.shape[1]])}
         name = names[number] if names else str(number + 1)
-        found.append(Track(name, where, frames[there] / rate, columns, frames[there]))
-    found = [track for track in found if len(track.time)]
-    if not found:
-        raise RecordingError(f"{where}: every position is missing")
+        found.append(Track(name, where, frames / rate, columns, frames))
     return found
 
 
@@ -69,7 +65,11 @@ def read_npy(path: Path, options: Options, findings: Findings) -> list[Track]:
             loaded = np.load(file, allow_pickle=False)
             if isinstance(loaded, np.lib.npyio.NpzFile):
                 names = [n for n in loaded.files if n in ("trajectories", "position", "tracks")] or loaded.files[:1]
+                if not names:
+                    raise RecordingError(f"{path}: is an archive without an array")
                 loaded = loaded[names[0]]
+                if isinstance(loaded, bytes):
+                    raise RecordingError(f"{path}: is an archive of {names[0]}, which is no array; unpack it first")
     except (ValueError, OSError, EOFError) as fault:
         text = str(fault).splitlines()[0]
         if "allow_pickle" in text or "pickle" in text.lower():
@@ -82,16 +82,11 @@ def refuse_pickle(path: Path) -> None:
     """Raise a RecordingError for a file of pickled objects."""
     with path.open("rb") as file:
         start = file.read(2)
-    if path.suffix.lower() in (".pkl", ".pickle") or (start[:1] == b"\x80" and start[1:2] in b"\x02\x03\x04\x05"):
+    if start[:1] == b"\x80" and start[1:2] in b"\x02\x03\x04\x05":
         raise RecordingError(_pickled(path))
 
 
 def _pickled(path: Path) -> str:
-    if path.suffix.lower() in (".pkl", ".pickle"):
-        return (
-            f"{path}: holds pickled Python objects, which could run code when read; if you trust the file and it is a "
-            f"table of pandas, python -c \"import pandas as pd; pd.read_pickle('{path.name}').to_csv('tracks.csv')\""
-        )
     return f"{path}: holds pickled Python objects, which could run code when read; {PLAIN}{COMMAND}".replace(
         "FILE", path.name
     )

@@ -1,14 +1,16 @@
 """Checks of times, individuals and heights: rules 1, 4, 7 and who is there at all. Each fault is one line."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.recordings.imports.absent import by_source
 from airflock.recordings.imports.expressions import quoted
+from airflock.recordings.imports.headers import split
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Track
 
 STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
+SLOW = 5.0  # s between rows: a unit of thousandths would be odd for so slow a log
+SINCE_1970 = 1e8  # s; times beyond are dates, and their unit is plain
 LEAST = 0.2  # share of the common span below which an individual is worth a question
 
 
@@ -18,45 +20,86 @@ def period_of(track: Track) -> float:
     return float(np.median(steps)) if steps.size else 0.0
 
 
-def check_time(track: Track, findings: Findings) -> None:
-    """Rule 1: sort by time, tell of repeated instants and of steps that no log has."""
-    late = np.flatnonzero(np.diff(track.time) < 0.0)
+def check_times(tracks: list[Track], findings: Findings) -> None:
+    """Rule 1: sort by time, tell of repeated instants and of steps that no log has, each once for a file."""
+    for source, own in by_source(tracks).items():
+        late = [_sorted(track) for track in own]
+        _tell_order(source, [rows for rows in late if rows.size], findings)
+        _repeated(source, own, findings)
+        wrong = [line for line in map(_wrong_step, own) if line]
+        if wrong:
+            findings.fault(wrong[0], "time")
+        else:
+            findings.notes += [line for line in map(_unsaid_step, own) if line][:1]
+
+
+def _sorted(track: Track) -> NDArray[np.int64]:
+    """Sort a track by time; the rows that came before an earlier one."""
+    late = np.flatnonzero(np.diff(track.time) < 0.0) + 1
+    rows = track.rows[late]
     if late.size:
-        row = int(track.rows[late[0] + 1])
-        findings.notes.append(f"{track.source}: {track.name}: {late.size} rows out of order (first row {row}): sorted")
         track.keep(np.argsort(track.time, kind="stable"))
-    same = np.flatnonzero(np.diff(track.time) == 0.0)
-    if same.size:
-        _repeated(track, same, findings)
-    step = period_of(track)
+    return rows
+
+
+def _tell_order(source: str, late: list[NDArray[np.int64]], findings: Findings) -> None:
+    if late:
+        count, first = sum(len(rows) for rows in late), min(int(rows[0]) for rows in late)
+        findings.notes.append(f"{source}: {count} rows out of order (first row {first}): sorted")
+
+
+def _wrong_step(track: Track) -> str:
+    """What is wrong with the time between rows; empty if nothing is."""
+    step, name = period_of(track), track.label("t")
+    where = f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}"
     if step and not STEPS[0] <= step <= STEPS[1]:
-        name = track.label("t")
-        findings.fault(
-            f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}; "
-            f'the unit is another one: write --map "t:={quoted(name)}*1e-6" (for us) or *1e-3 (for ms)',
-            "time",
-        )
+        return f'{where}; the unit is another one: write --map "t:={quoted(name)}*1e-6" (for us) or *1e-3 (for ms)'
+    unit, finer = split(name)[1], {"ms": ("us", 1e-6), "us": ("ns", 1e-9), "µs": ("ns", 1e-9)}
+    if unit in finer and step >= SLOW and track.time[0] < SINCE_1970 and not track.has(VELOCITY):
+        other, factor = finer[unit]
+        return f'{where}: {other} named {unit}? Write --map "t:={quoted(name)}*{factor:g}"'
+    return ""
 
 
-def _repeated(track: Track, same: NDArray[Any], findings: Findings) -> None:
-    """Rows with the time of the row before: the same row again, or another individual."""
-    place = track.stack(POSITION, 2)
-    apart = np.hypot(*(place[same + 1] - place[same]).T)
-    row, where = int(track.rows[same[0] + 1]), f"{track.source}: column {track.label('t')}"
-    other = np.flatnonzero(apart > 1e-9)
-    if len(other) > 0.5 * len(same):
-        first = same[other[0]]
+def _unsaid_step(track: Track) -> str:
+    """What is told of times without a unit that would be far apart in seconds; empty if there are none."""
+    step, name = period_of(track), track.labels.get("t", "")
+    if not name.isidentifier() or split(name)[1] or step < SLOW or track.time[0] >= SINCE_1970 or track.has(VELOCITY):
+        return ""
+    return (
+        f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart; if it does not count seconds, "
+        "write for instance --time-unit us"
+    )
+
+
+def _repeated(source: str, own: list[Track], findings: Findings) -> None:
+    """Rows with the time of the row before: the same row again, or another individual. The first of them is kept."""
+    again: list[tuple[Track, NDArray[np.int64]]] = []
+    for track in own:
+        same = np.flatnonzero(np.diff(track.time) == 0.0)
+        if not same.size:
+            continue
+        place = track.stack(POSITION, 2)
+        apart = np.hypot(*(place[same + 1] - place[same]).T)
+        other = np.flatnonzero(apart > 1e-9)
+        if len(other) > 0.5 * len(same):
+            findings.fault(
+                f"{source}: column {track.label('t')}: {track.name} is at two places at once, first row "
+                f"{track.rows[same[other[0]] + 1]} ({apart[other[0]]:.3g} m apart): two individuals under one id; "
+                "map another column: --map id:=COLUMN",
+                "duplicates",
+            )
+        else:
+            again.append((track, track.rows[same + 1]))
+        track.keep(np.r_[True, np.diff(track.time) > 0.0])
+    if again:
+        who = again[0][0].name if len(again) == 1 else f"{len(again)} individuals"
+        count, first = sum(len(rows) for _, rows in again), min(int(rows[0]) for _, rows in again)
         findings.fault(
-            f"{where}: {track.name} is at two places at once, first row {track.rows[first + 1]} "
-            f"({apart[other[0]]:.3g} m apart): two individuals under one id; map another column: --map id:=COLUMN",
+            f"{source}: column {again[0][0].label('t')}: {count} rows of {who} repeat a time, first row {first}; "
+            "remove the duplicates",
             "duplicates",
         )
-    else:
-        findings.fault(
-            f"{where}: {same.size} rows of {track.name} repeat a time, first row {row}; remove the duplicates",
-            "duplicates",
-        )
-    track.keep(np.r_[True, np.diff(track.time) > 0.0])
 
 
 def check_names(tracks: list[Track], findings: Findings) -> None:
@@ -104,24 +147,24 @@ def check_heights(tracks: list[Track], axes: str, findings: Findings) -> None:
     if len(levels) > 1:
         told = ", ".join(f"{t.name}: {level or 'not said'}" for level, t in levels.items())
         findings.fault(f"heights are above different levels ({told}); convert them to one", "height")
-    for track in tracks:
-        z = track.columns.get("z")
-        if z is None or not len(z):
+    for source, own in by_source(tracks).items():
+        heights = [(track, track.columns["z"]) for track in own if "z" in track.columns]
+        rows = sum(len(z) for _, z in heights)
+        deep = [(track, np.flatnonzero(z < -1.0)) for track, z in heights]
+        if not rows or sum(len(low) for _, low in deep) <= 0.9 * rows:  # around 0 some are always below
             continue
-        low = np.flatnonzero(z < -1.0)
-        if len(low) > 0.9 * len(z):
-            name = track.label("z")
-            turn = f'--map "z:=-{quoted(name)}"'
-            if axes == "ned":
-                told = f"it points up, where --axes ned has it down; leave --axes ned out, or add {turn} if x is north"
-            else:
-                told = f"it points down; write {turn}, or --axes ned if x is north"
-            findings.fault(
-                f"{track.source}: column {name}: z of {track.name} lies below -1 m, first row {track.rows[low[0]]}: "
-                + told,
-                "down",
-            )
-            return
+        track, low = next((track, low) for track, low in deep if len(low))
+        name = track.label("z")
+        turn = f'--map "z:=-{quoted(name)}"'
+        if axes == "ned":
+            told = f"it points up, where --axes ned has it down; leave --axes ned out, or add {turn} if x is north"
+        else:
+            told = f"it points down; write {turn}, or --axes ned if x is north"
+        findings.fault(
+            f"{source}: column {name}: z of {track.name} lies below -1 m, first row {track.rows[low[0]]}: {told}",
+            "down",
+        )
+        return
 
 
 def note_steps(track: Track, findings: Findings) -> None:
@@ -146,12 +189,15 @@ def check_presence(tracks: list[Track], findings: Findings) -> None:
     first, last = min(t.time[0] for t in tracks), max(t.time[-1] for t in tracks)
     if last <= first:
         return
-    for track in tracks:
-        step = period_of(track)
-        share = min(1.0, len(track.time) * step / (last - first))
-        if share < LEAST:
-            findings.fault(
-                f"{track.source}: {track.name} is there for {share:.0%} of {last - first:.4g} s "
-                f"(from {track.time[0]:.4g} to {track.time[-1]:.4g} s); leave it out, or cut with --begin and --end",
-                "absent",
-            )
+    for source, own in by_source(tracks).items():
+        shares = [min(1.0, len(track.time) * period_of(track) / (last - first)) for track in own]
+        rare = [number for number, share in enumerate(shares) if share < LEAST]
+        if not rare:
+            continue
+        track, share = own[rare[0]], shares[rare[0]]
+        more = f", {len(rare) - 1} more for less than {LEAST:.0%}" if len(rare) > 1 else ""
+        findings.fault(
+            f"{source}: {track.name} is there for {share:.0%} of {last - first:.4g} s "
+            f"(from {track.time[0]:.4g} to {track.time[-1]:.4g} s){more}; leave it out, or cut with --begin and --end",
+            "absent",
+        )

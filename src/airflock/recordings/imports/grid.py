@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.memory import give_back_memory
 from airflock.recordings.differences import gradient
 from airflock.recordings.imports.checks import period_of
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Track
@@ -31,12 +32,12 @@ def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: f
         period = _round(period)
     first = float(min(track.time[0] for track in tracks))
     if begin is not None:
-        early = np.floor((first - begin + _slack(period, first, begin)) / period)
+        early = np.floor((first - begin + slack(period, first, begin)) / period)
         first = begin if rate else first - float(early) * period
     last = max(track.time[-1] for track in tracks) if end is None else end
     if last < first:
         raise RecordingError(f"no rows between {first:g} and {last:g} s")
-    count = int(np.floor((last - first + _slack(period, first, last)) / period)) + 1
+    count = int(np.floor((last - first + slack(period, first, last)) / period)) + 1
     if count * len(tracks) * 6 > MOST:
         raise RecordingError(
             f"{count} times of {len(tracks)} individuals do not fit; write --rate or --begin and --end"
@@ -44,7 +45,7 @@ def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: f
     return first + np.arange(count) * period, period
 
 
-def _slack(period: float, *instants: float) -> float:
+def slack(period: float, *instants: float) -> float:
     """Time (s) by which rows may miss the grid: 1e-6 of a period, and what doubles of these instants do not tell.
 
     Seconds since 1970 are told to 2.4e-7 s.
@@ -88,22 +89,20 @@ def recording(
     """
     axes = 3 if any("z" in track.columns for track in tracks) else 2
     kind = np.float32 if precision == 32 else np.float64
-    shape = (len(times), axes, len(tracks))
-    commanded = any(track.has(COMMAND) for track in tracks)
-    place, speed = np.full(shape, np.nan, kind), np.full(shape, np.nan, kind)
-    wish = np.full(shape, np.nan, kind) if commanded else None
-    sure = np.zeros((len(times), len(tracks)), np.float32)
+    names = ["position", "velocity", *(["command"] if any(track.has(COMMAND) for track in tracks) else [])]
+    # one individual after another, so that memory is taken for each as its rows are given back
+    filled = {name: np.empty((len(tracks), axes, len(times)), kind) for name in names}
+    sure = np.empty((len(times), len(tracks)), np.float32)
     for who, track in enumerate(tracks):
-        _fill(track, who, times, period, bridge, place, speed, wish, sure)
+        _fill(track, who, times, period, bridge, {name: array[who].T for name, array in filled.items()}, sure)
         if len(tracks) > 1:
-            track.columns = {}  # a long log is in memory once
-    variables: dict[str, Any] = {
-        "position": (DIMENSIONS, place[:, :, None, :], {"units": UNITS["position"]}),
-        "velocity": (DIMENSIONS, speed[:, :, None, :], {"units": UNITS["velocity"]}),
-        "confidence": (("time", "keypoint", "individual"), sure[:, None, :]),
-    }
-    if wish is not None:
-        variables["command"] = (DIMENSIONS, wish[:, :, None, :], {"units": "m/s"})
+            track.columns, track.time, track.rows = {}, track.time[:0], track.rows[:0]  # a long log is in memory once
+            give_back_memory()
+    variables: dict[str, Any] = {}
+    for name in names:
+        whole = np.ascontiguousarray(filled.pop(name).transpose(2, 1, 0))
+        variables[name] = (DIMENSIONS, whole[:, :, None, :], {"units": UNITS.get(name, "m/s")})
+    variables["confidence"] = (("time", "keypoint", "individual"), sure[:, None, :])
     coordinates = {
         "time": ("time", np.arange(len(times)) * period, {"units": "s"}),
         "space": list("xyz"[:axes]),
@@ -115,15 +114,14 @@ def recording(
     return xr.Dataset(variables, coordinates, attributes), shares
 
 
-def _fill(
-    track: Track, who: int, times: Any, period: float, bridge: float, place: Any, speed: Any, wish: Any, sure: Any
-) -> None:
-    axes = place.shape[1]
+def _fill(track: Track, who: int, times: Any, period: float, bridge: float, filled: dict[str, Any], sure: Any) -> None:
+    """Fill in an individual's confidence (time, individual) and its arrays by name, each (time, axis)."""
+    axes = filled["position"].shape[1]
     own, usual = track.time, period_of(track) or period
     rows = track.stack(POSITION, axes)
-    slack = _slack(period, times[0], times[-1])
-    at = np.searchsorted(own, times + slack, side="right") - 1
-    inside = (at >= 0) & (times <= own[-1] + slack)
+    late = slack(period, times[0], times[-1])
+    at = np.searchsorted(own, times + late, side="right") - 1
+    inside = (at >= 0) & (times <= own[-1] + late)
     before = np.clip(at, 0, max(len(own) - 2, 0))
     after = np.minimum(before + 1, len(own) - 1)
     step = own[after] - own[before]
@@ -145,14 +143,14 @@ def _fill(
         v = slopes[before] + part[:, None] * (slopes[after] - slopes[before])
     same = np.clip(at, 0, None)
     p, v = np.where(on_row[:, None], rows[same], p), np.where(on_row[:, None], slopes[same], v)
-    place[:, :, who] = np.where(good[:, None], p, np.nan)
-    speed[:, :, who] = np.where(good[:, None], v, np.nan)
+    filled["position"][:] = np.where(good[:, None], p, np.nan)
+    filled["velocity"][:] = np.where(good[:, None], v, np.nan)
     sure[:, who] = np.where(good, np.where(on_row | normal, 1.0, 0.5), 0.0)
-    if wish is not None and track.has(COMMAND):
+    if "command" in filled:
         unsaid = np.full(len(own), np.nan)
         ask = np.stack([track.columns.get(name, unsaid) for name in COMMAND[:axes]], axis=1)
         held = ask[same]  # a command holds until the next one
-        wish[:, :, who] = np.where((on_row | normal)[:, None] & good[:, None], held, np.nan)
+        filled["command"][:] = np.where((on_row | normal)[:, None] & good[:, None], held, np.nan)
 
 
 def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:

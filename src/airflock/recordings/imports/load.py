@@ -13,6 +13,7 @@ import xarray as xr
 from airflock.errors import RecordingError
 from airflock.numeric import is_number
 from airflock.recordings.imports import (
+    absent,
     arrays,
     checks,
     clocks,
@@ -35,6 +36,7 @@ from airflock.recordings.imports.track import (
     Track,
     nothing,
 )
+from airflock.untrusted import own_path
 
 
 def load_tracks(
@@ -133,9 +135,9 @@ def load_tracks(
     findings = Findings()
     _sound(options, findings, numbers, precision, accept, origin)
     findings.accept = frozenset([accept] if isinstance(accept, str) else accept)
-    tracks, comparable = read_tracks(what, options, findings, origin=origin, same_clock=same_clock)
-    if begin is not None or end is not None:
-        tracks = cut(tracks, begin, end)
+    tracks, comparable = read_tracks(
+        what, options, findings, origin=origin, same_clock=same_clock, begin=begin, end=end
+    )
     checks.check_presence(tracks, findings)
     findings.refuse()
     if not all(track.has(VELOCITY) for track in tracks):
@@ -151,10 +153,10 @@ def load_tracks(
             f"far from the origin: kept with 64 bits; 32 bits resolve positions there only to {step:.2g} m"
         )
     found, shares = grid.recording(tracks, times, period, bridge, kept)
-    absent = 1.0 - shares["present"]
+    gone = 1.0 - shares["present"]
     findings.notes.append(
         f"{found.sizes['individual']} individuals, {times[-1] - times[0]:.4g} s at {1 / period:.4g} Hz; "
-        f"{absent:.1%} absent, {shares['bridged']:.1%} bridged (gaps up to {bridge:g} s)"
+        f"{gone:.1%} absent, {shares['bridged']:.1%} bridged (gaps up to {bridge:g} s)"
     )
     if found.sizes["individual"] > 1 and period > 0.05:
         findings.notes.append(f"nearest distances between frames {period:.3g} s apart are upper bounds")
@@ -175,23 +177,31 @@ def read_tracks(
     *,
     origin: tuple[float, float, float] | None = None,
     same_clock: bool = False,
+    begin: float | None = None,
+    end: float | None = None,
 ) -> tuple[list[Track], bool]:
-    """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault."""
+    """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault.
+
+    begin, end : window of time, s; what lies outside is not checked for jumps
+    """
     tracks = _read(what, options, findings)
     findings.refuse()
+    tracks = absent.leave_out(tracks, findings)
     checks.check_columns(tracks, findings)
-    for track in tracks:
-        checks.check_time(track, findings)
+    absent.tell_speeds(tracks, findings)
+    checks.check_times(tracks, findings)
     checks.check_names(tracks, findings)
     checks.check_heights(tracks, options.axes, findings)
     _to_metres(tracks, origin, findings)
     findings.refuse()
     motion.check_axes(tracks, findings)
     findings.refuse()
+    comparable = clocks.align(tracks, same_clock, findings)
+    if begin is not None or end is not None:
+        tracks = cut(tracks, begin, end)
     for track in tracks:
         motion.check_jumps(track, findings)
         checks.note_steps(track, findings)
-    comparable = clocks.align(tracks, same_clock, findings)
     findings.refuse()
     return tracks, comparable
 
@@ -200,7 +210,8 @@ def cut(tracks: list[Track], begin: float | None, end: float | None) -> list[Tra
     """Tracks between two times, s; those that have none of it are left out."""
     low, high = -np.inf if begin is None else begin, np.inf if end is None else end
     for track in tracks:
-        track.keep((track.time >= low) & (track.time <= high))
+        late = grid.slack(checks.period_of(track), *track.time[[0, -1]])
+        track.keep((track.time >= low - late) & (track.time <= high + late))
     there = [track for track in tracks if len(track.time)]
     if not there:
         raise RecordingError(f"no rows between {low:g} and {high:g} s")
@@ -219,7 +230,7 @@ def _read(what: Any, options: Options, findings: Findings) -> list[Track]:
     if isinstance(what, (str, os.PathLike)):
         what = [what]
     try:
-        files = [Path(name) for name in what]
+        files = [own_path(name) for name in what]
     except TypeError as fault:
         raise RecordingError(
             f"{type(what).__name__} holds no tracks; give files, a DataFrame, a Dataset or an array"

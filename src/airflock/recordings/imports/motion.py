@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from airflock.recordings.imports.checks import period_of
 from airflock.recordings.imports.expressions import quoted
-from airflock.recordings.imports.headers import LENGTHS, SPEEDS, TIMES, split
+from airflock.recordings.imports.headers import LENGTHS, SPEEDS, TIMES, meaning, split
 from airflock.recordings.imports.track import POSITION, VELOCITY, Findings, Track
 
 Array = NDArray[np.float64]
@@ -56,9 +56,10 @@ def _displacements(track: Track, axes: int) -> tuple[NDArray[np.float64], NDArra
     path = np.concatenate([np.zeros((1, axes)), path])
     broken = np.concatenate([[0], np.cumsum(~whole)])
     k = max(1, round(LAG / step)) if step < LAG else 1
-    sound = broken[k:] == broken[:-k]
-    thin = max(1, len(sound) // 20_000)
-    return (place[k:] - place[:-k])[sound][::thin], (path[k:] - path[:-k])[sound][::thin]
+    sound = np.flatnonzero(broken[k:] == broken[:-k])
+    # rows by number: a stride over all of them would keep them all in memory
+    rows = sound[:: max(1, (len(broken) - k) // 20_000)]
+    return place[rows + k] - place[rows], path[rows + k] - path[rows]
 
 
 class Likeness(NamedTuple):
@@ -143,7 +144,11 @@ def _scale_reason(track: Track, slope: float) -> str:
 def _unswapped(track: Track, i: int, j: int) -> str:
     """What to write where axis i of the positions is axis j of the velocities."""
     own = [quoted(track.label(POSITION[k])) for k in (i, j)]
-    if own == [POSITION[j], POSITION[i]]:  # they have been exchanged already, by --axes or --map
+    told = [meaning(track.label(POSITION[k])) for k in (i, j)]
+    if [None if one is None else one.target for one in told] == [
+        POSITION[j],
+        POSITION[i],
+    ]:  # they have been exchanged already, by --axes or --map
         return (
             "positions and velocities have different axes; write, without --axes, "
             f'--map "{POSITION[i]}:={own[0]}" --map "{POSITION[j]}:={own[1]}"'

@@ -50,19 +50,15 @@ def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") 
     for number, name in enumerate(found["individual"].values):
         own = found.isel(individual=number)
         position = own["position"].transpose("time", "space").values.astype(float) * scale
-        there = np.isfinite(position).all(axis=1) & np.isfinite(seconds)
-        columns = {axis: position[there, c] for c, axis in enumerate(axes)}
+        columns = {axis: position[:, c] for c, axis in enumerate(axes)}
         for variable, names in (("velocity", VELOCITY), ("command", COMMAND)):
             if variable in own and {"time", "space"} == set(own[variable].dims):
                 told = str(own[variable].attrs.get("units", ""))
                 if told not in headers.SPEEDS:
                     continue  # of unknown unit (frames, pixels) or no velocity: differentiated instead
                 values = own[variable].transpose("time", "space").values.astype(float) * headers.SPEEDS[told]
-                columns |= {names[c]: values[there, c] for c in range(len(axes))}
-        tracks.append(Track(str(name), where, seconds[there], columns, rows[there]))
-    tracks = [track for track in tracks if len(track.time)]
-    if not tracks:
-        raise RecordingError(f"{where}: every position is missing")
+                columns |= {names[c]: values[:, c] for c in range(len(axes))}
+        tracks.append(Track(str(name), where, seconds, columns, rows))
     return tracks
 
 

@@ -61,6 +61,12 @@ def taken_out(columns: dict[str, Any]) -> tuple[tuple[float, float, float] | Non
     return origin, np.all([flag != 0.0 for flag in flags], axis=0) if flags else None
 
 
+def invalid_note(where: str, name: str, valid: Any, rows: Any) -> str:
+    """What is told of rows that the estimator calls invalid."""
+    bad = rows[~valid]
+    return f"{where}: {name}: {len(bad)} rows that the estimator calls invalid left out, first row {bad[0]}"
+
+
 def origin_of(local: Mapping[str, Any]) -> tuple[float, float, float] | None:
     """Latitude, longitude (degrees) and height (m) of x = y = z = 0, which the estimator tells once it knows them."""
     if not all(name in local for name in ORIGIN):

@@ -6,6 +6,7 @@ from pathlib import Path
 from airflock.errors import RecordingError
 from airflock.recordings.imports import arrays, dataflash, movement, tables, ulog
 from airflock.recordings.imports.track import Findings, Options, Track
+from airflock.recordings.packed import refuse_packed, refuse_pickle
 from airflock.untrusted import from_outside
 
 Reader = Callable[[Path, Options, Findings], list[Track]]
@@ -32,10 +33,8 @@ def read(path: Path, options: Options, findings: Findings) -> list[Track]:
     if not path.is_file():
         raise RecordingError(f"{path}: no such file")
     ending = path.suffix.lower()
-    if ending in (".zip", ".gz", ".7z", ".tar", ".rar", ".xz", ".bz2"):
-        raise RecordingError(f"{path}: is an archive; unpack it first")
-    if ending in (".pkl", ".pickle"):
-        arrays.refuse_pickle(path)
+    refuse_packed(path)
+    refuse_pickle(path)
     if ending not in READERS:
         if ending == ".log":
             raise RecordingError(f"{path}: .log: unknown format; of ArduPilot give the .bin that it was made from")

@@ -10,12 +10,13 @@ import numpy as np
 import pandas as pd
 
 from airflock.errors import RecordingError
+from airflock.memory import give_back_memory
 from airflock.recordings.imports import headers, px4
+from airflock.recordings.imports.absent import PLACES
 from airflock.recordings.imports.columns import MOST_COLUMNS, Layout, layout
 from airflock.recordings.imports.track import GEODETIC, POSITION, Findings, Options, Track
 
 CHUNK = 250_000  # rows that are read at a time, so that an hour of thirty drones fits
-PLACES = (*POSITION[:2], *GEODETIC[:2])
 DELIMITERS = (",", ";", "\t", "|")
 
 
@@ -86,10 +87,6 @@ def _sniff(path: Path, options: Options) -> tuple[str, str, list[str]]:
     """Encoding, delimiter and names of the columns of a text table."""
     with path.open("rb") as file:
         start = file.read(1 << 20)
-    if start[:2] == b"PK":
-        raise RecordingError(f"{path}: is a zip archive; unpack it first: unzip {path.name}")
-    if start[:2] == b"\x1f\x8b":
-        raise RecordingError(f"{path}: is compressed; unpack it first: gunzip {path.name}")
     if not start.strip():
         raise RecordingError(f"{path}: is empty")
     if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -143,7 +140,7 @@ def from_parts(
     how = layout(where, _first_of(names, wide) if wide else names, options)
     findings.notes += how.notes
     gathered: dict[str, list[Any]] = {}
-    lacking: dict[str, list[Any]] = {"an id": [], "a time": []}
+    nameless: list[Any] = [np.empty(0, int)]
     columns = None if wide else how.used
     for at, part in parts(columns):
         rows = np.arange(at, at + len(part))
@@ -152,28 +149,22 @@ def from_parts(
             values = how.values(numbers, len(piece))
             placed = np.all([np.isfinite(values[c]) for c in PLACES if c in values], axis=0)
             timed = np.isfinite(values["t" if "t" in values else "utc"])
-            lacking["a time"].append(rows[placed & ~timed])
             if how.id:
-                lacking["an id"].append(rows[placed & timed & piece[how.id].isna().to_numpy()])
+                nameless.append(rows[placed & timed & piece[how.id].isna().to_numpy()])
                 for own, chosen in _by_name(piece[how.id]):
                     gathered.setdefault(own, []).append(_taken(values, rows, chosen))
             else:
                 gathered.setdefault(name, []).append(_taken(values, rows, None))
     if not gathered:
         raise RecordingError(f"{where}: has no rows")
-    for what, found in lacking.items():
-        lost = np.unique(np.concatenate([np.empty(0, int), *found]))
-        if len(lost):
-            findings.notes.append(f"{where}: {len(lost)} rows without {what} left out, first row {lost[0]}")
+    lost = np.unique(np.concatenate(nameless))
+    if len(lost):
+        findings.notes.append(f"{where}: {len(lost)} rows without an id left out, first row {lost[0]}")
     tracks = []
     for name in list(gathered):
-        tracks.append(_track(name, where, gathered.pop(name), how))
-    if not any(len(track.time) for track in tracks):
-        raise RecordingError(f"{where}: no row has both a time and a position")
-    findings.notes += [
-        f"{where}: {track.name}: has no position at any time: left out" for track in tracks if not len(track.time)
-    ]
-    return [track for track in tracks if len(track.time)]
+        tracks.append(_track(name, where, gathered.pop(name), how, findings))
+    give_back_memory()
+    return tracks
 
 
 def _wide(names: list[str]) -> dict[str, dict[str, str]]:
@@ -259,22 +250,21 @@ def _taken(values: dict[str, Any], rows: Any, chosen: Any) -> tuple[dict[str, An
     return {target: array[every] for target, array in values.items()}, rows[every]
 
 
-def _track(name: str, where: str, pieces: list[Any], how: Layout) -> Track:
+def _track(name: str, where: str, pieces: list[Any], how: Layout, findings: Findings) -> Track:
     columns = {target: np.concatenate([p[0][target] for p in pieces]) for target in pieces[0][0]}
     rows = np.concatenate([p[1] for p in pieces])
     origin, valid = px4.taken_out(columns)
-    needed = [columns[c] for c in ("t" if "t" in columns else "utc", *PLACES) if c in columns]
-    there = np.isfinite(np.stack(needed)).all(axis=0) & (True if valid is None else valid)
-    if not there.all():
-        columns, rows = {target: values[there] for target, values in columns.items()}, rows[there]
+    if valid is not None and not valid.all():
+        findings.notes.append(px4.invalid_note(where, name, valid, rows))
+        columns, rows = {target: values[valid] for target, values in columns.items()}, rows[valid]
     utc = columns.pop("utc", None)
     time = columns.pop("t") if "t" in columns else utc
     assert time is not None
-    of_day = bool(len(time)) and bool(time[0] > 1e9)  # seconds since 1970
+    of_day = bool((time[np.isfinite(time)][:1] > 1e9).any())  # seconds since 1970
     clock = "utc" if of_day or (utc is not None and utc is time) else ("shared" if how.id else "own")
     pair = None
-    if utc is not None and utc is not time and np.isfinite(utc).any():
-        pair = np.stack([time, utc], axis=1)[np.isfinite(utc)]
+    if utc is not None and utc is not time and np.isfinite(utc + time).any():
+        pair = np.stack([time, utc], axis=1)[np.isfinite(utc + time)]
     air = columns.pop("air") > 0.5 if "air" in columns else None
     found = Track(name, where, time, columns, rows, dict(how.labels), clock, pair, how.datum)
     found.origin, found.datum = (origin, found.datum or "amsl") if origin is not None else (None, found.datum)

@@ -57,7 +57,8 @@ class Options:
 
 @dataclass
 class Track:
-    """One individual. Arrays have one entry per row of the file that has a time and a position.
+    """One individual. Arrays have one entry per row of the file. Readers keep rows without a
+    time or a place (nan); `absent.leave_out` tells of them and takes them out.
 
     name, source : the individual and its file, for messages
     time    : (row,) s, of the clock that `clock` names
@@ -121,7 +122,8 @@ class Findings:
         if kind in self.accept:
             self.notes.append(f"accepted ({kind}): {line}")
             return True
-        way = f"; or keep it so: --accept {kind}" if kind else ""
+        kept = "the first of each" if kind == "duplicates" else "it so"
+        way = f"; or keep {kept}: --accept {kind}" if kind else ""
         self.faults.append(line + way)
         return False
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from airflock.errors import RecordingError
-from airflock.recordings.imports.px4 import origin_of
+from airflock.recordings.imports.px4 import invalid_note, origin_of
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
 
 LOCAL, SETPOINT = "vehicle_local_position", "trajectory_setpoint"
@@ -48,9 +48,11 @@ def read_ulog(path: Path, options: Options, findings: Findings) -> list[Track]:
     found.origin = origin_of(local)
     found.utc = _utc(topics.get("vehicle_gps_position"))
     found.air = _air(topics.get("vehicle_land_detected"), time)
-    found.keep(valid)
-    if not len(found.time):
+    if not valid.any():
         raise RecordingError(f"{path}: the estimator never called its position valid")
+    if not valid.all():
+        findings.notes.append(invalid_note(str(path), path.stem, valid, found.rows))
+        found.keep(valid)
     return [found]
 
 

@@ -12,9 +12,20 @@ from airflock.recordings.measures.states import sound, states
 def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
     """One row per burst and its coast: individual, begin (s), burst (s), coast (s), speed before and at its top (m/s).
 
-    least : rise of speed, m/s, below which it is noise of the tracker
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    least     : rise of speed, m/s, below which it is noise of the tracker
     A burst is a rise of speed from a minimum to the next maximum by `least` or more, with falls of less than that in
     between; its coast lasts until the next burst begins, or the individual is gone.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> speed = np.array([1.0, 1.0, 4.0, 3.0, 2.0, 1.0, 1.0])
+    >>> x = np.cumsum(speed)[:, None, None] * np.array([[[1.0, 0.0]]])
+    >>> fish = airflock.load_tracks(x, unit="m", fps=1.0)
+    >>> airflock.measures.bursts.bursts(fish, least=1.0)["speed_top"].tolist()
+    [3.5]
     """
     sound(least=least)
     if not least > 0.0:

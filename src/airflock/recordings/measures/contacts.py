@@ -13,11 +13,19 @@ from airflock.world.place import Place, Shapes
 def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame:
     """One row per contact: individual, what, begin (s), end (s), and where it began: east, north, up (m).
 
-    radius : of an individual, m; by default metrics.r_body of its scenario
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    radius    : of an individual, m; by default metrics.r_body of its scenario
 
     what is "wall", "obstacle 0" and so on as in world.obstacles, or "scene". Each is followed by itself: a contact
     lasts while an individual is nearer to it than its radius, and ends where the individual is gone. A log without an
     arena has no contacts. Touches between two frames are not seen; the order parameter n_contacts looks at every step.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> len(airflock.measures.contacts.contacts(airflock.simulate(short)))  # far from the walls
+    0
     """
     scenario = scenario_of(recording)
     radius = scenario.metrics.r_body if radius is None else radius

@@ -14,10 +14,21 @@ NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of record
 def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | None = None) -> pd.Series:
     """Correlation of velocities about the group's mean, by distance (m); 1 at distance 0.
 
-    width    : of a bin of distances, m: about a tenth of the group
-    farthest : m; by default the largest distance that occurs
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    width     : of a bin of distances, m: about a tenth of the group
+    farthest  : m; by default the largest distance that occurs
     nan where nobody differs from the mean, to the precision of a recording: of all who move alike nothing fluctuates.
     Cavagna et al., PNAS 107, 11865 (2010), with the mean velocity of those present taken off at each instant.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> out = np.array([[-3.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [3.0, 0.0]])  # a line that stretches evenly
+    >>> places = out * (1.0 + 0.1 * np.arange(5)[:, None, None])
+    >>> line = airflock.load_tracks(places, unit="m", fps=10.0)
+    >>> airflock.measures.correlation.velocity_correlation(line, width=3.0).index.name
+    'distance'
     """
     sound(width=width, **({} if farthest is None else {"farthest": farthest}))
     found = states(recording)
@@ -52,7 +63,21 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
 
 
 def correlation_length(recording: xr.Dataset, width: float) -> float:
-    """Distance at which the correlation of velocities first falls to zero, m; nan if it does not."""
+    """Distance at which the correlation of velocities first falls to zero, m; nan if it does not.
+
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    width     : of a bin of distances, m
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> out = np.array([[-3.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [3.0, 0.0]])  # a line that stretches evenly
+    >>> places = out * (1.0 + 0.1 * np.arange(5)[:, None, None])
+    >>> line = airflock.load_tracks(places, unit="m", fps=10.0)
+    >>> 2.0 < airflock.measures.correlation.correlation_length(line, width=0.5) < 6.0
+    True
+    """
     course = velocity_correlation(recording, width)
     values, at = course.to_numpy(), course.index.to_numpy()
     down = np.flatnonzero(values <= 0.0)

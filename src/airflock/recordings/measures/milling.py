@@ -10,8 +10,18 @@ from airflock.recordings.measures.states import headings, sound, states
 def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
     """Length of the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone.
 
-    slowest : speed (m/s) at or below which one has no heading; it still counts for the centre
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    slowest   : speed (m/s) at or below which one has no heading; it still counts for the centre
     In a periodic world the centre is that of the places as they stand, as it is for the order parameters.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> angle = 0.1 * np.arange(20)[:, None] + np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    >>> ring = airflock.load_tracks(np.stack([np.cos(angle), np.sin(angle)], axis=-1), unit="m", fps=10.0)
+    >>> round(float(airflock.measures.milling.milling(ring).iloc[10]), 3)
+    1.0
     """
     sound(slowest=slowest)
     found = states(recording)

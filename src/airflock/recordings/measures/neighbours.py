@@ -10,7 +10,19 @@ from airflock.recordings.measures.states import sound, states
 
 
 def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
-    """Distance of each individual to its nearest neighbour, (time, individual), m; nan for one absent or alone."""
+    """Distance of each individual to its nearest neighbour, (time, individual), m; nan for one absent or alone.
+
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> places = np.array([[0.0, 0.0], [3.0, 4.0]]) + np.zeros((5, 1, 1))
+    >>> still = airflock.load_tracks(places, unit="m", fps=1.0)
+    >>> airflock.measures.neighbours.nearest_distances(still).values[0].tolist()
+    [5.0, 5.0]
+    """
     found = states(recording)
     table = np.full(found.placed.shape, np.nan)
     for k, there in enumerate(found.placed):
@@ -26,8 +38,19 @@ def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
 def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.Series:
     """Share of pairs by distance, per m, over all frames: a histogram whose sum times the width of a bin is at most 1.
 
-    width    : of a bin, m; where it does not divide `farthest`, the nearest width that does: `attrs["width"]`
-    farthest : end of the last bin, m; a pair exactly so far apart counts
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    width     : of a bin, m; where it does not divide `farthest`, the nearest width that does: `attrs["width"]`
+    farthest  : end of the last bin, m; a pair exactly so far apart counts
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> places = np.array([[0.0, 0.0], [3.0, 4.0]]) + np.zeros((5, 1, 1))
+    >>> still = airflock.load_tracks(places, unit="m", fps=1.0)
+    >>> shares = airflock.measures.neighbours.pair_distances(still, width=2.0, farthest=10.0)
+    >>> float(shares.idxmax()), float(shares.sum() * 2.0)
+    (5.0, 1.0)
     """
     sound(width=width, farthest=farthest)
     if not 0.0 < width < farthest:

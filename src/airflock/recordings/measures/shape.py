@@ -10,9 +10,21 @@ from airflock.recordings.measures.states import states
 def group_shape(recording: xr.Dataset) -> pd.DataFrame:
     """By time: number present, hull (m², in space m³), length and width (m), elongation (length / width).
 
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+
     In a periodic world the places count as they stand.
     length, width : root mean square extension along and across the mean horizontal velocity, times sqrt(12), which is
     the side of an even rectangle. nan where too few are there.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0]])
+    >>> moved = corners + np.arange(5)[:, None, None] * np.array([1.0, 0.0])
+    >>> group = airflock.load_tracks(moved, unit="m", fps=1.0)
+    >>> float(airflock.measures.shape.group_shape(group)["hull"].iloc[0])
+    8.0
     """
     from scipy.spatial import ConvexHull, QhullError
 

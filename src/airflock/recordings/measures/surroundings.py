@@ -11,8 +11,21 @@ from airflock.recordings.measures.states import headings, sound, states
 def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: float = 0.0) -> xr.DataArray:
     """Neighbours per m² around an individual that moves along `front`, (left, front); mean over all and all frames.
 
-    reach : half the side of the map, m; cells: along each side; slowest: speed (m/s) at or below which one has no front
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    reach     : half the side of the map, m; cells: along each side
+    slowest   : speed (m/s) at or below which one has no front
     In space the map is horizontal: distances in height are left out.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0]])
+    >>> moved = corners + np.arange(5)[:, None, None] * np.array([1.0, 0.0])
+    >>> group = airflock.load_tracks(moved, unit="m", fps=1.0)
+    >>> around = airflock.measures.surroundings.density_map(group, reach=5.0, cells=5)
+    >>> float(around.sum()) * 4.0  # cells of 4 m²: each of the four has three others near it
+    3.0
     """
     sound(reach=reach, cells=cells, slowest=slowest)
     if not reach > 0.0 or cells < 1 or cells % 1:
@@ -46,8 +59,20 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
 def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> float:
     """Mean of cos 2 angle to the nearest neighbour within reach (m): 1 ahead or behind, -1 at the sides, 0 anywhere.
 
-    slowest : speed (m/s) at or below which one has no front
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    reach     : distance beyond which nobody counts as a neighbour, m
+    slowest   : speed (m/s) at or below which one has no front
     In space distances and angles are horizontal, as in `density_map`; nan where nobody has a neighbour within reach.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> corners = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0]])
+    >>> moved = corners + np.arange(5)[:, None, None] * np.array([1.0, 0.0])
+    >>> group = airflock.load_tracks(moved, unit="m", fps=1.0)
+    >>> airflock.measures.surroundings.anisotropy(group, reach=3.0)  # the nearest one is beside
+    -1.0
     """
     sound(reach=reach, slowest=slowest)
     found = states(recording)
@@ -67,4 +92,4 @@ def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> flo
             if apart[k, j] <= reach and apart[k, j] > 0.0:
                 along = float(ahead[:, i] @ offset[:, k, j]) / apart[k, j]
                 total, count = total + 2.0 * along * along - 1.0, count + 1
-    return total / count if count else float("nan")
+    return float(total / count) if count else float("nan")

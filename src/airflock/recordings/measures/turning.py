@@ -9,8 +9,18 @@ from airflock.recordings.measures.states import headings, sound, states
 def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
     """Rate of turn of the horizontal heading, (time, individual), rad/s; nan across absences.
 
-    slowest : speed (m/s) at or below which one has no heading
+    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    slowest   : speed (m/s) at or below which one has no heading
     A frame holds the turn between the frames on its two sides; at the ends, to the only one there is.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> angle = 0.1 * np.arange(20)[:, None]
+    >>> circle = airflock.load_tracks(np.stack([np.cos(angle), np.sin(angle)], axis=-1), unit="m", fps=10.0)
+    >>> round(float(airflock.measures.turning.turning_speed(circle)[10, 0]), 3)
+    1.0
     """
     sound(slowest=slowest)
     found = states(recording)
