@@ -139,9 +139,9 @@ def _option_faults(vehicle: str, body: str | None, mode: str, card_file: Path | 
         if word is not None and word not in known
     ]
     if card_file is not None and mode == MODES[0]:
-        faults.append(f"--card {card_file}: lock-step flies faster than anybody watches; add --mode tasks or processes")
+        faults.append(f"--card {card_file}: in lock-step it flies too fast to watch; add --mode tasks or processes")
     if against not in (None, "simulator"):
-        faults.append(f"--against {against}: only simulator can be compared with")
+        faults.append(f"--against {against}: only simulator is known")
     return faults
 
 
@@ -206,7 +206,7 @@ def _write_card(path: Path, card: Any, found: Any, seeds: int) -> None:
     from airflock.fleet.starting import write_for_watching
 
     if found.varied and seeds > 1:
-        options.refuse([f"--card {path}: tolerances give each seed a card of its own; add --seeds 1"])
+        options.refuse([f"--card {path}: with tolerances each seed has its own card; add --seeds 1"])
     write_for_watching(path, card)
     tables.say(f"wrote {path} and its key; airflock watch {path} shows the fleet")
 

@@ -270,7 +270,7 @@ def _judge(found: BodyFit, logs: Logs) -> None:
     if found.dead_time > 0.5 * tau:
         found.notes.append(f"commands act {found.dead_time:.2g} s late, more than half of tau: this body does not fit")
     elif found.dead_time > 1.5 * step:
-        found.notes.append(f"commands act about {found.dead_time:.2g} s late; a body has no number for that")
+        found.notes.append(f"commands act about {found.dead_time:.2g} s late; no parameter of a body describes that")
     if found.together > 0.2:
         found.notes.append(
             f"unexplained accelerations of the drones correlate ({found.together:.2f}): gusts that all feel"

@@ -107,8 +107,9 @@ def load_tracks(
     Returns
     -------
     xarray.Dataset
-        (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; differentiated where it is not
-        logged), command (m/s) where logged, confidence.
+        (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; differentiated where it is
+        not logged: central differences, one-sided at both ends of a track and of gaps), command (m/s) where
+        logged, confidence.
 
     Raises
     ------
@@ -141,7 +142,8 @@ def load_tracks(
     findings.refuse()
     if not all(track.has(VELOCITY) for track in tracks):
         findings.notes.append(
-            "no velocity: differentiated from positions; axes and units could not be checked against them"
+            "no velocity: differentiated from positions, one-sided at both ends of a track and of gaps; axes and units "
+            "could not be checked against them"
         )
     times, period = grid.grid_of(tracks, rate, begin, end)
     sources = sorted({track.source for track in tracks})
