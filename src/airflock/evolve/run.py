@@ -12,6 +12,7 @@ from airflock.errors import StudyError
 from airflock.evolve.fitness import Objective, Own
 from airflock.evolve.folder import open_folder, sweep, versions
 from airflock.evolve.pictures import draw
+from airflock.evolve.result import Result
 from airflock.evolve.resumed import resumed
 from airflock.evolve.search import Watch, search
 from airflock.evolve.search_table import fast as fast_keys
@@ -20,7 +21,7 @@ from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import Study, load_study, make_study, with_limits
-from airflock.evolve.winner import Result, conclude
+from airflock.evolve.winner import conclude
 from airflock.executors import Executor, Score
 from airflock.executors.cluster import Cluster, fly_on_their_cpu
 from airflock.executors.in_process import InProcess
