@@ -270,6 +270,7 @@ def vocabulary() -> None:
         "settled": "of an order parameter: whether nobody farther than `beyond` (m) can change its Pair",
         "fitness": "of a metric set: named values of a whole flight, from its order parameters",
         "limits": "of a body: what it cannot fly of a scenario, as lines of text",
+        "endures": "of a body: time for which its battery lasts at least, s; 0 once it is empty",
         "measure": "of a sensor: the position and velocity that an agent believes, and its Memory if it has one",
         "error": "of a sensor: the errors of position and velocity along one axis after one more measurement",
         "exact": "of a sensor: whether it has no error with these numbers",

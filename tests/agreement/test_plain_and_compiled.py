@@ -7,7 +7,7 @@ import pytest
 
 import covering
 from airflock.engine import plan_of
-from flocks import IDEAL, flown, scenario
+from flocks import IDEAL, flown, interpreted, scenario
 from inside import cpu, tables
 from reference.flight import fly_plainly
 
@@ -85,3 +85,16 @@ def test_a_crowd_without_room_is_refused_by_both(seed):
     assert status < 0
     plan = plan_of(found, precision=64, record=True)
     assert cpu.fly(plan, tables(found, plan, seed)).status == status
+
+
+def test_drones_that_land_with_an_empty_battery_are_absent_in_both(seed):
+    """The same driver text, interpreted: from 6 to 14 m they fall within the flight."""
+    keys = {
+        "agents": 5, "duration": 5.0, "world.dimensions": "3", "world.floor": 6.0, "world.ceiling": 14.0,
+        "body.kind": "quadrotor", "body.battery": "lithium", "body.capacity": 300.0, "start.separation": 3.0,
+    }  # fmt: skip
+    found = scenario("vasarhelyi_2018", **{key.replace(".", "__"): value for key, value in keys.items()})
+    plain, other = fly_plainly(found, seed), interpreted(found, seed)
+    assert np.isnan(plain.frames[-1]).any() and 0.2 < plain.values["present"] < 1.0
+    np.testing.assert_allclose(other.frames, plain.frames, rtol=0.0, atol=1e-9)
+    assert other.values == pytest.approx(plain.values, rel=1e-9, abs=1e-9, nan_ok=True)

@@ -169,7 +169,7 @@ def test_what_cannot_be_is_refused_at_once():
     with pytest.raises(ScenarioError) as told:
         airflock.load("vasarhelyi_2018/4ms", {"topology.kind": "voronoi", "world.dimensions": "3", "topology.k": 2.5})
     assert "topology.k = 2.5 is not a whole number" in str(told.value)
-    with pytest.raises(ScenarioError, match="cells are found in a plane"):
+    with pytest.raises(ScenarioError, match="works in a plane only"):
         airflock.load("vasarhelyi_2018/4ms", {"topology.kind": "voronoi", "world.dimensions": "3"})
     alone = model({"Parameters": Nothing, "decide": lambda period: (period, 0.0, 0.0), "COMMAND": "velocity"}, "alone")
     with pytest.raises(ScenarioError, match="has no rule for single neighbours"):

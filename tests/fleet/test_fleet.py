@@ -265,7 +265,7 @@ FAULTS = [
     (Fault("gnss", (2,), 56.0), {2: Phase.DONE}, "no position for too long"),
     (Fault("battery", (2,), 56.0, amount=20.0), {2: Phase.DONE}, "just enough for the way home"),
     (Fault("battery", (2,), 56.0, amount=5.0), {2: Phase.DONE}, "battery is critical"),
-    (Fault("outage", (), 56.0), {1: Phase.DONE, 2: Phase.DONE, 3: Phase.DONE}, "nobody is heard for too long"),
+    (Fault("outage", (), 56.0), {1: Phase.DONE, 2: Phase.DONE, 3: Phase.DONE}, "nobody has been heard for too long"),
 ]
 
 
@@ -532,7 +532,7 @@ def test_a_node_on_sockets_gets_ready_and_its_log_is_flown_again(tmp_path):
 
 
 def test_a_full_disk_does_not_bring_a_drone_down(tmp_path):
-    """Its log and its memory cannot be written any more: it says so, once for each, and ticks on."""
+    """Its log and its memory can no longer be written: it says so, once for each, and ticks on."""
 
     class Full(io.StringIO):
         def write(self, text):

@@ -172,7 +172,7 @@ def test_nothing_arms_without_a_start_and_nothing_starts_with_something_missing(
     assert node.phase == Phase.READY and not vehicle.armed
     assert {n for n in notes if n.startswith("missing")} == {
         "missing: drone 2 is not heard", "missing: drone 3 is not heard",
-    } | {n for n in notes if "autopilot has not told" in n}  # fmt: skip
+    } | {n for n in notes if "autopilot has not reported" in n}  # fmt: skip
     node.radio(order(Do.START, given=STARTED + 3_000_000, at=STARTED + 3_000_000), 3.0)
     live(node, vehicle, 3.2, 10.0)
     assert node.phase == Phase.READY and not vehicle.armed
@@ -282,10 +282,10 @@ def test_a_card_is_written_and_read_and_its_change_is_seen(tmp_path):
     ({"law": {"kind": "dimock_2003"}}, "no single drone can fly it"),
     ({"safety": {"speed_max": 900.0, "breake": 2.0}}, "safety.speed_max = 900 m/s lies outside"),
     ({"safety": {"breake": 2.0}}, "safety.breake is not known; did you mean safety.brake"),
-    ({"fence": {"corners": [[0, 0], [1, 0], [0, 1]], "low": 2.0, "high": 60.0}}, "does not hold the law's walls"),
+    ({"fence": {"corners": [[0, 0], [1, 0], [0, 1]], "low": 2.0, "high": 60.0}}, "does not enclose the law's walls"),
     ({"fence": {"corners": [[0, 0], [9, 0], [0, 9], [9, 9.5]], "low": 2.0, "high": 60.0}}, "crosses or touches itself"),
     ({"site": {"latitude": 95.0, "longitude": 0.0, "altitude": 0.0}}, "site.latitude = 95 lies outside"),
-    ({"world": {"arena": "square", "side": 120.0, "edges": "periodic"}}, "real space is open"),
+    ({"world": {"arena": "square", "side": 120.0, "edges": "periodic"}}, "real space has no such edges"),
 ])  # fmt: skip
 def test_what_is_wrong_with_a_card_is_one_line(change, line):
     made = {**document(SCENARIO), **change}

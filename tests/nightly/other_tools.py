@@ -2,12 +2,14 @@
 
     python tests/nightly/other_tools.py FOLDER
 
-Makes the environment in FOLDER once (some 1.5 GB), and runs tests/unit/test_other_tools.py there. Tells which versions
+Makes the environment in FOLDER once (some 1.5 GB), and runs tests/unit/test_other_tools.py and examples/real_fish.py
+there. Tells which versions
 pip gave. `movement` names its dimensions otherwise since 0.17, which needs a newer Python than 3.11: where one is at
 hand, another environment tests that layout, else a line says that it was not run. Status 0 if every test ran and
 passed: one that was skipped has shown nothing.
 """
 
+import os
 import shutil
 import subprocess
 import sys
@@ -15,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOLS = ("movement", "trajectorytools")
-NEWER = ("python3.14", "python3.13", "python3.12")
+NEWER = ("3.14", "3.13", "3.12")
 RENAMED = (0, 17)  # from this release of movement on the dimensions are keypoint and individual
 
 
@@ -32,7 +34,8 @@ def made(folder: Path, interpreter: str) -> Path:
 def tested(folder: Path, interpreter: str) -> tuple[bool, str]:
     """Whether every test ran and passed in an environment of an interpreter, and the version of movement there."""
     python = made(folder, interpreter)
-    tests = [python, "-m", "pytest", "-n", "0", "-q", "-rs", str(ROOT / "tests" / "unit" / "test_other_tools.py")]
+    files = ("unit/test_other_tools.py", "unit/test_examples.py::test_example_runs[real_fish]")
+    tests = [python, "-m", "pytest", "-n", "0", "-q", "-rs", *(str(ROOT / "tests" / name) for name in files)]
     ran = subprocess.run(tests, cwd=ROOT, capture_output=True, text=True)
     print(ran.stdout, ran.stderr)
     asked = f"from importlib.metadata import version; print(*(f'{{t}} {{version(t)}}' for t in {TOOLS}), sep=', ')"
@@ -42,10 +45,15 @@ def tested(folder: Path, interpreter: str) -> tuple[bool, str]:
     return sound, versions.split(",")[0].split()[1]
 
 
-def works(interpreter: str) -> bool:
-    """Whether an interpreter is at hand; some names only stand for one that could be installed."""
-    found = shutil.which(interpreter)
-    return found is not None and subprocess.run([found, "-c", "import venv"], capture_output=True).returncode == 0
+def newer() -> str | None:
+    """A newer interpreter that is at hand: by its name, or among those that pyenv keeps."""
+    kept = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
+    for version in NEWER:
+        for found in (shutil.which(f"python{version}"), *sorted(kept.glob(f"{version}.*/bin/python"))):
+            # some names only stand for one that could be installed
+            if found and subprocess.run([found, "-c", "import venv"], capture_output=True).returncode == 0:
+                return str(found)
+    return None
 
 
 def is_renamed(version: str) -> bool:
@@ -61,11 +69,11 @@ def main() -> int:
     if is_renamed(version):
         print("not run: the layout of movement up to 0.16, which pip gives on Python 3.11 alone")
         return 0 if sound else 1
-    newer = next((name for name in NEWER if works(name)), None)
-    if newer is None:
-        print(f"not run: the layout of movement from 0.17 on, which needs one of {', '.join(NEWER)}")
+    later = newer()
+    if later is None:
+        print(f"not run: the layout of movement from 0.17 on, which needs Python {', '.join(NEWER)}")
         return 0 if sound else 1
-    other, version = tested(folder / "newer", newer)
+    other, version = tested(folder / "newer", later)
     if not is_renamed(version):
         print(f"not run: the layout of movement from 0.17 on; pip gave {version}")
     return 0 if sound and other else 1

@@ -140,6 +140,41 @@ def test_batteries_of_groups_differ_and_are_told(seed):
     assert flight.look(1).body.thrust == pytest.approx(0.0, abs=1e-6) and flight.look(0).body.thrust > 0.5
 
 
+FALLING = {
+    "body.kind": "quadrotor", "body.battery": "lithium", "body.capacity": 450.0, "agents": 4, "duration": 8.0,
+    "world.dimensions": "3", "world.walls": "every_edge", "world.floor": 0.0, "world.ceiling": 40.0,
+    "start.separation": 5.0, "groups": [{"name": "new", "agents": [1], "body": {"capacity": "1 Wh"}}],
+}  # fmt: skip
+
+
+def test_whoever_falls_with_an_empty_battery_is_absent_on_the_ground(seed):
+    """Motors stop after 3 s; from 40 m at most the ground is reached within 4 s more. The cuts change nothing."""
+    scenario, found = load("vasarhelyi_2018/4ms", FALLING), []
+    for steps in (1000, 7):
+        flight = airflock.open(scenario, seed, record=True, device="python")
+        while not flight.over:
+            flight.advance(steps=steps)
+        flight.finish()
+        found.append(flight.frames.tobytes())
+    heights = flight.frames[:, 2]
+    assert found[0] == found[1] and np.nanmin(heights) > 0.0
+    assert flight.present.tolist() == [False, True, False, False]
+    assert np.isfinite(heights[flight.frame_times < 3.0]).all() and np.isfinite(heights[:, 1]).all()
+    assert np.isnan(heights[-1, [0, 2, 3]]).all() and 0.25 < flight.scores()["present"] < 0.9
+
+
+def test_a_note_says_what_becomes_of_whoever_is_empty():
+    def said(**keys):
+        return next(note for note in load("vasarhelyi_2018/4ms", FALLING | keys).notes if "motors stop" in note)
+
+    assert said().endswith("its motors stop, and on the ground it is absent")
+    free = {"world.floor": None, "world.ceiling": None}
+    nowhere = free | {"world.arena": "none", "start.kind": "ball", "start.radius": 30.0}
+    assert "falls without end, and counts; give a ground" in said(**nowhere)
+    assert said(**nowhere | {"scene.kind": "forest"}).endswith("on the ground it is absent")
+    assert said(**free | {"world.dimensions": "2"}).endswith("it stays in the plane and counts")
+
+
 @pytest.mark.parametrize("battery", ["endless", "lithium"])
 def test_any_cuts_of_a_flight_with_a_memory_give_its_bits(battery, seed):
     keys = {"body.kind": "quadrotor", "agents": 4, "duration": 4.0, "start.separation": 5.0, "wind.gust": 1.0}

@@ -88,7 +88,9 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
     begun = begin(scenario, seed, place) if start is None else given(start, dims)
     flock = [boarded(scenario, seed, place, i, state) for i, state in enumerate(begun)]
     due, here = begins(scenario, seed), 0
-    may_leave = any(entry.fault.leaves for entry in scenario.faults if entry.fault in scenario.fault_kinds)
+    may_leave = scenario.lands or any(
+        entry.fault.leaves for entry in scenario.faults if entry.fault in scenario.fault_kinds
+    )
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
     chosen = scenario.order_parameters if metrics is None else metrics
@@ -156,7 +158,7 @@ def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -
 
 
 def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any]) -> bool:
-    """Let begin what is due; whether somebody dropped out."""
+    """Let begin what is due, and drop out who has landed with an empty battery; whether somebody dropped out."""
     left = False
     for number, entry, lasts, leaves in due.get(step, ()):
         agent = flock[number]
@@ -173,6 +175,12 @@ def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any
         agent.faults[entry.fault.name] = Suffering(entry.fault, entry.numbers, step * dt, lasts, known, 0.5 * dt)
         order = [kind.name for kind in scenario.fault_kinds]  # a later kind disturbs what an earlier one has left
         agent.faults = dict(sorted(agent.faults.items(), key=lambda item: order.index(item[0])))
+    for number, agent in enumerate(flock if scenario.lands else ()):
+        low = agent.present and agent.state.z <= scenario.ground
+        if low and scenario.vehicle.lasts(memory=agent.kept, b=agent.b, wing=scenario.wing) <= 0.0:
+            agent.present, left = False, True
+            for other in flock:
+                other.pilot.forget(number)
     return left
 
 

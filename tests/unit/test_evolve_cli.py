@@ -42,6 +42,12 @@ def test_evolve_prints_json_its_best_flies_and_hardens(tmp_path):
     assert again.returncode == 2 and "continue it with --resume" in again.stderr
     resumed = json.loads(called(*asked, "--resume").stdout)
     assert resumed["parameters"] == found["parameters"] and resumed["fitness"] == found["fitness"]
+    bare = called("evolve", NAME, "--resume", "--json", "--out", tmp_path / "a")
+    assert "search.population = 4, search.generations = 2" in bare.stderr and "goes on with what" in bare.stderr
+    assert json.loads(bare.stdout)["fitness"] == found["fitness"]
+    other = called("evolve", NAME, "--resume", "--population", 6, "--out", tmp_path / "a")
+    assert other.returncode == 2 and other.stderr.count("\n") == 1, other.stderr
+    assert "holds another study: search.population = 4 there, 6 now; give another --out, or ask for" in other.stderr
     out = tmp_path / "flyable.toml"
     hardened = called("harden", tmp_path / "a", "--out", out, "--seeds", 5, "--json")
     steps = json.loads(hardened.stdout)["steps"]

@@ -15,7 +15,7 @@ from flocks import interpreted
 from reference.flight import fly_plainly
 
 ROOT = Path(__file__).parents[2]
-NEEDS = {"gym_env": "gymnasium"}  # examples that need what we do not install
+NEEDS = {"gym_env": "gymnasium", "real_fish": "trajectorytools"}  # examples that need what we do not install
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)

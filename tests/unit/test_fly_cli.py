@@ -31,7 +31,7 @@ def airflock(monkeypatch, capsys, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "the following arguments are required: --autopilot, --radio; python -m airflock.onboard --help tells"),
+        ([], "the following arguments are required: --autopilot, --radio; python -m airflock.onboard --help lists"),
         (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--memeber", "3"], "unrecognized arguments: --memeber 3"),
         (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--member", "x"], "argument --member: invalid int value"),
         (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--i-am"], "unrecognized arguments: --i-am; "),

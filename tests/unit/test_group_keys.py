@@ -73,6 +73,11 @@ def test_an_open_flight_takes_a_key_of_a_group(seed):
         ("groups.old.one.p_rep", "unknown key; did you mean groups.old.ones.model.p_rep"),
         ("groups.light.damping", "unknown key; did you mean groups.light.sensors.damping"),
         ("groups.light.zz", "did you mean groups.light.SECTION.zz; sections: model, body, sensors"),
+        (
+            "groups.heavy.agents",
+            r"agents: a setting changes only model, body, sensors of a group; write it in the file's",
+        ),
+        ("groups.old.ones.name", r"a setting changes only model, body, sensors of a group; write it in the file's"),
         ("groups.nobody.tau", "unknown key; write groups.NAME.SECTION.KEY"),
         ("groups.heavy", "unknown key; write groups.NAME.SECTION.KEY"),
         ("groups.heavy.body.tua", r"groups\[0\].body.tua: unknown key; did you mean groups.0..body.tau"),
@@ -83,7 +88,9 @@ def test_a_wrong_key_is_said_in_one_line(key, said):
     with pytest.raises(ScenarioError, match=said) as caught:
         flock({key: 1.0})
     assert len(str(caught.value).splitlines()) == 1
-    with pytest.raises(ScenarioError, match=r"groups.heavy.body.tau: the scenario has no \[\[groups\]\]"):
+    with pytest.raises(
+        ScenarioError, match=r"groups.heavy.body.tau: the scenario has no \[\[groups\]\]; write them in"
+    ):
         load(PAPER, {"groups.heavy.body.tau": 1.0})
 
 

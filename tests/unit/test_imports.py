@@ -549,6 +549,18 @@ def test_a_column_of_heights_without_one_is_none():
     )
 
 
+def test_differentiated_velocities_are_one_sided_at_the_ends_and_a_note_says_so():
+    """Of x = t²/2 central differences are exact; at both ends they are half a frame off."""
+    t = 0.1 * np.arange(20)
+    found = airflock.load_tracks({"t": t, "id": ["a"] * 20, "x": 0.5 * t**2, "y": t}, unit="m", time_unit="s")
+    east = values(found, "velocity")[:, 0].ravel()
+    np.testing.assert_allclose(east[1:-1], t[1:-1], atol=1e-5)
+    np.testing.assert_allclose(east[[0, -1]], [0.05, t[-1] - 0.05], atol=1e-5)
+    assert (
+        "differentiated from positions, one-sided at both ends of a track and of gaps" in found.attrs["airflock_import"]
+    )
+
+
 def test_velocities_that_are_not_there_are_differentiated():
     table = circle()
     bare = values(airflock.load_tracks(table[["t", "x", "y"]]), "velocity")

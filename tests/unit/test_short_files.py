@@ -96,6 +96,8 @@ def test_a_last_word_that_one_section_has_is_that_key():
             "sensors.noise (variance of the velocity error)",
         ),
         ("delai", "delai: unknown key; did you mean radio.delay?"),
+        ("extends", "extends: only a file has it; name the preset or file that it extends in place of this one"),
+        ("format", "format: only a file has it; leave it out"),
         ("agnets", "agnets: unknown key; did you mean agents?"),
     ],
 )

@@ -17,7 +17,7 @@ import toys
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.batched import Batched
 from airflock.evolve.folder import open_folder
-from airflock.evolve.run import Interrupted, on_device, run, score_of
+from airflock.evolve.run import Interrupted, asked_for, on_device, run, score_of, study_of
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import FILE, Batch, Store
 from airflock.evolve.study import differences, load_study, shipped
@@ -172,6 +172,20 @@ def test_folders_are_never_written_over(tmp_path):
     (tmp_path / "c" / "thesis.txt").write_text("years of work")
     with pytest.raises(StudyError, match="is not empty"):
         open_folder(tmp_path / "c", study, resume=False)
+
+
+def test_a_study_goes_on_with_what_its_folder_holds(tmp_path):
+    """Settings, keys of the search and limits need not be asked for again; what is, counts."""
+    first = {"agents": 5, "radio.kind": "links", "model.p_rep": 0.1}, {"generations": 2, "seeds": 2}, "r_min<3 at 1%"
+    name, folder = "vasarhelyi_2018/6ms", tmp_path / "a"
+    begun = study_of(name, first[0], search_keys=first[1], limit=first[2])
+    open_folder(folder, begun, resume=False)
+    again, told = asked_for(name, folder=folder)
+    assert again.document() == begun.document() and "agents = 5" in told and "limit = ['r_min<3 at 1%']" in told
+    open_folder(folder, again, resume=True)
+    other, _ = asked_for(name, {"agents": 6}, search_keys={"generations": 3}, folder=folder)
+    assert other.scenario.agents == 6 and other.search.generations == 3 and other.search.seeds == 2
+    assert asked_for(name, first[0], search_keys=first[1], limit=first[2], folder=folder)[1] == ""
 
 
 def test_files_that_are_no_store_and_full_disks_are_one_line(tmp_path):

@@ -101,7 +101,7 @@ def test_every_word_of_the_vocabulary_has_a_type():
             f"class {name}: pass\n" for name in ("Sums", "Walls", "Memory", "Shared", "Pair", "Agent", "Packet")
         )
         text += "class Member: pass\nclass Cluster: pass\nclass Parameters: pass\n"
-        beside = {"limits": ["move"], "exact": ["measure"], "bounds": ["measure"]}
+        beside = {"limits": ["move"], "endures": ["move"], "exact": ["measure"], "bounds": ["measure"]}
         beside |= dict.fromkeys(("decide", "meet", "move", "sample", "measure", "error", *FAULT), [])
         beside |= {"missed": [], "receive": [], "late": [], "missed_few": ["missed"], "carry": ["late"]}
         beside |= {"see": [], "lasts": ["see"]}

@@ -1,5 +1,6 @@
 """The verb validate: the faults of all files together, and studies as well as scenarios."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,26 @@ def test_faults_of_all_files_are_told_whatever_they_are(tmp_path):
         assert any(line.startswith(str(name)) for line in lines), (name, lines)
     assert all(line.startswith(str(tmp_path)) for line in lines)
     assert "zapotecatl_2016/best: valid" in done.output
+
+
+def test_verdicts_notes_and_faults_are_told_as_json(tmp_path):
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text('extends = "vasarhelyi_2018/4ms"\nagnets = 3\n[radio]\ndelay = -1')
+    done = validate("vasarhelyi_2018/4ms", wrong, "--json")
+    assert done.exit_code == 2 and done.stderr == ""
+    right, bad = json.loads(done.stdout)["files"]
+    assert right == {
+        "file": "vasarhelyi_2018/4ms", "verdict": "valid; vasarhelyi_2018, 100 agents, 600 s",
+        "notes": [], "faults": [],
+    }  # fmt: skip
+    assert bad["file"] == str(wrong) and bad["verdict"] is None
+    assert bad["faults"] == [
+        f"{wrong}: agnets: unknown key; did you mean agents?",
+        f"{wrong}: radio.delay = -1 s lies outside [0, 30] s",
+    ]
+    noted = validate("vasarhelyi_2018/4ms", "--set", "radio.delay=600 ms", "--json")
+    (entry,) = json.loads(noted.stdout)["files"]
+    assert noted.exit_code == 0 and entry["notes"] == ["radio.delay = 600 ms is 0.6 s"] and entry["faults"] == []
 
 
 def test_a_study_is_checked_as_one(tmp_path):

@@ -11,6 +11,7 @@ falls linearly with the energy that was drawn, and is zero once the battery is e
 import math
 from typing import Any
 
+from airflock.core.maths import FAR
 from airflock.core.parameters import choice, quantity
 
 
@@ -41,3 +42,10 @@ def hovering(thrust, density, b):
 def left(used, b):
     """Share of the largest thrust that is left when `used` J are drawn: 1 full, b.weak at the end, 0 when empty."""
     return 0.0 if used >= b.capacity else 1.0 - (1.0 - b.weak) * used / b.capacity
+
+
+def lasting(used, power, b):
+    """Time (s) for which a battery lasts at least, at a power (W) that nothing exceeds; 0 once it is empty."""
+    if b.battery == "endless":
+        return FAR
+    return max(b.capacity - used, 0.0) / max(power, 1e-6)

@@ -13,7 +13,8 @@ a largest rate of roll; there is no sideslip, no pitch dynamics and no flap. All
 aircraft is taken to know: wind is a true airspeed, and a velocity over ground is followed with the nose into the wind.
 
 Energy is the work of thrust over `use`. With body.battery = "lithium" the largest thrust falls with it as in
-`body.battery`; when the battery is empty the aircraft glides. In a plane, which holds its height, it only grows slower.
+`body.battery`; when the battery is empty the aircraft glides, and on the ground it is absent from then on. In a plane,
+which holds its height, it only grows slower.
 
 Integration: V, γ and χ one after another with the values after the step of the controllers, of first order in dt; turns
 keep the speed exactly. In a plane the height is held by the plane itself.
@@ -23,7 +24,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.body.battery import battery_end, battery_energy, battery_kind, left
+from airflock.body.battery import battery_end, battery_energy, battery_kind, lasting, left
 from airflock.core.maths import arc_cosine, clamp, norm
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import quantity
@@ -113,6 +114,11 @@ def largest_thrust(v, used, wing, b):
     if b.battery == "lithium":
         possible = possible * left(used, b)
     return possible
+
+
+def endures(memory, b):
+    """Time (s) for which the battery lasts at least: at the largest power."""
+    return lasting(memory.energy, b.power_max / b.use, b)
 
 
 def climbing(up, v, drag, slow, possible, b):

@@ -10,7 +10,8 @@ Forces are per mass. Drag is relative to the air: a part proportional to the spe
 et al. 2018) and a part that grows with its square; both, and the largest thrust, grow with the density of the air.
 
 With body.battery = "lithium" energy is drawn as in `body.battery`, the largest thrust falls with it, and when the
-battery is empty the motors stop: in space the quadrotor falls, in a plane drag brings it to rest.
+battery is empty the motors stop: in space the quadrotor falls, and on the ground it is absent from then on; in a plane
+drag brings it to rest.
 
 Integration: semi-implicit Euler, of first order in dt. In a plane the height is held by the plane itself.
 """
@@ -19,7 +20,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.body.battery import battery_end, battery_energy, battery_kind, hovering, left
+from airflock.body.battery import battery_end, battery_energy, battery_kind, hovering, lasting, left
 from airflock.core.maths import norm, shorten
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import quantity
@@ -116,6 +117,12 @@ def limits(b, dt):
     if dt <= longest:
         return []
     return [f"dt = {dt:g} s: body quadrotor with these gains flies in steps of at most {longest:.3g} s"]
+
+
+def endures(memory, b):
+    """Time (s) for which the battery lasts at least: at the largest thrust."""
+    air = b.rho / b.rho_0
+    return lasting(memory.used, hovering(max(memory.thrust, b.thrust_max * air), air, b), b)
 
 
 def wanted(ex, ey, ez, ix, iy, iz, b):

@@ -31,11 +31,11 @@ def refuse(campaign: Campaign) -> None:
     """Refuse what cannot be split, before anything flies."""
     faults = []
     if not any(limit.score == "r_min" for limit in campaign.limits):
-        faults.append("--split: is for limits on r_min; there is none")
+        faults.append("--split needs a limit on r_min, such as --limit 'r_min<1 at 1e-4/h'")
     if campaign.scenario.world.edges == "periodic":
-        faults.append("--split: distances across the edges of a periodic world are not followed")
+        faults.append("--split does not follow distances across the edges of a periodic world; leave it out")
     if campaign.uncertain:
-        faults.append("--split: all flights are of one scenario; leave out --uncertain")
+        faults.append("--split flies one scenario only; leave out --uncertain")
     if faults:
         raise ScenarioError(faults)
 
@@ -53,7 +53,7 @@ def split(flyer: Flyer, counted: Count, threads: int | None = None, where: str =
     try:
         seeds, least = _topped_up(flyer, own, values)
     except TimeOver:
-        return _refused(target, "time was over before there were flights enough to start from")
+        return _refused(target, "time ran out before there were enough flights to start from")
     share, runs, period = len(least) // REPETITIONS, [], sample_period(campaign.scenario)
     for number in range(REPETITIONS):
         fly = LineageFlyer(flyer, number, threads)
@@ -66,7 +66,7 @@ def split(flyer: Flyer, counted: Count, threads: int | None = None, where: str =
         try:
             runs.append(begun([seeds[i] for i in mine], [least[i] for i in mine], target, fly, period, rng, say))
         except TimeOver:
-            return _refused(target, f"time was over in repetition {number + 1} of {REPETITIONS}")
+            return _refused(target, f"time ran out in repetition {number + 1} of {REPETITIONS}")
     return _plain_values(campaign, estimate(runs, target, least), where or campaign.scenario.name)
 
 
@@ -104,7 +104,7 @@ def _topped_up(flyer: Flyer, seeds: list[int], least: list[float]) -> tuple[list
 
 
 class TimeOver(Exception):
-    """The budget was spent while flights were to be flown."""
+    """The time budget ran out before all flights were flown."""
 
 
 class LineageFlyer:
@@ -191,7 +191,7 @@ def _plain_values(campaign: Campaign, result: Estimate, where: str) -> dict[str,
     plain |= {"flights": flights, "repetitions": [[list(level) for level in r.levels] for r in result.repetitions]}
     if not result.refused:
         plain["statements"] = [
-            f"splitting, an estimate that shows nothing: r_min<{result.target:g} in {result.probability:.2g} of "
+            f"splitting, an estimate that proves nothing: r_min<{result.target:g} in {result.probability:.2g} of "
             f"flights ({result.low:.2g} to {result.high:.2g}), {plain['per_hour']:.2g} per flock hour, "
             f"from {flights:,} flights"
         ]
@@ -201,7 +201,7 @@ def _plain_values(campaign: Campaign, result: Estimate, where: str) -> dict[str,
         nearest.setdefault(particle.lineage.seed, particle)
     plain["worst"] = [_worst(campaign.scenario, p, where) for p in list(nearest.values())[:WORST]]
     if plain["worst"] and math.isfinite(plain["worst"][0]["r_min"]):
-        plain["statements"].append(f"nearest that splitting found: {plain['worst'][0]['replay']}")
+        plain["statements"].append(f"closest approach that splitting found: {plain['worst'][0]['replay']}")
     return plain
 
 

@@ -24,9 +24,9 @@ FEWEST = 20  # of them at least, where there are so many
 WORST = 5  # flights of each limit
 UNIT_WORDS = {"h": "per flock hour", "drone-h": "per drone hour", "flight": "per flight"}
 NOT_SAID = (
-    "the model was flown, no aircraft: a collision here is a distance of two centres",
-    "no faults, no pilot and no common GNSS jump but those that the scenario holds",
-    "the confidence is about chance within this scenario; numbers that are wrong in it are not covered",
+    "the model was flown, not an aircraft: a collision here is a distance between two centres",
+    "only the faults that the scenario contains are covered; no pilot, and no GNSS jump that hits all at once",
+    "the confidence covers chance within this scenario, not numbers that are wrong in it",
     "this is not an airworthiness or SORA document",
 )
 
@@ -212,7 +212,7 @@ def statement(campaign: Campaign, verdict: Verdict, rate: float = 0.0) -> str:
         could = f"{campaign.told(limit, verdict.could):.2g} {UNIT_WORDS[limit.unit]}"
         return f"{limit.text}: not shown: needs {verdict.needs:,} flights{time}; the given time can show {could}"
     if verdict.high == 1.0 and not verdict.refuted:
-        return f"{limit.text}: not shown: time was over before enough flights: {flown}"
+        return f"{limit.text}: not shown: time ran out before there were enough flights: {flown}"
     sure = f"with {100.0 * campaign.confidence:g} % confidence"
     said = f"{limit.event} happens at most {bound(campaign, verdict)}"
     if limit.timed and limit.unit == "h":

@@ -102,7 +102,7 @@ def checked(
         faults += _sums(document, campaign)
         rules = campaign.document()["rules"]
         if rules != flown["rules"]:
-            raise StudyError(f"{where}: its flights followed other rules (text {flown['rules']}, here {rules})")
+            raise StudyError(f"{where}: its flights were computed by other rules (text {flown['rules']}, here {rules})")
         found, notes = _flown_again(document, campaign, threads, done), _differences(flown)
     return Checked(len(document["check"]["digests"]), int(document["flights"]["count"]), (*faults, *found), notes)
 
@@ -137,7 +137,7 @@ def _shape_faults(document: Mapping[str, Any]) -> list[str]:
         digests, every = document["check"]["digests"], document["check"]["every"]
         if not all(isinstance(text, str) for text in digests) or len(digests) > MOST_DIGESTS or every < 1:
             faults.append("check")
-    return [f"{fault} is missing or not what a certificate holds there" for fault in faults[:5]]
+    return [f"{fault} is missing or of another type than a certificate has there" for fault in faults[:5]]
 
 
 def _wrong(name: str, table: Any, kinds: Kinds) -> list[str]:
@@ -207,7 +207,7 @@ def _flown_again(
     flown = in_threads([job(number) for number in numbers], 1 if campaign.device != "cpu" else threads, done)
     other = [number for number, now, then in zip(numbers, flown, wanted, strict=True) if now != then]
     return [f"flight {number}, seed {seed(campaign.hash, COUNT, number)}: other bits" for number in other[:5]] + (
-        [f"and {len(other) - 5} further flights with other bits"] if len(other) > 5 else []
+        [f"and {len(other) - 5} more flights with other bits"] if len(other) > 5 else []
     )
 
 

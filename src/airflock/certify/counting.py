@@ -1,4 +1,4 @@
-"""Counting: fly until a limit is shown, is refuted, or time is over; every flight is stored, every look is paid for."""
+"""Counting: fly until a limit is shown, is refuted, or time is over; each look spends part of the error."""
 
 import math
 import time
@@ -55,7 +55,7 @@ class Verdict:
 
     @property
     def refuted(self) -> bool:
-        """Whether the contrary is shown: the event happens more often."""
+        """Whether the opposite is shown: the event happens more often."""
         return self.probability is not None and not self.shown and self.low > self.probability
 
     @property
@@ -110,27 +110,27 @@ def count(flyer: Flyer, watch: Watch | None = None) -> Count:
 class _Counting:
     """Counting under way.
 
-    found : scores by number of the flight, in whatever order they landed; only a prefix without holes counts
+    scores : of flights by number, in whatever order they landed; only a prefix without holes counts
     """
 
     def __init__(self, flyer: Flyer, watch: Watch | None):
         self.flyer, self.watch = flyer, watch
         self.campaign = campaign = flyer.campaign
         self.began, self.fresh, self.chunk = time.monotonic(), 0, FIRST
-        self.found: dict[int, Mapping[str, Any]] = {}
+        self.scores: dict[int, Mapping[str, Any]] = {}
         for (_, number), values in flyer.store.flown(BATCH).items():
             if values is None:
                 raise StudyError(f"{flyer.store.path}: {_failure(campaign, number, _reason(flyer.store, number))}")
-            self.found[number] = values
+            self.scores[number] = values
         self.events = [0] * len(campaign.limits)
         self.told = Count([Verdict(limit, campaign.probability(limit)) for limit in campaign.limits], [])
         self.aims: list[int] = []
 
     def goes_on(self) -> bool:
-        """Take in what has landed; whether more flights can decide anything, and there is time for them."""
+        """Count the flights that have landed; whether more can decide anything, and there is time for them."""
         rows, verdicts = self.told.rows, self.told.verdicts
-        while len(rows) in self.found:
-            rows.append(self.found[len(rows)])
+        while len(rows) in self.scores:
+            rows.append(self.scores[len(rows)])
             for i, verdict in enumerate(verdicts):
                 self.events[i] += verdict.limit.happened(rows[-1])
                 due = _next(self.campaign, verdict)
@@ -154,7 +154,7 @@ class _Counting:
         return not all(verdict.needs for verdict in still)
 
     def _first(self, verdict: Verdict) -> int:
-        """Flights without an event that would show a limit; 0 where an upper bound is there already."""
+        """Flights without an event that would show a limit; 0 where there is an upper bound already."""
         return 0 if verdict.high < 1.0 else least(self.campaign, verdict.limit)
 
     def fly(self) -> None:
@@ -162,20 +162,20 @@ class _Counting:
         done = len(self.told.rows)
         flights = []
         for number in range(done, min(max(self.aims), done + self.chunk)):
-            if number not in self.found:
+            if number not in self.scores:
                 own = seed(self.campaign.hash, COUNT, number)
                 flights.append(Flight(0, number, self.campaign.parameters(own), own))
         for landed in self.flyer.fly(BATCH, flights):
             if landed.values is None:
                 raise StudyError(_failure(self.campaign, landed.flight.repeat, landed.reason))
-            self.found[landed.flight.repeat], self.fresh = landed.values, self.fresh + 1
+            self.scores[landed.flight.repeat], self.fresh = landed.values, self.fresh + 1
             self.told.rate = self.fresh / max(time.monotonic() - self.began, 1e-9)
             self._note()
 
     def _note(self) -> None:
         if self.watch:
-            total = max([*self.aims, len(self.found)])
-            self.watch(Progress(len(self.found), total, tuple(self.events), self.told.rate))
+            total = max([*self.aims, len(self.scores)])
+            self.watch(Progress(len(self.scores), total, tuple(self.events), self.told.rate))
 
 
 def _open(campaign: Campaign, verdict: Verdict) -> bool:
@@ -186,7 +186,7 @@ def _open(campaign: Campaign, verdict: Verdict) -> bool:
 
 
 def _next(campaign: Campaign, verdict: Verdict) -> tuple[int, float, float] | None:
-    """Flights at the coming look, and what its upper and its lower bound pay."""
+    """Flights at the next look, and the error probabilities spent on its upper and on its lower bound."""
     if campaign.flights:
         return None if verdict.looks else (campaign.flights, campaign.alpha, campaign.alpha)
     if verdict.probability is None:  # `run` gives every campaign without a rate a number of flights
@@ -206,8 +206,8 @@ def smallest(flights: float, alpha: float) -> float:
 
 
 def _reason(store: Store, number: int) -> str:
-    found = store.rows("SELECT reason FROM flight WHERE stage=? AND repeat=?", (BATCH.stage, number))
-    return str(found[0][0]) if found else ""
+    reasons = store.rows("SELECT reason FROM flight WHERE stage=? AND repeat=?", (BATCH.stage, number))
+    return str(reasons[0][0]) if reasons else ""
 
 
 def _failure(campaign: Campaign, number: int, reason: str) -> str:

@@ -45,6 +45,6 @@ class Flyer:
             yield landed
 
     def say(self, text: str) -> None:
-        """Tell what begins, if anybody listens."""
+        """Report what begins, if anybody asked for that."""
         if self.note:
             self.note(text)

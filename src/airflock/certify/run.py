@@ -48,7 +48,7 @@ def certify(
     watch: Watch | None = None,
     trust: bool = False,
 ) -> Certificate:
-    """Show by counting that an event is rare: exact bounds, all looks paid for, seeds fixed by the scenario.
+    """Show by counting that an event is rare: exact bounds that hold over all looks, seeds fixed by the scenario.
 
     Parameters
     ----------

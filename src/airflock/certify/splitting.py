@@ -145,7 +145,7 @@ def _moved(
 
 @dataclass(frozen=True)
 class Estimate:
-    """What repetitions say together.
+    """What the repetitions show together.
 
     probability, low, high : per flight, mean and 95 % t-interval of the logarithms; nan where refused says why
     """

@@ -39,7 +39,7 @@ TIME_OVER = "time was over"
 
 
 def usual_keys(scenario: Scenario) -> tuple[str, ...]:
-    """Numbers of the environment that a scenario uses and that a factor can move."""
+    """Numbers of the environment that a scenario uses and that a factor can change."""
     known = declared(scenario)
     links = scenario.transceiver.keeps
     of_links = ("radio.far", "radio.received_far")
@@ -61,7 +61,7 @@ def sound_keys(scenario: Scenario, keys: Sequence[str]) -> tuple[str, ...]:
             what = "a number of this scenario" if key in WORSE else "a number of the environment"
             faults.append(f"tolerance: {key} is not {what}; {hint}")
         elif not known[key][1]:
-            faults.append(f"tolerance: {key} = 0 in {scenario.name}; set the value from which it is to be moved")
+            faults.append(f"tolerance: {key} = 0 in {scenario.name}; give it a value that a factor can change")
     if faults:
         raise ScenarioError(faults)
     return tuple(dict.fromkeys(keys))
@@ -78,7 +78,7 @@ def tolerance(flyer: Flyer, counted: Count, keys: Sequence[str]) -> dict[str, An
     events = sum(any(limit.happened(row) for limit in campaign.limits) for row in counted.rows)
     told: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
     if not counted.rows or look(len(counted.rows), events, 1.0 - campaign.confidence, 0.0).high > level:
-        told["reason"] = f"as it stands the scenario is not shown to stay below {100.0 * level:g} % per flight"
+        told["reason"] = f"without any change, the scenario is not shown to stay below {100.0 * level:g} % per flight"
         return told
     for number, key in enumerate(keys):
         flyer.say(f"tolerance of {key}")

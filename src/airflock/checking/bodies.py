@@ -69,12 +69,12 @@ def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
     motions = [_motion(found, rng, speed) for _ in range(MOTIONS)]
     turn = turn_about_vertical(1.1)
     truths: Truths = {
-        "rule": ("the rule holds nothing that a compiler refuses", lambda: "".join(law.faults(found.move)[:1])),
+        "rule": ("the rule can be compiled", lambda: "".join(law.faults(found.move)[:1])),
         "rotation": ("a motion turned about the vertical turns", lambda: _turns(found, b, motions, turn, seed)),
         "mirror": ("a motion seen in a mirror is mirrored", lambda: _turns(found, b, motions, MIRROR, seed)),
         "rest": ("at rest, without a command, the velocity is finite", lambda: _rest(found, b)),
         "time step": ("halving dt shrinks the error", lambda: _time_step(found, b, motions)),
-        "units": ("in metres and seconds of another length it is the same", lambda: _units(found, b, motions, seed)),
+        "units": ("in other units of length and time it is the same", lambda: _units(found, b, motions, seed)),
         "single precision": ("the rule does not turn float32 into doubles", lambda: _single(found, b, motions)),
     }
     return reported(f"body {found.name}", truths, found.violates)
@@ -159,7 +159,7 @@ def _units(found: Body, b: Any, motions: list[Motion], seed: int) -> str:
             moved = _moved(found, other, scaled, 0.02 * units.second, rescaled(WING, units))
             fault = _apart(moved / scale["v"], _moved(found, b, motion, 0.02), number, seed)
             if fault:
-                return f"{fault}: a unit is declared wrong, or a number with a unit stands in the rule"
+                return f"{fault}: a unit is declared wrongly, or the rule contains a number that has a unit"
     return ""
 
 

@@ -72,15 +72,21 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
         return lambda: _same(scenario, flocks, [change(flock) for flock in flocks], seed)
 
     truths: Truths = {
-        "rules": ("no rule holds what a compiler refuses", lambda: _rules(scenario.order_parameters)),
-        "reports": ("every value that comes out has a unit and a meaning", lambda: _reports(scenario, flocks[0])),
-        "rotation": ("a flock turned about the vertical keeps its values", same(lambda flock: _turned(flock, turn))),
-        "translation": ("a flock shifted in space keeps its values", same(lambda flock: flock + shift)),
-        "mirror": ("a flock seen in a mirror keeps its values", same(lambda flock: _turned(flock, MIRROR))),
-        "renumbering": ("other numbers of the agents keep the values", same(lambda flock: flock[:, order])),
-        "lone agent": ("one agent alone gives numbers", lambda: _numbers(scenario, flocks[0][:, :1])),
-        "two agents": ("two agents in one place give numbers", lambda: _numbers(scenario, flocks[0][:, [0, 0]])),
-        "units": ("in other units each value changes as its unit says", lambda: _units(scenario, flocks, seed)),
+        "rules": ("every rule can be compiled", lambda: _rules(scenario.order_parameters)),
+        "reports": ("every value has a unit and a meaning", lambda: _reports(scenario, flocks[0])),
+        "rotation": (
+            "turning the flock about the vertical does not change the values",
+            same(lambda flock: _turned(flock, turn)),
+        ),
+        "translation": ("shifting the flock does not change the values", same(lambda flock: flock + shift)),
+        "mirror": ("mirroring the flock does not change the values", same(lambda flock: _turned(flock, MIRROR))),
+        "renumbering": ("renumbering the agents does not change the values", same(lambda flock: flock[:, order])),
+        "lone agent": ("a single agent gives finite values", lambda: _numbers(scenario, flocks[0][:, :1])),
+        "two agents": ("two agents at one place give finite values", lambda: _numbers(scenario, flocks[0][:, [0, 0]])),
+        "units": (
+            "in other units of length and time each value scales by its unit",
+            lambda: _units(scenario, flocks, seed),
+        ),
     }
     violates = {key: why for metric in found.metrics for key, why in metric.violates.items()}
     return reported(f"metrics {found.name}", truths, violates | dict(found.violates))
@@ -170,7 +176,8 @@ def _units(scenario: Scenario, flocks: Sequence[Flock], seed: int) -> str:
             wanted = {name: value * _factor(known, name, units) for name, value in values.items()}
             fault = _apart(_measured(other, flock * scale, q, units.second), wanted, CLOSE_IN_OTHER_UNITS)
             if fault:
-                return f"flock {number} of seed {seed}: {fault}: a unit is told wrong, or a number with a unit hides"
+                hidden = "a unit is declared wrongly, or a rule contains a number that has a unit"
+                return f"flock {number} of seed {seed}: {fault}: {hidden}"
     return ""
 
 

@@ -37,7 +37,7 @@ from airflock.scenarios.seeds import sound_seed
 SCENES = 12  # random scenes that each symmetry is tried on
 CLOSE = 1e-9  # of the largest command: more than rounding
 CLOSE_IN_FLIGHT = 1e-6  # of the flock's extent and speed: guards such as TINY, and what rounding grows to
-HIDDEN = "a unit is declared wrong, or a number with a unit stands in a rule"
+HIDDEN = "a unit is declared wrongly, or a rule contains a number that has a unit"
 
 
 def check_model(
@@ -100,18 +100,21 @@ def check_model(
             lambda: _same(made, scenes, [turned(s, t) for s, t in zip(scenes, turns, strict=True)], turns, seed),
         ),
         "translation": (
-            "a scene shifted in space leaves the command",
+            "shifting the scene does not change the command",
             lambda: _same(made, scenes, [shifted(s, made.length) for s in scenes], [np.eye(3)] * SCENES, seed),
         ),
         "mirror": (
             "a scene seen in a mirror mirrors the command",
             lambda: _same(made, scenes, [turned(s, MIRROR) for s in scenes], [MIRROR] * SCENES, seed),
         ),
-        "renumbering": ("other numbers of the agents leave the command", lambda: _renumbered(made, scenes, rng, seed)),
+        "renumbering": (
+            "renumbering the agents does not change the command",
+            lambda: _renumbered(made, scenes, rng, seed),
+        ),
         "lone agent": ("alone, an agent flies straight on at its preferred speed", lambda: _alone(made, rng)),
         "two agents": ("at any distance the command is finite", lambda: _pairs(made, rng)),
         "time step": ("halving dt shrinks the error", lambda: _time_step(made, seed)),
-        "units": ("in metres and seconds of another length it is the same flight", lambda: _units(made, scenes, seed)),
+        "units": ("in other units of length and time it is the same flight", lambda: _units(made, scenes, seed)),
         "single precision": ("no rule turns float32 into doubles", lambda: _single(made, scenes)),
     }
     if compiled:

@@ -28,7 +28,7 @@ SPEEDS = ("vx", "vy", "vz", "evx", "evy", "evz")
 def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a radio and return a report with one line a truth.
 
-    Chances lie between 0 and 1 and delays are not negative; data of this moment are believed as they are; what is
+    Chances lie between 0 and 1 and delays are not negative; a packet of age 0 is believed as it is; what is
     shifted is carried on shifted; in other units it is the same radio; rules stay in single precision. A radio that
     rightly breaks one of them says which and why: VIOLATES = {"place": "a mast stands in the origin"}.
 
@@ -64,11 +64,11 @@ def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed:
     pairs = list(_pairs(found, seed))
     rules = [rule for kind in RULES if (rule := getattr(found, kind)) is not None]
     truths: Truths = {
-        "rule": ("rules hold nothing that a compiler refuses", lambda: "".join(sum(map(law.faults, rules), [])[:1])),
+        "rule": ("every rule can be compiled", lambda: "".join(sum(map(law.faults, rules), [])[:1])),
         "chances": ("chances lie between 0 and 1, delays are not negative", lambda: _chances(found, k, pairs, seed)),
-        "fresh": ("data of this moment are believed as they are", lambda: _fresh(found, k, pairs, seed)),
-        "place": ("what is shifted is carried on shifted", lambda: _place(found, k, pairs, seed)),
-        "units": ("in metres and seconds of another length it is the same", lambda: _units(found, k, pairs, seed)),
+        "fresh": ("a packet of age 0 is believed as it is", lambda: _fresh(found, k, pairs, seed)),
+        "place": ("shifting the sender shifts where it is believed to be", lambda: _place(found, k, pairs, seed)),
+        "units": ("in other units of length and time it is the same", lambda: _units(found, k, pairs, seed)),
         "single precision": ("rules do not turn float32 into doubles", lambda: _single(found, k, pairs)),
     }
     return reported(f"radio {found.name}", truths, found.violates)
@@ -150,7 +150,7 @@ def _units(found: Radio, k: Any, pairs: list[dict[str, Any]], seed: int) -> str:
                 off = [(a, b) for a, b in both if abs(b - a) > CLOSE * max(abs(a), 1.0)]
                 if off:
                     told = f"pair {number} of seed {seed}: {kind} is {off[0][1]:.6g} instead of {off[0][0]:.6g}"
-                    return f"{told}: a unit is declared wrong, or a number with a unit stands in the rule"
+                    return f"{told}: a unit is declared wrongly, or the rule contains a number that has a unit"
     return ""
 
 

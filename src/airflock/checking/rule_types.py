@@ -46,7 +46,7 @@ SPECIAL = {
     "faults": {"edges": "str"},
 }
 # of the record of parameters, by owner
-LETTERS = {"p": LAW, "q": MEASURES, "b": ("move", "limits"), "s": SENSOR, "k": RADIO, "f": FAULT}
+LETTERS = {"p": LAW, "q": MEASURES, "b": ("move", "limits", "endures"), "s": SENSOR, "k": RADIO, "f": FAULT}
 STATE = f"tuple[{', '.join(['float'] * 6)}]"
 VECTOR = "tuple[float, float, float]"
 RESULTS = {
@@ -54,7 +54,7 @@ RESULTS = {
     "neighbour": "Sums", "boundary": "Walls", "decide": VECTOR, "move": VECTOR, "flock": "None", "survey": "None",
     "meet": "None",
     "pair": "Pair", "linked": "float", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",
-    "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
+    "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]", "endures": "float",
     "sense": STATE, "tell": STATE, "overrule": VECTOR, "motion": VECTOR, "clock": "float", "leaves": "float",
     "radio": "tuple[float, float]", "measure": STATE, "error": "tuple[float, float]", "exact": "bool",
     "settled": "bool", "bounds": "list[str]", "missed": "float", "missed_few": "float", "receive": "float",
@@ -68,7 +68,7 @@ def kinds_of(functions: set[str]) -> dict[str, str]:
     if "decide" in functions:
         kinds |= {name: name for name in (*LAW, *LAW_NUMBERS, "workspace")}
     if "move" in functions:
-        kinds |= {"move": "move", "limits": "limits"}
+        kinds |= {"move": "move", "limits": "limits", "endures": "endures"}
     if "sample" in functions or "fitness" in functions:
         kinds |= {name: name for name in (*MEASURES, "workspace", "total")}
     if "meet" in functions:

@@ -67,11 +67,11 @@ def check_sensor(what: Any, parameters: Mapping[str, Any] | None = None, *, seed
     rule = found.measure or found.error
     assert rule is not None
     truths: Truths = {
-        "rule": ("the rule holds nothing that a compiler refuses", lambda: "".join(law.faults(rule)[:1])),
-        "place": ("a track that is shifted is measured shifted", lambda: _place(found, s, tracks, period, seed)),
+        "rule": ("the rule can be compiled", lambda: "".join(law.faults(rule)[:1])),
+        "place": ("shifting the track shifts the measurements", lambda: _place(found, s, tracks, period, seed)),
         "bounded": ("errors stay finite", lambda: _bounded(found, s, period, seed)),
-        "exact": ("where it says that it tells the truth, it does", lambda: _exact(found, tracks, period, seed)),
-        "units": ("in metres and seconds of another length it is the same", lambda: _units(found, s, tracks, period)),
+        "exact": ("where `exact` holds, it measures the true state", lambda: _exact(found, tracks, period, seed)),
+        "units": ("in other units of length and time it is the same", lambda: _units(found, s, tracks, period)),
         "single precision": ("the rule does not turn float32 into doubles", lambda: _single(found, s, period)),
     }
     return reported(f"sensor {found.name}", truths, found.violates)
@@ -147,7 +147,7 @@ def _units(found: Sensor, s: Any, tracks: list[Track], period: float) -> str:
             scaled = _believed(found, other, track * scale, period * units.second, number)
             fault = _apart(scaled / scale, _believed(found, s, track, period, number), number, number)
             if fault:
-                return f"{fault}: a unit is declared wrong, or a number with a unit stands in the rule"
+                return f"{fault}: a unit is declared wrongly, or the rule contains a number that has a unit"
     return ""
 
 

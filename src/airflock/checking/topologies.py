@@ -73,12 +73,12 @@ def check_topology(what: Any, parameters: Mapping[str, Any] | None = None, *, se
     t = with_values(found.Parameters or Usual, parameters, "topology")
     flocks = list(_flocks(found, seed))
     truths: Truths = {
-        "rule": ("the rule holds nothing that a compiler refuses", lambda: "".join(law.faults(found.meet)[:1])),
-        "heard": ("each is met or not, and nobody who is not heard", lambda: _heard(found, t, flocks, seed)),
+        "rule": ("the rule can be compiled", lambda: "".join(law.faults(found.meet)[:1])),
+        "heard": ("each agent is met or not, and none that is not heard", lambda: _heard(found, t, flocks, seed)),
         "order": ("the order of the others does not matter", lambda: _order(found, t, flocks, seed)),
         "turned": ("turned about the vertical it is the same", lambda: _turned(found, t, flocks, seed)),
         "near": ("where it says NEAR, nobody farther matters", lambda: _near(found, t, flocks, seed)),
-        "units": ("in metres of another length it is the same", lambda: _units(found, t, flocks, seed)),
+        "units": ("in another unit of length it is the same", lambda: _units(found, t, flocks, seed)),
     }
     return reported(f"topology {found.name}", truths, found.violates)
 
@@ -124,7 +124,7 @@ def _heard(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
         if not np.isin(met, (0.0, 1.0)).all():
             return f"flock {number} of seed {seed}: met holds {met[~np.isin(met, (0.0, 1.0))][0]:g}"
         if (met[~others.heard] > 0.5).any():
-            return f"flock {number} of seed {seed}: one is met who is not heard"
+            return f"flock {number} of seed {seed}: an agent is met that is not heard"
     return ""
 
 
@@ -134,7 +134,7 @@ def _order(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
         order = rng.permutation(len(others.offsets))
         off = np.flatnonzero(_met(found, t, others.taken(order)) != _met(found, t, others)[order])
         if len(off):
-            return f"flock {number} of seed {seed}: in another order another one is met"
+            return f"flock {number} of seed {seed}: in another order other agents are met"
     return ""
 
 
@@ -164,5 +164,5 @@ def _units(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
             scaled = others._replace(offsets=others.offsets * units.metre)
             if (_met(found, other, scaled) != _met(found, t, others)).any():
                 told = f"flock {number} of seed {seed}: in other units others are met"
-                return f"{told}: a unit is declared wrong, or a number with a unit stands in the rule"
+                return f"{told}: a unit is declared wrongly, or the rule contains a number that has a unit"
     return ""

@@ -187,7 +187,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
     ),
     "keys": Counterpart('airflock.keys("radio")', "keys", {"section": "section", **TABLE}),
     "validate": Counterpart(
-        'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings", **CODE}
+        'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings", **CODE, **TABLE}
     ),
     "types": Counterpart('airflock.check_types("mine.py")', "check_types", {"files": "files", "out": "out", **TABLE}),
     "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.cache.clear_cache"}),

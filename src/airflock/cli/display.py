@@ -41,11 +41,11 @@ def display(
     settings: dict[str, Any] = {}
     with gathering(faults):
         settings = options.settings(changes)
-    found = []
+    layouts = []
     with gathering(faults):
-        found = plan(shapes, drones, failing, failure, points, spacing, settings, "--")
+        layouts = plan(shapes, drones, failing, failure, points, spacing, settings, "--")
     options.refuse(faults)
-    show = fly_show(found, drones, failing, failure, seed, settings)
+    show = fly_show(layouts, drones, failing, failure, seed, settings)
     rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.formed, strict=True)]
     if save is not None:
         from airflock.display.show import recording_of

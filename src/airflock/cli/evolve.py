@@ -59,7 +59,9 @@ def evolve(
             help="Use a third of the flights: 24 candidates, each with one flight at first and nine at the end.",
         ),
     ] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in the folder.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the study in the folder; other options may be left out.")
+    ] = False,
     scheduler: options.Scheduler = None,
     timeout: Annotated[
         float | None, typer.Option(help="Longest time for one flight on a worker, s.", show_default="no limit")
@@ -85,7 +87,7 @@ def evolve(
     """
     from airflock.errors import StudyError
     from airflock.evolve.folder import open_folder
-    from airflock.evolve.run import check_timeout, executor_for, on_device, run, study_of
+    from airflock.evolve.run import asked_for, check_timeout, executor_for, on_device, run
     from airflock.evolve.sensitivity import METHODS
 
     given = {
@@ -100,20 +102,23 @@ def evolve(
         "start": start,
         "averages": averages,
     }
-    study = study_of(
+    study, taken = asked_for(
         scenario,
         options.settings(changes, agents, duration),
         search_keys={key: value for key, value in given.items() if value is not None},
         limit=limit or (),
         trust=trust,
         fast=fast,
+        folder=out if resume else None,
     )
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"--sensitivity {sensitivity}: none of {', '.join(METHODS)}")
     check_timeout(timeout)
     study = on_device(study, device, scheduler)
     open_folder(out, study, resume=resume)
-    tables.say_notes([*(note for each in study.scenarios for note in each.notes), *study.notes])
+    tables.say_notes(
+        [*(note for each in study.scenarios for note in each.notes), *study.notes, *([taken] if taken else [])]
+    )
     begin = time.perf_counter()
     executor = executor_for(study, scheduler, threads, timeout)
     with options.searching(study, quiet or as_json) as (watch, note):

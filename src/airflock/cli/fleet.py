@@ -100,7 +100,7 @@ def fleet(
     live = mode != flying.LOCKSTEP
     options.refuse(realtime.refused(loaded, broken) if live else [])
     if card_file is not None and loaded.varied and seeds > 1:
-        options.refuse([f"--card {card_file}: tolerances give each seed a card of its own; add --seeds 1"])
+        options.refuse([f"--card {card_file}: with tolerances each seed has its own card; add --seeds 1"])
     how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "ground": ground, "join": join, "card_file": card_file}
     how["silent"] = True if silence is None and not against else silence
     series = flying.Fleets(loaded, vehicle)
@@ -124,9 +124,9 @@ def _option_faults(vehicle: str, body: str | None, mode: str, card_file: Path | 
         if word is not None and word not in known
     ]
     if card_file is not None and mode == MODES[0]:
-        faults.append(f"--card {card_file}: lock-step flies faster than anybody watches; add --mode tasks or processes")
+        faults.append(f"--card {card_file}: in lock-step it flies too fast to watch; add --mode tasks or processes")
     if against not in (None, "simulator"):
-        faults.append(f"--against {against}: only simulator can be compared with")
+        faults.append(f"--against {against}: only simulator is known")
     return faults
 
 

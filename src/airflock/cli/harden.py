@@ -101,7 +101,7 @@ def harden(
 
 def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
     """The optimum, or that of each scenario of a study's folder."""
-    from airflock.evolve.winner import BEST, further_best
+    from airflock.evolve.result import BEST, further_best
     from airflock.scenarios.files import load
 
     folder = Path(where)

@@ -62,28 +62,47 @@ def validate(
     changes: options.Set = None,
     law: options.Law = None,
     trust: options.Trust = False,
+    as_json: options.Json = False,
 ) -> None:
     """Check scenario and study files (every fault at once), or fly a recording again and compare the bits.
+
+    With --json, each file has a verdict (null if it is wrong), its faults and its notes. Exit status 2 if any is wrong.
 
     Example: airflock validate mine.toml
     """
     changed = options.settings(changes)
-    faults: list[str] = []
+    checked = []
     for name in files:
-        found: list[str] = []
-        with gathering(found):
-            _validate(name, changed, law, trust)
-        faults += [fault if name in fault else f"{name}: {fault}" for fault in found]
-    options.refuse(faults)
+        entry = _checked(name, changed, law, trust)
+        checked.append(entry)
+        if not as_json and entry["verdict"] is not None:
+            for note in entry["notes"]:
+                tables.say(f"note: {name}: {note}")
+            typer.echo(f"{name}: {entry['verdict']}")
+    faults = [fault for entry in checked for fault in entry["faults"]]
+    if not as_json:
+        options.refuse(faults)
+        return
+    tables.emit_json({"files": checked})
+    if faults:
+        raise typer.Exit(2)
 
 
-def _validate(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> None:
-    from airflock.evolve.validation import validate
+def _checked(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> dict[str, Any]:
+    """Verdict, notes and faults of one file; each fault begins with its name."""
+    from airflock.evolve.validation import Valid, validate
 
-    verdict, notes = validate(name, changed, law, trust=trust)
-    for note in notes:
-        tables.say(f"note: {name}: {note}")
-    typer.echo(f"{name}: {verdict}")
+    found: list[str] = []
+    valid: Valid | None = None
+    with gathering(found):
+        valid = validate(name, changed, law, trust=trust)
+    faults = [fault if name in fault else f"{name}: {fault}" for fault in found]
+    return {
+        "file": name,
+        "verdict": valid.verdict if valid else None,
+        "notes": list(valid.notes) if valid else [],
+        "faults": faults,
+    }
 
 
 def doctor(

@@ -84,7 +84,7 @@ class Pilot:
             made = self._decided(own, near, walls, 0.0, Senses.of(self.place, own, 0.0), shared)
             setpoint = self.setpoint(own, made.command)
             if not all(map(isfinite, setpoint)):
-                raise RuleError(f"{self.model.name} commands {setpoint}, which is no velocity")
+                raise RuleError(f"{self.model.name} commands {setpoint}, which is not a velocity")
 
     def hear(self, who: int, state: State, sent_at: float, now: float, *, stands: bool = False) -> bool:
         """Take note of a neighbour's state that held at sent_at (s); False if it is old, of the future or nan.

@@ -53,7 +53,7 @@ def points_of(shape: str, count: int, spacing: float = 3.0, height: float = 15.0
     else:
         filled = _pixels_of_image(path) if kind in IMAGES else _pixels_of_text(shape)
         if not filled.any():
-            raise AirflockError(f"{shape}: nothing in it to fill: no letter that can be drawn, or no dark pixel")
+            raise AirflockError(f"{shape}: nothing in it to fill: no letter that can be drawn, and no dark pixel")
         flat = _evenly(filled, count, rng)
         found = np.column_stack([flat[:, 0], LEAN * flat[:, 1], flat[:, 1]])
     found = found - 0.5 * (found.min(axis=0) + found.max(axis=0))

@@ -48,7 +48,9 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
     for scenario, plan in zip(scenarios, plans, strict=True):
         if plan not in largest or scenario.agents > largest[plan].agents:
             largest[plan] = scenario
-    faults = (no_cuda(plan, scenario.agents) for plan, scenario in largest.items())
+    faults = [no_cuda(plan, scenario.agents) for plan, scenario in largest.items()]
+    if any(scenario.lands for scenario in scenarios):
+        faults.append("drones that land with an empty battery (body.battery) fly on cpu")
     if device == "cuda":
         required()
         for fault in filter(None, faults):

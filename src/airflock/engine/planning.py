@@ -36,7 +36,7 @@ def plan_of(
     grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box too small for cells
     near        : where neighbours are found by cells, order parameters go by cells, too; by default in large flocks
     given_start : the start is handed over with each flight
-    absence     : agents may be absent; where a fault takes agents out they may in any case
+    absence     : agents may be absent; where a fault takes agents out, or empty batteries do, they may in any case
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
@@ -65,7 +65,7 @@ def _build(
         given_start=given_start,
         grid=cells,
         near=cells and (measured_by_cells(scenario) if near is None else near),
-        absence=absence or any(kind.leaves is not None for kind in scenario.fault_kinds),
+        absence=absence or scenario.lands or any(kind.leaves is not None for kind in scenario.fault_kinds),
     )
 
 

@@ -109,13 +109,13 @@ class State:
         It stops on the way where a fault is due. What is due at a step is done before it is flown or sensed.
         """
         if not self.tables.due:
-            return self._fly(first, last, half, frames)
+            return self._watched(first, last, half, frames)
         due = sorted({onset.step for onset in self.tables.due if first <= onset.step < last})
         step, skipped, every = first, -(-first // self.whole("sample_every")), self.whole("sample_every")
         for stop in [*(step for step in due if step > first or not half & 1), last]:
             if step < stop or stop == last:
                 rest = None if frames is None else frames[-(-step // every) - skipped :]
-                done = self._fly(step, stop, half, rest)
+                done = self._watched(step, stop, half, rest)
                 if done != stop or stop == last:
                     return done
                 step, half = stop, 0
@@ -131,6 +131,25 @@ class State:
                 leave(self, [onset.agent])
             elif onset.step == step:
                 strike(self, onset)
+
+    def _watched(self, first: int, last: int, half: int, frames: NDArray[Any] | None) -> int:
+        """Fly some steps; who has come to the ground with an empty battery is put away before the next one."""
+        landing, every = self.tables.landing, self.whole("sample_every")
+        if landing is None or first == last:
+            return self._fly(first, last, half, frames)
+        if not self.begun and (unplaced := self._fly(first, first, 0, None)) < 0:
+            return unplaced
+        step, skipped = first, -(-first // every)
+        while step < last:
+            if step > first or not half & 1:  # else that was done before this step was sensed
+                landing.land(self)
+            stop = min(last, step + landing.safe_steps(self))
+            rest = None if frames is None else frames[-(-step // every) - skipped :]
+            done = self._fly(step, stop, half, rest)
+            if done != stop:
+                return done
+            step, half = stop, 0
+        return step
 
     def _fly(self, first: int, last: int, half: int, frames: NDArray[Any] | None) -> int:
         """One call of the driver. An instant with fewer than two of several agents is not counted."""

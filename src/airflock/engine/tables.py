@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.body import dryden, wind
+from airflock.engine.landing import Landing, landing_of
 from airflock.engine.plan import WHOLE, Plan
 from airflock.scenarios.onsets import Onset, onsets
 from airflock.scenarios.scenario import Scenario
@@ -37,6 +38,7 @@ class Tables:
     goals : (goal, 3) points in their order, m
     own   : (number, agent) what differs among agents, in the plan's order
     due   : faults in the order of their steps
+    landing : who can land with an empty battery; None where nobody can
     """
 
     row: NDArray[Any]
@@ -51,6 +53,7 @@ class Tables:
     goals: NDArray[Any]
     own: NDArray[Any]
     due: tuple[Onset, ...] = ()
+    landing: Landing | None = None
 
     def changed(self, **whole: int) -> "Tables":
         """The same world with other integers, by their names in `plan.WHOLE`."""
@@ -121,6 +124,7 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
         whole=whole,
         own=row_values(scenario, plan, seed).astype(common.row.dtype) if plan.columns else common.own,
         due=onsets(scenario, seed, world) if plan.faults else (),
+        landing=landing_of(scenario, seed, common.row.dtype.type),
     )
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from airflock.evolve import tables
 from airflock.evolve.nondominated import front
+from airflock.evolve.result import Result
 from airflock.evolve.store import Store
 from airflock.evolve.study import Study
-from airflock.evolve.winner import Result
 
 
 def draw(study: Study, store: Store, result: Result, folder: Path) -> list[Path]:

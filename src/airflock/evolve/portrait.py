@@ -7,8 +7,8 @@ from airflock.core.parameters import Quantity, declarations
 from airflock.scenarios.portrait import number, table
 
 if TYPE_CHECKING:
+    from airflock.evolve.result import Result
     from airflock.evolve.study import Study
-    from airflock.evolve.winner import Result
 
 
 def study_sentence(study: "Study") -> str:

@@ -12,6 +12,8 @@ from airflock.errors import StudyError
 from airflock.evolve.fitness import Objective, Own
 from airflock.evolve.folder import open_folder, sweep, versions
 from airflock.evolve.pictures import draw
+from airflock.evolve.result import Result
+from airflock.evolve.resumed import resumed
 from airflock.evolve.search import Watch, search
 from airflock.evolve.search_table import fast as fast_keys
 from airflock.evolve.sensitivity import METHODS
@@ -19,7 +21,7 @@ from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import Study, load_study, make_study, with_limits
-from airflock.evolve.winner import Result, conclude
+from airflock.evolve.winner import conclude
 from airflock.executors import Executor, Score
 from airflock.executors.cluster import Cluster, fly_on_their_cpu
 from airflock.executors.in_process import InProcess
@@ -63,7 +65,7 @@ def evolve(
     out : str or path
         The study's folder.
     resume : bool
-        Continue the study in the folder to the identical end.
+        Continue the study in the folder to the identical end. What is not asked for again is as in the first call.
     settings : mapping, optional
         Keys of the scenario to change, such as {"duration": 300.0}.
     space : mapping, optional
@@ -124,10 +126,11 @@ def evolve(
     >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
     True
     """
-    study = study_of(
-        what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust, fast=fast
-    )
     folder = own_path(out)
+    study, _ = asked_for(
+        what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust, fast=fast,
+        folder=folder if resume else None,
+    )  # fmt: skip
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
     check_timeout(timeout)
@@ -135,6 +138,33 @@ def evolve(
     open_folder(folder, study, resume=resume)
     executor = executor_for(study, scheduler, threads, timeout)
     return run(study, folder, executor, watch, sensitivity=sensitivity)
+
+
+def asked_for(
+    what: Any,
+    settings: Mapping[str, Any] | None = None,
+    space: Mapping[str, Any] | None = None,
+    objective: Mapping[str, Any] | None = None,
+    fitness: Own | None = None,
+    search_keys: Mapping[str, Any] | None = None,
+    over_scenarios: str | None = None,
+    limit: str | Sequence[str] = (),
+    *,
+    trust: bool = False,
+    fast: bool = False,
+    folder: Path | None = None,
+) -> tuple[Study, str]:
+    """As `study_of`; if a folder is given, what is not asked for is as that holds it. Also a note of what it gave."""
+
+    def ask(changes: Mapping[str, Any] | None, keys: Mapping[str, Any], limits: Any, *, quick: bool = False) -> Study:
+        return study_of(what, changes, space, objective, fitness, keys, over_scenarios, limits, trust=trust, fast=quick)
+
+    limits = [limit] if isinstance(limit, str) else list(limit)
+    study = ask(settings, search_keys or {}, limits, quick=fast)
+    if folder is None or isinstance(what, Study):
+        return study, ""
+    keys = fast_keys(search_keys or {}, limits=bool(limits)) if fast else search_keys or {}
+    return resumed(folder, study, settings or {}, keys, limits, ask)
 
 
 def study_of(

@@ -277,4 +277,6 @@ def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any],
     if not found:
         return
     shown = found[:8] + ([f"and {len(found) - 8} more"] if len(found) > 8 else [])
-    raise StudyError(f"{folder}: holds another {kind}: {'; '.join(shown)}; give another --out")
+    raise StudyError(
+        f"{folder}: holds another {kind}: {'; '.join(shown)}; give another --out, or ask for what it holds"
+    )

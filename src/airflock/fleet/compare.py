@@ -76,11 +76,11 @@ def recording(fleet: Fleet | realtime.Flown) -> xr.Dataset:
         "random_start": 0, "airflock_device": "fleet", "airflock_vehicle": fleet.card.autopilot.name,
         "airflock_card": fleet.card.hash, "airflock_notes": "\n".join(f"{t:.2f} {w} {n}" for t, w, n in fleet.log),
     }  # fmt: skip
-    found = dataset(frames, dims, fleet.card.period, attributes, "velocity")
+    recorded = dataset(frames, dims, fleet.card.period, attributes, "velocity")
     known = rows[:, :, 9 : 9 + dims].transpose(0, 2, 1)[:, :, None, :]
-    found["own_position"] = (found["position"].dims, known, {"units": "m", "meaning": "as the node knows it"})
-    found["age"] = (("time", "receiver", "sender"), fleet.ages().astype(np.float32), {"units": "s"})
-    return found
+    recorded["own_position"] = (recorded["position"].dims, known, {"units": "m", "meaning": "as the node knows it"})
+    recorded["age"] = (("time", "receiver", "sender"), fleet.ages().astype(np.float32), {"units": "s"})
+    return recorded
 
 
 def fly(

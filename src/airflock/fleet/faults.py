@@ -63,15 +63,15 @@ def read_faults(path: Path, members: tuple[int, ...]) -> tuple[Fault, ...]:
     """Faults from a TOML file of tables [[fault]]; ScenarioError with one line per mistake."""
     with from_outside(path):
         document = read_toml(path)
-    found, mistakes = [], [f"{path}: {key} is not known; write [[fault]]" for key in document if key != "fault"]
+    faults, mistakes = [], [f"{path}: {key} is not known; write [[fault]]" for key in document if key != "fault"]
     tables = document.get("fault", [])
     for number, table in enumerate(tables if isinstance(tables, list) else [tables]):
         made, wrong_ = _fault(table, members)
-        found += made
+        faults += made
         mistakes += [f"{path}: fault {number + 1}: {line}" for line in wrong_]
     if mistakes:
         raise ScenarioError(mistakes)
-    return tuple(found)
+    return tuple(faults)
 
 
 def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[Fault], list[str]]:

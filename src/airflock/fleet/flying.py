@@ -166,7 +166,7 @@ def fleet(
         if word is not None and word not in known
     ]
     if card is not None and mode == LOCKSTEP:
-        mistakes.append("card: lock-step flies faster than anybody watches; give mode = 'tasks' or 'processes'")
+        mistakes.append("card: in lock-step it flies too fast to watch; give mode = 'tasks' or 'processes'")
     known: Scenario | None = None
     injected: tuple[Fault, ...] = ()
     with gathering(mistakes):
@@ -178,7 +178,7 @@ def fleet(
         mistakes += individuals.refused(known)
         mistakes += realtime.refused(known, injected) if mode != LOCKSTEP else []
     if card is not None and known is not None and known.varied and len(numbers) > 1:
-        mistakes.append(f"card = {card}: tolerances give each seed a card of its own; give one seed")
+        mistakes.append(f"card = {card}: with tolerances each seed has its own card; give one seed")
     if mistakes or known is None:
         raise ScenarioError(mistakes)
     stops = True if silence is None and not beside else silence

@@ -112,18 +112,18 @@ def _own(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[st
     base = {"law": plain(scenario.parameters), "body": plain(scenario.body)}
     if not scenario.varied and len(scenario.laws) == 1:
         return []
-    found = [
+    rows = [
         {
             part: {k: v for k, v in plain(record).items() if v != base[part].get(k)}
             for part, record in zip(base, own, strict=True)
         }
         for own in records
     ]
-    for agent, ((p, _), row) in enumerate(zip(records, found, strict=True)):
+    for agent, ((p, _), row) in enumerate(zip(records, rows, strict=True)):
         law = scenario.law_of(agent).model
         if law.name != scenario.model.name:
             row["law"] = {"kind": law.name, **plain(p)}
-    return found
+    return rows
 
 
 def _groups(scenario: Scenario, count: int) -> dict[str, list[int]]:

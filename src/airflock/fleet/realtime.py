@@ -118,12 +118,12 @@ def _at(rows: Sequence[Any], k: int, part: int, none: Any) -> Any:
 
 def refused(scenario: Scenario, faults: Sequence[Fault]) -> list[str]:
     """What flies in lock-step only, one line each."""
-    found = [
+    refused = [
         f"faults.kind = {kind.name!r}: faults of a scenario fly with --mode lockstep; give --faults FILE instead"
         for kind in scenario.fault_kinds
     ]
     gone = [f for f in faults if f.kind == "node" and f.end < 1e9]
-    return found + ["fault node: on the real clock a node that died stays dead; leave out end"] * bool(gone)
+    return refused + ["fault node: on the real clock a node that died stays dead; leave out end"] * bool(gone)
 
 
 def fly(
@@ -215,10 +215,10 @@ def _forked(lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[l
         for pipe in ours:
             pipe.send("go")
         asyncio.run(watching(partial(_alive, processes)))
-        found = _all(ours, processes)
+        lives = _all(ours, processes)
         for process in processes:
             process.join()
-        return found, time.process_time() - began + sum(life.processor for life in found)
+        return lives, time.process_time() - began + sum(life.processor for life in lives)
     finally:
         for process in processes:
             if process.is_alive():
@@ -227,17 +227,17 @@ def _forked(lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[l
 
 def _all(pipes: Sequence[Any], processes: Sequence[Any]) -> list[Any]:
     """One message of each process; LinkError if one ends without it."""
-    found: dict[int, Any] = {}
-    while len(found) < len(pipes):
-        waiting = {pipe: i for i, pipe in enumerate(pipes) if i not in found}
+    received: dict[int, Any] = {}
+    while len(received) < len(pipes):
+        waiting = {pipe: i for i, pipe in enumerate(pipes) if i not in received}
         for pipe in wait(list(waiting)):
             i = waiting[pipe]  # type: ignore[index]
             try:
-                found[i] = pipes[i].recv()
+                received[i] = pipes[i].recv()
             except EOFError as fault:
                 processes[i].join()
                 raise LinkError(ENDED.format(processes[i].exitcode)) from fault
-    return [found[i] for i in range(len(pipes))]
+    return [received[i] for i in range(len(pipes))]
 
 
 def _alive(processes: Sequence[Any]) -> None:

@@ -26,13 +26,15 @@ NAMES = ("tau", "a_max", "noise", "white")
 STARTS = ((0.7, 4.0, 0.1, 0.05), (0.25, 8.0, 0.3, 0.02))
 LIMITED = (0.5, 0.7, 0.85, 0.95, 0.99)  # shares of rows below the limit, from which a limit is sought, and
 SHORTER = (1.0, 0.92, 0.84, 0.7)  # shares of the first tau, which without a limit is too long
+MOST_FRESH = 0.5  # share of rows that begin with a new command, up to which these are left out
 BLOCK = 20.0  # s of one drone whose slopes are taken together
 FREE = 1e4  # m/s^2: no limit
 WITHIN, NEWTON = 1.92, 3  # half of the 95 % point of chi-squared with 1 degree of freedom; steps of each fit on the way
 GAIN, SATURATED = 200.0, 100  # least 2 Δ log-likelihood and rows at the limit for an a_max
 DISAGREE = 0.15  # of two estimates of tau
 # Relative standard deviation of what the filter leaves out: commands come from the true velocity, so they know more of
-# it than the filter does. Measured on random fleets with 0.1 m/s of noise in the log (benchmarks/identify.py).
+# it than the filter does, also one row after they are given (`_told`). Measured on random fleets with 0.1 m/s of noise
+# in the log (benchmarks/identify.py).
 BEYOND = np.array([0.01, 0.01, 0.005, 0.005])
 
 
@@ -66,7 +68,7 @@ def _kernel() -> Any:
     decay_rate, wander, gap_left = njit(held.decay_rate), njit(held.wander), njit(held.gap_left)
 
     @njit
-    def kernel(time, m, c, new, block, out, tau, a_max, noise, white, dt):  # type: ignore[no-untyped-def]
+    def kernel(time, m, c, new, told, block, out, tau, a_max, noise, white, dt):  # type: ignore[no-untyped-def]
         out[:] = 0.0
         axes = m.shape[1]
         v, e = np.zeros(3), np.zeros(3)
@@ -96,7 +98,8 @@ def _kernel() -> Any:
                 loss += off * off
                 v[i] = predicted + gain * off
             variance *= 1.0 - gain
-            out[block[k]] += 0.5 * axes * np.log(total) + 0.5 * loss / total
+            if told[k]:
+                out[block[k]] += 0.5 * axes * np.log(total) + 0.5 * loss / total
         return out.sum()
 
     return kernel
@@ -123,6 +126,7 @@ def fit_body(logs: Logs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
         np.ascontiguousarray(flying.velocity),
         np.ascontiguousarray(flying.command),
         flying.new,
+        _told(flying),
         span,
     )
     kernel = _kernel()
@@ -164,6 +168,17 @@ def _nothing(reason: str) -> BodyFit:
     return BodyFit(
         empty, dict.fromkeys(NAMES, (nan, nan)), dict.fromkeys(NAMES, reason), 0, 0, 0.0, nan, 0.0, 0.0, 0.0, []
     )
+
+
+def _told(logs: Logs) -> NDArray[np.bool_]:
+    """Of each row whether its increment counts: not one that begins as a command is given.
+
+    That command was computed from the very velocity that the filter does not know, so that the gap to it is wrong by
+    what the filter is wrong by. Where most rows have a command of their own, all count.
+    """
+    fresh = np.zeros(len(logs.time), bool)
+    fresh[2:] = (logs.command[1:-1] != logs.command[:-2]).any(axis=1) & ~logs.new[1:-1]
+    return ~fresh if fresh.mean() < MOST_FRESH else np.ones(len(fresh), bool)
 
 
 def _blocks(logs: Logs) -> NDArray[np.int64]:
@@ -270,7 +285,7 @@ def _judge(found: BodyFit, logs: Logs) -> None:
     if found.dead_time > 0.5 * tau:
         found.notes.append(f"commands act {found.dead_time:.2g} s late, more than half of tau: this body does not fit")
     elif found.dead_time > 1.5 * step:
-        found.notes.append(f"commands act about {found.dead_time:.2g} s late; a body has no number for that")
+        found.notes.append(f"commands act about {found.dead_time:.2g} s late; no parameter of a body describes that")
     if found.together > 0.2:
         found.notes.append(
             f"unexplained accelerations of the drones correlate ({found.together:.2f}): gusts that all feel"

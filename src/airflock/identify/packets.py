@@ -137,7 +137,7 @@ def fit_delay(heard: pd.DataFrame) -> DelayFit:
     both = np.isin(pairs % n * n + pairs // n, pairs)
     nan = float("nan")
     if not both.any():
-        return DelayFit(nan, (nan, nan), "packets of one direction only: clocks and delay cannot be told apart")
+        return DelayFit(nan, (nan, nan), "packets in one direction only: clocks and delay cannot be separated")
     a, b = pairs[both] // n, pairs[both] % n
     design = np.zeros((both.sum() + 1, n + 1))
     rows = np.arange(both.sum())

@@ -98,11 +98,11 @@ def candidate(base: Scenario, scale: Scale, axes: int) -> Candidate:
     name = base.name
     scenario = quiet(base, scale, axes)
     if scenario.model.flock is not None:
-        raise ScenarioError([f"{name}: has a rule of the whole flock, which no individual follows by itself"])
+        raise ScenarioError([f"{name}: has a rule of the whole flock, which no single individual follows"])
     if scenario.flight.update != "synchronous":
         scenario = replace(scenario, flight=replace(scenario.flight, update="synchronous"))
     if scenario.model.neighbour is None:
-        raise ScenarioError([f"{name}: this law has no neighbours; nothing social can be inferred"])
+        raise ScenarioError([f"{name}: this law does not react to neighbours; nothing social can be inferred"])
     texted = replace(scenario, parameters=_unusual(scenario))
     plan = plan_of(texted, precision=64, metrics=()).built(given_start=True, grid=False)
     found = _numbers(scenario, plan, scale)
@@ -138,7 +138,7 @@ def scenarios_of(
     for each, box in zip(found, boxes, strict=True):
         if box != boxes[0]:
             raise ScenarioError(
-                [f"{each.name}: its box is not that of {found[0].name}; say what is so, such as --set world.edges=open"]
+                [f"{each.name}: its box is not that of {found[0].name}; set one for all: --set world.edges=open"]
             )
     return found, boxes[0]
 
@@ -260,5 +260,5 @@ def _noises(scenario: Scenario, plan: Plan, numbers: tuple[Number, ...]) -> tupl
     of_law = [n for n in numbers if n.key.startswith("model.") and (0.0 in (n.low, n.default) or n.unit == "rad")]
     found = tuple(n for n in of_law if not differ({n.column: 0.0}))
     if not found:
-        raise ScenarioError([f"{scenario.name}: its law draws noise that no single number of it switches off"])
+        raise ScenarioError([f"{scenario.name}: its law draws noise, and none of its numbers switches that off"])
     return found

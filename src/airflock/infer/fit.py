@@ -118,10 +118,10 @@ def climb(
             new[free] = np.clip(new[free] + np.clip(move, -LONGEST, LONGEST), 0.0, 1.0)
             e_new, _ = model.differences(new, spans)
             score = model.tally(e_new, owner)
-            found = Fit(new, free, score, score.loss() + prior(new, free))
-            if found.loss < fit.loss:
-                gained, e = fit.loss - found.loss, e_new
-                fit, damping = found, 0.3 * damping
+            trial = Fit(new, free, score, score.loss() + prior(new, free))
+            if trial.loss < fit.loss:
+                gained, e = fit.loss - trial.loss, e_new
+                fit, damping = trial, 0.3 * damping
                 break
             damping = max(10.0 * damping, 1e-3)
         if gained < GAINED:
@@ -144,10 +144,10 @@ def settle(model: Model, fit: Fit, spans: Sequence[int] | None) -> Fit:
                 while True:
                     u = place.copy()
                     u[k] = min(max(u[k] + move, 0.0), 1.0)
-                    found = loss_at(model, u, fit.free, spans) if u[k] != place[k] else lowest
-                    if found >= lowest:
+                    loss = loss_at(model, u, fit.free, spans) if u[k] != place[k] else lowest
+                    if loss >= lowest:
                         break
-                    place, lowest = u, found
+                    place, lowest = u, loss
     return climb(model, place, fit.free, spans, slopes=(FINE,))
 
 
@@ -158,10 +158,10 @@ def spread(model: Model, fit: Fit, spans: Sequence[int]) -> Array:
     show that a radius takes in or leaves out. The prior is part of it: a number that the tracks do not tell has about
     half its range.
     """
-    found = np.zeros(len(fit.place))
+    errors = np.zeros(len(fit.place))
     each = [np.diag(np.linalg.inv(curvature(model, fit, spans, way))) for way in (WIDE, BOTH)]
-    found[fit.free] = np.sqrt(np.maximum(*each))
-    return found
+    errors[fit.free] = np.sqrt(np.maximum(*each))
+    return errors
 
 
 def open_ends(model: Model, fit: Fit, spans: Sequence[int]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -169,12 +169,12 @@ def open_ends(model: Model, fit: Fit, spans: Sequence[int]) -> tuple[NDArray[np.
 
     Such as a largest force that nobody ever uses.
     """
-    found = np.zeros((2, len(fit.place)), bool)
+    unlimited = np.zeros((2, len(fit.place)), bool)
     for k in [k for k in fit.free if k < model.named]:
         for side, end in enumerate((0.0, 1.0)):
             ways = fit.place[k] + np.array(ON_THE_WAY) * (end - fit.place[k])
-            found[side, k] = not any(_worse(model, fit, spans, k, x) for x in ways)
-    return found[0], found[1]
+            unlimited[side, k] = not any(_worse(model, fit, spans, k, x) for x in ways)
+    return unlimited[0], unlimited[1]
 
 
 def closed_end(model: Model, fit: Fit, spans: Sequence[int], number: int, end: float) -> float:
@@ -201,12 +201,12 @@ def curvature(model: Model, fit: Fit, spans: Sequence[int] | None, way: int = WI
     """Second derivatives of the loss by the free numbers, with the prior."""
     e, _ = model.differences(fit.place, spans)
     if way == EVEN:
-        found = _normal(model, fit, spans, e, PROBE / 8.0, False)[0]
+        curvature = _normal(model, fit, spans, e, PROBE / 8.0, False)[0]
     else:
-        found = _normal(model, fit, spans, e, PROBE, True)[0]
+        curvature = _normal(model, fit, spans, e, PROBE, True)[0]
         if way != WIDE:
-            found = _normal(model, fit, spans, e, _probes(found), way != BOTH)[0]
-    return found + 4.0 * np.eye(len(fit.free))
+            curvature = _normal(model, fit, spans, e, _probes(curvature), way != BOTH)[0]
+    return curvature + 4.0 * np.eye(len(fit.free))
 
 
 def _probes(hessian: Array) -> Array:
@@ -252,9 +252,9 @@ def by_powers(model: Model, fit: Fit, moved: Array, number: int, spans: Sequence
             better = False
             for f, more in ((f, more) for f in powers for more in (1, -1)):
                 changed = {**powers, f: powers[f] + more}
-                found = loss_at(model, place(changed), fit.free, spans)
-                if found < lowest - GAINED:
-                    powers, lowest, better = changed, found, True
+                loss = loss_at(model, place(changed), fit.free, spans)
+                if loss < lowest - GAINED:
+                    powers, lowest, better = changed, loss, True
         return lowest, place(powers)
 
     return min(lower(read), lower(dict.fromkeys(read, 0)), key=lambda found: found[0])[1]

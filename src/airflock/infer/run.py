@@ -72,7 +72,7 @@ def infer(
     >>> import airflock
     >>> airflock.infer("fish.nc", models=[])
     Traceback (most recent call last):
-    airflock.errors.AirflockError: infer: no laws to choose from; give models, such as couzin_2002
+    airflock.errors.AirflockError: infer: no laws to choose from; name models, such as couzin_2002
     >>> found = airflock.infer("fish.nc")  # doctest: +SKIP
     >>> found.verdict  # doctest: +SKIP
     'couzin_2002 explains the tracks best'
@@ -81,7 +81,7 @@ def infer(
     if not isinstance(models, Iterable):
         raise AirflockError(f"infer: models = {models!r}: give a list of laws, such as ['couzin_2002']")
     if not models:
-        raise AirflockError("infer: no laws to choose from; give models, such as couzin_2002")
+        raise AirflockError("infer: no laws to choose from; name models, such as couzin_2002")
     say = done or (lambda _: None)
     settings = dict(settings or {})
     scenarios, box = scenarios_of(models, settings, trust=trust)
@@ -92,22 +92,22 @@ def infer(
     comparison = _Comparison(followed, scale, seed, say)
     laws, by_name = comparison.of([candidate(each, scale, followed[0].axes) for each in scenarios])
     best, verdict = verdict_of(laws)
-    found = Inferred(
+    result = Inferred(
         laws, best, verdict, sum(each.counted for each in followed), comparison.frames(), scale,
         max(each.individuals for each in followed),
     )  # fmt: skip
     if best is None:
-        return found
+        return result
     comparison.contest(laws, by_name)
-    found.best, found.verdict = verdict_of(laws)
-    if found.best is not None:
-        best, model = found.best, by_name[found.best.name]
+    result.best, result.verdict = verdict_of(laws)
+    if result.best is not None:
+        best, model = result.best, by_name[result.best.name]
         teller = _teller(say, f"{best.name}, flown again")
         corrected = correct(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
-        set_numbers(found, model, corrected)
+        set_numbers(result, model, corrected)
         if check:
-            found.check = posterior(model, corrected.place, corrected.noise, check, _teller(say, "check"))
-    return found
+            result.check = posterior(model, corrected.place, corrected.noise, check, _teller(say, "check"))
+    return result
 
 
 class _Comparison:
@@ -194,17 +194,17 @@ def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
     several: Iterable[Any] = [what] if isinstance(what, (xr.Dataset, str, Path)) else what
     if not isinstance(several, Iterable):
         raise RecordingError(f"{type(what).__name__} holds no tracks; give recordings or files")
-    found = []
+    recordings = []
     for number, each in enumerate(several, 1):
         if isinstance(each, xr.Dataset):
-            found.append((f"recording {number}", each))
+            recordings.append((f"recording {number}", each))
         elif str(each).endswith(".nc"):
-            found.append((str(each), load_recording(each)))
+            recordings.append((str(each), load_recording(each)))
         else:
-            found.append((str(each), _read(own_path(each))))
-    if not found:
+            recordings.append((str(each), _read(own_path(each))))
+    if not recordings:
         raise RecordingError("no tracks to infer a law from")
-    return found
+    return recordings
 
 
 def _read(path: Path) -> xr.Dataset:

@@ -63,13 +63,13 @@ def fit(
     kept = identifiable(model, _begin(model, gains), begin, model.few())
     say()
     model = model.with_numbers([law.numbers[k] for k in kept])
-    found = race(model, _begin(model, gains), begin[:, kept], free(model), model.few(), say)
-    found = polish(model, found.place)
+    fitted = race(model, _begin(model, gains), begin[:, kept], free(model), model.few(), say)
+    fitted = polish(model, fitted.place)
     say()
-    return model, found
+    return model, fitted
 
 
-def regained(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
+def regained(law: Candidate, model: Model, fitted: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
     """The fit with those numbers that were given up before the search, but explain something beside the fit.
 
     Before the search, `identifiable` asks at places that explain little; at the fit the answer may differ.
@@ -77,7 +77,7 @@ def regained(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) 
     law : with all its numbers
     """
     few = model.few()
-    best = climb(model, found.place, found.free, few, slopes=(WIDE,))
+    best = climb(model, fitted.place, fitted.free, few, slopes=(WIDE,))
     for number in model.missing(law):
         fuller, k = model.with_number(law, number)
         places = [np.insert(best.place, k, x) for x in (number.place(number.default), *ELSEWHERE)]
@@ -87,42 +87,42 @@ def regained(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) 
         with_it = min(tried, key=lambda each: each.loss)
         if with_it.loss < best.loss - WORSE:
             model, best = fuller, with_it
-    if len(model.numbers) == len(found.place):
-        return model, found
+    if len(model.numbers) == len(fitted.place):
+        return model, fitted
     return model, polish(model, best.place, LONG)
 
 
-def simpler(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
+def simpler(law: Candidate, model: Model, fitted: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
     """The fit after a search along each number, with all numbers that explain something and no others.
 
     law : with all its numbers
     """
-    model, found = first_names(law, *without_spare(*regained(law, model, found, say), say), say)
-    other = profile(model, climb(model, found.place, found.free, model.few(), slopes=(WIDE,)), model.few(), say)
+    model, fitted = first_names(law, *without_spare(*regained(law, model, fitted, say), say), say)
+    other = profile(model, climb(model, fitted.place, fitted.free, model.few(), slopes=(WIDE,)), model.few(), say)
     other = settle(model, climb(model, other.place, other.free, sample(model), LONG), sample(model))
-    found = hills(model, min(found, other, key=lambda each: each.loss), model.few(), sample(model), say)
-    model, found = first_names(law, *without_spare(model, found, say), say)
-    return taken_back(law, model, found, sample(model), say)
+    fitted = hills(model, min(fitted, other, key=lambda each: each.loss), model.few(), sample(model), say)
+    model, fitted = first_names(law, *without_spare(model, fitted, say), say)
+    return taken_back(law, model, fitted, sample(model), say)
 
 
-def first_names(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
+def first_names(law: Candidate, model: Model, fitted: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
     """The fit in terms of the numbers that are declared first, where either of two explains the tracks."""
-    renamed, place = canonical(law, model, found, say)
-    return (model, found) if renamed is model else (renamed, _nearest(renamed, place, place))
+    renamed, place = canonical(law, model, fitted, say)
+    return (model, fitted) if renamed is model else (renamed, _nearest(renamed, place, place))
 
 
-def without_spare(model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
+def without_spare(model: Model, fitted: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
     """The model without numbers that the others make up for, where the sample is explained as well by what is left."""
-    gone, place, carried = simplify(model, found, say)
+    gone, place, carried = simplify(model, fitted, say)
     if not gone:
-        return model, found
+        return model, fitted
     rest = [k for k in range(len(model.numbers)) if k not in gone]
     assert model.law is not None
     without = model.with_numbers([n for k, n in enumerate(model.law.numbers) if k not in gone])
     less = _nearest(without, place[rest], carried[rest])
-    if less.loss >= found.loss + 2.0 * len(gone):
-        return model, found
-    return without, replace(less, others=tuple(place[rest] for place in found.others))
+    if less.loss >= fitted.loss + 2.0 * len(gone):
+        return model, fitted
+    return without, replace(less, others=tuple(place[rest] for place in fitted.others))
 
 
 def _nearest(model: Model, *places: Array) -> Fit:

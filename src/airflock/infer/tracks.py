@@ -105,7 +105,7 @@ def tracks_of(
     spans = tuple((int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True))
     found = restated(Tracks(period, seen, np.zeros(sure.shape, np.int8), np.zeros_like(seen), spans, name, box), seen)
     if not found.counted:
-        raise RecordingError(f"{name}: nobody is seen for {SETTLING + 1} frames on end")
+        raise RecordingError(f"{name}: no individual is seen for {SETTLING + 1} frames in a row")
     return found
 
 
@@ -175,7 +175,9 @@ def scale_of(all_tracks: list[Tracks]) -> Scale:
                 near.append(float(np.median(apart.min(axis=0))))
     speed = np.concatenate(speeds)
     if not near or not len(speed):
-        raise RecordingError(f"{all_tracks[0].name}: two individuals are never seen together; nobody to flock with")
+        raise RecordingError(
+            f"{all_tracks[0].name}: no two individuals are ever seen together, so nobody to flock with"
+        )
     return Scale(
         float(np.median(near)), float(np.quantile(far, 0.9)), float(np.median(speed)),
         float(np.quantile(speed, 0.999)), all_tracks[0].period,

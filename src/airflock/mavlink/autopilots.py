@@ -95,7 +95,7 @@ AUTOPILOTS = {
         "px4", number=12, ours=px4_mode(6), land=px4_mode(4, 6), hold=px4_mode(4, 3), climbs=True, bytewise=True,
         guards=(
             Guard("COM_OF_LOSS_T", 0.0, 1.0, "s after the last setpoint until it acts", silent=1.0),
-            Guard("COM_OBL_RC_ACT", 4.0, 4.0, "on lost setpoints: 4 land; whoever holds is hit by those who forget it"),
+            Guard("COM_OBL_RC_ACT", 4.0, 4.0, "on lost setpoints: 4 land; one that hovers is hit by one that flies on"),
             Guard("GF_ACTION", 2.0, 5.0, "its own fence acts: 2 hold, 3 return, 5 land"),
         ),
     ),
@@ -104,7 +104,7 @@ AUTOPILOTS = {
         guards=(
             Guard("GUID_TIMEOUT", 0.1, 1.0, "s after the last setpoint until it brakes", silent=3.0),
             Guard("FENCE_ENABLE", 1.0, 1.0, "its own fence acts"),
-            Guard("FS_GCS_ENABLE", 5.0, 5.0, "when heartbeats end: 5 land; whoever hovers is hit in the end"),
+            Guard("FS_GCS_ENABLE", 5.0, 5.0, "when heartbeats end: 5 land; a drone that hovers is hit in the end"),
             Guard("FS_GCS_TIMEOUT", 2.0, 5.0, "s after the last heartbeat until it lands"),
             Guard("SYSID_MYGCS", 1.0, 250.0, "whose heartbeats count: those of the node, of the same system", own=True),
         ),

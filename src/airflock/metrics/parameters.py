@@ -16,11 +16,9 @@ class Parameters(Record):
     kind: str = text(
         "vasarhelyi",
         source="our choice",
-        meaning="which order parameters, or a file of your own that ends in .py. vasarhelyi: of Vásárhelyi et al. 2018 "
-        "with fitness; kidger: flocked, sub-swarms, avoidance; dimock: power of a flock of wings (Dimock & Selig "
-        "2003); zapotecatl: extension, polarization and quality of Zapotecatl et al. 2016; groups: these with "
-        "sub-groups told apart; contacts: with walls and obstacles as well as with each other; order: only "
-        "polarisation, milling, speed and shape",
+        meaning="set of order parameters, or a file of your own that ends in .py. vasarhelyi, dimock, zapotecatl and "
+        "kidger: those of the paper; groups: zapotecatl, with sub-groups told apart; contacts: "
+        "collisions and contacts with walls and obstacles; order: polarisation, milling, speed and shape",
     )
     stop: str = choice(
         "never", ("never", "collision"), source="Dimock & Selig 2003: a collision halts the simulation",

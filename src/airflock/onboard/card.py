@@ -153,7 +153,7 @@ def card_of(document: Any, where: str = "card") -> Card:
     if faults:
         raise CardError([f"{where}: {fault}" for fault in faults])
     if document["hash"] != hash_of(document):
-        raise CardError([f"{where}: was changed after it was written: its hash does not fit"])
+        raise CardError([f"{where}: was changed after it was written: its hash does not match"])
     card = _made(document, faults)
     if not faults and card is not None:
         faults += _geometry_faults(card)
@@ -255,13 +255,13 @@ def _geometry_faults(card: Card) -> list[str]:
         )
     for x, y in _outline(world):
         if card.outside(x, y, card.height) > 1e-6:
-            faults.append(f"fence: does not hold the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
+            faults.append(f"fence: does not enclose the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
             break
     kind = TOPOLOGIES[card.topology.kind]
     if kind is not None and kind.flat and not card.flat:
-        faults.append(f"topology.kind = {kind.name!r}: cells are found in a plane; world.dimensions = '2' is one")
+        faults.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
     if world.edges != "open":
-        faults.append(f"world.edges = {world.edges!r}: real space is open; nothing bounces or comes in again")
+        faults.append(f"world.edges = {world.edges!r}: real space has no such edges; set world.edges = 'open'")
     for member in card.members if card.own else card.members[:1]:
         with gathering(faults):
             card.pilot(member)

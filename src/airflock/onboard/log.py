@@ -80,7 +80,7 @@ def replay(lines: Iterable[str], card: Card, key: bytes) -> Iterator[Replayed]:
     if head.get("log") != VERSION:
         raise LinkError("this is not a log of a flight on board")
     if head.get("card") != card.hash:
-        raise LinkError("the log is of another card")
+        raise LinkError("the log belongs to another card")
     node = _node(head, card, key)
     now = float(head["now"])
     for number, row in rows:
@@ -103,7 +103,7 @@ def _node(head: Mapping[str, Any], card: Card, key: bytes) -> Node:
     sound = all(type(stamp) is int and 0 <= stamp < 2**63 for stamp in stamps) and head.get("member") in card.members
     sound = sound and all(_is_number(period) and period > 0.0 for period in periods) and _is_number(head.get("now"))
     if not sound or not isinstance(heard, dict) or not all(who.isascii() and who.isdigit() for who in heard):
-        raise LinkError("line 1: does not tell how the node began")
+        raise LinkError("line 1: does not say how the node began")
     memory = Memory(head["sent"], {int(who): stamp for who, stamp in heard.items()}, head["order"])
     return Node(
         card, head["member"], key, now=float(head["now"]), utc=head["utc"], memory=memory, radios=tuple(periods),
@@ -119,7 +119,7 @@ def _row(row: Mapping[str, Any], number: int, before: float) -> tuple[float, byt
     except (KeyError, TypeError, ValueError):
         now, data = None, b""
     if not _is_number(now) or not before <= now <= before + LONGEST_GAP or not {"a", "r", "out"} & set(row):
-        raise LinkError(f"line {number}: is not one that a node wrote")
+        raise LinkError(f"line {number}: was not written by a node")
     return float(now), data
 
 
@@ -157,7 +157,7 @@ def read_memory(path: Path) -> Memory:
     except FileNotFoundError:
         return Memory()
     except (OSError, TextError, ValueError, OverflowError, KeyError, TypeError, AttributeError) as fault:
-        raise LinkError(f"{path}: cannot be read as the memory of a node; remove it on the ground only") from fault
+        raise LinkError(f"{path}: cannot be read as the memory of a node; remove it, on the ground only") from fault
 
 
 def memory_text(memory: Memory) -> str:

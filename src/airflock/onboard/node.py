@@ -292,7 +292,7 @@ class Node:
             return STILL
         if not (isfinite(x) and isfinite(y) and isfinite(z)):
             self._failed = True
-            self._notes.append(f"the law commanded {(x, y, z)}, which is no velocity")
+            self._notes.append(f"the law commanded {(x, y, z)}, which is not a velocity")
             return STILL
         if goal is not None:
             gx, gy, _ = guidance.make_for(own, goal, self.card.safety)

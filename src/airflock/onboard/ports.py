@@ -57,7 +57,7 @@ def open_port(text: str) -> Port:
     except OSError as fault:
         raise LinkError(f"{text}: {fault.strerror}") from fault
     except UnicodeError as fault:
-        raise LinkError(f"{text}: a computer cannot have this name") from fault
+        raise LinkError(f"{text}: is not a valid name of a computer") from fault
     raise LinkError(f"{text}: give udp:HOST:PORT, udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")
 
 

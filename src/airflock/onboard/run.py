@@ -35,7 +35,7 @@ class Arguments(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and end with status 2."""
-        self.exit(2, f"airflock: {message}; {self.prog} --help tells all options\n")
+        self.exit(2, f"airflock: {message}; {self.prog} --help lists all options\n")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -151,7 +151,7 @@ def fly(
             action()
         except OSError as fault:
             ended.add(name)
-            tell(f"the {name} cannot be written any more: {fault.strerror}; the flight goes on without it")
+            tell(f"the {name} can no longer be written: {fault.strerror}; the flight goes on without it")
 
     def write(line: str) -> None:
         kept("log", lambda: log.write(line + "\n"))

@@ -76,7 +76,7 @@ def _parameter_misses(card: Card, member: int, wire: Wire) -> list[str]:
     for guard in card.autopilot.guards:
         value = wire.parameters.get(guard.name)
         if value is None:
-            found.append(f"{guard.name}: the autopilot has not told it")
+            found.append(f"{guard.name}: the autopilot has not reported it")
             continue
         low, high = guard.range(member)
         if not low <= value <= high:
@@ -95,7 +95,7 @@ def _own_misses(card: Card, wire: Wire, now: float) -> list[str]:
     elif wire.disagreement(now) > s.jump:
         found.append(f"local and global position of the autopilot differ by {wire.disagreement(now):.0f} m")
     if wire.origin is None:
-        found.append("GPS_GLOBAL_ORIGIN: the autopilot has not told it")
+        found.append("GPS_GLOBAL_ORIGIN: the autopilot has not reported it")
     if wire.fix < 3 or wire.h_acc > s.h_acc:
         accuracy = f"accuracy {min(wire.h_acc, 999.0):.1f} m"
         found.append(f"navigation: fix {wire.fix}, {accuracy}; needs a 3-D fix and {s.h_acc:g} m")
@@ -103,7 +103,7 @@ def _own_misses(card: Card, wire: Wire, now: float) -> list[str]:
         told = "not told" if wire.battery is None else f"{wire.battery:.0f} %"
         found.append(f"battery: {told}; needs more than {s.battery_low:g} %")
     if wire.landed is not True:
-        found.append("the autopilot does not say that it stands on the ground")
+        found.append("the autopilot does not report that it is on the ground")
     return found
 
 
@@ -111,18 +111,18 @@ def _clock_misses(card: Card, wire: Wire, peers: Peers) -> list[str]:
     """Whether the own clock is known and right."""
     offset = wire.clock_offset()
     if offset is None:
-        return ["SYSTEM_TIME: the autopilot has not told the time"]
+        return ["SYSTEM_TIME: the autopilot has not reported the time"]
     if abs(offset) > card.safety.clock_error:
         return [f"clock: {offset:+.2f} s off the autopilot's; at most {card.safety.clock_error:g} s"]
-    return ["clock: it is off the clocks of all others"] if peers.clocks_suspect() else []
+    return ["clock: it differs from the clocks of all others"] if peers.clocks_suspect() else []
 
 
 def _peer_misses(card: Card, wire: Wire, peers: Peers, now: float) -> list[str]:
-    """Who is not heard, flies another card, or stands too near."""
+    """Who is not heard, has another card, or stands too near."""
     found = []
     for who, peer in peers.all.items():
         if peer.other_card:
-            found.append(f"drone {who} flies another card")
+            found.append(f"drone {who} has another card")
         elif now - peer.heard_at > FRESH:
             found.append(f"drone {who} is not heard")
         elif wire.state is not None and peer.state is not None:

@@ -1,6 +1,7 @@
 """Links: two unreliable radio links; data are carried forward (Vásárhelyi et al. 2018, Drone setup)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from airflock.core.parameters import choice, quantity
 from airflock.core.radio import Packets, forward
@@ -11,6 +12,28 @@ KINDS = ("constant", "links", "table", "congestion", "shadow", "bursts", "jitter
 RATES = ("fast_rate", "slow_rate")
 
 
+def near_distance() -> Any:
+    """Parameter `near`, m."""
+    return quantity(
+        20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="distance below which reception is near-perfect"
+    )
+
+
+def far_distance() -> Any:
+    """Parameter `far`, m."""
+    return quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="distance beyond which outages begin")
+
+
+def near_share() -> Any:
+    """Parameter `received_near`."""
+    return quantity(0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="share of packets received below near")
+
+
+def far_share() -> Any:
+    """Parameter `received_far`."""
+    return quantity(0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="share of packets received at far")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Packets):
     """Status packets between agents: constant delay and range, optional loss, or two unreliable links."""
@@ -19,22 +42,17 @@ class Parameters(Packets):
         "constant",
         KINDS,
         source=SETUP,
-        meaning="constant: every packet in range arrives after delay; links: two lossy links, data extrapolated; "
-        "table: a measured table of reception; congestion: more talkers, more loss; shadow: buildings weaken signals; "
-        "bursts: losses in rows; jitter: delays differ; vision: seen instead of heard; or a file that ends in .py",
+        meaning="which packets are lost, and how late the others come. constant: one delay, radio.loss; links: two "
+        "lossy links; table: reception as measured; congestion: more senders, more loss; shadow: buildings weaken "
+        "signals; bursts: losses in a row; jitter: delays differ; vision: agents see each other; or a file of your own "
+        "that ends in .py",
     )
     fast_rate: float = quantity(10.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the short link")
     slow_rate: float = quantity(1.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the long link")
-    near: float = quantity(
-        20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="distance below which reception is near-perfect"
-    )
-    far: float = quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="distance beyond which outages begin")
-    received_near: float = quantity(
-        0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="share of packets received below near"
-    )
-    received_far: float = quantity(
-        0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="share of packets received at far"
-    )
+    near: float = near_distance()
+    far: float = far_distance()
+    received_near: float = near_share()
+    received_far: float = far_share()
 
 
 def share(distance, near, far, received_near, received_far):

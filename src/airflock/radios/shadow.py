@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from airflock.core.parameters import quantity
 from airflock.core.radio import Packets, forward
-from airflock.radios.links import FIG8, SETUP, share
+from airflock.radios.links import far_distance, far_share, near_distance, near_share, share
 
 OURS = "our choice: a house"
 
@@ -17,16 +17,10 @@ OURS = "our choice: a house"
 class Parameters(Packets):
     """One link whose reception depends on the true distance of both agents and on what stands between them."""
 
-    near: float = quantity(
-        20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="distance below which reception is near-perfect"
-    )
-    far: float = quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="distance beyond which outages begin")
-    received_near: float = quantity(
-        0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="share of packets received below near"
-    )
-    received_far: float = quantity(
-        0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="share of packets received at far"
-    )
+    near: float = near_distance()
+    far: float = far_distance()
+    received_near: float = near_share()
+    received_far: float = far_share()
     wall: float = quantity(
         20.0, "dB", low=0.0, high=200.0, source=OURS, meaning="loss of signal behind an obstacle or the scene"
     )

@@ -60,7 +60,7 @@ def topology_faults(kind: Topology | None, world: Any, found: Model | None) -> l
     """Why agents of a law in a world cannot meet each other by a topology."""
     faults = []
     if kind is not None and kind.flat and world is not None and world.dimensions == "3":
-        faults.append(f"topology.kind = {kind.name!r}: cells are found in a plane; world.dimensions = '2' is one")
+        faults.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
     if kind is not None and found is not None and found.neighbour is None:
         faults.append(f"topology.kind = {kind.name!r}: law {found.name} has no rule for single neighbours")
     return faults

@@ -7,6 +7,7 @@ from airflock.core.parameters import declarations
 from airflock.core.vectors import expanded, overruled
 from airflock.errors import ScenarioError
 from airflock.scenarios.families import FAMILIES
+from airflock.scenarios.schema import value_of
 from airflock.scenarios.sections import SECTIONS
 from airflock.spelling import meant
 
@@ -29,8 +30,7 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
             notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {family.kind(document)} are left out")
         document = {**document, section: kept}
     law = document.get("model", {})
-    before = law.get("kind") if isinstance(law, Mapping) else None
-    before = before["value"] if isinstance(before, Mapping) and "value" in before else before
+    before = value_of(law.get("kind")) if isinstance(law, Mapping) else None
     if "model.kind" in settings and before not in (None, settings["model.kind"]):
         if set(law) - {"kind"}:
             notes.append(f"model.kind = {settings['model.kind']!r}: the numbers of the file's {before} are left out")

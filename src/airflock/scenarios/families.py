@@ -22,6 +22,7 @@ from airflock.metrics.registry import USUAL as USUAL_SET
 from airflock.radios.registry import RADIOS
 from airflock.radios.registry import USUAL as USUAL_RADIO
 from airflock.scenarios.own_code import own_code
+from airflock.scenarios.schema import value_of
 from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
 from airflock.spelling import as_name, meant
@@ -84,8 +85,8 @@ class Family(Generic[T]):
     def kind(self, document: Mapping[str, Any], usual: str = "") -> Any:
         """The kind that a document names, which may be written as a table with value and source."""
         table = document.get(self.section, {})
-        kind = table.get("kind", usual or self.usual) if isinstance(table, Mapping) else usual or self.usual
-        return kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
+        usual = usual or self.usual
+        return value_of(table.get("kind", usual)) if isinstance(table, Mapping) else usual
 
     def kept(self, table: Mapping[str, Any], other: str) -> dict[str, Any]:
         """The keys of a section that stay when its kind becomes another: all where both have the same numbers."""

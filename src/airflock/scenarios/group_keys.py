@@ -36,13 +36,17 @@ def with_groups(
         or not isinstance(given, (list, tuple))
         or not all(isinstance(table, Mapping) for table in given)
     ):
-        return document, others, [f"{key}: the scenario has no [[groups]]" for key in wanted]
+        return document, others, [f"{key}: the scenario has no [[groups]]; write them in a file" for key in wanted]
     tables = [dict(table) for table in given]
     names = [table.get("name", f"group_{number}") for number, table in enumerate(tables)]
     faults = []
     for key, value in wanted.items():
         group, section, name = parts_of(key)
-        if section not in LETTERS or not name:
+        if section not in LETTERS and _of_the_file(key, names):
+            faults.append(
+                f"{key}: a setting changes only {', '.join(LETTERS)} of a group; write it in the file's [[groups]]"
+            )
+        elif section not in LETTERS or not name:
             hint = _advice(key, document, dict(zip(map(str, names), tables, strict=True)))
             faults.append(f"{key}: unknown key; {hint}")
         elif group not in names:
@@ -53,6 +57,12 @@ def with_groups(
             own = table.get(section, {})
             table[section] = {**own, name: _kept(own.get(name), value)} if isinstance(own, Mapping) else own
     return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, faults
+
+
+def _of_the_file(key: str, names: list[str]) -> bool:
+    """Whether a key is a group's name or its agents, which only the file tells."""
+    group, _, word = key.removeprefix(FIRST).rpartition(".")
+    return word in ("name", "agents") and group in names
 
 
 def _advice(key: str, document: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> str:

@@ -105,8 +105,7 @@ class Laws:
     def _chosen(self, where: str, table: Mapping[str, Any], found: Model) -> tuple[Any, list[str]]:
         """Parameters of a group's law with its own choices; its numbers come later."""
         known = {name for name, declared, _ in declarations(found.Parameters) if isinstance(declared, Choice)}
-        own = {key: value for key, value in table.items() if key in known}
-        own = {key: v["value"] if isinstance(v, Mapping) and "value" in v else v for key, v in own.items()}
+        own = {key: schema.value_of(value) for key, value in table.items() if key in known}
         made, faults = schema.check(where, own, found.Parameters)
         if faults or made is None:
             return None, faults

@@ -207,6 +207,15 @@ def _finite(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
 
 
+def _after(scenario: Scenario) -> str:
+    """What becomes of a drone whose motors have stopped."""
+    if scenario.lands:
+        return ", and on the ground it is absent"
+    if scenario.dimensions == 3:
+        return ", and it falls without end, and counts; give a ground: world.arena with world.floor, or scene.ground"
+    return ", and it stays in the plane and counts"
+
+
 def _notes(scenario: Scenario) -> list[str]:
     """What cannot be meant, for a person to read; nothing here stops a flight."""
     cells = takes_all_cores(scenario) and measured_by_cells(scenario)
@@ -219,7 +228,7 @@ def _notes(scenario: Scenario) -> list[str]:
         if lasts < duration:
             notes.append(
                 f"body.capacity = {body.capacity:g} J lasts about {lasts:.3g} s of hovering, less than duration = "
-                f"{duration:g} s: then its motors stop"
+                f"{duration:g} s: then its motors stop{_after(scenario)}"
             )
     if getattr(p, "r0_frict", None) is not None and p.r0_frict < getattr(p, "r0_rep", 0.0):
         notes.append(

@@ -217,6 +217,26 @@ class Scenario:
         """Whether something stands in the world that agents see with rays, feel, or must not touch."""
         return self.scene.draw == "flight" or bool(len(self.stands().shapes))
 
+    @property
+    def ground(self) -> float | None:
+        """Height of the ground, m: that of the scene, or the floor of the arena; None where nothing lies below."""
+        if self.dimensions != 3:
+            return None
+        if self.scene.kind != "none" and self.scene.ground == "yes":
+            return 0.0
+        walled = self.world.arena != "none" and self.world.edges != "periodic"
+        return arena.heights_of(self.world)[0] if walled else None
+
+    @property
+    def drains(self) -> bool:
+        """Whether batteries run empty."""
+        return self.vehicle.endures is not None and getattr(self.body, "battery", "") != "endless"
+
+    @property
+    def lands(self) -> bool:
+        """Whether agents whose batteries are empty may come to the ground: then they are absent."""
+        return self.drains and self.ground is not None
+
     def stands(self) -> Scene:
         """What stands in the world; for a model that casts, polygons are walls of it too.
 

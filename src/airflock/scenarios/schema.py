@@ -57,6 +57,11 @@ def _holds(interval: Any, value: Any) -> bool:
     return sound and numbers[0] <= value <= numbers[-1]
 
 
+def value_of(given: Any) -> Any:
+    """A value as it is, or that of a table that also holds its unit or source: { value = ..., source = ... }."""
+    return given["value"] if isinstance(given, Mapping) and "value" in given else given
+
+
 def check(
     section: str, given: Mapping[str, Any], record: type, beside: Sequence[str] = (),
     kinds: Mapping[str, type] | None = None,

@@ -7,6 +7,12 @@ from typing import Any
 
 from airflock.core.parameters import Quantity, declarations
 
+# keys that only files have: what to do instead
+IN_FILES = {
+    "extends": "only a file has it; name the preset or file that it extends in place of this one",
+    "format": "only a file has it; leave it out",
+}
+
 
 def places(records: Mapping[str, type]) -> dict[str, list[str]]:
     """Last word → whole keys of all sections that have it.
@@ -45,6 +51,8 @@ def whole_keys(
         elif where:
             meant = (f"{name} ({_meaning(name, records)})" for name in where)
             faults.append(f"{key} is several keys; write {' or '.join(meant)}")
+        elif key in IN_FILES:
+            faults.append(f"{key}: {IN_FILES[key]}")
         else:
             near = get_close_matches(key, (*top, *known), n=1, cutoff=0.5)
             full = known.get(near[0], near) if near else []

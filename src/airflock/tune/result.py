@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from airflock.certify.certificate import Certificate
+from airflock.evolve.result import Result
 from airflock.evolve.steps import Measured
-from airflock.evolve.winner import Result
 from airflock.scenarios.scenario import Scenario
 
 PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (

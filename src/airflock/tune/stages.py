@@ -15,12 +15,12 @@ from airflock.errors import ScenarioError
 from airflock.evolve.folder import open_folder, write
 from airflock.evolve.harden import document as hardened_document
 from airflock.evolve.harden import harden
+from airflock.evolve.result import BEST, Result
 from airflock.evolve.run import executor_for as searching
 from airflock.evolve.run import run as evolved
 from airflock.evolve.search import Watch
 from airflock.evolve.steps import Measured
 from airflock.evolve.study import make_study
-from airflock.evolve.winner import BEST, Result
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.folder import document, read_steps

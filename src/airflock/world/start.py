@@ -15,8 +15,8 @@ class Parameters(Record):
         "arena",
         ("arena", "ball", "box", "vee", "echelon"),
         source="authors' programs: arena (Vásárhelyi et al. 2018), ball (Zapotecatl et al. 2016)",
-        meaning="region: the whole arena, or a ball (in a plane a disc) or a box (a square) about its centre; or a "
-        "formation: a V, or a line whose members are a spacing apart (a column, a row, an echelon)",
+        meaning="where agents start: anywhere in the arena, in a ball or a box about its centre (a disc or a square in "
+        "a plane), or in formation: vee is a V, echelon a line (a column or a row, too) with a fixed spacing",
     )
     radius: float = quantity(
         0.5, "m", low=1e-6, high=1e6, source="Zapotecatl et al. 2016, authors' program", meaning="radius of the ball"

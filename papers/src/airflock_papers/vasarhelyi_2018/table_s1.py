@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from airflock.evolve.result import Result
 from airflock.evolve.space import with_parameters
-from airflock.evolve.winner import Result
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

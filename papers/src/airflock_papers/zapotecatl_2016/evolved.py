@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from airflock.evolve.result import Result
 from airflock.evolve.space import with_parameters
-from airflock.evolve.winner import Result
 from airflock.scenarios.files import load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured

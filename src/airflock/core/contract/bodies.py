@@ -1,5 +1,6 @@
 """The contract of a body: what turns a command into a motion."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,6 +19,8 @@ class Body:
     Memory      : NamedTuple of what a body keeps from step to step, each field with its value at the start; `move` asks
                   for it as `memory` and returns it behind the velocity
     limits      : `limits` of any of b, dt, speed, start, wing → what of a scenario the body cannot fly, one line each
+    endures     : `endures` of any of memory, b, wing → how long (s) a battery lasts at least, 0 once it is empty; then
+                  an agent that comes to the ground is absent
     violates    : truths of `airflock.check_body` that do not hold for it, and why (VIOLATES)
     """
 
@@ -29,6 +32,7 @@ class Body:
     violates: Mapping[str, str] = field(default_factory=dict)
     Memory: type | None = None
     limits: Callable[..., list[str]] | None = None
+    endures: Callable[..., float] | None = None
 
     def __hash__(self) -> int:
         return hash((self.name, self.move))
@@ -37,6 +41,12 @@ class Body:
     def beginnings(self) -> tuple[float, ...]:
         """What each field of its Memory is at the start of a flight."""
         return tuple(getattr(self.Memory, "_field_defaults", {}).values())
+
+    def lasts(self, **given: Any) -> float:
+        """How long its battery lasts at least, s; 0 once it is empty."""
+        if self.endures is None:
+            return math.inf
+        return self.endures(**{name: given[name] for name in asks(self.endures, "endures", self.name)})
 
     def lacks(self, **given: Any) -> list[str]:
         """What this body cannot fly, by what `limits` may ask for."""
@@ -91,9 +101,10 @@ def body(namespace: Any, name: str = "") -> Body:
         raise RuleError(f"body {name}: a rule move that asks for memory and a NamedTuple Memory come together")
     if memory is not None and set(getattr(memory, "_field_defaults", {})) != set(getattr(memory, "_fields", "-")):
         raise RuleError(f"body {name}: Memory is a NamedTuple whose fields all have a value for the start")
-    if found.get("limits") is not None:
-        asks(found["limits"], "limits", name)
+    for optional in ("limits", "endures"):
+        if found.get(optional) is not None:
+            asks(found[optional], optional, name)
     return Body(
         name, found["Parameters"], found["ACCEPTS"], found["INTEGRATION"], found["move"],
-        dict(found.get("VIOLATES", {})), memory, found.get("limits"),
+        dict(found.get("VIOLATES", {})), memory, found.get("limits"), found.get("endures"),
     )  # fmt: skip

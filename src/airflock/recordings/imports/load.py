@@ -11,23 +11,20 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import RecordingError
-from airflock.numeric import is_number
 from airflock.recordings.imports import (
     absent,
     arrays,
     checks,
     clocks,
-    geodesy,
     grid,
-    headers,
     motion,
     movement,
     registry,
     tables,
 )
+from airflock.recordings.imports.local_frame import to_metres
+from airflock.recordings.imports.sound_options import check_options
 from airflock.recordings.imports.track import (
-    ACCEPTED,
-    COMMAND,
     GEODETIC,
     POSITION,
     VELOCITY,
@@ -107,8 +104,9 @@ def load_tracks(
     Returns
     -------
     xarray.Dataset
-        (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; differentiated where it is not
-        logged), command (m/s) where logged, confidence.
+        (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; differentiated where it is
+        not logged: central differences, one-sided at both ends of a track and of gaps), command (m/s) where
+        logged, confidence.
 
     Raises
     ------
@@ -132,7 +130,7 @@ def load_tracks(
     )  # fmt: skip
     numbers = {"rate": rate, "bridge": bridge, "begin": begin, "end": end}
     findings = Findings()
-    _sound(options, findings, numbers, precision, accept, origin)
+    check_options(options, findings, numbers, precision, accept, origin)
     findings.accept = frozenset([accept] if isinstance(accept, str) else accept)
     tracks, comparable = read_tracks(
         what, options, findings, origin=origin, same_clock=same_clock, begin=begin, end=end
@@ -141,7 +139,8 @@ def load_tracks(
     findings.refuse()
     if not all(track.has(VELOCITY) for track in tracks):
         findings.notes.append(
-            "no velocity: differentiated from positions; axes and units could not be checked against them"
+            "no velocity: differentiated from positions, one-sided at both ends of a track and of gaps; axes and units "
+            "could not be checked against them"
         )
     times, period = grid.grid_of(tracks, rate, begin, end)
     sources = sorted({track.source for track in tracks})
@@ -190,7 +189,7 @@ def read_tracks(
     checks.check_times(tracks, findings)
     checks.check_names(tracks, findings)
     checks.check_heights(tracks, options.axes, findings)
-    _to_metres(tracks, origin, findings)
+    to_metres(tracks, origin, findings)
     findings.refuse()
     motion.check_axes(tracks, findings)
     findings.refuse()
@@ -251,116 +250,3 @@ def _placed(path: Path, tracks: list[Track]) -> list[Track]:
         if not any(set(names) <= set(track.columns) for names in (POSITION[:2], GEODETIC[:2])):
             raise RecordingError(f"{path}: {track.name} has no positions")
     return tracks
-
-
-def _sound(
-    options: Options, findings: Findings, numbers: Mapping[str, Any], precision: Any, accept: Any, origin: Any
-) -> None:
-    """Refuse options that cannot be meant, all at once."""
-    faults = findings.faults
-    known = {"unit": ("", *headers.LENGTHS, *headers.PIXELS), "time_unit": ("", *headers.TIMES, "frames")}
-    for name, allowed in {**known, "axes": ("", "enu", "ned"), "decimal": (".", ",")}.items():
-        value = getattr(options, name)
-        if not isinstance(value, str) or value not in allowed:
-            faults.append(f"{name} = {value!r} is none of {', '.join(text for text in allowed if text)}")
-    given = {name: getattr(options, name) for name in ("keypoint", "delimiter")}
-    faults += [f"{name} = {value!r} is no text" for name, value in given.items() if not isinstance(value, str)]
-    if not isinstance(options.map, Mapping):
-        faults.append(f'map = {options.map!r}: give targets with expressions, such as {{"t": "time_us*1e-6"}}')
-    else:
-        said = [(key, text) for key, text in options.map.items() if not isinstance(text, str)]
-        faults += [f"map: {key} = {text!r} is no text; an expression is one" for key, text in said]
-    for name, number in {"scale": options.scale, "fps": options.fps, "rate": numbers["rate"]}.items():
-        if number is not None and not (is_number(number) and 0.0 < number < 1e9):
-            faults.append(f"{name} = {_shown(number)} must be a number above 0")
-    if not (is_number(numbers["bridge"]) and 0.0 <= numbers["bridge"] < 1e9):
-        faults.append(f"bridge = {_shown(numbers['bridge'])} s must be a number, 0 or more")
-    for name in ("begin", "end"):
-        if numbers[name] is not None and not (is_number(numbers[name]) and np.isfinite(numbers[name])):
-            faults.append(f"{name} = {_shown(numbers[name])} is not a time in s")
-    if not is_number(precision) or precision not in (32, 64):
-        faults.append(f"precision = {precision} is none of 32, 64")
-    if origin is not None and not _is_origin(origin):
-        faults.append(f"origin = {origin!r} is not (latitude, longitude, height) in degrees, degrees and m")
-    kinds = [accept] if isinstance(accept, str) or not isinstance(accept, Iterable) else list(accept)
-    faults += [f"accept = {kind} is none of {', '.join(ACCEPTED)}" for kind in kinds if str(kind) not in ACCEPTED]
-    findings.refuse()
-
-
-def _shown(value: Any) -> str:
-    return f"{value:g}" if is_number(value) else repr(value)
-
-
-def _is_origin(given: Any) -> bool:
-    """Whether something is a latitude, a longitude and a height."""
-    numbers = list(given) if isinstance(given, Iterable) else []
-    sound = len(numbers) == 3 and all(is_number(number) and np.isfinite(number) for number in numbers)
-    return sound and abs(numbers[0]) <= 90.0 and abs(numbers[1]) <= 360.0
-
-
-def _to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, findings: Findings) -> None:
-    """Rule 3: latitude and longitude to local metres, and all frames about one origin."""
-    geodetic = [t for t in tracks if "x" not in t.columns]
-    placed = [t for t in tracks if "x" in t.columns and t.origin is not None]
-    free = [t for t in tracks if "x" in t.columns and t.origin is None]
-    if free and (geodetic or placed):
-        findings.fault(
-            f"{free[0].source}: has no origin, while {(geodetic or placed)[0].source} has one; import them separately"
-        )
-        return
-    if origin is None and placed:
-        origin = placed[0].origin
-    for track in geodetic:
-        fault = _degrees_fault(track)
-        if fault:
-            findings.fault(fault)
-        elif len(track.columns["lat"]):
-            if origin is None:
-                origin = _first_fix(track)
-                findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
-            _project(track, origin)
-    for track in placed:
-        assert origin is not None
-        _move(track, origin)
-
-
-def _degrees_fault(track: Track) -> str:
-    """The first row that is no latitude and longitude, and what to write; empty if all are."""
-    lat, lon = track.columns["lat"], track.columns["lon"]
-    bad = np.flatnonzero((np.abs(lat) > 90.0) | (np.abs(lon) > 360.0))
-    if not bad.size:
-        return ""
-    name = track.label("lat" if abs(lat[bad[0]]) > 90.0 else "lon")
-    return (
-        f"{track.source}: column {name}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, {lon[bad[0]]:g} is no "
-        f"latitude and longitude; if it is in 1e-7 degrees, write --map 'lat:={track.label('lat')}*1e-7'"
-    )
-
-
-def _first_fix(track: Track) -> tuple[float, float, float]:
-    """Latitude, longitude (degrees) and height (m) of a track's first row; 0 m where no height is logged."""
-    height = track.columns["alt"][0] if "alt" in track.columns else 0.0
-    return float(track.columns["lat"][0]), float(track.columns["lon"][0]), float(height)
-
-
-def _project(track: Track, origin: tuple[float, float, float]) -> None:
-    """Put local metres about an origin in the place of a track's latitude, longitude and height."""
-    lat, lon = track.columns["lat"], track.columns["lon"]
-    local = geodesy.enu(lat, lon, track.columns.get("alt", np.zeros(len(lat))), origin)
-    axes = 3 if "alt" in track.columns else 2
-    track.columns = {k: v for k, v in track.columns.items() if k not in GEODETIC}
-    track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION[:axes])}
-    track.labels |= {"x": track.label("lon"), "y": track.label("lat"), "z": track.label("alt")}
-    track.origin = origin
-
-
-def _move(track: Track, origin: tuple[float, float, float]) -> None:
-    """Carry a track in local metres over to the frame about another origin."""
-    assert track.origin is not None
-    if track.origin == origin:
-        return
-    for names, change in ((POSITION, geodesy.moved), (VELOCITY, geodesy.turned), (COMMAND, geodesy.turned)):
-        if track.has(names):
-            moved = change(track.stack(names, 3), track.origin, origin)
-            track.columns |= {name: moved[:, c] for c, name in enumerate(names) if name in track.columns}
-    track.origin = origin

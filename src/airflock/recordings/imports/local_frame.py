@@ -1,0 +1,74 @@
+"""Local frame: latitudes and longitudes become metres, and tracks of several frames lie about one origin."""
+
+import numpy as np
+
+from airflock.recordings.imports import geodesy
+from airflock.recordings.imports.track import COMMAND, GEODETIC, POSITION, VELOCITY, Findings, Track
+
+
+def to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, findings: Findings) -> None:
+    """Rule 3: latitude and longitude to local metres, and all frames about one origin."""
+    geodetic = [t for t in tracks if "x" not in t.columns]
+    placed = [t for t in tracks if "x" in t.columns and t.origin is not None]
+    free = [t for t in tracks if "x" in t.columns and t.origin is None]
+    if free and (geodetic or placed):
+        findings.fault(
+            f"{free[0].source}: has no origin, while {(geodetic or placed)[0].source} has one; import them separately"
+        )
+        return
+    if origin is None and placed:
+        origin = placed[0].origin
+    for track in geodetic:
+        fault = _degrees_fault(track)
+        if fault:
+            findings.fault(fault)
+        elif len(track.columns["lat"]):
+            if origin is None:
+                origin = _first_fix(track)
+                findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
+            _project(track, origin)
+    for track in placed:
+        assert origin is not None
+        _move(track, origin)
+
+
+def _degrees_fault(track: Track) -> str:
+    """The first row that is no latitude and longitude, and what to write; empty if all are."""
+    lat, lon = track.columns["lat"], track.columns["lon"]
+    bad = np.flatnonzero((np.abs(lat) > 90.0) | (np.abs(lon) > 360.0))
+    if not bad.size:
+        return ""
+    name = track.label("lat" if abs(lat[bad[0]]) > 90.0 else "lon")
+    return (
+        f"{track.source}: column {name}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, {lon[bad[0]]:g} is no "
+        f"latitude and longitude; if it is in 1e-7 degrees, write --map 'lat:={track.label('lat')}*1e-7'"
+    )
+
+
+def _first_fix(track: Track) -> tuple[float, float, float]:
+    """Latitude, longitude (degrees) and height (m) of a track's first row; 0 m where no height is logged."""
+    height = track.columns["alt"][0] if "alt" in track.columns else 0.0
+    return float(track.columns["lat"][0]), float(track.columns["lon"][0]), float(height)
+
+
+def _project(track: Track, origin: tuple[float, float, float]) -> None:
+    """Put local metres about an origin in the place of a track's latitude, longitude and height."""
+    lat, lon = track.columns["lat"], track.columns["lon"]
+    local = geodesy.enu(lat, lon, track.columns.get("alt", np.zeros(len(lat))), origin)
+    axes = 3 if "alt" in track.columns else 2
+    track.columns = {k: v for k, v in track.columns.items() if k not in GEODETIC}
+    track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION[:axes])}
+    track.labels |= {"x": track.label("lon"), "y": track.label("lat"), "z": track.label("alt")}
+    track.origin = origin
+
+
+def _move(track: Track, origin: tuple[float, float, float]) -> None:
+    """Carry a track in local metres over to the frame about another origin."""
+    assert track.origin is not None
+    if track.origin == origin:
+        return
+    for names, change in ((POSITION, geodesy.moved), (VELOCITY, geodesy.turned), (COMMAND, geodesy.turned)):
+        if track.has(names):
+            moved = change(track.stack(names, 3), track.origin, origin)
+            track.columns |= {name: moved[:, c] for c, name in enumerate(names) if name in track.columns}
+    track.origin = origin
