@@ -8,6 +8,7 @@ from airflock.core.parameters import number_names
 from airflock.core.radio import Packets
 from airflock.core.vectors import overruled
 from airflock.errors import ScenarioError
+from airflock.scenarios.schema import value_of
 from airflock.untrusted import is_file, own_path
 
 OF_ITS_OWN = ("published", "title")  # what a paper published of a file and what the file is called: not of another
@@ -57,16 +58,12 @@ def _section(key: str, base: Any, own: Any) -> Any:
     """One section: the document's keys over the file's, unless they are of different kinds."""
     if not isinstance(base, Mapping) or not isinstance(own, Mapping) or (set(own) & {"value", "unit"} and key != "set"):
         return own
-    kinds = (_plain(own.get("kind", base.get("kind"))), _plain(base.get("kind")))
+    kinds = (value_of(own.get("kind", base.get("kind"))), value_of(base.get("kind")))
     other = key in KINDS and kinds[0] != kinds[1]
     if key == "topology":  # ours share their numbers; a file has its own
         other = kinds[0] != kinds[1] and any(isinstance(kind, str) and kind.endswith(".py") for kind in kinds)
     kept = {name: base[name] for name in SHARED.get(key, ()) if name in base} if other else base
     return {**overruled(kept, own), **own}
-
-
-def _plain(value: Any) -> Any:
-    return value.get("value") if isinstance(value, Mapping) else value
 
 
 def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -75,7 +72,7 @@ def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     kinds = [(section, "kind") for section in ("model", "body", "sensors", "radio", "topology", "metrics")]
     for section, key in (*kinds, ("scene", "file")):
         table = result.get(section)
-        name = _plain(table.get(key)) if isinstance(table, Mapping) else None
+        name = value_of(table.get(key)) if isinstance(table, Mapping) else None
         if isinstance(name, str) and name and not own_path(name).is_absolute() and is_file(folder / name):
             result[section] = {**table, key: str((folder / name).absolute())}  # type: ignore[dict-item]
     faults, groups = result.get("faults"), result.get("groups")
