@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.evolve.harden import harden as harden
     from airflock.evolve.run import evolve as evolve
     from airflock.evolve.validation import validate as validate
+    from airflock.fleet.flying import fleet as fleet
     from airflock.identify.run import identify as identify
     from airflock.infer.run import infer as infer
     from airflock.metrics.registry import metric_set as metric_set
@@ -93,6 +94,7 @@ _WHERE = {
     "certify": "airflock.certify",
     "tune": "airflock.tune",
     "display": "airflock.display",
+    "fleet": "airflock.fleet",
     "plot": "airflock.plots.picture",
     "plots": "airflock.plots",
     "video": "airflock.plots.video",
@@ -109,7 +111,7 @@ _WHERE = {
     "doctor": "airflock.recordings.health",
 }
 # packages; all but plots and measures can be called (decision 0010)
-_MODULES = ("evolve", "certify", "tune", "display", "identify", "infer", "body", "plots", "measures")
+_MODULES = ("evolve", "certify", "tune", "display", "fleet", "identify", "infer", "body", "plots", "measures")
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine"  # not in __all__: `from airflock import *` would hide Python's own
 

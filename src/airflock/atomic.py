@@ -4,7 +4,6 @@ A process that is killed leaves its temporary file. It held a lock on it, which 
 next process that writes beside it knows that nobody needs it, and removes it.
 """
 
-import fcntl
 import os
 import stat
 import tempfile
@@ -14,8 +13,11 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from airflock import locks
+
 MARK = ".airflock-"  # in the name of every temporary file
 FRESH = 60.0  # s in which a temporary file may not be locked yet
+FOUND = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # how what was found is opened
 
 
 @contextmanager
@@ -43,15 +45,26 @@ def _beside(target: Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         with suppress(OSError):  # some file systems know no locks; then nothing is swept
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            locks.lock(handle)
         yield temporary
         temporary.chmod(0o666 & ~_umask())
+        handle = _let_go(handle)
         temporary.replace(target)
     except BaseException:
+        handle = _let_go(handle)
         temporary.unlink(missing_ok=True)
         raise
     finally:
-        os.close(handle)
+        if handle >= 0:
+            os.close(handle)
+
+
+def _let_go(handle: int) -> int:
+    """Close a file, so that it can be renamed or removed, where the system does that to no open file; else keep it."""
+    if locks.MOVES_OPEN_FILES or handle < 0:
+        return handle
+    os.close(handle)
+    return -1
 
 
 def write(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
@@ -73,18 +86,20 @@ def swept(folder: Path) -> int:
 def _remove(path: Path) -> bool:
     """Remove a temporary file that no process holds."""
     try:
-        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+        handle = os.open(path, FOUND)
     except OSError:
         return False
     try:
         if time.time() - os.fstat(handle).st_mtime < FRESH:
             return False
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        locks.lock(handle)
+        handle = _let_go(handle)
         path.unlink()
     except OSError:  # somebody is writing it, or it is not ours
         return False
     finally:
-        os.close(handle)
+        if handle >= 0:
+            os.close(handle)
     return True
 
 

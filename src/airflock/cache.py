@@ -18,6 +18,7 @@ ROOM = 20_000_000  # bytes that must be free for a driver and its compiled code
 MOST = 500_000_000  # bytes of all drivers; beyond it the ones that were not used for longest go
 IN_USE = 3600.0  # s since its last use in which no driver is removed
 DRIVERS = "drivers"
+OWNERS = hasattr(os, "geteuid")  # Windows has none: there a user's own folder is closed to others by its rights
 
 
 def cache_folder() -> Path:
@@ -37,15 +38,15 @@ def cache_trouble(base: Path) -> str:
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = base.stat()
-        if found.st_uid not in (0, os.geteuid()):
+        if OWNERS and found.st_uid not in (0, os.geteuid()):
             return f"{base} belongs to another user"
-        if found.st_mode & 0o022 and not found.st_mode & stat.S_ISVTX:
+        if OWNERS and found.st_mode & 0o022 and not found.st_mode & stat.S_ISVTX:
             return f"{base} may be written by other users"
         (base / DRIVERS).mkdir(mode=0o700, exist_ok=True)
         inner = os.lstat(base / DRIVERS)
-        if not stat.S_ISDIR(inner.st_mode) or inner.st_uid != os.geteuid():
+        if not stat.S_ISDIR(inner.st_mode) or (OWNERS and inner.st_uid != os.geteuid()):
             return f"{base / DRIVERS} is not a folder of this user's"
-        if inner.st_mode & 0o077:
+        if OWNERS and inner.st_mode & 0o077:
             if inner.st_mode & 0o022:  # others may have put code there
                 _empty(base / DRIVERS)
             (base / DRIVERS).chmod(0o700)

@@ -552,3 +552,25 @@ def test_a_full_disk_does_not_bring_a_drone_down(tmp_path):
     told = [text for text in said if "goes on without it" in text]
     assert len(told) == 2 and any("log" in t and "No space" in t for t in told) and any("memory" in t for t in told)
     assert "ticks" in said[-1] and len(log.getvalue()) <= 2000
+
+
+def test_a_fleet_in_python_is_that_of_the_command(tmp_path):
+    import json
+
+    from typer.testing import CliRunner
+
+    import airflock
+    from airflock.cli.main import app
+    from airflock.errors import ScenarioError
+
+    small = {"agents": 3, "duration": 2.0}
+    found = airflock.fleet("vasarhelyi_2018/real_4ms", seeds=[4, 5], settings=small, beside=True)
+    words = "vasarhelyi_2018/real_4ms --agents 3 --duration 2 --seeds 2 --first-seed 4 --against simulator --json"
+    told = json.loads(CliRunner().invoke(app, ["fleet", *words.split()]).stdout)
+    assert [run["sha256"] for run in told["runs"]] == [run["sha256"] for run in found.runs]
+    assert [line["name"] for line in told["comparison"]] == [line.name for line in found.comparison]
+    assert found.table.attrs["units"]["phi_vel"] == "m/s" and found.departure.times
+    with pytest.raises(
+        ScenarioError, match=r"vehicle = 'px5' is none of px4, ardupilot; did you mean px4\?\n.*\n.*rad"
+    ):
+        airflock.fleet("vasarhelyi_2018/real_4ms", vehicle="px5", card="c.json", settings={"radio.dela": 1.0})

@@ -23,6 +23,12 @@ def test_no_page_breaks_the_rules_of_words():
     assert [fault for path in words.pages() for fault in words.faults_of(path)] == []
 
 
+def test_the_changelog_is_read_and_the_paper_has_no_blank():
+    assert {"CHANGELOG.md", "paper.md"} <= {path.name for path in words.pages()}
+    (paper,) = [path for path in words.pages() if path.name == "paper.md"]
+    assert "to be filled" not in paper.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("name", "text", "fault"),
     [

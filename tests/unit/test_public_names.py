@@ -3,6 +3,7 @@
 import inspect
 import re
 from importlib import import_module
+from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
@@ -17,7 +18,7 @@ CLASSES = {"AirflockError", "Scenario", "Flight", "Parameters"}
 HOMES = {
     "evolve": "airflock.evolve.run", "certify": "airflock.certify.run", "display": "airflock.display.displays",
     "tune": "airflock.tune.run", "identify": "airflock.identify.run", "infer": "airflock.infer.run",
-    "body": "airflock.core.contract",
+    "body": "airflock.core.contract", "fleet": "airflock.fleet.flying",
 }  # fmt: skip
 UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "s", "body_length": "m"}
 FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__"} - CLASSES)  # their examples: test_api_page
@@ -66,6 +67,16 @@ def test_every_command_has_a_function_and_every_function_a_command():
     assert {found.function for found in COUNTERPARTS.values() if "." not in found.function} | set(LIBRARY) == set(
         FUNCTIONS
     )
+
+
+def test_no_cell_of_the_tables_of_commands_and_functions_is_empty():
+    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    rows = [
+        [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in text.splitlines() if line[:1] == "|"
+    ]
+    rows = [row for row in rows if len(row) == 3]
+    assert len(rows) > 30 and [row for row in rows if not all(row)] == []
+    assert {name for name in COMMANDS if not any(f"airflock {name}" in row[1] for row in rows)} <= {"doctor"}
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))

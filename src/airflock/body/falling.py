@@ -1,4 +1,4 @@
-"""Falling: a body that nothing holds up any more. What air takes off its speed is left out."""
+"""Falling: a body that nothing holds up any more. What air takes off its speed is left out. Ours."""
 
 GRAVITY = 9.80665  # m/s², standard gravity
 

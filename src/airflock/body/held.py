@@ -1,4 +1,4 @@
-"""Multirotor that holds one command: the closed form of `motion.move` without noise, over any time."""
+"""Multirotor that holds one command: the closed form of `motion.move` without noise, over any time. Ours."""
 
 import math
 

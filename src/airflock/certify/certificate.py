@@ -68,7 +68,10 @@ class Certificate:
 
     @property
     def worst(self) -> list[dict[str, Any]]:
-        """The worst flights of each limit, worst first: number, seed, value of the score, the line that replays it."""
+        """The worst flights of each limit, worst first: number, seed, value of the score, the line that replays it.
+
+        Raises StudyError as `document` does.
+        """
         found = []
         for verdict in self.verdicts:
             limit, sign = verdict.limit, 1.0 if verdict.limit.sign in ("<", "<=") else -1.0
@@ -86,6 +89,8 @@ class Certificate:
 
     def document(self) -> dict[str, Any]:
         """The certificate as plain values: what certificate.toml holds.
+
+        Raises StudyError for a certificate of more flights than its numbers can tell apart.
 
         Examples
         --------
@@ -129,6 +134,8 @@ class Certificate:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write certificate.toml to `path`, complete or not at all.
 
+        Raises StudyError for a certificate of more flights than its numbers can tell apart.
+
         Examples
         --------
         >>> import airflock
@@ -144,6 +151,8 @@ class Certificate:
         """Fly one flight in a hundred again and compare the bits; see `airflock.certify.check.checked`.
 
         threads : of the flights, all processors by default
+
+        Raises StudyError for a certificate of more flights than its numbers can tell apart, or where one flies no more.
 
         Examples
         --------

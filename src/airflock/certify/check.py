@@ -55,7 +55,8 @@ def check(
     trust   : whether a law in a Python file that the scenario names may run
     done    : called after each flight
 
-    Raises StudyError where the file is no certificate, of another format, version or scenario than it says.
+    Raises StudyError where the file is no certificate, of another format, version or scenario than it says; and an
+    AirflockError where it cannot be read.
 
     Examples
     --------

@@ -102,7 +102,9 @@ def certify(
     Raises
     ------
     ScenarioError, StudyError
-        If the scenario, a limit or the folder cannot be used, or a flight fails; Interrupted at Ctrl-C.
+        If the scenario, a limit or the folder cannot be used, or a flight fails.
+    Interrupted
+        At Ctrl-C.
 
     Examples
     --------

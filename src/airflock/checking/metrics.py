@@ -51,6 +51,8 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     ------
     CheckError
         If a truth does not hold that the order parameter does not declare.
+    RuleError, ScenarioError, ParameterError
+        If what is checked cannot be read, or a number is none.
 
     Examples
     --------

@@ -77,6 +77,8 @@ def check_model(
     ------
     CheckError
         If a truth does not hold that the law does not declare.
+    RuleError, ScenarioError, ParameterError
+        If what is checked cannot be read, or a value is none of its numbers.
 
     Examples
     --------

@@ -50,6 +50,8 @@ def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed:
     ------
     CheckError
         If a truth does not hold that the radio does not declare.
+    RuleError, ScenarioError, ParameterError
+        If what is checked cannot be read, or a value is none of its numbers.
 
     Examples
     --------

@@ -60,6 +60,8 @@ def check_topology(what: Any, parameters: Mapping[str, Any] | None = None, *, se
     ------
     CheckError
         If a truth does not hold that the topology does not declare.
+    RuleError, ScenarioError, ParameterError
+        If what is checked cannot be read, or a value is none of its numbers.
 
     Examples
     --------

@@ -166,17 +166,16 @@ COUNTERPARTS: dict[str, Counterpart] = {
         },
     ),
     "fleet": Counterpart(
-        "airflock.fleet.compare.fly(scenario, card, seed)", "airflock.fleet.compare.fly",
+        'airflock.fleet("vasarhelyi_2018/real_4ms", seeds=5)', "fleet",
         {
-            "scenario": "scenario", "seeds": "seed", "first_seed": "seed", "faults": "faults", "ground": "ground",
-            **{name: LOADED[name] for name in SETTINGS}, "trust": "airflock.load", **TABLE,
-            **dict.fromkeys(("vehicle", "silence"), "airflock.fleet.compare.software_card"),
-            "against": "airflock.fleet.compare.both", "save": "airflock.fleet.compare.recording",
-            "body": "airflock.load", **dict.fromkeys(("mode", "join"), "airflock.fleet.realtime.fly"),
-            "card_file": "airflock.fleet.starting.write_for_watching",
+            "scenario": "scenario", **SEEDS, **SETTINGS, "trust": "trust", **TABLE, "against": "beside",
+            "card_file": "card", "save": "the recordings of the value returned",
+            **{name: name for name in ("vehicle", "body", "mode", "join", "faults", "silence", "ground")},
         },
     ),
-    "fly": Counterpart("airflock.core.pilot.Pilot", "airflock.core.pilot.Pilot", {}),
+    "fly": Counterpart(  # missions, nodes and orders are commands' work; a program of one's own asks the law
+        "airflock.core.pilot.Pilot(model, p, place, index=0, period=0.2)", "airflock.core.pilot.Pilot", {}
+    ),
     "paper": Counterpart(
         'airflock.paper("vasarhelyi_2018", only="s2")', "paper",
         {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads",

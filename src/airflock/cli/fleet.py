@@ -3,7 +3,6 @@
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,9 +12,6 @@ from airflock.cli import options, tables
 from airflock.errors import gathering
 from airflock.spelling import meant
 from airflock.suffixes import RECORDINGS
-
-VEHICLES = ("px4", "ardupilot")
-FLOWN = ("multirotor", "quadrotor")
 
 
 def fleet(
@@ -85,10 +81,9 @@ def fleet(
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 300 --mode processes --card fleet.json,
     and beside it airflock watch fleet.json
     """
-    from airflock.fleet import compare, individuals, realtime
+    from airflock.fleet import compare, flying, individuals, realtime
     from airflock.fleet.faults import read_faults
     from airflock.fleet.starting import READY_TIME
-    from airflock.fleet.teller import WATCHED
     from airflock.scenarios.files import load
 
     wrong: list[str] = []
@@ -96,46 +91,36 @@ def fleet(
         options.writable((save, RECORDINGS), (card_file, (".json",)))
     with gathering(wrong):
         settings = options.settings(changes, agents, duration)
-        loaded = load(scenario, settings | ({"body.kind": body} if body in FLOWN else {}), trust=trust)
+        loaded = load(scenario, settings | ({"body.kind": body} if body in flying.BODIES else {}), trust=trust)
         loaded = compare.sampled(loaded, loaded.sensors.period or loaded.flight.dt)
         broken = read_faults(faults, tuple(range(1, loaded.agents + 1))) if faults else ()
     options.refuse(wrong + _option_faults(vehicle, body, mode, card_file, against))
     tables.say_notes(loaded.notes)
-    private, public = _operator(ground)
     options.refuse(individuals.refused(loaded))
-    stops = True if silence is None and not against else silence
-    live = mode != realtime.MODES[0]
-    about: dict[str, Any] = {"vehicle": vehicle, "operator": public, "silent": stops, "live": live}
-    card = compare.software_card(loaded, **about, seed=first_seed)
+    live = mode != flying.LOCKSTEP
     options.refuse(realtime.refused(loaded, broken) if live else [])
-    if card_file is not None:
-        _write_card(card_file, card, loaded, seeds)
-    series = Series()
+    if card_file is not None and loaded.varied and seeds > 1:
+        options.refuse([f"--card {card_file}: with tolerances each seed has its own card; add --seeds 1"])
+    how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "ground": ground, "join": join, "card_file": card_file}
+    how["silent"] = True if silence is None and not against else silence
+    series = flying.Fleets(loaded, vehicle)
     ticks = seeds * int(loaded.flight.duration + (READY_TIME if ground else 0.0))
     with options.progress(f"{loaded.name}: fleet", ticks, quiet=as_json) as done, _imports_kept():
-        for seed in range(first_seed, first_seed + seeds):
-            card = compare.software_card(loaded, **about, seed=seed) if loaded.varied else card
-            common: dict[str, Any] = {"faults": broken, "operator": private, "done": done}
-            if live:
-                start = None if ground else compare.first_states(loaded, seed)
-                join_at, watcher = (realtime.JOIN[0], join), WATCHED if card_file else None
-                flown: Any = realtime.fly(
-                    loaded, card, seed, mode, start=start, join=join_at, watcher=watcher, **common
-                )
-            else:
-                flown = compare.fly(loaded, card, seed, ground=ground, **common)
-            series.add(flown, flown.load if live else None, beside=against is not None, follows=not ground and not live)
-            _save(save, seed, seeds, flown)
-    _tell(loaded, card, series, as_json)
+        numbers = range(first_seed, first_seed + seeds)
+        for flown in flying.in_turn(loaded, numbers, faults=broken, done=done, say=tables.say, **how):
+            series.add(flown, beside=against is not None, follows=not ground and not live)
+            _save(save, flown.seed, seeds, flown)
+    _tell(series, as_json)
 
 
 def _option_faults(vehicle: str, body: str | None, mode: str, card_file: Path | None, against: str | None) -> list[str]:
     """What is wrong with options that do not concern the scenario."""
+    from airflock.fleet.flying import BODIES, VEHICLES
     from airflock.fleet.realtime import MODES
 
     faults = [
         f"{option} {word} is none of {', '.join(known)}{meant(word, known, lead='; ')}"
-        for option, word, known in (("--vehicle", vehicle, VEHICLES), ("--body", body, FLOWN), ("--mode", mode, MODES))
+        for option, word, known in (("--vehicle", vehicle, VEHICLES), ("--body", body, BODIES), ("--mode", mode, MODES))
         if word is not None and word not in known
     ]
     if card_file is not None and mode == MODES[0]:
@@ -143,43 +128,6 @@ def _option_faults(vehicle: str, body: str | None, mode: str, card_file: Path | 
     if against not in (None, "simulator"):
         faults.append(f"--against {against}: only simulator is known")
     return faults
-
-
-@dataclass
-class Series:
-    """What a fleet flew, seed after seed.
-
-    measured  : order parameters of each flight
-    simulated : those of the simulator beside it, where it was asked for
-    runs      : what is told of each flight: seed, digest, phases, notes, order parameters; on the real clock its load
-    departure : how fast the first flight leaves the simulated one, where a fleet follows it
-    """
-
-    measured: list[dict[str, Any]] = field(default_factory=list)
-    simulated: list[dict[str, Any]] = field(default_factory=list)
-    runs: list[dict[str, Any]] = field(default_factory=list)
-    departure: Any = None
-
-    def add(self, flown: Any, load: Any, *, beside: bool, follows: bool) -> None:
-        """Measure a flight, and fly the simulator beside it where asked.
-
-        load    : what it cost on the real clock; None in lock-step
-        follows : whether both start alike, on one clock
-        """
-        from airflock.fleet import compare
-        from airflock.recordings.scores import measure
-
-        if beside:
-            simulated, measured = compare.both(flown.scenario, flown)
-            self.simulated.append(simulated)
-            if follows and self.departure is None:
-                self.departure = compare.departure(flown)
-        else:
-            measured = measure(compare.recording(flown))[0]
-        self.measured.append(measured)
-        phases = [phase.name for phase in flown.phases()]
-        run = {"seed": flown.seed, "sha256": flown.digest(), "phases": phases, "notes": flown.log, **measured}
-        self.runs.append(run if load is None else run | {"load": load._asdict()})
 
 
 @contextmanager
@@ -192,25 +140,6 @@ def _imports_kept() -> Iterator[None]:
         gc.unfreeze()
 
 
-def _operator(ground: bool) -> tuple[bytes, bytes]:
-    """Keys of an operator where one is needed."""
-    if not ground:
-        return b"", b""
-    from airflock.mavlink.orders import new_keys
-
-    return new_keys()
-
-
-def _write_card(path: Path, card: Any, found: Any, seeds: int) -> None:
-    """Write the card of the fleet for `airflock watch`; one card must do for all seeds."""
-    from airflock.fleet.starting import write_for_watching
-
-    if found.varied and seeds > 1:
-        options.refuse([f"--card {path}: with tolerances each seed has its own card; add --seeds 1"])
-    write_for_watching(path, card)
-    tables.say(f"wrote {path} and its key; airflock watch {path} shows the fleet")
-
-
 def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:
     if save is None:
         return
@@ -221,20 +150,18 @@ def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:
     tables.say(f"saved {save_recording(recording(flown), path)}")
 
 
-def _tell(scenario: Any, card: Any, series: Series, as_json: bool) -> None:
+def _tell(series: Any, as_json: bool) -> None:
     """Print what was flown."""
-    from airflock.fleet.compare import table
     from airflock.metrics.registry import reports
 
-    lines = table(series.simulated, series.measured) if len(series.simulated) > 1 else []
-    seeds = len(series.runs)
+    scenario, lines, seeds = series.scenario, series.comparison, len(series.runs)
     if as_json:
-        about = {"name": scenario.name, "agents": scenario.agents, "vehicle": card.autopilot.name, "seeds": seeds}
+        about = {"name": scenario.name, "agents": scenario.agents, "vehicle": series.vehicle, "seeds": seeds}
         content = {"fleet": about, "runs": series.runs, "comparison": [line._asdict() for line in lines]}
         tables.emit_json(content | ({"departure": series.departure._asdict()} if series.departure else {}))
         return
     flown = f"{scenario.flight.duration:g} s, {seeds} seed{'s' if seeds > 1 else ''}"
-    title = f"{scenario.name}: fleet of {scenario.agents} {card.autopilot.name}, {flown}"
+    title = f"{scenario.name}: fleet of {scenario.agents} {series.vehicle}, {flown}"
     tables.score_table(title, series.measured, {}, reports(scenario.measures))
     for run in series.runs:
         _tell_load(run.get("load"))

@@ -76,12 +76,12 @@ def quantity(
     Parameters
     ----------
     default : float, tuple of float or None
-        None makes it optional: it then comes from the rest of the scenario. Of a vector one number for all components,
-        or one for each.
+        In `unit`. None makes it optional: it then comes from the rest of the scenario. Of a vector one number for all
+        components, or one for each.
     unit : str
         SI unit, "1" for a plain number.
     low, high : float
-        Allowed range, both ends included.
+        Allowed range in `unit`, both ends included.
     meaning : str
         What it is, for help texts and error messages.
     source : str
@@ -89,7 +89,7 @@ def quantity(
     whole : bool
         Only whole numbers make sense; searches take no others.
     usual : (float, float), optional
-        The span in which it is usually set, inside the allowed range: the ends of its slider on a live page. Without
+        The span in `unit` of usual values, inside the allowed range: the ends of its slider on a live page. Without
         it a slider takes the bounds of a study of the same law, or else reaches from 0 to 4 times the value.
     size : int, optional
         How many components a vector has. A rule reads it as a tuple, `p.weights[k]`; loops over it are unrolled. In a
@@ -104,7 +104,8 @@ def quantity(
     Raises
     ------
     ParameterError
-        By the record, when it is made with a word that is none of the options.
+        By the record, when it is made with a value outside the range, or with what is not a number. At once, where
+        the declaration itself is faulty.
 
     Examples
     --------
@@ -164,7 +165,7 @@ def choice(default: str, options: tuple[str, ...], *, meaning: str, source: str 
     Raises
     ------
     ParameterError
-        By the record, when it is made with a value outside the range, or with what is not a number.
+        By the record, when it is made with a word that is none of the options.
 
     Examples
     --------

@@ -53,6 +53,8 @@ def display(
     ------
     ScenarioError
         With one line for each fault of the shapes, shares, numbers and keys.
+    AirflockError
+        If the display cannot be flown.
 
     Notes
     -----

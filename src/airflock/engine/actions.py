@@ -55,6 +55,8 @@ class Actions(Readings):
         value : one number per axis, m/s, m/s² or a direction, as the law commands; for several agents one such row
                 for all of them, or one for each: (agent, axis)
 
+        Raises FlightError for an agent that is not there, for another number of numbers, and where `sense` does.
+
         Examples
         --------
         >>> import airflock
@@ -75,7 +77,7 @@ class Actions(Readings):
         Everything that a scenario file says may change but agents, dimensions, dt and start. A new window of scores
         begins. Where other text must be compiled, `wait` says whether to wait for it; if not, the flight goes on under
         the old scenario until the next `advance` after the new one is ready.
-        Raises ScenarioError, and the flight is as it was.
+        Raises ScenarioError, or FlightError once the flight has ended; the flight is as it was.
 
         Examples
         --------
@@ -98,6 +100,8 @@ class Actions(Readings):
         """Add to the velocity of an agent, or of several: a gust, a collision, a hand.
 
         velocity : m/s, one number per axis, at most 1000; for several agents one such row for all, or one for each
+
+        Raises FlightError for an agent that is not there, and for a velocity that is none or too large.
 
         Examples
         --------
@@ -155,7 +159,7 @@ class Actions(Readings):
         kind   : such as "motor"; agents : whom it hits
         numbers : of the kind, such as share=0.2; lasts (s), number (how many, drawn); or group instead of agents
         wait   : as in `change`
-        Raises ScenarioError, and the flight is as it was.
+        Raises ScenarioError, or FlightError once the flight has ended; the flight is as it was.
 
         Examples
         --------
@@ -176,6 +180,8 @@ class Actions(Readings):
 
         reason : for the list of events
 
+        Raises FlightError for an agent that is not there.
+
         Examples
         --------
         >>> import airflock
@@ -194,6 +200,8 @@ class Actions(Readings):
         """Let an agent that is absent join, as agents join at the start: the others know at once where it is.
 
         position, velocity : one number per axis, m and m/s; by default at rest
+
+        Raises FlightError for an agent that is there already, and for a place where it cannot be.
 
         Examples
         --------

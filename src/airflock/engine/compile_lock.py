@@ -3,7 +3,6 @@
 The lock is one of the system's on a file beside the driver: it ends with the process that holds it, however that ends.
 """
 
-import fcntl
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from typing import Any
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import trigger_event
 
+from airflock import locks
 from airflock.engine.compile_shortcuts import implementations, seldom_collected
 from airflock.engine.thread_waiting import waiting_briefly
 
@@ -55,7 +55,7 @@ def alone(folder: Path, patience: float = PATIENCE) -> Iterator[bool]:
     handle = -1
     try:
         with suppress(OSError):  # a folder that was removed meanwhile, a full disk: then all compile
-            handle = os.open(folder / NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            handle = os.open(folder / NAME, os.O_RDWR | os.O_CREAT, 0o600)
         yield handle >= 0 and _taken(handle, time.monotonic() + patience)
     finally:
         if handle >= 0:
@@ -66,7 +66,7 @@ def _taken(handle: int, until: float) -> bool:
     """Whether the lock was free in time."""
     while True:
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            locks.lock(handle)
         except BlockingIOError:
             if time.monotonic() > until:
                 return False

@@ -100,6 +100,8 @@ class Flight(Actions):
     def advance(self, seconds: float | None = None, *, steps: int | None = None) -> "Flight":
         """Fly on by some seconds or motion steps, at most to the end of the flight. Returns the flight.
 
+        seconds : time to fly, s; steps: or motion steps
+
         Raises FlightError where the flight is over, where the agents find no place at the start, and where a state
         stops being finite.
 
@@ -160,6 +162,8 @@ class Flight(Actions):
 
         Of a flight that was never changed these are the scores of the closed flight.
 
+        Raises FlightError as `advance` does where a state stops being finite.
+
         Examples
         --------
         >>> import airflock
@@ -191,6 +195,9 @@ class Flight(Actions):
 
         Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
 
+        Raises FlightError for an agent that is not there, and RuleError for a rule that asks for what cannot be told
+        outside of the flight.
+
         Examples
         --------
         >>> import airflock
@@ -214,6 +221,8 @@ class Flight(Actions):
         """Do what an event says: the method of the same name.
 
         kind : change, fault, push, place, command, remove, add or branch; data : the arguments of that method
+
+        Raises FlightError for an event that there is not, and what the method raises, such as ScenarioError.
 
         Examples
         --------
@@ -270,6 +279,8 @@ class Flight(Actions):
 
         world : the same (default) meets the same noise, another one an independent future
 
+        Raises FlightError for a `world` that is no whole number from 0 to 2^32 - 1.
+
         Examples
         --------
         >>> import airflock
@@ -286,6 +297,9 @@ class Flight(Actions):
 
     def again(self) -> "Flight":
         """The same flight from its start, with the same events to come.
+
+        Raises ScenarioError, FlightError and ParameterError as opening it did; so only where files have changed
+        meanwhile.
 
         Examples
         --------

@@ -100,7 +100,7 @@ class Readings:
 
     @property
     def sent(self) -> NDArray[Any]:
-        """Over two lossy links: when the newest packet that each agent has of each other was sent, s; nan: none yet."""
+        """Over two lossy links: when the newest packet of each pair was sent, s (receiver, sender); nan: none."""
         stamps = self._state.arrays["store"][2 * self._state.plan.dimensions, :, : self.agents].astype(float)
         return np.where(stamps > NEVER / 10.0, stamps, np.nan)
 
@@ -138,7 +138,7 @@ class Readings:
 
     @property
     def present(self) -> NDArray[np.bool_]:
-        """Of each agent whether it is there."""
+        """Of each agent whether it is there (agent,)."""
         return self._state.present
 
     @property

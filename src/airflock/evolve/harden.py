@@ -65,7 +65,7 @@ def harden(
         What is tried, one after another; earlier braking is added where agents touch walls or obstacles, and comes
         first where that is what is short.
     cost : float
-        Fitness that may be given up in all; a step towards limits that are not kept yet may cost more.
+        Fitness, 0 to 1, that may be given up in all; a step towards limits that are not kept yet may cost more.
     limit : str or sequence of str
         What may happen how rarely, as `airflock.certify` takes it. A step must not raise the estimated probability of
         an event above its limit, with a reserve of ten.

@@ -23,8 +23,9 @@ class Result:
     """What a study found.
 
     parameters : of the winner, by key; scenario : with these parameters
-    fitness, sd, low, high, seeds : of the winner on fresh seeds, with Student's 95 % interval of the mean
-    largest    : best candidate of the search, luck included
+    fitness, sd, low, high, seeds : of the winner on fresh seeds, with Student's 95 % interval of the
+                 mean; the fitness in the unit of the objective
+    largest    : best candidate of the search, luck included, in the same unit of the objective
     origin     : "mean" or "top": what the winner was
     ranges     : key → (low, high) over the `above` candidates of the search that reach the winner's fitness
     finalists  : one row each: origin, parameters, fitness on fresh seeds

@@ -108,7 +108,9 @@ def evolve(
     Raises
     ------
     ScenarioError, StudyError
-        If the scenario, the study or its folder cannot be used; Interrupted at Ctrl-C.
+        If the scenario, the study or its folder cannot be used.
+    Interrupted
+        At Ctrl-C; what has flown is kept.
 
     Notes
     -----

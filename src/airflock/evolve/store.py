@@ -5,10 +5,10 @@ air. Nothing depends on the order in which flights land. Readers may look on whi
 refused by a lock that the system gives back however the first one ends.
 """
 
-import fcntl
 import json
 import math
 import os
+import platform
 import sqlite3
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from airflock import locks
 from airflock.errors import StudyError
 from airflock.executors import Landed
 from airflock.untrusted import FormatError, from_outside, json_object, json_value
@@ -90,7 +91,7 @@ class Store:
 
     def begin(self, versions: Mapping[str, str]) -> None:
         """Note that a process begins to write: when, where, with which versions."""
-        row = (time.strftime("%Y-%m-%dT%H:%M:%S%z"), os.uname().nodename, json.dumps(dict(versions)))
+        row = (time.strftime("%Y-%m-%dT%H:%M:%S%z"), platform.node(), json.dumps(dict(versions)))
         with plain_faults(self.path):
             cursor = self.connection.execute("INSERT INTO session (began, host, versions) VALUES (?, ?, ?)", row)
             self.session = int(cursor.lastrowid or 0)
@@ -177,13 +178,13 @@ def _lock(folder: Path) -> int:
     path = folder / LOCK
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        locks.lock(handle)
     except OSError as fault:
         holder = os.read(handle, 200).decode(errors="replace").strip()
         os.close(handle)
         raise StudyError(f"{folder}: another process ({holder or 'unknown'}) is writing this study") from fault
     os.ftruncate(handle, 0)
-    os.write(handle, f"process {os.getpid()} on {os.uname().nodename}\n".encode())
+    os.write(handle, f"process {os.getpid()} on {platform.node()}\n".encode())
     return handle
 
 

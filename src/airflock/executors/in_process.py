@@ -1,6 +1,7 @@
 """Flights in this process, side by side on all cores: compiled flights release the interpreter."""
 
 import os
+import platform
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -27,7 +28,7 @@ class InProcess:
 
         others : the same for further scenarios of the study
         """
-        self.scores, self.name = (score, *others), f"{os.uname().nodename}:{os.getpid()}"
+        self.scores, self.name = (score, *others), f"{platform.node()}:{os.getpid()}"
         self.pool = ThreadPoolExecutor(max(1, threads))
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:

@@ -6,6 +6,7 @@ is no time-out: a process that ends before is named in one line, and ends the fl
 
 import asyncio
 import hashlib
+import math
 import multiprocessing
 import os
 import signal
@@ -196,6 +197,8 @@ async def together(life: Begun) -> Life:
 
 def _forked(lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
     """Each life in a process of its own; what is left of each, and the processor time of all, s."""
+    if not hasattr(os, "fork"):
+        raise LinkError("mode = 'processes' forks, which this system does not do; give mode = 'tasks'")
     context, began = multiprocessing.get_context("fork"), time.process_time()
     dialect.common()  # once here, so that no process imports it for itself
     pipes = [context.Pipe() for _ in lives]
@@ -301,4 +304,5 @@ def _load(lives: Sequence[Life], count: int, seconds: float, all_: float, togeth
     by = [None if together else sum(life.processor for life in part) / seconds for part in (nodes, others)]
     ticks = [life.ticks for life in nodes]
     total, late = sum(t.total for t in ticks), sum(t.late for t in ticks)
-    return Load(all_ / seconds, by[0], by[1], total, late, max(t.worst for t in ticks), os.getloadavg()[0])
+    others_ = os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan  # Windows counts none
+    return Load(all_ / seconds, by[0], by[1], total, late, max(t.worst for t in ticks), others_)

@@ -7,11 +7,16 @@ opens a serial line.
 
 import os
 import socket
-import termios
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from airflock.errors import LinkError
+
+termios: Any
+try:
+    import termios
+except ImportError:  # Windows
+    termios = None
 
 LONGEST = 2048  # bytes read at once
 MOST = 1000  # datagrams read at one look; what a flood brings beyond waits, or is lost as on a jammed radio
@@ -49,8 +54,8 @@ def open_port(text: str) -> Port:
             return Udp(_place(rest, text))
         if kind == "serial":
             return Serial(rest, text)
-    except (OSError, termios.error) as fault:
-        raise LinkError(f"{text}: {fault.strerror if isinstance(fault, OSError) else fault}") from fault
+    except OSError as fault:
+        raise LinkError(f"{text}: {fault.strerror}") from fault
     except UnicodeError as fault:
         raise LinkError(f"{text}: is not a valid name of a computer") from fault
     raise LinkError(f"{text}: give udp:HOST:PORT, udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")
@@ -141,6 +146,8 @@ class Serial:
     """A serial line, raw, eight bits."""
 
     def __init__(self, rest: str, text: str):
+        if termios is None:
+            raise LinkError(f"{text}: serial lines need a POSIX system such as Linux; give udp:HOST:PORT")
         path, _, told = rest.rpartition(":")
         speed: Callable[..., int] | int | None = getattr(termios, f"B{told}", None) if told.isdigit() else None
         if not path or not isinstance(speed, int):
@@ -152,8 +159,10 @@ class Serial:
             mode[2] = termios.CS8 | termios.CREAD | termios.CLOCAL
             mode[4] = mode[5] = speed
             termios.tcsetattr(self._file, termios.TCSANOW, mode)
-        except BaseException:
+        except BaseException as fault:
             os.close(self._file)
+            if isinstance(fault, termios.error):  # is no OSError
+                raise LinkError(f"{text}: {fault}") from fault
             raise
 
     def fileno(self) -> int:

@@ -12,6 +12,8 @@ def stood(show: Show, titles: list[str], *, ax: Axes | None = None) -> Figure:
 
     titles : one for each shape; ax : axes of a grid, whose place the panels take, instead of a new figure
 
+    Raises AirflockError for an `ax` that is none of a grid.
+
     Examples
     --------
     >>> import airflock

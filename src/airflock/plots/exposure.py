@@ -46,9 +46,14 @@ def exposure(
 ) -> Figure:
     """Light trails of all agents, brighter where they linger or meet, coloured by speed; 3-D recordings obliquely.
 
+    recording   : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; by default the last 30 s
     fading      : time after which a trail has faded to 37 %, s; by default half the window
     ax          : axes to draw into, instead of a new figure
+    The picture is that of Vásárhelyi et al. 2018, Fig. 5.
+
+    Raises RecordingError for what is no recording, and for a window that holds none of it; AirflockError for a `fading`
+    that is not above 0.
 
     Examples
     --------

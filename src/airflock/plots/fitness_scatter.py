@@ -27,6 +27,8 @@ def fitness_scatter(
     best      : the chosen parameters, a line in each panel
     what      : title; ax : axes of a grid, whose place the panels take, instead of a new figure
 
+    Raises AirflockError for an `ax` that is none of a grid.
+
     Examples
     --------
     >>> import airflock

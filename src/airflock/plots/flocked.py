@@ -27,9 +27,14 @@ def flocked(
 ) -> Figure:
     """Share of agents flocked and their polarisation, sub-swarms and collisions at every instant; lines mark goals.
 
+    recording   : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; settings : keys that replace those the recording was flown with
     smooth      : window of the means of shares, s, as in `series`
     ax          : axes of a grid, whose place the panels take, instead of a new figure
+    The order parameters are those of Kidger, section 5.1.
+
+    Raises RecordingError for what is no recording, and for a window that holds none of it, or whose order parameters do
+    not hold the share flocked; AirflockError for an `ax` that is none of a grid.
 
     Examples
     --------

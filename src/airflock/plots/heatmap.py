@@ -37,6 +37,8 @@ def heatmap(
     scenario : what was swept, for the title and for the units of its model's keys
     ax       : axes to draw into, instead of a new figure
 
+    Raises AirflockError for a table without these columns, and for more keys than two.
+
     Examples
     --------
     >>> import airflock

@@ -19,6 +19,8 @@ def pareto(
     what  : title; objectives: columns that are drawn
     ax    : axes of a grid, whose place the panels take, instead of a new figure
 
+    Raises AirflockError for an `ax` that is none of a grid.
+
     Examples
     --------
     >>> import airflock

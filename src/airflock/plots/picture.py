@@ -51,7 +51,8 @@ def plot(
     Parameters
     ----------
     what : Scenario, xarray.Dataset, str or path
-        A scenario or the name of one, which is flown; or a recording or a file (.nc) of one.
+        A scenario or the name of one, which is flown; or a recording (time, space, keypoint, individual), or a
+        file (.nc) of one.
     kind : str
         trajectories, exposure, series, flocked; scene, space, rays where something stands in the world; wash of a
         formation of wings; reception, the time since the last packet by distance; rules of a model;

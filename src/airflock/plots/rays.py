@@ -40,9 +40,11 @@ def cast_at(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[Ray], t
 def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, ax: Axes | None = None) -> Figure:
     """Rays of one agent from above: red where they met something, green the first free one, black what was flown.
 
-    recording : of a law that casts rays, m and m/s; agent : whose rays
+    recording : (time, space, keypoint, individual), of a law that casts rays, m and m/s; agent : whose rays
     start     : instant, s; by default the one at which this agent cast most rays in the flight's first 20 s
     ax        : axes to draw into, instead of a new figure
+
+    Raises RecordingError where the law casts no rays, or there is no such agent or instant.
 
     Examples
     --------

@@ -16,8 +16,12 @@ FEW = 10  # pairs of a bin below which it is not drawn
 def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | None = None) -> Figure:
     """Ages of what agents have of each other: median, half of all, nine tenths of all; and the share heard so far.
 
-    heard : a recording with `age` or a table of packets, as `airflock.recordings.reception` takes it
+    heard : a recording with `age` (time, receiver, sender), s, or a table of packets (`recordings.reception`)
     bins  : of distance; ax : axes of a grid, whose place the panels take, instead of a new figure
+    The picture is that of Vásárhelyi et al. 2018, Fig. 8.
+
+    Raises RecordingError where the recording holds no ages or the table lacks a column, and AirflockError for an `ax`
+    that is none of a grid.
 
     Examples
     --------

@@ -37,6 +37,9 @@ def rules(
     speed      : at which an agent flies towards a wall, m/s; by default the same
     farthest   : largest distance drawn, m; by default a quarter beyond the interaction range
     ax         : axes of a grid, whose place the panels take, instead of a new figure
+    The picture is that of Vásárhelyi et al. 2018, Fig. 6.
+
+    Raises RuleError for a law without a rule of distance, and AirflockError for an `ax` that is none of a grid.
 
     Examples
     --------

@@ -23,10 +23,12 @@ class PictureError(RecordingError):
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: float = 200.0) -> Path:
-    """Write a figure as .png, .pdf or .svg; raises PictureError and leaves nothing behind.
+    """Write a figure as .png, .pdf or .svg.
 
     path       : of the picture; its ending says of which kind it is
     resolution : dots per inch of .png, and of what is drawn as pixels within the others
+
+    Raises PictureError where it cannot be written; then nothing is left behind.
 
     Examples
     --------

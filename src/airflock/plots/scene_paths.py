@@ -49,10 +49,12 @@ def through(
 ) -> Figure:
     """Paths through what stands in the scene, coloured by speed; stars mark the goals.
 
-    recording   : flown among buildings, trees or boxes, m and m/s
+    recording   : (time, space, keypoint, individual), flown among buildings, trees or boxes, m and m/s
     start, stop : window of time, s; by default the whole flight
     space       : solid and lit, obliquely from above, instead of ground plans; what a solid hides is drawn faintly
     ax          : axes to draw into, instead of a new figure
+
+    Raises RecordingError for tracks, which have no scene, for a flight in a plane, and for an empty window.
 
     Examples
     --------

@@ -33,11 +33,16 @@ def series(
 ) -> Figure:
     """Correlation, speed in units of v_flock, nearest neighbours (m) and rotation at every instant.
 
+    recording   : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; by default the whole flight
-    smooth      : means over so many seconds (of the nearest pair the least value), told in the title; 0 draws instants
-    alone, by default a two-hundredth of what is shown
+    smooth      : means over so many seconds, s (of the nearest pair the least value), told in the title; 0 draws
+                  instants alone, by default a two-hundredth of what is shown
     settings    : keys such as {"metrics.r_cluster": 60.0} that replace those the recording was flown with
     ax          : axes of a grid, whose place the panels take, instead of a new figure
+    The picture is that of Vásárhelyi et al. 2018, Fig. 3.
+
+    Raises RecordingError for what is no recording, and for a window that holds none of it, ScenarioError for settings
+    that its scenario does not take, and AirflockError for an `ax` that is none of a grid or a `smooth` below 0.
 
     Examples
     --------
@@ -141,10 +146,13 @@ def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax:
 def rotations(
     flights: Mapping[str, xr.Dataset], *, start: float | None = None, stop: float | None = None, ax: Axes | None = None
 ) -> Figure:
-    """phi_LAP of several flights on one axis (Fig. 4 D): circling is near ±1, diagonal flight near 0.
+    """phi_LAP of several flights on one axis (Vásárhelyi et al. 2018, Fig. 4 D): near ±1 where they circle.
 
-    flights     : label → recording
+    flights     : label → recording, (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; ax : axes to draw into, instead of a new figure
+
+    Raises RecordingError for what is no recording, and for a window that holds none of it, and for tracks, which have
+    no phi_lap; AirflockError for an unfit `ax`.
 
     Examples
     --------

@@ -30,6 +30,8 @@ def slices(
     what   : title; maximise: whether more of the objective is better
     ax     : axes of a grid, whose place the panels take, instead of a new figure
 
+    Raises AirflockError for an `ax` that is none of a grid.
+
     Examples
     --------
     >>> import airflock

@@ -49,13 +49,18 @@ def trajectories(
 ) -> Figure:
     """Paths from above, or in space for a 3-D recording; dots mark where agents are at the end.
 
-    Where a city, forest or mesh stands, the paths through it, from above.
+    Where a city, forest or mesh stands, the paths through it, from above. The picture is that of
+    Vásárhelyi et al. 2018, Fig. 4.
 
+    recording   : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; by default the last 60 s, or fewer where so many paths would cover each other
     agent       : number of the agent highlighted in grey scale; by default one drawn at random, the same for a seed
     highlight   : False highlights none
     colour      : speed, heading (in the plane) or agent; auto: speed, unless all fly equally fast
     ax          : axes to draw into, in space with projection="3d", instead of a new figure
+
+    Raises RecordingError for what is no recording, and for a window that holds none of it, or without such an agent;
+    AirflockError for an unknown colour.
 
     Examples
     --------

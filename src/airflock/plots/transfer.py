@@ -13,10 +13,12 @@ from airflock.scenarios.scenario import Scenario
 
 
 def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Figure:
-    """F1, F2 and F3 (Eqs 17-20), each over the order parameter that it judges.
+    """F1, F2 and F3 (Vásárhelyi et al. 2018, Eqs 17-20 and Fig. 7), each over the order parameter that it judges.
 
     scenario : draws them with its v_flock, tolerances and units; without it, in units of their own parameters
     ax       : axes of a grid, whose place the panels take, instead of a new figure
+
+    Raises AirflockError for an `ax` that is none of a grid.
 
     Examples
     --------

@@ -45,7 +45,7 @@ def video(
     Parameters
     ----------
     recording : xarray.Dataset
-        Simulated or flown.
+        (time, space, keypoint, individual), simulated or flown: position m, velocity m/s.
     path : str or path
         Ends in .mp4 or .gif.
     fps : float
@@ -72,6 +72,8 @@ def video(
 
     Raises
     ------
+    AirflockError
+        For what is no recording, an empty window, or numbers that are not above 0.
     PictureError
         When it cannot be written, then nothing is left behind; or without imageio-ffmpeg
         (`pip install 'airflock[video]'`).

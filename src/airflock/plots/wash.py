@@ -87,6 +87,7 @@ def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None =
 
     The number beside a wing is its induced drag against a lone bird's: -30 % is saved.
 
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start : instant, s; by default the last one; ax : axes to draw into, instead of a new figure
     Raises RecordingError for a recording in a plane, or of more than 60 birds.
 

@@ -69,8 +69,8 @@ def simulate(
 
     Raises
     ------
-    ScenarioError, FlightError
-        If the scenario or the flight is faulty.
+    ScenarioError, FlightError, ParameterError, DeviceError
+        If the scenario, the flight, the seed or the device is faulty.
 
     Notes
     -----

@@ -28,6 +28,11 @@ def doctor() -> dict[str, Any]:
         Names and findings. `self_check` (and `gpu_self_check` where there is a GPU) is "passed" or "failed";
         `first_flight_s` and `second_flight_s` are s, `cache_free_gb` is GB, `cache_mb` is MB.
 
+    Raises
+    ------
+    AirflockError
+        Where this machine cannot fly at all: the first flight of the self-check is refused.
+
     Examples
     --------
     >>> import airflock

@@ -10,6 +10,7 @@ import select
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -25,6 +26,7 @@ WAIT = 4.0  # times as long it may take where processors are busy with other thi
 PACE = 5e6  # bytes per second that a file of any size is read at
 MOST_ABOUT = 200_000_000  # bytes of names and attributes
 FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", ".h5")  # what airflock import reads
+ENDED_LATE = tuple(-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name))
 READER = Path(__file__).with_name("reader.py")
 
 
@@ -33,6 +35,11 @@ KINDS = {
     "hdf5": "a HDF5 file", "dataflash": "a DataFlash log", "telemetry": "telemetry",
 }  # fmt: skip
 PACES = {"dataflash": 1e5, "telemetry": 1e5}  # bytes per second; read by Python, row by row
+
+
+def _memory() -> int:
+    """Bytes of this machine's memory; 8 GB where the system does not tell, as Windows."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 8 << 30
 
 
 class Opening:
@@ -57,7 +64,7 @@ class Opening:
             refuse_pickle(self.path)
         self.how = how
         self.limit = LEAST_TIME + self.path.stat().st_size / PACES.get(how, PACE) if limit is None else limit
-        most = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 4
+        most = _memory() // 4
         paths = [path for path in sys.path if os.path.isabs(path)]
         asked = {"paths": paths, "file": str(self.path.absolute()), "most": most}
         asked["how"] = "netcdf" if how == "recording" else how
@@ -135,18 +142,33 @@ class Opening:
         assert self.process.stdout is not None
         view, pipe = memoryview(into), self.process.stdout.fileno()
         while len(view):
-            left = self.until - time.monotonic()
-            if left <= 0.0 or not select.select([pipe], [], [], left)[0]:
-                raise self._late()
-            count = os.readv(pipe, [view[: 1 << 20]])
+            count = self._piece(pipe, view[: 1 << 20])
             if not count:
                 code = self.process.wait(timeout=10.0)
-                if code in (-signal.SIGXCPU, -signal.SIGKILL):
+                if code in ENDED_LATE:
                     raise self._late()
                 how = f"signal {-code}" if code < 0 else f"status {code}"
                 raise RecordingError(f"{self.path}: is damaged: the process that opened it ended with {how}")
             view = view[count:]
         return into
+
+    def _piece(self, pipe: int, view: memoryview) -> int:
+        """Read into a buffer what the pipe has, in time; how many bytes, 0 where it has ended."""
+        left = self.until - time.monotonic()
+        if hasattr(os, "readv"):
+            if left <= 0.0 or not select.select([pipe], [], [], left)[0]:
+                raise self._late()
+            return os.readv(pipe, [view])
+        clock = threading.Timer(max(left, 0.0), self.process.kill)  # Windows cannot wait for a pipe
+        clock.start()
+        try:
+            data = os.read(pipe, len(view))
+        finally:
+            clock.cancel()
+        if not data and time.monotonic() >= self.until:
+            raise self._late()
+        view[: len(data)] = data
+        return len(data)
 
 
 def _attributes(given: dict[str, Any]) -> dict[str, Any]:

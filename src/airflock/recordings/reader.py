@@ -60,8 +60,10 @@ def _at_times(tell: Callable[[dict[str, Any]], None]) -> "Share":
 
 def _limit(most: int, seconds: int) -> None:
     """No core file, no file written, no more memory than the arrays may need, so many seconds of a processor."""
-    import resource
-
+    try:
+        import resource
+    except ImportError:  # Windows has no such limits
+        return
     limits = ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_FSIZE, 0), (resource.RLIMIT_AS, 3 * most + SPARE))
     for kind, value in (*limits, (resource.RLIMIT_CPU, seconds)):
         hard = resource.getrlimit(kind)[1]

@@ -56,7 +56,8 @@ def score(
     Parameters
     ----------
     what : Scenario, str, path or xarray.Dataset
-        A scenario, or the name of a preset or scenario file, which is flown; or a recording, which is measured.
+        A scenario, or the name of a preset or scenario file, which is flown; or a recording (time, space,
+        keypoint, individual), which is measured.
     seeds : int or iterable of int
         A number of flights, with seeds 0, 1, 2, ..., or the seeds themselves.
     settings : mapping, optional
@@ -91,8 +92,9 @@ def score(
 
     Raises
     ------
-    ScenarioError, RecordingError, FlightError, StudyError
-        If the scenario, the recording or the flight is faulty, or the scheduler does not answer.
+    ScenarioError, RuleError, RecordingError, FlightError, ParameterError, DeviceError, StudyError
+        If the scenario, one of its rules, the recording, the flight, the seeds or the device is faulty, or the
+        scheduler does not answer.
 
     Notes
     -----
@@ -176,7 +178,7 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, 
     Parameters
     ----------
     recording : xarray.Dataset
-        Simulated, flown or loaded from a file.
+        (time, space, keypoint, individual), simulated, flown or loaded from a file.
     settings : mapping, optional
         Keys such as {"metrics.r_coll": 2.0} that replace those it was flown with.
     trust : bool
@@ -192,6 +194,8 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, 
     ------
     RecordingError
         If positions are missing or frames are not evenly spaced.
+    ScenarioError
+        If the settings are none that its scenario takes.
 
     Examples
     --------

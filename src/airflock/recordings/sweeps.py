@@ -71,8 +71,9 @@ def sweep(
 
     Raises
     ------
-    ScenarioError, FlightError, StudyError
-        With the faults of all points, before anything flies; if a flight goes wrong; if the scheduler does not answer.
+    ScenarioError, FlightError, ParameterError, DeviceError, StudyError
+        With the faults of all points, before anything flies; if a flight goes wrong; if seeds or device are none that
+        there are; if the scheduler does not answer.
 
     Examples
     --------

@@ -65,18 +65,20 @@ class Replay:
 def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") -> Replay:
     """Page that plays a recording; it opens from disk without network and displays itself in a notebook.
 
-    recording : a Dataset with position (m) and velocity (m/s), simulated or flown
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     rate      : frames per second that are kept at most
     colour    : what the colours stand for when it opens, as the page's menu names it: speed, heading, height, agent,
                 cluster, group, fault, a number that differs among agents, or a variable of the recording with one
                 number for each individual (at each time, or for good)
 
-    Individuals that are absent are not drawn. Raises RecordingError for a colour that the recording does not know, and
-    for a rate that is none.
+    Individuals that are absent are not drawn.
 
     Returns
     -------
     The page: `save(path)` writes it as one HTML file, `text` holds it, and a notebook shows it.
+
+    Raises RecordingError for a colour that the recording does not know, and for a rate that is none; ScenarioError and
+    FlightError where the scenario that it carries cannot be read or flown again.
 
     Examples
     --------

@@ -113,6 +113,8 @@ def load(
     ------
     ScenarioError
         With one line per fault: file, key, value, unit, allowed range, and the nearest right key.
+    RuleError
+        If a law or another part of your own breaks the contract of its kind.
 
     Examples
     --------

@@ -240,6 +240,8 @@ class Scenario:
     def stands(self) -> Scene:
         """What stands in the world; for a model that casts, polygons are walls of it too.
 
+        Raises SceneError for a mesh that cannot be read, and for a scene without free room.
+
         Examples
         --------
         >>> import airflock
@@ -255,6 +257,8 @@ class Scenario:
 
     def waypoints(self) -> Any:
         """Goals in their order (goal, 3), m.
+
+        Raises SceneError where the scene has no room for its goals.
 
         Examples
         --------

@@ -1,7 +1,7 @@
 """Who can be seen: no other body, and nothing that stands in the world, lies on the straight way to its centre.
 
 Bodies are balls of one radius at the places where they are believed to be. One hides another if its centre is nearer
-and the way to the other's centre passes through it; a way that only touches is free.
+and the way to the other's centre passes through it; a way that only touches is free. Our definition.
 """
 
 from airflock.topology.ranking import HEARD

@@ -23,7 +23,7 @@ class Tuned:
     start      : the scenario that tuning began from; notes : what was noticed on the way
     result     : of the search
     steps      : of hardening; empty where the law has no recipe, and `why` says so
-    seconds    : that it took
+    seconds    : that it took, s
     identified : what logs said, where it began with logs
     """
 

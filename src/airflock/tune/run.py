@@ -59,7 +59,7 @@ def tune(
         than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
         that look as if they kept these limits before all others.
     confidence : float
-        Confidence of the certificate.
+        Confidence of the certificate, in (0, 1).
     like : Scenario, str or path, optional
         The scenario whose law, field and speed are tuned with the numbers that the logs tell of the drones.
     heard : str or path, optional
@@ -86,7 +86,9 @@ def tune(
     Raises
     ------
     ScenarioError, StudyError
-        If the scenario or the folder cannot be used, the budget is too small, or nothing flies; Interrupted at Ctrl-C.
+        If the scenario or the folder cannot be used, the budget is too small, or nothing flies.
+    Interrupted
+        At Ctrl-C.
 
     Examples
     --------

@@ -21,7 +21,7 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
     Parameters
     ----------
     recording : xarray.Dataset
-        Simulated, flown, imported or loaded.
+        (time, space, keypoint, individual), simulated, flown, imported or loaded.
     path : str or path
         File to write; its ending decides: .csv, .parquet or .nc.
     layout : str

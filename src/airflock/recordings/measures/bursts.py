@@ -12,10 +12,14 @@ from airflock.recordings.measures.states import sound, states
 def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
     """One row per burst and its coast: individual, begin (s), burst (s), coast (s), speed before and at its top (m/s).
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     least     : rise of speed, m/s, below which it is noise of the tracker
     A burst is a rise of speed from a minimum to the next maximum by `least` or more, with falls of less than that in
-    between; its coast lasts until the next burst begins, or the individual is gone.
+    between; its coast lasts until the next burst begins, or the individual is gone. After Calovi et al., PLoS Comput.
+    Biol. 14, e1005933 (2018).
+
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `least` that is not above
+    0.
 
     Examples
     --------

@@ -14,11 +14,14 @@ NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of record
 def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | None = None) -> pd.Series:
     """Correlation of velocities about the group's mean, by distance (m); 1 at distance 0.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     width     : of a bin of distances, m: about a tenth of the group
     farthest  : m; by default the largest distance that occurs
     nan where nobody differs from the mean, to the precision of a recording: of all who move alike nothing fluctuates.
     Cavagna et al., PNAS 107, 11865 (2010), with the mean velocity of those present taken off at each instant.
+
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `width` that is not above
+    0.
 
     Examples
     --------
@@ -65,8 +68,11 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
 def correlation_length(recording: xr.Dataset, width: float) -> float:
     """Distance at which the correlation of velocities first falls to zero, m; nan if it does not.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     width     : of a bin of distances, m
+    Cavagna et al., PNAS 107, 11865 (2010), by straight lines between the bins of `velocity_correlation`.
+
+    Raises RecordingError and ParameterError as `velocity_correlation` does.
 
     Examples
     --------

@@ -13,9 +13,11 @@ ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordin
 def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: float = 0.0) -> xr.DataArray:
     """Mean of heading i at t times heading j at t + delay, (leader, follower, delay), -1 to 1.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     longest   : largest delay, s; slowest: headings at this speed (m/s) or less do not count
     nan where two are never there together. Nagy, Ákos, Biro & Vicsek, Nature 464, 890 (2010).
+
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `longest` below 0.
 
     Examples
     --------
@@ -54,11 +56,13 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
     A positive delay says that the leader is first; each pair stands there twice, with both signs. Where several delays
     are as good, such as of two that fly straight, it is the shortest of them.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     longest   : largest delay that is tried, s
-    least     : correlation below which a pair is left out
+    least     : correlation below which a pair is left out, -1 to 1
     slowest   : headings at this speed (m/s) or less do not count
     Nagy, Ákos, Biro & Vicsek, Nature 464, 890 (2010).
+
+    Raises RecordingError and ParameterError as `delay_correlation` does.
 
     Examples
     --------

@@ -10,9 +10,13 @@ from airflock.recordings.measures.states import headings, sound, states
 def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
     """Length of the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     slowest   : speed (m/s) at or below which one has no heading; it still counts for the centre
     In a periodic world the centre is that of the places as they stand, as it is for the order parameters.
+    Couzin et al., J. theor. Biol. 218, 1 (2002), Eq. 5.
+
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `slowest` that is no
+    number.
 
     Examples
     --------

@@ -12,7 +12,10 @@ from airflock.recordings.measures.states import sound, states
 def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
     """Distance of each individual to its nearest neighbour, (time, individual), m; nan for one absent or alone.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
+    Geometry, of no publication.
+
+    Raises RecordingError for what is no recording of one keypoint.
 
     Examples
     --------
@@ -38,9 +41,13 @@ def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
 def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.Series:
     """Share of pairs by distance, per m, over all frames: a histogram whose sum times the width of a bin is at most 1.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     width     : of a bin, m; where it does not divide `farthest`, the nearest width that does: `attrs["width"]`
     farthest  : end of the last bin, m; a pair exactly so far apart counts
+    A histogram, of no publication.
+
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `width` that does not lie
+    between 0 and `farthest`.
 
     Examples
     --------

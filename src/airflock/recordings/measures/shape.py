@@ -10,11 +10,13 @@ from airflock.recordings.measures.states import states
 def group_shape(recording: xr.Dataset) -> pd.DataFrame:
     """By time: number present, hull (m², in space m³), length and width (m), elongation (length / width).
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
 
     In a periodic world the places count as they stand.
     length, width : root mean square extension along and across the mean horizontal velocity, times sqrt(12), which is
-    the side of an even rectangle. nan where too few are there.
+    the side of an even rectangle. nan where too few are there. Our definitions.
+
+    Raises RecordingError for what is no recording of one keypoint.
 
     Examples
     --------

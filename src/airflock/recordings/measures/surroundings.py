@@ -11,10 +11,14 @@ from airflock.recordings.measures.states import headings, sound, states
 def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: float = 0.0) -> xr.DataArray:
     """Neighbours per m² around an individual that moves along `front`, (left, front); mean over all and all frames.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     reach     : half the side of the map, m; cells: along each side
     slowest   : speed (m/s) at or below which one has no front
     In space the map is horizontal: distances in height are left out.
+    Maps of neighbours as in Katz et al., PNAS 108, 18720 (2011).
+
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for `reach` or `cells` that make
+    no map.
 
     Examples
     --------
@@ -59,10 +63,14 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
 def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> float:
     """Mean of cos 2 angle to the nearest neighbour within reach (m): 1 ahead or behind, -1 at the sides, 0 anywhere.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     reach     : distance beyond which nobody counts as a neighbour, m
     slowest   : speed (m/s) at or below which one has no front
     In space distances and angles are horizontal, as in `density_map`; nan where nobody has a neighbour within reach.
+    Our definition, in the plane, of what Ballerini et al., PNAS 105, 1232 (2008), ask of directions in space.
+
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `reach` that is not above
+    0.
 
     Examples
     --------

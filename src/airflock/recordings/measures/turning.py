@@ -9,9 +9,13 @@ from airflock.recordings.measures.states import headings, sound, states
 def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
     """Rate of turn of the horizontal heading, (time, individual), rad/s; nan across absences.
 
-    recording : positions and velocities of individuals, simulated or flown, m and m/s
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     slowest   : speed (m/s) at or below which one has no heading
     A frame holds the turn between the frames on its two sides; at the ends, to the only one there is.
+    Geometry, of no publication.
+
+    Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `slowest` that is no
+    number.
 
     Examples
     --------
