@@ -14,7 +14,8 @@ Files = Annotated[
     list[Path],
     typer.Argument(
         metavar="FILE...", show_default=False,
-        help=".csv, .parquet, .ulg (PX4), .bin and .tlog (ArduPilot), .nc and .h5 (movement, idtracker.ai), .npy, .npz",
+        help=".csv, .parquet, .ulg (PX4), .bin and .tlog (ArduPilot), .log (our nodes), .nc and .h5 (movement, "
+        "idtracker.ai), .npy, .npz",
     ),
 ]  # fmt: skip
 Map = Annotated[

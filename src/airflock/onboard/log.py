@@ -9,8 +9,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from airflock.core.agent import State
 from airflock.errors import LinkError
 from airflock.onboard.card import Card
+from airflock.onboard.limiter import Velocity
+from airflock.onboard.mission import Phase
 from airflock.onboard.node import Memory, Node, Out
 from airflock.untrusted import FormatError, TextError, from_outside, json_object, json_value, read_text
 
@@ -73,6 +76,58 @@ class Replayed(NamedTuple):
     same: bool
 
 
+class Ticked(NamedTuple):
+    """What a log tells of one tick: the time of the own clock (s), the phase, the own state, and the command (m/s).
+
+    own : x, y, z (m), vx, vy, vz (m/s); None where the node did not know it
+    """
+
+    time: float
+    phase: Phase
+    own: State | None
+    command: Velocity
+
+
+class Told(NamedTuple):
+    """What a log tells without being flown again: whose it is, Unix time (µs) at a time of its clock (s), its ticks."""
+
+    member: int
+    now: float
+    utc: int
+    ticks: list[Ticked]
+
+
+def read_ticks(path: Path) -> Told:
+    """What the log of a file tells of its ticks; LinkError, which names file and line, where it is no log."""
+    with from_outside(path, LinkError):
+        try:
+            with open(path, encoding="utf-8") as lines:
+                rows = enumerate(_rows(lines), 1)
+                _, head = next(rows, (0, {}))
+                begun, utc, member = _numbers([head.get("now")], 1), head.get("utc"), head.get("member")
+                if head.get("log") != VERSION or begun is None or type(utc) is not int or type(member) is not int:
+                    raise LinkError("this is not a log of a flight on board")
+                ticks, before = [], begun[0]
+                for number, row in rows:
+                    before, _ = _row(row, number, before)
+                    if "out" in row:
+                        ticks.append(_tick(row, number, before))
+                return Told(member, begun[0], utc, ticks)
+        except LinkError as fault:
+            raise LinkError(f"{path}: {fault}") from fault
+        except UnicodeDecodeError as fault:
+            raise LinkError(f"{path}: this is not a log of a flight on board") from fault
+
+
+def _tick(row: Mapping[str, Any], number: int, now: float) -> Ticked:
+    """What a line tells of a tick; LinkError where it is none that a node wrote."""
+    given, phase = row.get("own"), str(row.get("phase"))
+    own, command = _numbers(given, 6), _numbers(row.get("set"), 3)
+    if (own is None and given is not None) or command is None or phase not in Phase.__members__:
+        raise LinkError(f"line {number}: was not written by a node")
+    return Ticked(now, Phase[phase], None if own is None else State(*own), (command[0], command[1], command[2]))
+
+
 def replay(lines: Iterable[str], card: Card, key: bytes) -> Iterator[Replayed]:
     """Fly a log again; LinkError where it is of another card or is no log."""
     rows = enumerate(_rows(lines), 1)
@@ -121,6 +176,12 @@ def _row(row: Mapping[str, Any], number: int, before: float) -> tuple[float, byt
     if not _is_number(now) or not before <= now <= before + LONGEST_GAP or not {"a", "r", "out"} & set(row):
         raise LinkError(f"line {number}: was not written by a node")
     return float(now), data
+
+
+def _numbers(values: Any, count: int) -> tuple[float, ...] | None:
+    """So many numbers of a line; None if they are none."""
+    sound = isinstance(values, list) and len(values) == count and all(map(_is_number, values))
+    return tuple(map(float, values)) if sound else None
 
 
 def _is_number(value: Any) -> bool:

@@ -64,7 +64,7 @@ def load_tracks(
     Parameters
     ----------
     what : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array
-        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy), a table, such as {"t": [...], "id":
+        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .log, .nc, .h5, .npy), a table, such as {"t": [...], "id":
         [...], "x": [...]}, a Dataset of `movement`, or an array (frame, individual, 2 or 3).
     map : mapping, optional
         Target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are t, x, y, z

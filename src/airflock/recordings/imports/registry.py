@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from airflock.errors import RecordingError
-from airflock.recordings.imports import arrays, dataflash, movement, tables, ulog
+from airflock.recordings.imports import arrays, dataflash, movement, node_log, tables, ulog
 from airflock.recordings.imports.track import Findings, Options, Track
 from airflock.recordings.packed import refuse_packed, refuse_pickle
 from airflock.untrusted import from_outside
@@ -18,6 +18,7 @@ READERS: dict[str, tuple[str, Reader]] = {
     ".ulg": ("PX4 ULog", ulog.read_ulog),
     ".bin": ("ArduPilot DataFlash", dataflash.read_dataflash),
     ".tlog": ("MAVLink telemetry", dataflash.read_tlog),
+    ".log": ("log of a node on board", node_log.read_node_log),
     ".nc": ("movement netCDF", movement.read_netcdf),
     ".h5": ("movement or idtracker.ai HDF5", movement.read_netcdf),
     ".hdf5": ("movement or idtracker.ai HDF5", movement.read_netcdf),
@@ -36,8 +37,6 @@ def read(path: Path, options: Options, findings: Findings) -> list[Track]:
     refuse_packed(path)
     refuse_pickle(path)
     if ending not in READERS:
-        if ending == ".log":
-            raise RecordingError(f"{path}: .log: unknown format; of ArduPilot give the .bin that it was made from")
         known = ", ".join(READERS)
         raise RecordingError(f"{path}: {ending or 'a name without an ending'}: unknown format; known: {known}")
     with from_outside(path, RecordingError):  # libraries raise whatever they happen to where a file is damaged

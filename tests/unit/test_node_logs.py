@@ -1,0 +1,88 @@
+"""Logs of our own nodes are tracks: places, velocities and commands as they were told, on one clock."""
+
+import json
+
+import numpy as np
+import pytest
+
+import airflock
+from airflock.core.agent import State
+from airflock.errors import RecordingError
+from airflock.onboard.log import Logged
+from airflock.onboard.mission import Phase
+from airflock.onboard.node import Memory, Node
+from fleets import card
+
+KEY, UTC = bytes(range(32)), 1_767_225_600 * 10**6  # µs
+
+CARD = card(airflock.load("vasarhelyi_2018/real_4ms", {"agents": 4}))
+
+
+def written(path, member, boot, place, phase=Phase.FLOCK, hold=1):
+    """The log of a node whose autopilot tells places (tick, axis) at each tick, 0.05 s apart, or at each `hold`-th.
+
+    boot : since when its computer is on, s
+    """
+    lines = []
+    node = Node(CARD, member, KEY, now=boot, utc=UTC, memory=Memory(), radios=(0.2,))
+    logged = Logged(node, lines.append, now=boot, memory=Memory(), radios=(0.2,))
+    speed = np.gradient(place, 0.05, axis=0)
+    place, speed = (np.repeat(each[::hold], hold, axis=0) for each in (place, speed))
+    for k in range(len(place)):
+        logged.tick(boot + 0.05 * k)
+        node.wire.state, node.phase = State(*place[k], *speed[k]), phase
+        node.command = (1.0, 0.0, -0.5)
+        row = json.loads(lines[-1])
+        row |= {"phase": node.phase.name, "own": list(node.wire.state), "set": list(node.command)}
+        lines[-1] = json.dumps(row)
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def circle(start):
+    angle = start + 0.3 * 0.05 * np.arange(400)
+    return np.stack([20.0 * np.cos(angle), 20.0 * np.sin(angle), 50.0 + 0.0 * angle], axis=1)
+
+
+def test_two_drones_meet_on_one_clock(tmp_path):
+    files = [written(tmp_path / f"mission-{k}-x.log", k, boot, circle(k)) for k, boot in ((1, 12.0), (2, 4711.5))]
+    notes = []
+    found = airflock.load_tracks(files, precision=64, say=notes.append)
+    assert list(found["individual"].values) == ["member_1", "member_2"]
+    place = found["position"].transpose("time", "individual", "space", "keypoint").values[..., 0]
+    assert np.abs(np.hypot(place[..., 0], place[..., 1]) - 20.0).max() < 1e-3 and (place[..., 2] == 50.0).all()
+    apart = np.linalg.norm(place[:, 0] - place[:, 1], axis=-1)
+    np.testing.assert_allclose(apart, 40.0 * np.sin(0.5), atol=2e-2)  # of drones whose clocks differ by 78 minutes
+    asked = found["command"].transpose("time", "individual", "space", "keypoint").values[..., 0]
+    assert (asked == [1.0, 0.0, -0.5]).all()
+    assert any("clocks aligned" in note for note in notes)
+
+
+def test_what_a_node_on_the_ground_says_is_no_command(tmp_path):
+    log = written(tmp_path / "a.log", 3, 5.0, circle(0.0), phase=Phase.READY)
+    notes = []
+    found = airflock.load_tracks(log, say=notes.append)
+    assert "command" not in found and any("never flew" in note for note in notes)
+
+
+def test_places_told_again_are_one_row(tmp_path):
+    slow = written(tmp_path / "a.log", 1, 0.0, circle(0.0), hold=4)
+    found = airflock.load_tracks(slow, precision=64)
+    assert np.median(np.diff(found["time"].values)) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda lines: ["FMT, 128, 89, FMT"], "give the .bin"),
+        (lambda lines: lines[:1], "never told where it is"),
+        (lambda lines: [lines[0], lines[5].replace('"own": [', '"own": [7, ')], "line 2: was not written by a node"),
+        (lambda lines: [lines[0].replace('"log":1', '"log":9'), *lines[1:]], "not a log of a flight on board"),
+    ],
+)
+def test_what_is_no_log_of_a_node_is_one_line(tmp_path, change, said):
+    path = written(tmp_path / "a.log", 1, 0.0, circle(0.0))
+    path.write_text("\n".join(change(path.read_text().splitlines())) + "\n")
+    with pytest.raises(RecordingError) as fault:
+        airflock.load_tracks(path)
+    assert said in str(fault.value) and "\n" not in str(fault.value) and str(path) in str(fault.value)
