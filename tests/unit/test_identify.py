@@ -75,6 +75,25 @@ def test_a_limit_that_hides_behind_a_longer_lag_is_no_lower_bound_above_itself(s
     assert low < 1.3 < high
 
 
+@pytest.mark.parametrize(("follows", "off"), [(0.95, 0.1), (-2.0, 0.08)])
+def test_commands_computed_from_the_own_velocity_bend_the_lag_by_less(follows, off):
+    """Each fourth row a command takes up what the log knows with noise: the lag is told 0.14 shorter, or 0.12 longer,
+    where all rows count."""
+    rng, tau, n, drones = np.random.default_rng(5), 1.0, 4000, 10
+    speed, command = np.zeros((n, drones, 2)), np.zeros((n, drones, 2))
+    keep = np.exp(-STEP / tau)
+    for k in range(n - 1):
+        command[k] = follows * speed[k] + rng.normal(0.0, 0.4, (drones, 2)) if k % 4 == 0 else command[k - 1]
+        push = rng.normal(0.0, np.sqrt(0.1 * tau * (1.0 - keep**2)), (drones, 2))
+        speed[k + 1] = command[k] + (speed[k] - command[k]) * keep + push
+    measured = speed + rng.normal(0.0, 0.1, speed.shape)
+    time, who = np.tile(STEP * np.arange(n - 1), drones), np.repeat(np.arange(drones), n - 1)
+    flat = [x[:-1].transpose(1, 0, 2).reshape(-1, 2) for x in (measured, command)]
+    names, new = [f"d{i}" for i in range(drones)], np.diff(who, prepend=-1) != 0
+    logs = Logs(time, np.zeros_like(flat[0]), *flat, who, new, names, np.zeros(len(time), bool))
+    assert body.fit_body(logs).value["tau"] == pytest.approx(tau, abs=off)
+
+
 def test_commands_that_the_vehicle_runs_ahead_of_are_no_lag():
     """Feed-forward: the vehicle is where the set-point is, whatever its own lag."""
     g = np.random.default_rng(3)

@@ -77,11 +77,12 @@ class Replayed(NamedTuple):
 
 
 class Ticked(NamedTuple):
-    """What a log tells of one tick: the time of the own clock (s), the phase, the own state, and the command (m/s).
+    """What a log tells of one tick: its line, the time of the own clock (s), phase, own state, and command (m/s).
 
     own : x, y, z (m), vx, vy, vz (m/s); None where the node did not know it
     """
 
+    line: int
     time: float
     phase: Phase
     own: State | None
@@ -125,7 +126,7 @@ def _tick(row: Mapping[str, Any], number: int, now: float) -> Ticked:
     own, command = _numbers(given, 6), _numbers(row.get("set"), 3)
     if (own is None and given is not None) or command is None or phase not in Phase.__members__:
         raise LinkError(f"line {number}: was not written by a node")
-    return Ticked(now, Phase[phase], None if own is None else State(*own), (command[0], command[1], command[2]))
+    return Ticked(number, now, Phase[phase], None if own is None else State(*own), (command[0], command[1], command[2]))
 
 
 def replay(lines: Iterable[str], card: Card, key: bytes) -> Iterator[Replayed]:

@@ -41,7 +41,16 @@ def read_node_log(path: Path, options: Options, findings: Findings) -> list[Trac
         columns = {name: column for name, column in columns.items() if name not in COMMAND}
     labels = {name: f"own[{c}]" for c, name in enumerate((*POSITION, *VELOCITY))}
     labels |= {name: f"set[{c}]" for c, name in enumerate(COMMAND)}
-    found = Track(f"member_{told.member}", str(path), time, columns, np.array(rows), labels, "boot", datum="home")
+    found = Track(
+        f"member_{told.member}",
+        str(path),
+        time,
+        columns,
+        np.array([tick.line for tick in ticks]),
+        labels,
+        "boot",
+        datum="home",
+    )
     ends = time[[0, -1]]
     found.utc = np.stack([ends, told.utc * 1e-6 + ends - told.now], axis=1)
     found.air = np.array([tick.phase in AIR for tick in ticks])
