@@ -13,7 +13,7 @@ import airflock_papers
 from airflock.cli.main import app
 from airflock_papers import PAPERS, programs
 from airflock_papers.catalogue import find
-from airflock_papers.sentences import PARTS, faults, first_words, letters, sentences
+from airflock_papers.sentences import PARTS, faults, in_order, letters, sentences, without_row
 
 ROOT = Path(__file__).parents[2]
 
@@ -41,8 +41,48 @@ def test_every_claim_of_a_paper_has_a_sentence_and_every_sentence_a_claim_or_a_r
 
 def test_a_list_of_sentences_is_checked_against_a_text() -> None:
     text = "One sentence of five words here. (A second one, e.g. with a point inside.) 3\t4\n\nThe last of them ends."
-    found = [letters(first_words(sentence)) for sentence in sentences(text)]
-    assert found == ["onesentenceoffivewords", "asecondoneegwith", "thelastofthemends"]
+    assert list(sentences(text)) == [
+        "One sentence of five words here.",
+        "(A second one, e.g. with a point inside.)",
+        "The last of them ends.",
+    ]
+
+
+def test_a_sentence_that_ends_like_an_abbreviation_ends() -> None:
+    text = (
+        "It could be flown by UAVs. Whereas others have flown none, this rule saves power. See Fig. 3 and ref. 4 of it."
+    )
+    assert list(sentences(text)) == [
+        "It could be flown by UAVs.",
+        "Whereas others have flown none, this rule saves power.",
+        "See Fig. 3 and ref. 4 of it.",
+    ]
+
+
+def test_every_sentence_has_a_row_of_its_own() -> None:
+    every = ["We will then implement the rule of Alignment.", "We will then implement the rule of Cohesion."]
+    assert without_row(every, ["We will then implement the"]) == [f"no row of its own: {every[1]}"]
+    assert not without_row(every, ["We will then implement the", "We will then implement the rule of C"])
+    assert without_row(every[:1], ["Nothing of it"]) == [f"no row: {every[0]}"]
+    assert without_row(every[:1], ["We will then", "we will then"]) == ["wewillthen: two rows begin so"]
+
+
+def test_the_parts_of_a_quote_follow_one_another() -> None:
+    whole = letters("It reaches a fitness of -9.8 HP. The parameters are as follows.")
+    assert in_order("a fitness of −9.8 HP … parameters are as follows", whole)
+    assert not in_order("parameters are as follows … a fitness of −9.8 HP", whole)
+
+
+def test_an_identity_names_a_test_that_is_there(tmp_path: Path) -> None:
+    table = (ROOT / "papers" / "zapotecatl_2016" / "sentences.csv").read_text(encoding="utf-8")
+    folder = tmp_path / "papers" / "zapotecatl_2016"
+    folder.mkdir(parents=True)
+    (tmp_path / "test_x.py").write_text("def test_y():\n    assert True\n", encoding="utf-8")
+    for proof, wrong in (("test_x.py::test_y", []), ("test_x.py::test_z", ["test_x.py::test_z: no such test"])):
+        (folder / "sentences.csv").write_text(
+            f"{table}End,It is so by construction,{proof},identity\n", encoding="utf-8"
+        )
+        assert faults("zapotecatl_2016", folder, None) == wrong
 
 
 @pytest.mark.parametrize("name", PAPERS)

@@ -22,6 +22,19 @@ from airflock_papers.vasarhelyi_2018.published import REFIT, SPEEDS, optimum, pr
 from airflock_papers.vasarhelyi_2018.table_s2 import PROGRAM
 
 FOLDER = Path(__file__).parents[2] / "papers" / "vasarhelyi_2018"
+TABLE_S1 = (
+    "r0_rep",
+    "p_rep",
+    "r0_frict",
+    "c_frict",
+    "v_frict",
+    "p_frict",
+    "a_frict",
+    "r0_shill",
+    "v_shill",
+    "p_shill",
+    "a_shill",
+)
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +66,22 @@ def recomputed(speed):
 )
 def test_transfer_functions_have_the_landmarks_of_fig_7(value, expected):
     assert value == pytest.approx(expected, abs=1e-12)
+
+
+def test_most_values_that_flew_lie_inside_the_working_ranges():
+    """Table S4 by the ranges that Table S1 prints: 19 of 33, mostly; at 8 m/s four of eleven."""
+    statements, outside = load(PAPER.package), {}
+    for speed in (4, 6, 8):
+        flew = airflock.load(f"vasarhelyi_2018/real_{speed}ms").parameters
+        quotes = {name: statements[f"s1.range.{name}.{speed}ms"].quote for name in TABLE_S1}
+        ends = {name: re.findall(r"\[(.*), (.*)\]", quote)[0] for name, quote in quotes.items()}
+        outside[speed] = {n for n, (low, high) in ends.items() if not float(low) <= getattr(flew, n) <= float(high)}
+    assert outside == {
+        4: {"r0_rep", "r0_frict", "c_frict"},
+        6: {"c_frict", "a_frict", "v_shill", "a_shill"},
+        8: {"p_rep", "c_frict", "p_frict", "a_frict", "r0_shill", "v_shill", "p_shill"},
+    }
+    assert sum(map(len, outside.values())) < 33 / 2
 
 
 @pytest.mark.parametrize(("speed", "expected"), [(6, 0.924), (8, 0.857), (16, 0.934), (32, 0.905)])

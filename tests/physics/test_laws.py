@@ -43,6 +43,40 @@ def test_braking_distance_inverts_the_braking_curve(a, p):
         assert braking_curve(braking_distance(v, a, p), a, p) == pytest.approx(v, rel=1e-9)
 
 
+@pytest.mark.parametrize("a", A)
+def test_a_large_gain_makes_the_braking_curve_that_of_constant_deceleration(a):
+    """Table S3 of Vásárhelyi et al. 2018, p^frict: v = sqrt(2 a r) as p grows, v² short of it by (a/p)²."""
+    r = np.linspace(1.0, 100.0, 200)
+    gaps = [max(math.sqrt(2.0 * a * x) - braking_curve(x, a, p) for x in r) for p in (3.0, 30.0, 300.0)]
+    assert gaps[0] > 50.0 * gaps[1] > 2500.0 * gaps[2] > 0.0  # a hundredth for ten times the gain
+    assert gaps[2] < 1e-4
+
+
+@pytest.mark.parametrize("a", A)
+def test_a_small_gain_makes_the_end_of_braking_long_and_smooth(a):
+    """The same: below v = a/p the deceleration p v falls with the speed, so that half of it takes ln 2 / p."""
+    for p in (0.3, 1.0, 5.0):
+        v = 0.5 * a / p
+        speeds = (v, 0.5 * v)
+        places = [braking_distance(speed, a, p) for speed in speeds]
+        slopes = [(braking_curve(x * (1.0 + 1e-7), a, p) - braking_curve(x, a, p)) / (x * 1e-7) for x in places]
+        decelerations = [speed * slope for speed, slope in zip(speeds, slopes, strict=True)]
+        assert decelerations == pytest.approx([0.5 * a, 0.25 * a], rel=1e-5)  # smoother than a, and ever more so
+        x = np.linspace(*places, 2001)
+        time = np.trapezoid([1.0 / braking_curve(each, a, p) for each in x[::-1]], x[::-1])
+        assert time == pytest.approx(math.log(2.0) / p, rel=1e-5)  # constant deceleration: v / (2 a), 2.8 times less
+
+
+@pytest.mark.parametrize("p", P)
+def test_a_higher_deceleration_makes_alignment_more_local(p):
+    """Table S3, a^frict: what differs by v aligns up to a distance that falls with a, to v / p at the least."""
+    for v in (2.0, 10.0, 40.0):
+        reach = [braking_distance(v, a, p) for a in (0.5, 1.0, 3.0, 8.0)]
+        assert all(near <= far for far, near in zip(reach, reach[1:], strict=False))
+        assert reach[0] > reach[-1] or v <= 0.5 * p
+        assert braking_distance(v, 1e6, p) == pytest.approx(v / p)
+
+
 def test_an_agent_on_the_braking_curve_stops_in_time():
     """dx/dt = -D(x) reaches the stopping point, never passes it and never brakes harder than a."""
     a, p, dt = 3.0, 1.2, 1e-3

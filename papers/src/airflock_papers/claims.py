@@ -11,6 +11,7 @@ from typing import Any
 from airflock import atomic
 from airflock.errors import AirflockError
 from airflock_papers import bounds
+from airflock_papers.counts import headline
 from airflock_papers.statements import Statement
 from airflock_papers.statistics import Estimate
 
@@ -21,7 +22,6 @@ VERDICTS = {  # by kind: the bound holds, it does not, there is none
     "ours": ("holds", "does not hold", "finding"),
 }
 UNFLOWN = "not flown yet"
-COUNTED = ("reproduced", "not reproduced", "qualitative only", "not testable", "not flown yet")
 
 
 @dataclass(frozen=True)
@@ -242,15 +242,6 @@ def remark(claim: Claim) -> str:
     """Reason, note, the command that would fly it, and what was judged before."""
     command = f"`{claim.command}` would fly it" if claim.command else ""
     return ". ".join(part.rstrip(".") for part in (claim.reason, claim.note, command, claim.changed) if part)
-
-
-def headline(claims: Sequence[Claim]) -> str:
-    """Count of the paper's own sentences by verdict; empty if there is none."""
-    paper = [claim for claim in claims if claim.kind == "paper"]
-    if not paper:
-        return ""
-    count = [(verdict, sum(claim.verdict == verdict for claim in paper)) for verdict in COUNTED]
-    return f"{len(paper)} sentences of the paper: " + ", ".join(f"{n} {verdict}" for verdict, n in count if n)
 
 
 def print_claims(claims: Sequence[Claim]) -> None:

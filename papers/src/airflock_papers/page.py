@@ -1,12 +1,16 @@
-"""The committed page of a paper: claims.toml and README.md, its sentences first, other lines in tables of their own."""
+"""The committed page of a paper: claims.toml and README.md, its claims first, other lines in tables of their own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from airflock import atomic
 from airflock_papers import claims as records
 from airflock_papers.claims import SEEDS, Claim
+from airflock_papers.counts import headline
+
+NOT_KEPT, PART_BY_PART = "not kept", "of each part, below"  # in place of one hash for a whole page
 
 
 @dataclass(frozen=True)
@@ -36,16 +40,33 @@ def write(
     """
     folder.mkdir(parents=True, exist_ok=True)
     records.write_claims(folder / names[0], claims, records.header(title, command, told=told) | dict(more or {}))
-    read = records.read_claims(folder / names[0])[1]  # so that both show the same rounded numbers
-    atomic.write(folder / names[1], page(title, command, read, sections, about))
+    header, read = records.read_claims(folder / names[0])  # so that both show the same rounded numbers
+    atomic.write(folder / names[1], page(title, command, read, sections, about, flown_by(header)))
 
 
-def page(title: str, command: str, claims: Sequence[Claim], sections: Sequence[Section], about: str = "") -> str:
-    """README.md of a paper."""
+def flown_by(header: Mapping[str, Any]) -> str:
+    """Which texts flew a page, in words; header: of its claims.toml."""
+    parts = [each.partition(": ")[::2] for each in str(header.get("renewed", "")).split("; ") if each]
+    listed = ", ".join(f"{part} `{texts}`" for part, texts in parts)
+    texts = header.get("texts", NOT_KEPT)
+    told = {
+        NOT_KEPT: "The hash of the texts that flew this page was not kept" + f"; later parts: {listed}" * bool(parts),
+        PART_BY_PART: f"Each part by the text of its day: {listed}",
+    }.get(texts, f"`{texts}`" + f", later parts by others: {listed}" * bool(parts))
+    return (
+        f"{told}. Version {header['version']}, {header['precision']}. A hash stands for all rules, the engine, presets "
+        "and parts (`airflock_papers.texts`)."
+    )
+
+
+def page(
+    title: str, command: str, claims: Sequence[Claim], sections: Sequence[Section], about: str = "", flown: str = ""
+) -> str:
+    """README.md of a paper; about: words on top; flown: which texts flew it."""
     paper = [claim for claim in claims if claim.kind == "paper"]
     lines = [f"# {title}", "", f"`{command}` computes this page again. {about}".strip(), ""]
     if paper:
-        lines += [f"**{records.headline(claims)}.**", "", *_legend(claims), *_overview(paper, sections)]
+        lines += [f"**{headline(claims)}.**", "", *_legend(claims), *_overview(paper, sections)]
     lines += _table("Not reproduced", [claim for claim in paper if claim.verdict == "not reproduced"])
     for section in sections:
         mine = [claim for claim in paper if claim.id.startswith(section.start) and claim.verdict != "not reproduced"]
@@ -57,13 +78,15 @@ def page(title: str, command: str, claims: Sequence[Claim], sections: Sequence[S
     lines += _table("Other sentences", rest)
     lines += _table("Agreement with the authors' program", [claim for claim in claims if claim.kind == "program"])
     lines += _table("Ours: targets, extensions and findings", [claim for claim in claims if claim.kind == "ours"])
+    lines += ["## The text that flew it", "", flown] if flown else []
     return "\n".join(lines).rstrip() + "\n"
 
 
 def _legend(claims: Sequence[Claim]) -> list[str]:
     words = (
-        "A sentence counts as reproduced when the bound beside it holds for the quantity, the place and the time that "
-        "it names. Qualitative only: it names no number or sign that a bound could be taken from; our value is shown. "
+        "A claim is a quote and one place where it is flown: a sentence at three speeds is three claims. It counts as "
+        "reproduced when the bound beside it holds for the quantity, the place and the time that it names. Qualitative "
+        "only: it names no number or sign that a bound could be taken from; the reason says where our numbers stand. "
         "Every sentence of the paper, also those without a claim, stands in [sentences.csv](sentences.csv); quotes, "
         "bounds and what would turn each red (`fails_if`) in [claims.toml](claims.toml)."
     )
@@ -75,7 +98,7 @@ def _legend(claims: Sequence[Claim]) -> list[str]:
 
 
 def _overview(paper: Sequence[Claim], sections: Sequence[Section]) -> list[str]:
-    """How many sentences of each section are reproduced; nothing for a page of one section."""
+    """How many claims of each section are reproduced; nothing for a page of one section."""
     rows, rest = [], list(paper)
     for section in sections:
         mine = [claim for claim in rest if claim.id.startswith(section.start)]

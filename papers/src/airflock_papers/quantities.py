@@ -79,7 +79,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "distance to the goal": ("repelling",),
     "goals_reached": ("goal",),
     "overruled": ("overruling", "overruled"),
-    "erratic": ("erratic",),
+    "erratic": ("erratic", "irregular"),
     "bank": ("bank",),
     "climb": ("ascension",),
     "fall": ("fall",),

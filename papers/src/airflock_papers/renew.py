@@ -10,6 +10,7 @@ import sys
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,7 @@ def words(text: str, title: str) -> str:
 
 def above(text: str) -> str:
     """What a page says above its headline and its sections, without the command."""
-    found = re.search(r"computes this page again\.(.*?)(?=^\*\*\d+ sentences|^## |\Z)", text, re.S | re.M)
+    found = re.search(r"computes this page again\.(.*?)(?=^\*\*\d+ \w+|^## |\Z)", text, re.S | re.M)
     return found[1].strip() if found else ""
 
 
@@ -75,7 +76,8 @@ def renew(
     unknown = [part for part in parts if part not in (*paper.parts, *paper.long)]
     if unknown:
         raise AirflockError(f"{unknown[0]}: unknown part; known: {', '.join((*paper.long, *paper.parts))}")
-    report: Any = import_module(f"airflock_papers.{name}.{module}")
+    place = f"airflock_papers.{name}.{module}"
+    sections: Any = getattr(import_module(place), "SECTIONS", ()) if find_spec(place) else ()
     header, old = records.read_claims(folder / table)
     text = (folder / file).read_text(encoding="utf-8")
     found: list[Measured] = []
@@ -86,8 +88,8 @@ def renew(
     tables = folder.glob("*.toml") if table == "claims.toml" else ()
     new = set(statements) - {claim.id for path in tables for claim in records.read_claims(path)[1]} if tables else set()
     claims = renewed(statements, old, found, str(header["command"]), new)
-    sections = [replace(s, words=words(text, s.title) or s.words) for s in report.SECTIONS]
-    told = {"texts": "not kept"}  # of a page from before they were
+    sections = [replace(s, words=words(text, s.title) or s.words) for s in sections]
+    told = {"texts": page.NOT_KEPT}  # of a page from before they were
     told |= {key: value for key, value in header.items() if key not in ("paper", "command", "seeds")}
     if parts:
         before = [
@@ -96,7 +98,7 @@ def renew(
         told["renewed"] = "; ".join([*before, *(f"{part}: {texts()}" for part in parts)])
         flown = {each.split(":")[0] for each in told["renewed"].split("; ")}
         if table == "claims.toml" and set(paper.parts) <= flown:
-            told["texts"] = "of each part, below"
+            told["texts"] = page.PART_BY_PART
     page.write(
         folder, header["paper"], header["command"], claims, sections, above(text), header["seeds"], (table, file), told
     )

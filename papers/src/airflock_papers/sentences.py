@@ -1,13 +1,15 @@
 """Sentences of a paper: papers/NAME/sentences.csv holds one row for each, and this checks it against the text.
 
 The texts are not part of this project. `python -m airflock_papers.sentences FOLDER` takes a folder with NAME.txt of
-each paper and tells which sentences have no row, which rows and quotes are in no text, and which claims do not exist.
+each paper and tells which sentences have no row of their own, which rows and quotes are in no text, and which claims
+and tests do not exist. A row begins its sentence with five words, or with as many as tell it from all others.
 """
 
 import csv
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
@@ -27,6 +29,7 @@ WHY = (
     "table",
     "heading",
 )
+IDENTITY = "identity"  # true by construction: a test is named in place of claims
 # parts of each text that are listed: from and up to these words
 PARTS: dict[str, tuple[tuple[str, str], ...]] = {
     "vasarhelyi_2018": (
@@ -35,13 +38,23 @@ PARTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("Fig. 6. Visual explanation", "front of agent"),
         ("Fig. 7. Three different types", "algorithms such as the CMA-ES (38, 53)"),
         ("Fig. 8. Probability distribution", "SUPPLEMENTARY MATERIALS\n"),
-        ("Table S1: Optimized model parameter", "Table S5: Environmental parameters"),
+        ("- Movie S1.", "REFERENCES AND NOTES"),
+        ("Supplementary Movies", "Supplementary Tables"),
+        ("Table S1: Optimized model parameter values and working ranges in simulation. F", "\x00"),
     ),
     "zapotecatl_2016": (
         ("Measurements of coordinated motion", "Introduction"),
+        ("Figure 1: Figure (a)", "The set of"),
         ("model was implemented and run", "Acknowledgements"),
     ),
-    "dimock_2003": (("Natural aggregation processes", "Introduction"), ("The fitness evaluation simulation", "\x00")),
+    "dimock_2003": (
+        ("Natural aggregation processes", "Introduction"),
+        ("Fig. 1 Flocking rules", "variable and the only"),
+        ("Fig. 2 Discrete vortex system", "Chord line"),
+        ("Fig. 3 Induced drag", "comprehensive discussion"),
+        ("Fig. 4 Induced downwash", "I (_Pw"),
+        ("The fitness evaluation simulation", "\x00"),
+    ),
     "kidger": (
         ("The management of drone swarms", "2 – Introduction"),
         ("Without any underlying rules", "8 – References"),
@@ -50,10 +63,14 @@ PARTS: dict[str, tuple[tuple[str, str], ...]] = {
 }
 SHORT = 4  # words: shorter pieces are captions' numbers, cells and code
 ABBREVIATIONS = ("fig", "figs", "eq", "eqs", "i.e", "e.g", "ie", "et al", "ref", "vs", "approx", "no", "min")
+ABBREVIATED = re.compile(r"(?:^|[^a-z])(?:" + "|".join(map(re.escape, ABBREVIATIONS)) + r")\.*$")  # a word, not its end
 
 
 class Row(NamedTuple):
-    """A sentence: where it stands, how it begins, claims about it (patterns, by blanks), or why there is none."""
+    """A sentence: where it stands, how it begins, claims about it (patterns, by blanks), or why there is none.
+
+    An identity names the tests that show it instead, as `tests/unit/test_x.py::test_y`.
+    """
 
     where: str
     begins: str
@@ -91,7 +108,7 @@ def sentences(text: str) -> Iterator[str]:
         begun = ""
         for piece in re.split(r"(?<=[.!?:])[\])]?\s+(?=[“\"(\[A-Z0-9])", " ".join(paragraph.split())):
             begun = f"{begun} {piece}".strip()
-            if not begun.rstrip(".").lower().endswith(ABBREVIATIONS):
+            if not ABBREVIATED.search(begun.lower()):
                 if len(re.findall(r"[A-Za-z]{2,}", begun)) >= SHORT:
                     yield begun
                 begun = ""
@@ -111,33 +128,64 @@ def part_of(text: str, begin: str, end: str) -> str:
     return text[start : stop if stop > 0 else len(text)]
 
 
-def first_words(sentence: str, count: int = 5) -> str:
-    """The first words of a sentence."""
-    return " ".join(sentence.split()[:count])
-
-
 def faults(name: str, folder: Path, text: str | None) -> list[str]:
     """What is wrong with the list of one paper; folder: papers/NAME; text: of the paper, if at hand."""
     table = rows(folder / "sentences.csv")
     statements = load(f"airflock_papers.{name}")
-    paper = [key for key, s in statements.items() if s.kind == "paper"]
+    paper = {key: s for key, s in statements.items() if s.kind == "paper"}
     wrong = [f"{row.begins}: neither claim nor reason" for row in table if not row.claims and row.why not in WHY]
-    patterns = [pattern for row in table for pattern in row.claims.split()]
+    wrong += [
+        f"{row.begins}: both a claim and a reason" for row in table if row.claims and row.why not in ("", IDENTITY)
+    ]
+    proofs = [proof for row in table if row.why == IDENTITY for proof in row.claims.split()]
+    wrong += [f"{proof}: no such test" for proof in proofs if not _is_a_test(folder.parents[1], proof)]
+    patterns = [pattern for row in table if row.why != IDENTITY for pattern in row.claims.split()]
     wrong += [f"{p}: no such claim" for p in patterns if not any(fnmatchcase(key, p) for key in statements)]
     wrong += [f"{key}: no sentence names this claim" for key in paper if not any(fnmatchcase(key, p) for p in patterns)]
-    if text is None:
-        return wrong
+    return (
+        wrong
+        if text is None
+        else wrong + _in_text(table, {key: s.quote for key, s in paper.items()}, text, PARTS[name])
+    )
+
+
+def _is_a_test(root: Path, proof: str) -> bool:
+    """Whether a place like tests/unit/test_x.py::test_y is there; root: of the repository."""
+    path, _, test = proof.partition("::")
+    return (root / path).is_file() and f"def {test}(" in (root / path).read_text(encoding="utf-8")
+
+
+def _in_text(table: Sequence[Row], quotes: Mapping[str, str], text: str, parts: Iterable[tuple[str, str]]) -> list[str]:
+    """Rows and quotes that are not in the text, and sentences of its parts that have no row of their own."""
     whole, with_margins = letters(text), letters(" ".join(text.split()))
-    wrong += [
-        f"{row.begins}: not in the text" for row in table if letters(row.begins) not in whole + " " + with_margins
-    ]
-    for key in paper:
-        lost = [part for part in statements[key].quote.split("…") if letters(part) not in whole]
+    wrong = [f"{row.begins}: not in the text" for row in table if letters(row.begins) not in whole + " " + with_margins]
+    for key, quote in quotes.items():
+        lost = [part for part in quote.split("…") if letters(part) not in whole]
         wrong += [f"{key}: not in the text: {part.strip()}" for part in lost]
-    listed = {letters(row.begins) for row in table}
-    for begin, end in PARTS[name]:
-        every = sentences(part_of(text, begin, end))
-        wrong += [f"no row: {s[:90]}" for s in every if letters(first_words(s)) not in listed]
+        wrong += [f"{key}: not in this order in the text: {quote}"] * (not lost and not in_order(quote, whole))
+    every = dict.fromkeys(s for begin, end in parts for s in sentences(part_of(text, begin, end)))
+    return wrong + without_row(every, [row.begins for row in table])
+
+
+def in_order(quote: str, whole: str) -> bool:
+    """Whether the parts of a quote follow one another somewhere in the letters of a text."""
+    return bool(re.search(".*".join(letters(part) for part in quote.split("…")), whole))
+
+
+def without_row(every: Iterable[str], begins: Iterable[str]) -> list[str]:
+    """Faults of a list: sentences that no row begins, and rows that begin more than one sentence."""
+    starts = [letters(words) for words in begins]
+    wrong = [f"{start}: two rows begin so" for start, count in Counter(starts).items() if count > 1]
+    taken: dict[str, str] = {}
+    for sentence in every:
+        mine = [start for start in starts if letters(sentence).startswith(start)]
+        if not mine:
+            wrong.append(f"no row: {sentence[:90]}")
+            continue
+        longest = max(mine, key=len)
+        if letters(taken.get(longest, sentence)) != letters(sentence):
+            wrong.append(f"no row of its own: {sentence[:90]}")
+        taken.setdefault(longest, sentence)
     return wrong
 
 

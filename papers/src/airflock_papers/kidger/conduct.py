@@ -33,12 +33,18 @@ STILL: dict[str, Any] = {
     "goals.radius": 0.01,
 }
 TURN = {**OPEN, **SHORT, "model.method": "turn"}
-# what is recorded: preset and keys
-RECORDED: dict[str, tuple[str, dict[str, Any]]] = {
+# what is scored and what is recorded: preset and keys
+FINAL: dict[str, tuple[str, dict[str, Any]]] = {"final": ("kidger/city", {**OPEN, **SHORT})}
+TURNED: dict[str, tuple[str, dict[str, Any]]] = {
     "method 1, 3 boids": ("kidger/city", {**TURN, "agents": 3}),
     "method 1, 40 boids": ("kidger/city", {**TURN, "agents": 40}),
-    "final": ("kidger/city", {**OPEN, **SHORT}),
+}
+SCORED = {**TURNED, "method 1": ("kidger/city", TURN), **FINAL}
+RECORDED = {
+    **TURNED,
+    **FINAL,
     "s_sep = 4": ("kidger/city", {**OPEN, **SHORT, "model.s_sep": 4.0}),
+    "s_cohes = 4": ("kidger/city", {**OPEN, **SHORT, "model.s_cohes": 4.0}),
     "goal, final": ("kidger/city", {**STILL, **SHORT}),
     "goal, s_goal = 0.0625": ("kidger/city", {**STILL, **SHORT, "model.s_goal": 0.0625}),
 }
@@ -46,7 +52,7 @@ TOWARDS = 30.0  # deg, within which a boid heads for its goal
 
 
 class Flown(NamedTuple):
-    """Order parameters by (scene, seed) and of separation 1 by (case, seed); measures by case and seed."""
+    """Order parameters by (scene, seed) and of both separations by (case, seed); measures by case and seed."""
 
     scenes: pd.DataFrame
     turned: pd.DataFrame
@@ -81,7 +87,7 @@ def fly(flights: Flights) -> Flown:
         return lambda: measures(simulate(scenario, seed))
 
     table = flights.score("Four scenes", scenes, seeds)
-    turned = flights.score("Separation 1", {name: cases[name] for name in list(cases)[:2]}, seeds)
+    turned = flights.score("Separations", {name: load(preset, keys) for name, (preset, keys) in SCORED.items()}, seeds)
     count = flights.counter("Recorded boids", len(cases) * seeds)
     rows = {n: list(in_threads([job(s, k) for k in range(seeds)], flights.threads, count)) for n, s in cases.items()}
     return Flown(table, turned, rows)
@@ -109,9 +115,20 @@ def measured(flown: Flown) -> list[Measured]:
             f"{flown.turned.loc[many, 'n_coll'].mean():.3g} with 40 boids",
         )
     )
+    x, y = (flown.turned.loc[case, "n_coll"] for case in ("method 1", "final"))
+    found.append(
+        Measured(
+            "conduct.method1.less",
+            "n_coll of a method",
+            "open air, ten boids, method 1 less method 2",
+            statistics.difference(x, y),
+            f"{x.mean():.3g} against {y.mean():.3g} in {SHORT['duration']:g} s",
+        )
+    )
     pairs = (
         ("method1.many", "erratic", "turning", many, few),
         ("s_sep.high", "erratic", "turning", "s_sep = 4", "final"),
+        ("s_cohes.high", "erratic", "turning", "s_cohes = 4", "final"),
         ("s_goal.low", "bank", "towards", "goal, s_goal = 0.0625", "goal, final"),
     )
     for name, quantity, column, a, b in pairs:

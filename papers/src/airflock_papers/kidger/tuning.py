@@ -63,8 +63,16 @@ def measured(table: pd.DataFrame) -> list[Measured]:
     found = [_difference(table, place, *statement) for statement in STATEMENTS for place in PLACES]
     city, air = (_values(table, place, "r_cohes", 40.0, "n_clusters") for place in ("city", "open air"))
     gap = statistics.difference(city, air)
+    final, other = (_values(table, "city", "s_goal", value, "flocked") for value in (0.25, 4.0))
     return [
         *found,
+        Measured(
+            "tuning.best",
+            "flocked",
+            "city, final set less s_goal = 4",
+            statistics.difference(final, other),
+            f"flocked {final.mean():.3g} against {other.mean():.3g}",
+        ),
         Measured(
             "tuning.split.city", "n_clusters", "city less open air", gap, f"{city.mean():.3g} against {air.mean():.3g}"
         ),
