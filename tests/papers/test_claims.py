@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from airflock.errors import AirflockError
 from airflock_papers import PAPERS, bounds, statistics
 from airflock_papers.claims import Claim, Measured, judge, read_claims, verdict_of, write_claims
+from airflock_papers.counts import count, headline
+from airflock_papers.page import NOT_KEPT, PART_BY_PART, flown_by
 from airflock_papers.renew import above, renewed, words
 from airflock_papers.statements import LONGEST, load, read
 
@@ -161,21 +163,50 @@ def test_words_of_a_page_are_those_above_its_pictures_and_claims() -> None:
 
 
 @pytest.mark.parametrize("name", PAPERS)
-def test_the_front_page_tells_the_fraction_that_is_committed(name: str) -> None:
-    told = re.search(rf"\| (\d+) of (\d+): \[papers/{name}\]", (ROOT.parent / "README.md").read_text(encoding="utf-8"))
-    paper = [claim.verdict for claim in read_claims(ROOT / name / "claims.toml")[1] if claim.kind == "paper"]
-    good, bad = paper.count("reproduced"), paper.count("not reproduced")
+def test_the_front_page_tells_what_the_page_counts(name: str) -> None:
+    """Reproduced, of what is judged by a bound: claims, and quotes of which every claim is."""
+    front = (ROOT.parent / "README.md").read_text(encoding="utf-8")
+    told = re.search(rf"\| (\d+) of (\d+); (\d+) of (\d+): \[papers/{name}\]", front)
+    claims = read_claims(ROOT / name / "claims.toml")[1]
+    found = count(claims)
+    good, bad = (found.verdicts[verdict] for verdict in ("reproduced", "not reproduced"))
     assert (told is None) == (good + bad == 0)
-    assert told is None or (int(told[1]), int(told[2])) == (good, good + bad)
+    assert told is None or tuple(map(int, told.groups())) == (good, good + bad, found.whole, found.judged)
+    assert not headline(claims) or f"**{headline(claims)}.**" in (ROOT / name / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_readme_counts_the_sentences_that_the_pages_count() -> None:
-    """Reproduced, and judged by a bound: what is only qualitative, or not testable, is left out of both."""
-    text = (ROOT.parent / "README.md").read_text(encoding="utf-8")
-    told = {name: (int(a), int(b)) for a, b, name in re.findall(r"(\d+) of (\d+): \[papers/(\w+)\]", text)}
-    assert set(told) == {"vasarhelyi_2018", "zapotecatl_2016", "kidger", "dimock_2003"}
-    for name, counts in told.items():
-        _, claims = read_claims(ROOT / name / "claims.toml")
-        verdicts = [claim.verdict for claim in claims if claim.kind == "paper"]
-        good = verdicts.count("reproduced")
-        assert counts == (good, good + verdicts.count("not reproduced")), name
+def test_one_quote_flown_in_two_places_is_two_claims_and_holds_in_both_or_not_at_all() -> None:
+    name, statement = next((k, s) for k, s in load("airflock_papers.dimock_2003").items() if k == "ga.vee.n")
+    places = {"a": 1.0, "b": 0.5}
+    statements = {f"{name}.{at}": replace(statement, id=f"{name}.{at}") for at in places}
+    found = [
+        Measured(key, statement.quantity, statement.at, statistics.Estimate(value, None, value, value, 3))
+        for key, value in zip(statements, places.values(), strict=True)
+    ]
+    both = judge(statements, found)
+    assert [claim.verdict for claim in both] == ["reproduced", "not reproduced"]
+    assert (count(both).quotes, count(both).judged, count(both).whole) == (1, 1, 0)
+    assert count(both[:1])[1:] == (1, 1, 1) and headline([]) == ""
+    assert headline(both).endswith("1 not reproduced; of the 1 quotes that are judged, 0 in all their claims")
+
+
+def test_a_page_tells_which_text_flew_it() -> None:
+    header = {"texts": "0123", "version": "1.0", "precision": "32 bits"}
+    assert flown_by(header).startswith("`0123`. Version 1.0, 32 bits.")
+    assert flown_by(header | {"renewed": "ga: 45; static: 67"}).startswith(
+        "`0123`, later parts by others: ga `45`, static `67`."
+    )
+    assert flown_by(header | {"texts": PART_BY_PART, "renewed": "ga: 45"}).startswith(
+        "Each part by the text of its day: ga `45`."
+    )
+    assert flown_by({"version": "1.0", "precision": "32 bits"}).startswith(
+        "The hash of the texts that flew this page was not kept."
+    )
+
+
+@pytest.mark.parametrize("path", sorted(ROOT.glob("*/*.toml")), ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_every_committed_page_says_which_text_flew_it(path: Path) -> None:
+    name = {"claims": "README", "evolved": "EVOLVED", "rounding": "ROUNDING"}[path.stem]
+    header, _ = read_claims(path)
+    assert header["texts"] in (NOT_KEPT, PART_BY_PART) or re.fullmatch("[0-9a-f]{16}", header["texts"])
+    assert flown_by(header) in path.with_name(f"{name}.md").read_text(encoding="utf-8")

@@ -43,7 +43,7 @@ def test_a_list_of_sentences_is_checked_against_a_text() -> None:
     text = "One sentence of five words here. (A second one, e.g. with a point inside.) 3\t4\n\nThe last of them ends."
     assert list(sentences(text)) == [
         "One sentence of five words here.",
-        "(A second one, e.g. with a point inside.)",
+        "(A second one, e.g. with a point inside.",
         "The last of them ends.",
     ]
 

@@ -17,7 +17,7 @@ from airflock_papers import statistics
 from airflock_papers.claims import Claim, judge, read_claims
 from airflock_papers.flights import Flights
 from airflock_papers.statements import load
-from airflock_papers.vasarhelyi_2018 import PAPER, fig1, outdoor, pressure, report, table_s2, tuning
+from airflock_papers.vasarhelyi_2018 import PAPER, evolved, fig1, outdoor, pressure, report, table_s2, tuning
 from airflock_papers.vasarhelyi_2018.published import REFIT, SPEEDS, optimum, program_runs
 from airflock_papers.vasarhelyi_2018.table_s2 import PROGRAM
 
@@ -141,8 +141,17 @@ def test_a_flock_that_does_not_flock_makes_nothing_better(committed):
 
 
 def test_readme_is_the_page_of_the_committed_claims(committed):
-    page = report.page.page(PAPER.title, report.COMMAND, list(committed[1].values()), report.SECTIONS, report.ABOUT)
+    flown = report.page.flown_by(committed[0])
+    claims = list(committed[1].values())
+    page = report.page.page(PAPER.title, report.COMMAND, claims, report.SECTIONS, report.ABOUT, flown)
     assert (FOLDER / "README.md").read_text(encoding="utf-8") == page
+
+
+@pytest.mark.parametrize("speed", SPEEDS)
+def test_what_a_preset_says_of_its_gain_is_what_its_page_says(speed):
+    claims = {claim.id: claim for claim in read_claims(FOLDER / "evolved.toml")[1]}
+    told = evolved.note(speed, claims[f"s1.gain.{speed}ms"], claims[f"s1.gain.no_wall.{speed}ms"])
+    assert told in airflock.presets()[f"vasarhelyi_2018/evolved_{speed}ms"].read_text(encoding="utf-8")
 
 
 def test_an_unknown_part_is_refused_with_the_known_ones():

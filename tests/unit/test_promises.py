@@ -87,16 +87,3 @@ def test_every_file_that_a_page_links_to_exists(path):
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", path.read_text(encoding="utf-8")):
         if not re.match(r"https?:|mailto:|/generated/", target):
             assert (path.parent / target).exists(), f"{path.name}: {target}"
-
-
-def test_the_counts_of_sentences_in_the_readme_are_those_of_the_reports():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    told = {name: counts for counts, name in re.findall(r"\| (\d+ of \d+): \[papers/(\w+)\]", text)}
-    found = {}
-    for report in sorted((ROOT / "papers").glob("*/README.md")):
-        counts = re.search(
-            r"\*\*\d+ sentences of the paper: (\d+) reproduced, (\d+) not", report.read_text(encoding="utf-8")
-        )
-        if counts:
-            found[report.parent.name] = f"{counts[1]} of {int(counts[1]) + int(counts[2])}"
-    assert told == found
