@@ -18,7 +18,7 @@ def called(*arguments):
     from airflock.cli import main
 
     command, (out, err) = ["airflock", *map(str, arguments)], (io.TextIOWrapper(io.BytesIO(), "utf-8") for _ in "12")
-    argv, heard, status = sys.argv, signal.getsignal(signal.SIGTERM), 0
+    argv, heard, told, status = sys.argv, signal.getsignal(signal.SIGTERM), sys.unraisablehook, 0
     with warnings.catch_warnings(), redirect_stdout(out), redirect_stderr(err):
         warnings.simplefilter("default")
         sys.argv = command
@@ -29,6 +29,7 @@ def called(*arguments):
         finally:
             sys.argv = argv
             signal.signal(signal.SIGTERM, heard)
+            sys.unraisablehook = told
     texts = []
     for stream in (out, err):
         stream.flush()

@@ -187,7 +187,7 @@ def test_one_quote_flown_in_two_places_is_two_claims_and_holds_in_both_or_not_at
     assert [claim.verdict for claim in both] == ["reproduced", "not reproduced"]
     assert (count(both).quotes, count(both).judged, count(both).whole) == (1, 1, 0)
     assert count(both[:1])[1:] == (1, 1, 1) and headline([]) == ""
-    assert headline(both).endswith("1 not reproduced; of the 1 quotes that are judged, 0 in all their claims")
+    assert headline(both).endswith("1 not reproduced; of 1 judged quotes 0 in all their claims")
 
 
 def test_a_page_tells_which_text_flew_it() -> None:

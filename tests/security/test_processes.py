@@ -58,6 +58,38 @@ def test_sigterm_ends_like_ctrl_c_and_leaves_nothing(tmp_path, monkeypatch):
     assert list(target.parent.iterdir()) == []
 
 
+class Finalised:
+    """Something whose finaliser takes as long as a signal needs to come, as those of a compiler's objects may."""
+
+    def __init__(self, number):
+        self.number = number
+
+    def __del__(self):
+        signal.raise_signal(self.number)
+        for _ in range(1000):  # the interpreter hears of it in here
+            pass
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_an_interruption_that_falls_into_a_finaliser_is_not_lost(monkeypatch, number):
+    """Python can only tell of what is raised there: a flight of days went on after SIGTERM, and heard no other."""
+    main = import_module("airflock.cli.main")
+
+    def flying(**_):
+        Finalised(number)
+        time.sleep(10.0)
+
+    def act():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        monkeypatch.setattr(main, "app", flying)
+        try:
+            main.main()
+        except SystemExit as end:
+            os._exit(end.code)
+
+    assert os.waitstatus_to_exitcode(os.waitpid(child(act), 0)[1]) == 2  # 99: it slept to its end
+
+
 def test_what_a_killed_process_left_is_swept_and_what_a_living_one_writes_is_not(tmp_path):
     pids = []
     for name in ("dead", "alive"):

@@ -35,5 +35,5 @@ def headline(claims: Sequence[Statement]) -> str:
     told = ", ".join(f"{n} {verdict}" for verdict, n in found.verdicts.items() if n)
     line = f"{sum(found.verdicts.values())} claims on {found.quotes} quotes of the paper: {told}"
     if found.judged:
-        line += f"; of the {found.judged} quotes that are judged, {found.whole} in all their claims"
+        line += f"; of {found.judged} judged quotes {found.whole} in all their claims"
     return line if told else ""

@@ -1,5 +1,6 @@
 """The command `airflock`: its verbs, and one line for everything that goes wrong."""
 
+import _thread
 import os
 import signal
 import sys
@@ -42,6 +43,9 @@ HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plo
 
 Try [bold]airflock run vasarhelyi_2018/4ms[/bold]. Every verb has --help with an example.
 """
+
+
+MOMENT = 0.05  # s
 
 
 class Verbs(TyperGroup):
@@ -135,6 +139,7 @@ def main() -> None:
     """Run the command; bad input ends with one line per fault and exit status 2, and so does SIGTERM."""
     if threading.current_thread() is threading.main_thread():  # only there are signals heard
         signal.signal(signal.SIGTERM, _stop)
+        sys.unraisablehook = _again
     warnings.showwarning = _note
     try:
         try:
@@ -166,6 +171,20 @@ def _stop(number: int, _: Any) -> NoReturn:
     """SIGTERM, as batch systems send it, ends like Ctrl-C; a second one does not disturb what is being put away."""
     signal.signal(number, signal.SIG_IGN)
     raise KeyboardInterrupt
+
+
+def _again(lost: Any) -> None:
+    """An interruption that fell into a finaliser, where Python can only tell of it, comes again a moment later.
+
+    Numba's compiler drops objects with finalisers at every turn: Ctrl-C and SIGTERM were lost in one of 200 tries.
+    """
+    if not (lost.exc_type and issubclass(lost.exc_type, KeyboardInterrupt)):
+        sys.__unraisablehook__(lost)
+    elif threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _stop)
+        later = threading.Timer(MOMENT, _thread.interrupt_main, (signal.SIGTERM,))  # by then this function has ended
+        later.daemon = True
+        later.start()
 
 
 def _end(text: str, fault: BaseException) -> NoReturn:
