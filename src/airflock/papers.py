@@ -18,7 +18,7 @@ def paper(
 ) -> list[Any]:
     """Recompute a paper's numbers and compare them with what it prints.
 
-    Needs `pip install airflock-papers`, or in a clone of the repository `pip install -e ./papers`.
+    Needs airflock-papers: in a clone of the repository, `pip install -e ./papers`.
 
     Parameters
     ----------
@@ -68,6 +68,4 @@ def installed() -> None:
     try:
         import_module(PACKAGE)
     except ModuleNotFoundError as fault:
-        raise AirflockError(
-            "papers need airflock-papers: pip install airflock-papers (in a clone of Airflock: pip install -e ./papers)"
-        ) from fault
+        raise AirflockError("papers need airflock-papers: pip install -e ./papers in a clone of Airflock") from fault

@@ -12,7 +12,7 @@ import airflock_papers
 from airflock.cli.main import app
 
 ROOT = Path(__file__).parents[2]
-INSTALL = "papers need airflock-papers: pip install airflock-papers (in a clone of Airflock: pip install -e ./papers)"
+INSTALL = "papers need airflock-papers: pip install -e ./papers in a clone of Airflock"
 
 
 def test_both_distributions_have_one_version_and_the_papers_ask_for_it():

@@ -27,7 +27,7 @@ def paper(
 ) -> None:
     """Recompute a paper's numbers and figures; print each claim with its verdict.
 
-    Needs pip install airflock-papers; in a clone of the repository: pip install -e ./papers
+    Needs airflock-papers; in a clone of the repository: pip install -e ./papers
 
     `all --quick` flies the small form of every paper, and fails if a verdict differs from the one committed for this
     kind of processor. `all --breaks` makes the change of every claim, and fails if a claim that was committed as turned
