@@ -114,6 +114,7 @@ def test_runs_of_the_authors_program_have_the_summaries_that_the_comparison_rest
     found = [runs[c].median() for c in ("phi_vel", "r_min_mean", "f_corr", "f_speed")]
     assert found == pytest.approx([3.839, 12.52, 0.923, 0.972], rel=6e-4)
     assert [len(program_runs(v)) for v in SPEEDS] == [10, 10, 10, 10, 22]
+    assert [len(program_runs(v, ("stock",))) for v in SPEEDS] == [23, 23, 23, 22, 0]  # as papers/programs.md says
     assert len(program_runs(4, ("stock", "stock_abs"))) == 23  # the same seeds in both variants count once
 
 

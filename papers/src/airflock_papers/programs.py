@@ -15,9 +15,9 @@ PROGRAMS = {
         "The authors' C program, MIT licence, compiled with gcc, 600 s a run, statistics at every 0.01 s from t = 0,"
         " parameters as Table S1 prints them. Variants: `stock` adds r0_frict to r0_rep, as the program does; "
         "`stock_abs` takes it as the distance of Eq. 5, as Table S1 means it. Up to 16 m/s both are the same in the "
-        "statistics. Runs: 10 of `stock_abs` and 22 or 23 of `stock` at 4 to 16 m/s, 22 and 22 at 32 m/s; one line "
-        "each in `papers/src/airflock_papers/vasarhelyi_2018/program_runs.csv`. Ours: 100 flights. z is the difference "
-        "over its standard error. Medians at 4 m/s, where flights settle in one of two patterns.",
+        "statistics. Runs: 10 of `stock_abs` and 22 or 23 of `stock` at 4 to 16 m/s, 22 of `stock_abs` at 32 m/s; one "
+        "line each in `papers/src/airflock_papers/vasarhelyi_2018/program_runs.csv`. Ours: 100 flights. z is the "
+        "difference over its standard error. Medians at 4 m/s, where flights settle in one of two patterns.",
     ),
     "zapotecatl_2016": (
         "Zapotecatl et al. 2016: MetricsBoids, commit 59b28af",
