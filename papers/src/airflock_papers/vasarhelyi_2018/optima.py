@@ -17,7 +17,7 @@ from airflock.scenarios.scenario import Scenario
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
 from airflock_papers.vasarhelyi_2018.published import SPEEDS
-from airflock_papers.vasarhelyi_2018.table_s1 import COLUMNS, PAIRS, exponent, of_optimum
+from airflock_papers.vasarhelyi_2018.table_s1 import COLUMNS, PAIRS, exponent, means_tested, of_optimum
 
 STOPS: Mapping[str, float] = {"low": 0.0, "middle": 0.5, "high": 1.0}  # places in the space, as shares of each axis
 
@@ -52,4 +52,4 @@ def fly(flights: Flights) -> Data:
 def measured(data: Data) -> list[Measured]:
     """Everything that is said of an optimum."""
     found = [exponent(data.optima, name) for name in ("r0_rep", "v_shill")]
-    return found + [each for v in SPEEDS for each in of_optimum(v, data.optima[v], data.flown[v])]
+    return found + means_tested([each for v in SPEEDS for each in of_optimum(v, data.optima[v], data.flown[v])])

@@ -5,7 +5,9 @@ name. The studies lie in Airflock's cache folder and are continued where they we
 steps than the paper (`COARSE`); what is claimed of the optima is measured with the paper's own.
 """
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,11 +16,12 @@ from scipy import stats
 
 from airflock.evolve.result import Result
 from airflock.evolve.space import with_parameters
+from airflock.many_tests import holm
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
 from airflock_papers.studies import evolve
-from airflock_papers.vasarhelyi_2018.published import REFIT, optimum
+from airflock_papers.vasarhelyi_2018.published import EVALUATIONS, REFIT, SPEEDS, optimum
 
 RUNS = {4: 3, 6: 3, 8: 3, 16: 1, 32: 1}  # "at least three independent runs" at the first three speeds
 PAIRS = 400  # paired flights, ours against S1
@@ -88,7 +91,19 @@ def measured(data: Data) -> list[Measured]:
             *of_optimum(v, optima[v], data.ours[v], ranges),
             *([_alike(v, runs)] if len(runs) > 1 else []),
         ]
-    return found
+    return means_tested(found)
+
+
+def means_tested(found: Sequence[Measured]) -> list[Measured]:
+    """Mean fitnesses with p of Welch's test against Table S1, corrected over its columns; the rest as it is."""
+    means = {each.id: each.value for each in found if each.id.startswith("s1.mean.")}
+    printed = {v: optimum(v).published["fitness"] for v in SPEEDS}
+    ps = holm([
+        statistics.welch(means[name], mean, sd or 0.0, EVALUATIONS) if (name := f"s1.mean.{v}ms") in means else math.nan
+        for v, (mean, sd) in printed.items()
+    ])  # fmt: skip
+    by_id = {f"s1.mean.{v}ms": p for v, p in zip(printed, ps, strict=True)}
+    return [replace(each, p=by_id.get(each.id, each.p)) for each in found]
 
 
 def of_optimum(
