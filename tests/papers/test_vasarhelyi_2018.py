@@ -13,9 +13,9 @@ import airflock
 from airflock.core.maths import bell, peak, rising
 from airflock.errors import AirflockError
 from airflock.metrics.fitness_vasarhelyi import fitness
-from airflock_papers import statistics
+from airflock_papers import bounds, statistics
 from airflock_papers.claims import Claim, judge, read_claims
-from airflock_papers.flights import Flights
+from airflock_papers.flights import Flights, with_changes
 from airflock_papers.statements import load
 from airflock_papers.vasarhelyi_2018 import PAPER, evolved, fig1, outdoor, pressure, report, table_s2, tuning
 from airflock_papers.vasarhelyi_2018.published import REFIT, SPEEDS, optimum, program_runs
@@ -240,6 +240,30 @@ def test_every_pair_of_tuning_differs_in_what_its_sentence_says():
             assert tuning.CASES[changed].scenario(v).document != tuning.CASES[base].scenario(v).document
             for column in columns:
                 assert f"tuning.{name}.{column}.{v}ms" in load("airflock_papers.vasarhelyi_2018")
+
+
+def test_under_its_change_a_pair_is_one_scenario_so_that_nothing_differs():
+    """Same seeds, same bits: the difference is 0, and no claim that there is one holds."""
+    statements = load("airflock_papers.vasarhelyi_2018")
+    for name, (changed, base, columns) in tuning.PAIRS.items():
+        for v in tuning.ONLY.get(name, tuning.SPEEDS):
+            for claim in (statements[f"tuning.{name}.{column}.{v}ms"] for column in columns):
+                sides = [with_changes(tuning.CASES[case].scenario(v), claim.breaks) for case in (changed, base)]
+                if "same value" in claim.fails_if:
+                    assert sides[0].document == sides[1].document, claim.id
+                    assert not bounds.holds(claim.bound, {"ours": 0.0, "low": 0.0, "high": 0.0}), claim.id
+                else:
+                    assert claim.bound in ("ours == 0", "ours <= 0"), claim.id  # that there is none
+
+
+def test_of_what_is_asked_for_no_other_pair_is_flown(monkeypatch):
+    flown = []
+    monkeypatch.setattr(tuning, "_kept", lambda flights, name, v, scored, recorded: flown.append((name, v)))
+    tuning.fly(Flights(wanted=frozenset({"tuning.v_max.top_speed.6ms"})))
+    assert flown == [("cap", 6), ("cap, v_max", 6)]
+    flown.clear()
+    tuning.fly(Flights())
+    assert len(flown) == 57 and ("s4, r0_rep of s1", 4) in flown and ("s4, r0_rep of s1", 6) not in flown
 
 
 @pytest.mark.papers

@@ -1,8 +1,8 @@
 """Breaks: each claim names a change under which it must turn red; here the changes are made and flown.
 
 A claim that no change could break would say nothing. Its `breaks` are keys of a scenario that are set in every flight
-of its part, or `sides = "exchanged"` for a difference that is taken the other way round. Both are flown with few
-seeds, as they are and changed: the bound has to hold before and fail after.
+of its part: of two sides that are compared, both have the same value then. It is flown with few seeds, as it is and
+changed: the bound has to hold before and fail after.
 """
 
 import math
@@ -15,10 +15,8 @@ from airflock_papers.claims import VERDICTS, Measured, judge
 from airflock_papers.flights import Flights, Progress, progress_bar
 from airflock_papers.paper import Paper
 from airflock_papers.statements import Statement, load
-from airflock_papers.statistics import Estimate
 
 GOOD = {kind: verdicts[0] for kind, verdicts in VERDICTS.items()}
-EXCHANGED = {"sides": "exchanged"}
 RED = "turned red"
 GREEN = "still holds"  # a claim that its own change does not break
 UNSHOWN = "does not hold with so few flights"  # so that its turning red would say nothing
@@ -80,27 +78,29 @@ def of(paper: Paper, statements: Iterable[Statement], only: str | None, flights:
         raise AirflockError(f"{paper.title}: no claim of {only or 'it'} names a change; parts that do: {known}")
     found = []
     for part, members in chosen.items():
-        plain = _measured(paper, part, flights, {})
+        plain = _measured(paper, part, flights, {}, members)
         for changes in _different([statement.breaks for statement in members]):
             named = [statement for statement in members if statement.breaks == changes]
             after: dict[str, Measured] = {}
-            if changes == EXCHANGED:
-                after = {key: replace(each, value=_mirrored(each.value)) for key, each in plain.items()}
-            elif any(_holds(statement, plain.get(statement.id)) for statement in named):
-                after = _measured(paper, part, flights, changes)
+            if any(_holds(statement, plain.get(statement.id)) for statement in named):
+                after = _measured(paper, part, flights, changes, named)
             found += [_broken(s, part, plain.get(s.id), after.get(s.id)) for s in named]
     return found
 
 
-def _measured(paper: Paper, part: str, flights: Flights, changes: Mapping[str, Any]) -> dict[str, Measured]:
-    """Measurements of one part under changes, by id."""
+def _measured(
+    paper: Paper, part: str, flights: Flights, changes: Mapping[str, Any], asked: Iterable[Statement]
+) -> dict[str, Measured]:
+    """Measurements of one part under changes, by id; a part may leave out what is not asked for."""
     told, progress = in_words(changes) or "as it is", flights.progress
 
     def tell(title: str, done: int, total: int) -> None:
         if progress:
             progress(f"{part}, {told}: {title}", done, total)
 
-    return {found.id: found for found in paper.fly((part,), replace(flights, progress=tell, changes=changes))[0]}
+    wanted = frozenset(statement.id for statement in asked)
+    how = replace(flights, progress=tell, changes=changes, wanted=wanted)
+    return {found.id: found for found in paper.fly((part,), how)[0]}
 
 
 def part_of(statement: Statement) -> str:
@@ -135,9 +135,3 @@ def _broken(statement: Statement, part: str, plain: Measured | None, after: Meas
 def _holds(statement: Statement, measured: Measured | None) -> bool:
     """Whether the bound of a statement holds for what was measured; not if nothing was."""
     return measured is not None and judge({statement.id: statement}, [measured])[0].verdict == GOOD[statement.kind]
-
-
-def _mirrored(value: Estimate) -> Estimate:
-    """A difference taken the other way round."""
-    low, high = (None if end is None else -end for end in (value.high, value.low))
-    return value._replace(ours=-value.ours, low=low, high=high)

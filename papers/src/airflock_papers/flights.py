@@ -23,6 +23,7 @@ class Flights:
 
     quick : fewer seeds, coarser maps; seeds : flights per number instead of the paper's
     changes : keys that are set in every scenario, for `airflock_papers.breaks`; those of `search` are of an evolution
+    wanted : ids of the claims that are asked for, else all; a part may leave out flights of others
     """
 
     quick: bool = False
@@ -30,6 +31,7 @@ class Flights:
     threads: int | None = None
     progress: Progress | None = None
     changes: Mapping[str, Any] = field(default_factory=dict)
+    wanted: frozenset[str] | None = None
     flown: int = field(default=0, init=False)
 
     def count(self, full: int, quick: int) -> int:

@@ -6,7 +6,7 @@ kept in Airflock's cache folder case by case, so that a run that was stopped goe
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -124,12 +124,23 @@ def fly(flights: Flights) -> Flown:
     """Order parameters and measures of every case and speed by seed."""
     scored = flights.count(SEEDS, 6)
     recorded = min(scored, RECORDED)
-    return {(name, v): _kept(flights, name, v, scored, recorded) for name in CASES for v in _speeds(name)}
+    needed = {
+        (case, v) for name, v, column in _claims()
+        if flights.wanted is None or _id(name, column, v) in flights.wanted
+        for case in PAIRS[name][:2]
+    }  # fmt: skip
+    order = ((name, v) for name in CASES for v in SPEEDS)
+    return {(name, v): _kept(flights, name, v, scored, recorded) for name, v in order if (name, v) in needed}
 
 
-def _speeds(case: str) -> tuple[int, ...]:
-    used = {v for name, (a, b, _) in PAIRS.items() if case in (a, b) for v in ONLY.get(name, SPEEDS)}
-    return tuple(sorted(used))
+def _claims() -> Iterator[tuple[str, int, str]]:
+    """Pair, speed (m/s) and measure of every claim."""
+    for name, (_, _, columns) in PAIRS.items():
+        yield from ((name, v, column) for v in ONLY.get(name, SPEEDS) for column in columns)
+
+
+def _id(name: str, column: str, v: int) -> str:
+    return f"tuning.{name}.{column}.{v}ms"
 
 
 def _kept(flights: Flights, name: str, v: int, scored: int, recorded: int) -> pd.DataFrame:
@@ -150,16 +161,14 @@ def _kept(flights: Flights, name: str, v: int, scored: int, recorded: int) -> pd
 
 
 def measured(flown: Flown) -> list[Measured]:
-    """Paired differences, changed less unchanged, at every speed."""
+    """Paired differences, changed less unchanged, at every speed at which both were flown."""
     found = []
-    for name, (changed, base, columns) in PAIRS.items():
-        for v in ONLY.get(name, SPEEDS):
-            a, b = flown[changed, v], flown[base, v]
-            for column in columns:
-                pairs = (a[column] - b[column]).dropna()
-                note = f"{a[column].mean():.4g} with {changed}, {b[column].mean():.4g} with {base}"
-                value = statistics.mean(pairs)
-                found.append(
-                    Measured(f"tuning.{name}.{column}.{v}ms", column, f"{v} m/s, {changed}, less {base}", value, note)
-                )
+    for name, v, column in _claims():
+        changed, base, _ = PAIRS[name]
+        if not {(changed, v), (base, v)} <= set(flown):
+            continue
+        a, b = (flown[case, v][column] for case in (changed, base))
+        note = f"{a.mean():.4g} with {changed}, {b.mean():.4g} with {base}"
+        at = f"{v} m/s, {changed}, less {base}"
+        found.append(Measured(_id(name, column, v), column, at, statistics.mean((a - b).dropna()), note))
     return found
