@@ -27,6 +27,7 @@ class Builder:
     ranges   : whether a loop over some of the lanes is one from the first of them to the last
     by_pairs : whether each pair of agents draws its random words by itself, not four receivers at once
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
+    drifts   : whether agents may be watched by how fast they are beside the drift of the flock
     drops    : whether the compiler drops a sum over agents that nobody reads
     """
 
@@ -37,6 +38,7 @@ class Builder:
     apart = True
     ranges = True
     by_pairs = False
+    drifts = True
 
     def __init__(self, plan: Plan):
         self.plan = plan

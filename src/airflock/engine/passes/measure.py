@@ -5,17 +5,17 @@ from typing import Any
 from airflock.core.contract import Metric
 from airflock.core.vocabulary import Mean
 from airflock.engine.passes import flock, grid
+from airflock.engine.passes.approach import foretold
 from airflock.engine.passes.build import Builder, in_place
 from airflock.engine.passes.move import excursion
-from airflock.engine.plan import Plan
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import Call
 from airflock.engine.stages import measure as measuring
 from airflock.engine.stages.clusters import clusters_of
 from airflock.engine.stages.links import clusters_by_cells
-from airflock.engine.stages.measure import Measured
+from airflock.engine.stages.measure import Measured, measured
 from airflock.engine.stages.near import SURE, pairs_by_cells
-from airflock.engine.stages.words import fields, wants
+from airflock.engine.stages.words import wants
 from airflock.rules.reading import fields_read
 
 CLOCKS = ("sample", "collision")
@@ -32,7 +32,7 @@ def arguments(build: Builder, cells: bool = False) -> str:
 def measure(build: Builder, clock: str) -> None:
     """Function measure_<clock>: writes every Sample field into `values`.
 
-    That of the collision clock returns the least distance of a pair, m.
+    That of the collision clock returns the least distance of a pair, m, unless that was looked for first.
     """
     metrics = measured(build.plan, clock)
     paired = [one.metric for one in metrics if one.metric.pair is not None]
@@ -42,7 +42,8 @@ def measure(build: Builder, clock: str) -> None:
     parts = {f"survey_{one.metric.name}": flock.survey(build, one.metric) for one in metrics if one.metric.survey}
     clustered = {one.metric.name: clusters(build, one.metric, parts) for one in metrics}
     made = specialise(
-        build, measuring.measure, metrics=metrics, nearest=clock == "collision", over=looked, abreast=build.abreast,
+        build, measuring.measure, metrics=metrics, nearest=clock == "collision" and not foretold(build), over=looked,
+        abreast=build.abreast,
         summed="xvh" if build.drops else averaged(metrics),
         excursion=excursion(build) if outside else None,
         survey={one.metric.name: Call(f"survey_{one.metric.name}()") for one in metrics},
@@ -96,15 +97,3 @@ def clusters(build: Builder, metric: Metric, parts: dict[str, list[str]]) -> Any
         parts[name] = build.clusters(metric)
         return Call(f"{name}()")
     return clusters_of
-
-
-def measured(plan: Plan, clock: str) -> tuple[Measured, ...]:
-    """Metrics of a clock, and where their numbers lie."""
-    found, value, row, total = [], 0, 0, 0
-    for metric in plan.metrics:
-        if metric.clock == clock:
-            found.append(Measured(metric, value, row, total))
-            total += len(fields(metric.Pair))
-        value += len(fields(metric.Sample))
-        row += len(fields(metric.Memory))
-    return tuple(found)
