@@ -57,6 +57,7 @@ class CudaBuilder(Builder):
     ranges = False
     by_pairs = True
     drifts = False
+    trails = False
 
     def __init__(self, plan: Plan, shape: Shape):
         super().__init__(plan.built(grid=False))

@@ -4,6 +4,7 @@ import ast
 
 from airflock.engine.passes.approach import drifts, watched
 from airflock.engine.passes.build import Builder, in_place
+from airflock.engine.passes.noise import draw
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import Call, argument
 from airflock.engine.stages import faults, start
@@ -50,7 +51,7 @@ def move(build: Builder) -> None:
     )  # fmt: skip
     parts: dict[str, tuple[str, list[str]]] = {}
     if build.wants(plan.body.move, "move", "gx", "gy", "gz"):
-        parts["noise"] = NOISE, [*specialise(build, outer.noise).lines, "return 0"]
+        parts["noise"] = NOISE, [*specialise(build, outer.noise, drawn=draw(build)).lines, "return 0"]
     if plan.windy:
         blown = specialise(build, air.gusts)
         parts["gusts"] = GUSTS, [*blown.lines, f"return {blown.answer}"]
