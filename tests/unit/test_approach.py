@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import airflock
 from inside import stages_approach as approach
 
 
@@ -35,6 +36,19 @@ def apart(x):
     """Distances of all pairs, in double precision."""
     d = x.astype(float)[:, :, None] - x.astype(float)[:, None, :]
     return np.sqrt((d * d).sum(axis=0))
+
+
+@pytest.mark.parametrize(("preset", "settings"), (
+    ("vasarhelyi_2018/4ms", {"faults": [{"kind": "motor", "at": 0.0, "agents": [1]}]}),
+    ("zapotecatl_2016/best", {}),
+    ("vasarhelyi_2018/4ms", {"world.edges": "bounce"}),
+))  # fmt: skip
+def test_a_flight_that_counts_no_collisions_flies_as_one_that_does(preset, settings):
+    """Also where only some agents are asked, and where agents move in turn: it wants to know nobody's speed."""
+    settings = {"agents": 5, "duration": 1.0, **settings}
+    found = [airflock.load(preset, settings, metrics=metrics) for metrics in (None, ["speed"])]
+    counted, other = (airflock.simulate(one, 3, device="python") for one in found)
+    np.testing.assert_array_equal(counted["position"], other["position"])
 
 
 def test_a_flock_that_flies_past_without_a_change_of_shape_comes_no_nearer():

