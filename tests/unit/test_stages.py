@@ -223,7 +223,7 @@ class World:
                 least = judging.measure(
                     self.flock(work), self.numbers(), self.whole, self.around(), 0.7, n, n, *parts,
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
-                    plan=self.plan, metrics=metrics, nearest=False, over=None, abreast=True,
+                    plan=self.plan, metrics=metrics, nearest=clock == "collision", over=None, abreast=True,
                     summed="xvh",
                 )  # fmt: skip
             found.append((least, values, memory, work))
@@ -236,7 +236,7 @@ def test_order_parameters_as_they_stand_are_those_of_the_driver_made_of_them(nam
     text, direct = World(name, seed).samples(clock)
     for expected, value in zip(text, direct, strict=True):
         np.testing.assert_allclose(value, expected, rtol=1e-12, atol=1e-12)
-    assert np.any(text[1]) or clock == "collision"
+    assert np.any(text[1]) or (clock == "collision" and 0.0 < text[0] < 100.0)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -19,12 +19,12 @@ def drifts(build: Builder) -> bool:
 
 
 def foretold(build: Builder) -> bool:
-    """Whether the least distance of a pair is looked for first, and tells whether there is anything to measure."""
+    """Whether the least distance of a pair is looked for alone, as long as there is nothing to measure."""
     return drifts(build) and not build.plan.near
 
 
 def nearest(build: Builder) -> None:
-    """Function nearest, where pairs are looked at so: the least distance of any."""
+    """Function nearest: the least distance of a pair, where it is looked for alone."""
     if foretold(build):
         made = specialise(build, approach.nearest)
         build.function("nearest(n, m, row, whole, work)", made.lines, f"return {made.answer}")

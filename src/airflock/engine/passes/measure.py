@@ -5,7 +5,6 @@ from typing import Any
 from airflock.core.contract import Metric
 from airflock.core.vocabulary import Mean
 from airflock.engine.passes import flock, grid
-from airflock.engine.passes.approach import foretold
 from airflock.engine.passes.build import Builder, in_place
 from airflock.engine.passes.move import excursion
 from airflock.engine.specialise.stage import specialise
@@ -32,7 +31,7 @@ def arguments(build: Builder, cells: bool = False) -> str:
 def measure(build: Builder, clock: str) -> None:
     """Function measure_<clock>: writes every Sample field into `values`.
 
-    That of the collision clock returns the least distance of a pair, m, unless that was looked for first.
+    That of the collision clock returns the least distance of a pair, m.
     """
     metrics = measured(build.plan, clock)
     paired = [one.metric for one in metrics if one.metric.pair is not None]
@@ -42,8 +41,7 @@ def measure(build: Builder, clock: str) -> None:
     parts = {f"survey_{one.metric.name}": flock.survey(build, one.metric) for one in metrics if one.metric.survey}
     clustered = {one.metric.name: clusters(build, one.metric, parts) for one in metrics}
     made = specialise(
-        build, measuring.measure, metrics=metrics, nearest=clock == "collision" and not foretold(build), over=looked,
-        abreast=build.abreast,
+        build, measuring.measure, metrics=metrics, nearest=clock == "collision", over=looked, abreast=build.abreast,
         summed="xvh" if build.drops else averaged(metrics),
         excursion=excursion(build) if outside else None,
         survey={one.metric.name: Call(f"survey_{one.metric.name}()") for one in metrics},

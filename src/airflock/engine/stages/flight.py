@@ -117,7 +117,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
     sampled    : by stage: values that it samples, and which of the sums counts its instants
     watched    : metrics that look for collisions, if all of them promise a distance beyond which there are none
     drifts     : whether it counts how fast agents are beside the drift of the flock, or how fast they are
-    foretold   : whether the least distance of a pair is looked for first, and tells whether there is more to measure
+    foretold   : whether the least distance of a pair is looked for alone, as long as there is nothing to measure
     collided   : place of the value that ends a flight, where a scenario says so
     slots      : whether agents lie in slots
     """
@@ -143,7 +143,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
             break
         for name in order["watch"]:
             if step % whole.collide_every == 0:
-                if foretold and travelled >= gap:
+                if foretold and calm and travelled >= gap:
                     gap = ask(stages["nearest"]) - width(tuple(one.metric for one in watched), numbers.q) - SLACK
                     travelled = ZERO
                     set_out(held, flock, n, plan=plan)
@@ -152,9 +152,6 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
                     if not calm:
                         forget(watched, memory, n)
                         calm = True
-                elif foretold:
-                    take(name, time, values, sums, stages=stages, sampled=sampled)
-                    calm = False
                 elif watched:
                     near = ask(stages[name], time=time)
                     add_up(sums, values, *sampled[name])
