@@ -177,7 +177,7 @@ def faults(
         if fault:
             found.append(f"world.corners {fault}")
     if world.arena != "square" and world.walls == "nearest_per_axis":
-        found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'")
+        found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'; set world.walls = 'every_edge'")
     plan = None if found else ground_plan(world)
     region, height = (None, 1.0) if found else _region(world, begin)
     if not found:

@@ -163,12 +163,21 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
         else:
             values[key] = value
     apart = f"{where}.spread"
-    converted, notes, wrong = units.converted({where: values, apart: spreads}, {where: record, apart: record})
+    converted, told, unfit = units.converted({where: values, apart: spreads}, {where: record, apart: record})
+    notes, wrong = ([_as_written(line, where, apart) for line in lines] for lines in (told, unfit))
     made, more = schema.check(where, converted[where], record)
     faults += wrong + more
     off, more = _spreads(where, converted[apart], known)
     numbers = {key: float(getattr(made, key)) for key in converted[where]} if made is not None and not more else {}
     return numbers, off, notes, faults + more
+
+
+def _as_written(line: str, where: str, apart: str) -> str:
+    """A line about a spread under the key that a file has for it."""
+    if not line.startswith(f"{apart}."):
+        return line
+    key, _, rest = line.removeprefix(f"{apart}.").partition(" ")
+    return f"{where}.{key}.spread {rest}"
 
 
 def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
