@@ -56,6 +56,12 @@ def members(where: str, given: Any, agents: int) -> tuple[tuple[int, ...] | None
     return tuple(sorted(set(given))), []
 
 
+def names_of(groups: Sequence[Group], agents: int) -> tuple[str, ...]:
+    """Name of the group of each agent, "" in none; nothing where there are no groups."""
+    named = {agent: group.name for group in groups for agent in group.agents}
+    return tuple(named.get(agent, "") for agent in range(agents)) if named else ()
+
+
 def counted(given: Any, agents: int) -> Any:
     """A number of agents out of a share of the flock such as "20 %", at least one; anything else as it is."""
     share = SHARE.fullmatch(given) if isinstance(given, str) else None
