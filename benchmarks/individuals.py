@@ -2,11 +2,12 @@
 
     python benchmarks/individuals.py [--processes 12] [--rounds 40] [--only NAME ...] [--json FILE]
 
-A process may be fast or slow by luck, by where its memory lies. So several fresh ones measure, one after another. In
-each, all flights are open at once and take turns, 2,000 steps each, by the time of the thread; a flight's figure is the
-least of its turns. Told are two ratios to the plain flight: of the least of all processes, and the median of those
-within a process, with the quarters of these beside it. The plain flight stands there a second and a third time, as the
-noise floor: what differs from 1 by no more than they do is not told apart from 1.
+A process may be fast or slow by luck, by where its memory lies, and so may a flight in it by when it was opened. So
+several fresh ones measure, one after another, and open the flights in orders of their own. In each, all are open at
+once and take turns, 2,000 steps each, by the time of the thread; a flight's figure is the least of its turns. Told are
+two ratios to the plain flight: of the least of all processes, and the median of those within a process, with the
+quarters of these beside it. The plain flight stands there a second and a third time, as the noise floor: what differs
+from 1 by no more than they do is not told apart from 1.
 
 Faults hit one agent. "void" rows have numbers of the fault at which it changes nothing, and "due" rows a fault that is
 due after the last step, so that bit by bit the plain flight is flown: they tell what the text of a driver costs. In
@@ -17,6 +18,7 @@ looks at pairs at all.
 
 import argparse
 import json
+import random
 import subprocess
 import sys
 import time
@@ -60,10 +62,11 @@ def cases():
     }
 
 
-def turns(names, rounds, blind):
-    """Least times of a step in this process, µs, by the name of a row."""
+def turns(names, rounds, blind, order):
+    """Least times of a step in this process, µs, by the name of a row; flights are opened in a drawn order."""
     found = cases()
     metrics = ["speed"] if blind else None
+    names = random.Random(order).sample(names, len(names))
     flights = {
         name: airflock.open(airflock.load(PRESET, {"duration": END, **found[name]}, metrics=metrics), 1)
         for name in names
@@ -83,7 +86,7 @@ def measured(names, given):
     """Least times of a step of each process, µs, by the name of a row."""
     found = []
     for number in range(given.processes):
-        call = [sys.executable, __file__, "--turns", "--rounds", str(given.rounds), "--only", *names]
+        call = [sys.executable, __file__, "--turns", str(number), "--rounds", str(given.rounds), "--only", *names]
         done = subprocess.run(call + ["--blind"] * given.blind, stdout=subprocess.PIPE, check=True, text=True)
         found.append(json.loads(done.stdout))
         print(f"process {number + 1} of {given.processes}: plain {found[-1]['plain']:.3f} µs a step", flush=True)
@@ -97,12 +100,12 @@ def main():
     options.add_argument("--rounds", type=int, default=40)
     options.add_argument("--only", nargs="*", default=[])
     options.add_argument("--blind", action="store_true", help="measure no collisions")
-    options.add_argument("--turns", action="store_true", help="be one of the processes")
+    options.add_argument("--turns", type=int, metavar="NUMBER", help="be one of the processes: this one")
     options.add_argument("--json", type=Path)
     given = options.parse_args()
     names = [name for name in cases() if name.startswith("plain") or not given.only or name in given.only]
-    if given.turns:
-        print(json.dumps(turns(names, given.rounds, given.blind)))
+    if given.turns is not None:
+        print(json.dumps(turns(names, given.rounds, given.blind, given.turns)))
         return
     took = measured(names, given)
     print(f"{'':20s}  µs a step  of the least  median  quarters")

@@ -15,7 +15,8 @@ from airflock.rules.nodes import walk
 TURNS = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move", "overrule")
 STAGES = (
     *TURNS, *(f"{name}_of" for name in TURNS), "begin", "excursion", "tune", "meet", "aim_", "glide_", "appear_",
-    "measure_sample", "measure_collision", "near_sample", "near_collision", "clusters_correlation", "clusters_groups",
+    "measure_sample", "measure_collision", "nearest", "draw",
+    "near_sample", "near_collision", "clusters_correlation", "clusters_groups",
     "clusters_swarms", "advance", "measure_frames", "turns",
 )  # fmt: skip
 
@@ -82,11 +83,19 @@ def _by_name(tree, rows):
     names = {number: name for name, number in reversed(rows.items())}
     for node in walk(tree):
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "work":
-            if isinstance(node.slice, ast.Constant):
-                node.slice = ast.Constant(names[node.slice.value])
-            elif isinstance(node.slice, ast.Tuple) and isinstance(node.slice.elts[0], ast.Constant):
-                node.slice.elts[0] = ast.Constant(names[node.slice.elts[0].value])
+            if _number(node.slice) is not None:
+                node.slice = ast.Constant(names[_number(node.slice) % len(rows)])
+            elif isinstance(node.slice, ast.Tuple) and _number(node.slice.elts[0]) is not None:
+                node.slice.elts[0] = ast.Constant(names[_number(node.slice.elts[0]) % len(rows)])
     return tree
+
+
+def _number(node):
+    """A number as it is written, with its sign; None where it is none."""
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        found = _number(node.operand)
+        return None if found is None else -found
+    return node.value if isinstance(node, ast.Constant) else None
 
 
 def _with_parts(statements, parts):

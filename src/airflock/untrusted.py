@@ -163,11 +163,12 @@ def json_value(text: Any) -> Any:
 
 
 class Element(NamedTuple):
-    """An element of an XML text: its name without a namespace, its own text, and the elements in it."""
+    """An element of an XML text: its tag without a namespace, its own text, the elements in it, its attribute name."""
 
     tag: str
     text: str
     children: list["Element"]
+    name: str = ""
 
 
 def xml(text: str) -> Element:
@@ -177,34 +178,34 @@ def xml(text: str) -> Element:
     """
     if len(text) > MOST_BYTES:
         raise TextError(f"is larger than {MOST_BYTES / 1e6:g} MB, more than any text of this kind needs")
-    around: list[tuple[str, list[str], list[Element]]] = [("", [], [])]
+    around: list[tuple[str, str, list[str], list[Element]]] = [("", "", [], [])]
     count = 0
 
-    def begin(tag: str, _: dict[str, str]) -> None:
+    def begin(tag: str, attributes: dict[str, str]) -> None:
         nonlocal count
         count += 1
         if count > MOST_ELEMENTS:
             raise TextError(f"has more than {MOST_ELEMENTS} elements")
         if len(around) > MOST_DEPTH:
             raise TextError(f"is nested more than {MOST_DEPTH} deep")
-        around.append((tag.rpartition(" ")[2], [], []))
+        around.append((tag.rpartition(" ")[2], attributes.get("name", ""), [], []))
 
     def end(_: str) -> None:
-        tag, parts, children = around.pop()
-        around[-1][2].append(Element(tag, "".join(parts).strip(), children))
+        tag, name, parts, children = around.pop()
+        around[-1][3].append(Element(tag, "".join(parts).strip(), children, name))
 
     def refuse(*_: Any) -> Any:
         raise FormatError("has a document type or entities, which no file of this kind needs")
 
     parser = expat.ParserCreate("utf-8", namespace_separator=" ")
     parser.StartElementHandler, parser.EndElementHandler = begin, end
-    parser.CharacterDataHandler = lambda part: around[-1][1].append(part)
+    parser.CharacterDataHandler = lambda part: around[-1][2].append(part)
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
     try:
         parser.Parse(text.encode("utf-8"), True)
     except expat.ExpatError as fault:
         raise FormatError(f"is not XML: {fault}") from fault
-    return around[0][2][0]
+    return around[0][3][0]
 
 
 def _measure(text: str) -> None:

@@ -552,6 +552,31 @@ def test_groups_are_scored_alone_and_against_each_other():
         airflock.score(airflock.simulate(load(PAPER, SMALL), 1, device="python"), groups=True)
 
 
+def test_a_group_that_is_never_there_is_a_row_without_numbers(seed):
+    """It ended the table of all others with "no individual is present"."""
+    groups = [{"name": "gone", "agents": 2}, {"name": "rest"}]
+    faults = [{"kind": "fails", "at": 0.0, "group": "gone"}]
+    scenario = load(PAPER, {**SMALL, "duration": 1.0, "groups": groups, "faults": faults})
+    recording = airflock.simulate(scenario, seed, device="python")
+    table = airflock.score(recording, groups=True)
+    assert table.loc["gone", "present"] == 0.0 and table.loc["gone"].drop("present").isna().all()
+    assert table.loc["gone to rest"].isna().all()
+    assert table.loc["rest", "phi_vel"] == table.loc["all", "phi_vel"] > 0.0
+
+
+def test_a_recording_names_the_group_of_each_agent(tmp_path, seed):
+    groups = [{"name": "old ones", "agents": [1, 5]}, {"name": "new", "agents": 2}]
+    recording = airflock.simulate(load(PAPER, {**SMALL, "duration": 1.0, "groups": groups}), seed, device="python")
+    names = ["new", "old ones", "new", "", "", "old ones", *[""] * (recording.sizes["individual"] - 6)]
+    assert recording.group.values.tolist() == names and recording.group.dims == ("individual",)
+    airflock.save(recording, tmp_path / "a.nc")
+    again = airflock.load_recording(tmp_path / "a.nc")
+    assert again.coords["group"].equals(recording.coords["group"])
+    assert again.position.where(again.group == "new", drop=True).sizes["individual"] == 2
+    assert airflock.score(again).equals(airflock.score(recording))
+    assert "group" not in airflock.simulate(load(PAPER, {**SMALL, "duration": 1.0}), seed, device="python").coords
+
+
 def test_what_the_page_shows_works(tmp_path):
     """The examples of docs/faults.md, as they stand there."""
     import re

@@ -27,7 +27,8 @@ from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
 from airflock.onboard.fields import frozen
 from airflock.radios.registry import RADIOS
 from airflock.world import arena
-from airflock.world.place import Place, Shapes, counter_clockwise, polygon_fault
+from airflock.world.corners import counter_clockwise, polygon_fault
+from airflock.world.place import Place, Shapes
 from flocks import ISLANDS, PENTAGON
 
 QUIET = {"sensors.noise": 0.0, "body.noise": 0.0, "duration": 10.0, "metrics.period": 0.2}

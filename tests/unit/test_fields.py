@@ -137,7 +137,10 @@ def test_a_field_without_a_polygon_hides_no_other_fault(tmp_path):
 
 def test_a_field_and_its_corners_are_not_given_twice():
     lines = faults_of(FIELDS / "field.kml", **{"world.corners": SHELL, "world.simplify": -1.0})
-    assert "world.corners: is given, and world.file as well" in lines[0] and "world.simplify = -1.0" in lines[1]
+    assert (
+        "world.corners: is given, and world.file as well" in lines[0]
+        and "world.simplify = -1 m lies outside" in lines[1]
+    )
 
 
 BOMB = '<!DOCTYPE k [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><kml>&b;</kml>'
@@ -194,3 +197,105 @@ def test_the_largest_extension_is_that_of_all_pairs(kind):
             "line": [(0.1 * k, 0.3 * k) for k in range(count)],
         }[kind]
         assert geometry.diameter(points) == max((math.dist(a, b) for a in points for b in points), default=0.0)
+
+
+def kml(tmp_path, *placemarks, name="a.kml"):
+    path = tmp_path / name
+    path.write_text(f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{"".join(placemarks)}</Document></kml>')
+    return path
+
+
+def boundary(tag, *rings):
+    texts = [" ".join(f"{x},{y},0" for x, y in [*ring, ring[0]]) for ring in rings]
+    lines = [f"<LinearRing><coordinates>{text}</coordinates></LinearRing>" for text in texts]
+    return f"<{tag}>{''.join(lines)}</{tag}>"
+
+
+POND = [[19.061, 47.471], [19.062, 47.471], [19.062, 47.472]]
+TREE = [[19.063, 47.471], [19.0632, 47.471], [19.0632, 47.4712]]
+
+
+def test_all_holes_of_one_inner_boundary_are_obstacles(tmp_path):
+    """As Google Earth writes them: only the first one was kept, so that drones would have flown into the others."""
+    outer = boundary("outerBoundaryIs", SHELL)
+    one = f"<Placemark><Polygon>{outer}{boundary('innerBoundaryIs', POND, TREE)}</Polygon></Placemark>"
+    each = boundary("innerBoundaryIs", POND) + boundary("innerBoundaryIs", TREE)
+    two = f"<Placemark><MultiGeometry><Polygon>{outer}{each}</Polygon></MultiGeometry></Placemark>"
+    assert len(ground_of(kml(tmp_path, one)).keys["obstacles"]) == 2
+    assert ground_of(kml(tmp_path, one)).keys == ground_of(kml(tmp_path, two)).keys
+
+
+@pytest.mark.parametrize("wrapped", [
+    '<Data name="floor"><value>{}</value></Data><Data name="other"><value>x</value></Data>',
+    '<SchemaData schemaUrl="#f"><SimpleData name="floor">{}</SimpleData></SchemaData>',
+])  # fmt: skip
+def test_kml_tells_heights_as_geojson_does(tmp_path, wrapped):
+    def placemark(shape, told):
+        data = f"<ExtendedData>{wrapped.format(told)}</ExtendedData>"
+        return f"<Placemark>{data}<Polygon>{boundary('outerBoundaryIs', shape)}</Polygon></Placemark>"
+
+    path = kml(tmp_path, placemark(SHELL, 5), placemark(TREE, ""), placemark(POND, "-2.5"))
+    theirs = written(tmp_path, polygon(SHELL, floor=5.0), polygon(TREE), polygon(POND, floor=-2.5))
+    assert ground_of(path, space=True).keys == ground_of(theirs, space=True).keys
+    (line,) = faults_of(kml(tmp_path, placemark(SHELL, "low")))
+    assert "the property floor = 'low' is not a height in m" in line
+
+
+def test_corners_that_say_nothing_are_left_out(tmp_path):
+    """A point given twice up to rounding, a ring that is closed up to rounding, points along straight sides."""
+    slanted = [[19.06, 47.47], [19.064, 47.4707], [19.0646, 47.473], [19.0605, 47.4733]]
+    ends = zip(slanted, [*slanted[1:], slanted[0]], strict=True)
+    fine = [[round(a[c] + (b[c] - a[c]) * k / 7.0, 7) for c in (0, 1)] for a, b in ends for k in range(7)]
+    nearly = [[fine[2][0] + 1e-9, fine[2][1]]]
+    whole, few = (ground_of(written(tmp_path, polygon(ring))).keys for ring in (slanted, fine[3:] + fine[:3] + nearly))
+    assert len(few["corners"]) == 4
+    assert {tuple(c) for c in few["corners"]} == {tuple(c) for c in whole["corners"]}
+    load(
+        "vasarhelyi_2018/4ms", FEW | {"world.file": str(written(tmp_path, polygon([*slanted, [19.06 + 1e-9, 47.47]])))}
+    )
+
+
+@pytest.mark.parametrize("simplify", [0.0, 3.0])
+def test_a_wood_that_ends_where_the_field_does_lies_inside(tmp_path, simplify):
+    """On an edge that runs to no cardinal point rounding puts one of its two corners outside."""
+    slanted = [[19.06, 47.47], [19.064, 47.4707], [19.0646, 47.473], [19.0605, 47.4733]]
+    rng = random.Random(7)
+    for _ in range(10):
+        a, b = sorted((rng.uniform(0.1, 0.9), rng.uniform(0.1, 0.9)))
+        edge = [[19.06 + 0.004 * k, 47.47 + 0.0007 * k] for k in (a, b)]
+        path = written(tmp_path, polygon(slanted), polygon([*edge, [19.0622, 47.4715]], name="wood"))
+        keys = ground_of(path, simplify=simplify).keys
+        assert Polygon(keys["corners"]).buffer(2e-3).covers(Polygon(keys["obstacles"][0]))
+        load("vasarhelyi_2018/4ms", FEW | {"world.file": str(path), "world.simplify": simplify})
+
+
+def test_what_is_no_polygon_is_told(tmp_path):
+    tree = {"type": "Feature", "properties": {"name": "oak"}, "geometry": {"type": "Point", "coordinates": SHELL[0]}}
+    fence = {"type": "LineString", "coordinates": SHELL[:2]}
+    assert "; oak (Point), no polygon, is left out" in ground_of(written(tmp_path, polygon(SHELL), tree)).note
+    note = ground_of(written(tmp_path, polygon(SHELL), tree, fence)).note
+    assert "; oak (Point) and 1 more, no polygons, are left out" in note
+
+
+def test_many_short_sides_are_told(tmp_path):
+    turn = np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)
+    ring = np.column_stack([19.06 + 0.002 * np.cos(turn), 47.47 + 0.001 * np.sin(turn)]).tolist()
+    note = ground_of(written(tmp_path, polygon(ring))).note
+    few = len(ground_of(written(tmp_path, polygon(ring)), simplify=1.0).keys["corners"])
+    assert f"agents feel each of its sides for itself: world.simplify = 1 leaves {few} of them" in note
+    assert "simplify" not in ground_of(FIELDS / "field.geojson").note
+
+
+@pytest.mark.parametrize("told", ["1 m", {"value": 1.0, "unit": "m", "source": "ours"}, "100 cm"])
+def test_simplify_takes_units_as_every_key_does(told):
+    file = {"world.file": str(FIELDS / "field.kml")}
+    given = load("vasarhelyi_2018/4ms", FEW | file | {"world.simplify": told})
+    assert given.world == load("vasarhelyi_2018/4ms", FEW | file | {"world.simplify": 1.0}).world
+    (line,) = faults_of(FIELDS / "field.kml", **{"world.simplify": "1 s"})
+    assert "world.simplify = 1 s: the unit is m" in line
+
+
+def test_a_field_and_another_arena_are_not_given_together():
+    """The circle was flown, and the field forgotten."""
+    (line,) = faults_of(FIELDS / "field.kml", **{"world.arena": "circle"})
+    assert "world.arena = 'circle': is given, and world.file as well" in line

@@ -109,6 +109,33 @@ def test_a_body_of_ones_own_flies_half_of_the_command(files):
     assert np.ptp(fly(still, 1, record=True, device="python").frames[:, :2], axis=0).max() == 0.0
 
 
+@pytest.mark.parametrize(("returned", "said"), [
+    ("cx / 0.0, cy, cz", "plain.move fails on a probe: ZeroDivisionError"),
+    ("cx, cy", "plain.move must return x, y, z"),
+    ("1e308 * cx * cx, cy, cz", "plain.move returns inf on a probe"),
+])  # fmt: skip
+def test_a_fault_of_a_body_is_found_at_its_line_before_it_flies(tmp_path, returned, said):
+    """As of every other rule; interpreted it was "unexpected, please report it", and compiled it flew."""
+    path = tmp_path / "plain.py"
+    path.write_text(f'ACCEPTS, INTEGRATION = "velocity", "new"\n\n\ndef move(cx, cy, cz):\n    return {returned}\n')
+    for device in ("python", "cpu"):
+        with pytest.raises(RuleError) as caught:
+            airflock.simulate(load("vasarhelyi_2018/4ms", SMALL, body=path), 1, device=device)
+        assert str(caught.value).startswith((f"{path}:4: ", f"{path}:5: ")) and said in str(caught.value)
+
+
+def test_a_body_without_numbers_needs_no_parameters(tmp_path, seed):
+    path = tmp_path / "plain.py"
+    path.write_text('ACCEPTS, INTEGRATION = "velocity", "new"\n\n\ndef move(cx, cy, cz):\n    return cx, cy, cz\n')
+    ours = load("vasarhelyi_2018/4ms", SMALL | {"body.kind": "direct"})
+    theirs = load("vasarhelyi_2018/4ms", SMALL, body=path)
+    one, other = (fly(found, seed, record=True, device="python").frames for found in (ours, theirs))
+    assert np.array_equal(one, other)
+    assert airflock.check_body(path)
+    theirs = load("vasarhelyi_2018/4ms", SMALL | {"groups": [{"name": "a", "agents": 1}]}, body=path)
+    assert airflock.simulate(theirs, seed, device="python").position.notnull().all()
+
+
 def test_a_file_and_the_same_names_given_directly_are_one(files):
     keys = {"metrics.width": 3.0, "body.share": 0.25}
     from_file = load("vasarhelyi_2018/4ms", {**SMALL, **keys}, metrics=files / "spread.py", body=files / "half.py")

@@ -18,6 +18,7 @@ from inside import passes_decide as decide
 from inside import passes_driver as driver
 from inside import passes_measure as measure
 from inside import passes_perceive as perceive
+from inside import stages_approach as approach
 from inside import stages_decide as deciding
 from inside import stages_gusts as gusts
 from inside import stages_measure as judging
@@ -99,6 +100,7 @@ class World:
             "words": np.zeros((4, n), np.uint32).astype(object),
             "store": np.concatenate([rng.uniform(-9.0, 9.0, (2 * dims, n, n)), np.full((1, n, n), -1e9)]),
             "gust": np.array([0.3, -0.2, 0.1, 0.5, -0.4])[: 5 if self.plan.dryden else 3],
+            "held": rng.uniform(-2.0, 2.0, approach.HELD),
         }  # fmt: skip
         whole = dict(zip(WHOLE, self.tables.whole.tolist(), strict=True))
         self.whole, self.row = types.SimpleNamespace(**whole), self.tables.row.tolist()
@@ -111,7 +113,7 @@ class World:
         held |= {name: float(getattr(words, name)) for name in ("ZERO", "HALF", "ONE", "TINY", "FAR", "LIMIT", "AWAY")}
         held |= {name: getattr(random, name) for name in random.PRIMITIVES}
         held |= {"math": math, "np": np, "namedtuple": namedtuple, "JIT": {}, "wide_vectors": lambda: None}
-        held["apart"] = lambda: None
+        held |= {"apart": lambda: None, "u64": int}
         held["njit"] = lambda *_, **__: lambda function: function
         exec("\n\n".join([*self.build.source.blocks, *self.build.functions]), held)
         return held
@@ -126,7 +128,7 @@ class World:
         made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"], state["words"], *around)
         made["boundaries"](n, *common, *self.rest.values())
         made["decide"](step, n, 0.7, *common, None, *list(self.rest.values())[1:])
-        state["fastest"] = made["move"](step, n, n, *common, state["words"], state["gust"])
+        state["fastest"] = made["move"](step, n, n, state["held"], *common, state["words"], state["gust"])
         return state
 
     def directly(self, step):
@@ -165,7 +167,8 @@ class World:
         state["fastest"] = motion.move(
             range(n), range(n), flock, numbers, step, n,
             lambda: noise.noise(flock, whole, step, n, plan=plan),
-            lambda: gusts.gusts(numbers, whole, step, state["gust"], plan=plan), 0, 0, plan=plan,  # nobody suffers
+            lambda: gusts.gusts(numbers, whole, step, state["gust"], plan=plan), state["held"],
+            0, 0, plan=plan, watched=True, drifts=True,  # nobody suffers
         )  # fmt: skip
         return state
 
@@ -216,7 +219,7 @@ class World:
             if text:
                 least = self.text()[f"measure_{clock}"](0.7, n, n, self.row, whole, work, edges, spans, scene, *parts)
             else:
-                metrics = measure.measured(self.plan, clock)
+                metrics = judging.measured(self.plan, clock)
                 least = judging.measure(
                     self.flock(work), self.numbers(), self.whole, self.around(), 0.7, n, n, *parts,
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
@@ -234,6 +237,15 @@ def test_order_parameters_as_they_stand_are_those_of_the_driver_made_of_them(nam
     for expected, value in zip(text, direct, strict=True):
         np.testing.assert_allclose(value, expected, rtol=1e-12, atol=1e-12)
     assert np.any(text[1]) or (clock == "collision" and 0.0 < text[0] < 100.0)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_least_distance_as_it_stands_is_that_of_the_driver_made_of_it(name, seed):
+    world = World(name, seed)
+    work, n = world.state["work"], 6
+    found = approach.nearest(range(n), world.flock(work), world.numbers(), n, n, plan=world.plan)
+    assert found == world.text()["nearest"](n, n, world.row, world.tables.whole.tolist(), work)
+    assert 0.0 < found < 40.0
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -1,6 +1,6 @@
 """Course: where a flight stands, what it has behind it, and the driver that flies it on; `Flight` is its face."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import Future
 from numbers import Integral
 from typing import Any
@@ -12,6 +12,7 @@ from airflock import __version__
 from airflock.engine import cpu, failure
 from airflock.engine.background_compile import compile_aside
 from airflock.engine.drivers import device_of, flying, is_compiled
+from airflock.engine.fault_columns import renew
 from airflock.engine.handover import carry
 from airflock.engine.simulate import opened, to_fly
 from airflock.engine.snapshots import Snapshot, Window, sendable
@@ -19,7 +20,7 @@ from airflock.engine.state import State
 from airflock.errors import FlightError
 from airflock.scenarios.change import begun
 from airflock.scenarios.events import Event
-from airflock.scenarios.onsets import onsets
+from airflock.scenarios.onsets import Onset, going_on, onsets
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 from airflock.threads import in_background
@@ -171,6 +172,8 @@ class Course:
             scores = self.scenario.judged(self.state.values())
             self.windows.append(Window(self.scenario, begin, self.time, scores))
         carry(self.state, state, self.step)
+        self._expect(state, state.tables.due, [n for n, e in enumerate(self.scenario.faults) if e in scenario.faults])
+        renew(state, state.tables.due)
         for event in events:
             self.note(event.kind, **event.data)
         self.scenario, self.state, self.steps, self.since = scenario, state, state.whole("steps"), self.step
@@ -182,12 +185,18 @@ class Course:
             given_start=self.state.plan.given_start, absence=absence,
         )  # fmt: skip
 
+    def _expect(self, state: State, coming: Sequence[Onset], lasting: Collection[int]) -> None:
+        """Have a state expect these faults from now on; `lasting` as of `onsets.going_on`."""
+        now = self.step + (1 if self.sensed else 0)
+        state.expect(going_on(self.state.tables.due, coming, now, lasting))
+
     def let_come_and_go(self) -> None:
         """Go on with a driver that knows who is absent; in the same window of scores."""
         if self.state.plan.absence:
             return
         old, state = self.state, self._opened(self.scenario, absence=True)
         carry(old, state, self.step)
+        state.expect(old.tables.due)
         for name in ("sums", "values"):
             state.arrays[name][:] = old.arrays[name]
         state.arrays["there"][:] = (self.step - self.since) * state.agents
@@ -264,9 +273,7 @@ class Course:
         self.world = world = int(world)
         self.state.set_whole("world", world)
         if self.state.plan.faults:
-            before = [onset for onset in self.state.tables.due if onset.step < self.step]
-            coming = [o for o in onsets(self.scenario, self.seed, world) if o.step >= self.step]
-            self.state.expect((*before, *coming))
+            self._expect(self.state, onsets(self.scenario, self.seed, world), range(len(self.scenario.faults)))
         self.note("branch", world=world)
 
 

@@ -1,7 +1,9 @@
-"""Fault columns: what is written when a fault begins."""
+"""Fault columns: what is written when a fault begins, and when others come into force while it lasts."""
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from airflock.core.fault import Fault
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import fault_row
 from airflock.scenarios.onsets import Onset
@@ -20,10 +22,37 @@ def strike(state: "State", onset: Onset) -> None:
     if kind is None:
         return
     work, rows = state.arrays["work"], state.driver.ROWS
-    real, dt = work.dtype.type, state.dt
-    values: dict[str, Any] = {"onset": real(onset.step) * real(dt), "lasts": onset.lasts}
+    values: dict[str, Any] = {"onset": _began(state, onset), "lasts": onset.lasts}
     values |= dict(zip(kind.fields, onset.numbers, strict=True))
     values |= {name: work[rows[name[3:]], slot] for name in kind.onset if name[3:] in rows}
+    _write(state, kind, slot, values)
+
+
+def renew(state: "State", due: Sequence[Onset]) -> None:
+    """Go on with these faults: what has begun has their numbers and their end, and ends where it is none of them."""
+    slots = range(state.agents) if state.slots is None else state.slots.tolist()
+    agents = {lane: agent for agent, lane in enumerate(slots)}
+    work, rows = state.arrays["work"], state.driver.ROWS
+    for kind in state.plan.faults:
+        named = {(o.agent, float(_began(state, o))): o for o in due if o.kind == kind.name and not o.leaves}
+        onset, lasts = (rows.get(fault_row(kind.name, name)) for name in ("onset", "lasts"))
+        if onset is None or lasts is None:
+            continue
+        for lane in range(state.here):
+            if work[lasts, lane] > 0.0:
+                found = named.get((agents[lane], float(work[onset, lane])))
+                numbers = dict(zip(kind.fields, found.numbers, strict=True)) if found else {}
+                _write(state, kind, lane, {"lasts": found.lasts if found else 0.0, **numbers})
+
+
+def _began(state: "State", onset: Onset) -> Any:
+    """When a fault began, s, as its column tells it."""
+    real = state.arrays["work"].dtype.type
+    return real(onset.step) * real(state.dt)
+
+
+def _write(state: "State", kind: Fault, slot: int, values: Mapping[str, Any]) -> None:
+    work, rows = state.arrays["work"], state.driver.ROWS
     for name, value in values.items():
         row = rows.get(fault_row(kind.name, name))
         if row is not None:

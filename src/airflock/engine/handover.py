@@ -9,7 +9,7 @@ from airflock.engine.initial_rows import first_memories, rows_of_metrics
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan
-from airflock.engine.stages.flight import BEGUN
+from airflock.engine.stages.approach import BEGUN
 from airflock.engine.state import State
 
 

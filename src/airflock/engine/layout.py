@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airflock.engine.initial_rows import first_memories, memories, of_pairs
 from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.stages.approach import HELD
 from airflock.engine.stages.decide import NEAR
 from airflock.engine.totals import sums_of
 
@@ -59,7 +60,7 @@ def layout_of(
     columns = sum(map(len, plan.records.values()))
     gusts = (5 if plan.dryden else 3,)
     shaped: dict[str, tuple[tuple[int, ...], Any]] = {
-        "held": ((5,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": (gusts, real),
+        "held": ((HELD,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": (gusts, real),
         "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
         "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
         "past": ((ring, 2 * dims, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),

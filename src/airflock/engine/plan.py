@@ -254,6 +254,11 @@ class Plan(Facts):
         return self.edge is edges.wrap
 
     @property
+    def flows(self) -> bool:
+        """Whether agents come nearer by their velocities alone, all in the same step; not where faces throw back."""
+        return not self.sequential and (self.edge is None or self.periodic)
+
+    @property
     def integration(self) -> str:
         """Whether positions move by the velocity before ("old") or after ("new") the body has moved."""
         return dict(self.body_choices).get("integration", self.body.integration)

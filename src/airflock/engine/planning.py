@@ -11,7 +11,7 @@ from airflock.core.vocabulary import asks
 from airflock.engine.facts import Build, OwnLaw
 from airflock.engine.plan import Plan
 from airflock.errors import ScenarioError
-from airflock.rules.probe import probe, probe_fault, probe_radio, probe_sensor, probe_topology
+from airflock.rules.probe import probe, probe_body, probe_fault, probe_radio, probe_sensor, probe_topology
 from airflock.scenarios.cells import by_cells, has_room, measured_by_cells, takes_all_cores
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
@@ -102,6 +102,7 @@ def _probe_rules(scenario: Scenario) -> None:
         _probed(law.model, tuple(choices(law.parameters).items()))
     for kind in scenario.fault_kinds:
         probe_fault(kind)
+    probe_body(scenario.vehicle, _chosen(scenario.body))
     if scenario.errs:
         probe_sensor(scenario.sensor)
     probe_radio(scenario.transceiver)

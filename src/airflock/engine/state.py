@@ -18,7 +18,7 @@ from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.presence import leave
-from airflock.engine.stages.flight import BEGUN, ENDED, GAP
+from airflock.engine.stages.approach import BEGUN, ENDED, GAP
 from airflock.engine.stages.state import own_row
 from airflock.engine.tables import Tables, tables
 from airflock.engine.totals import combined, goals_reached

@@ -19,6 +19,7 @@ from airflock.onboard.card import Card, card_of, hash_of
 from airflock.recordings.flights import provenance, simulate
 from airflock.recordings.layout import dataset
 from airflock.recordings.scores import measure
+from airflock.scenarios.groups import names_of
 from airflock.scenarios.scenario import Scenario
 
 SITE = (47.5, 19.0, 120.0)  # somewhere; a fleet in software is nowhere
@@ -76,7 +77,9 @@ def recording(fleet: Fleet | realtime.Flown) -> xr.Dataset:
         "random_start": 0, "airflock_device": "fleet", "airflock_vehicle": fleet.card.autopilot.name,
         "airflock_card": fleet.card.hash, "airflock_notes": "\n".join(f"{t:.2f} {w} {n}" for t, w, n in fleet.log),
     }  # fmt: skip
-    recorded = dataset(frames, dims, fleet.card.period, attributes, "velocity")
+    recorded = dataset(
+        frames, dims, fleet.card.period, attributes, "velocity", names_of(scenario.groups, scenario.agents)
+    )
     known = rows[:, :, 9 : 9 + dims].transpose(0, 2, 1)[:, :, None, :]
     recorded["own_position"] = (recorded["position"].dims, known, {"units": "m", "meaning": "as the node knows it"})
     recorded["age"] = (("time", "receiver", "sender"), fleet.ages().astype(np.float32), {"units": "s"})

@@ -30,7 +30,8 @@ from airflock.topology import parameters as topologies
 from airflock.topology.registry import TOPOLOGIES
 from airflock.untrusted import from_outside, json_value, read_text
 from airflock.world import arena
-from airflock.world.place import Place, Shapes, polygon_fault
+from airflock.world.corners import polygon_fault
+from airflock.world.place import Place, Shapes
 
 VERSION = 2  # a card of version 1 does not name its rule of silence
 KEYS = (

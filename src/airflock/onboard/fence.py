@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from airflock.core.maths import FAR
 from airflock.world import polygon
-from airflock.world.place import counter_clockwise, inward, is_convex
+from airflock.world.corners import counter_clockwise, is_convex
+from airflock.world.place import inward
 
 Side = tuple[float, float, float, float]
 

@@ -20,6 +20,7 @@ from airflock.recordings.layout import dataset
 from airflock.recordings.perception import finish_keeping, sound
 from airflock.scenarios.events import Event
 from airflock.scenarios.files import loaded
+from airflock.scenarios.groups import names_of
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.own_code import law_hash
 from airflock.scenarios.scenario import Scenario
@@ -101,7 +102,14 @@ def simulate(
     assert flown.frames is not None
     times = np.arange(len(flown.frames)) * clock(scenario)["sample_every"] * scenario.flight.dt
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None), "airflock_device": device}
-    return dataset(flown.frames, scenario.dimensions, times, attributes, scenario.model.command)
+    return dataset(
+        flown.frames,
+        scenario.dimensions,
+        times,
+        attributes,
+        scenario.model.command,
+        names_of(scenario.groups, scenario.agents),
+    )
 
 
 def recording_of(flight: Flight) -> xr.Dataset:
@@ -140,7 +148,10 @@ def recording_of(flight: Flight) -> xr.Dataset:
         attributes["airflock_events"] = json.dumps({"events": [plain(event.plain()) for event in flight.events]})
     if flight.faults:
         attributes[FAULTS] = json.dumps({"faults": plain(flight.faults)})
-    return dataset(flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command)
+    return dataset(
+        flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command,
+        names_of(scenario.groups, scenario.agents),
+    )  # fmt: skip
 
 
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:

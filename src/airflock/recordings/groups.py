@@ -28,7 +28,8 @@ def group_scores(
     """Order parameters as a table: a row for all agents, one for each group, and one for each two groups.
 
     A group is measured as if the others were not there. What is between two groups, `BETWEEN`, stands in rows named
-    "one to other"; an instant counts where both have somebody there.
+    "one to other"; an instant counts where both have somebody there. Of a group that is never there all but `present`
+    is nan.
     Raises RecordingError where the recording's scenario has no groups.
     """
     scenario = scenario_of(recording, settings, trust=trust)
@@ -36,9 +37,12 @@ def group_scores(
     if not groups:
         raise RecordingError("recording: its scenario has no [[groups]]")
     rows: dict[str, dict[str, Any]] = {"all": measure(recording, settings, trust=trust)[0]}
-    for group in groups:
-        rows[group.name] = measure(recording.isel(individual=list(group.agents)), settings, trust=trust)[0]
     frames, _, present = frames_of(recording)
+    for group in groups:
+        members = list(group.agents)
+        rows[group.name] = {"present": 0.0}
+        if present[:, members].any():
+            rows[group.name] = measure(recording.isel(individual=members), settings, trust=trust)[0]
     dims, world = frames.shape[1] // 2, scenario.world
     box = images.sides(world, dims)
     for one, other in combinations(groups, 2):

@@ -5,6 +5,7 @@ convention of `movement`; velocity and command are Airflock's own additions. Loc
 """
 
 import os
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,11 +26,13 @@ def dataset(
     times: float | NDArray[Any],
     attributes: dict[str, Any],
     command: str,
+    groups: Sequence[str] = (),
 ) -> xr.Dataset:
     """Dataset from frames (time, component, agent): position, velocity and command components.
 
     times   : time of each frame, or the constant time between two, s
     command : what the model commands: velocity (m/s), acceleration (m/s²) or heading
+    groups  : name of each agent's group, "" in none, as the coordinate `group`; none where there are no groups
     """
     count, _, agents = frames.shape
     if isinstance(times, np.ndarray):
@@ -37,12 +40,14 @@ def dataset(
     else:
         period, times = times, np.arange(count) * times
     space = ["x", "y", "z"][:dimensions]
-    coordinates = {
+    coordinates: dict[str, Any] = {
         "time": ("time", times, {"units": "s"}),
         "space": space,
         "keypoint": ["centre"],
         "individual": [f"agent_{i}" for i in range(agents)],
     }
+    if groups:
+        coordinates["group"] = ("individual", np.array(groups, str))
     names = ("position", "velocity", "command")
     units = {**UNITS, "command": {"velocity": "m/s", "acceleration": "m/s^2"}.get(command, "1")}
     variables: dict[str, Any] = {

@@ -10,7 +10,7 @@ from typing import Any
 
 from airflock.aero import descent
 from airflock.aero import wing as wings
-from airflock.core.contract import Model
+from airflock.core.contract import Body, Model
 from airflock.core.fault import RULES, Fault
 from airflock.core.radio import RULES as RADIO_RULES
 from airflock.core.radio import Radio
@@ -85,6 +85,18 @@ def probe_sensor(sensor: Sensor) -> None:
     answer = _answer(rule, kind, given, sensor.name, *parts)
     if sensor.Memory is not None:
         _same_length(rule, answer[-1], sensor.Memory, sensor.name)
+
+
+@cache
+def probe_body(body: Body, chosen: tuple[tuple[str, str], ...]) -> None:
+    """The same for the rule of a body, with these choices of its parameters."""
+    given: dict[str, Any] = {name: 9.0 + 0.1 * k for k, name in enumerate(VOCABULARY["move"])}
+    given |= {"dt": 0.01, "b": body.Parameters(**dict(chosen)), "wing": wings.Parameters(segments="5")}
+    given["memory"] = body.Memory() if body.Memory is not None else None
+    parts = ("x", "y", "z", *["Memory(...)"] * (body.Memory is not None))
+    answer = _answer(body.move, "move", given, body.name, *parts)
+    if body.Memory is not None:
+        _same_length(body.move, answer[3], body.Memory, body.name)
 
 
 @cache

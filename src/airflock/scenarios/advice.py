@@ -14,7 +14,7 @@ SEES_WALLS = {"ray", "cast"}
 
 def advice(scenario: Scenario) -> list[str]:
     """What a person should know before flying a scenario."""
-    asked = (_speed_alone, _no_walls, _lengths, _all_met, _unsent, _about_an_edge)
+    asked = (_speed_alone, _no_walls, _lengths, _all_met, _unsent, _too_late, _about_an_edge)
     return [note for note in (ask(scenario) for ask in asked) if note]
 
 
@@ -86,6 +86,16 @@ def _unsent(scenario: Scenario) -> str:
         f"radio.kind = {scenario.transceiver.name!r}: agents send nothing, so these faults have no effect: "
         + ", ".join(kind.name for kind in told)
     )
+
+
+def _too_late(scenario: Scenario) -> str:
+    """Faults that begin when the flight is over."""
+    duration = scenario.flight.duration
+    late = [(number, entry.at) for number, entry in enumerate(scenario.faults) if (entry.at or 0.0) >= duration]
+    if not late:
+        return ""
+    named = ", ".join(f"faults[{number}].at = {at:g} s" for number, at in late[:3])
+    return f"{named}: the flight is over by then, after duration = {duration:g} s; nothing happens"
 
 
 def _all_met(scenario: Scenario) -> str:

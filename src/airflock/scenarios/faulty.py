@@ -100,17 +100,21 @@ def _entry(
     kinds: Mapping[str, Fault], trust: bool,
 ) -> tuple[Entry | None, list[str], list[str]]:  # fmt: skip
     kind, faults = _kind(where, table.get("kind"), folder, kinds, trust)
-    if kind is None:
-        return None, [], faults
     names = ("kind", "agents", "group")
     timing = {key: value for key, value in table.items() if key in KEYS and key not in names}
-    rest = {key: value for key, value in table.items() if key not in KEYS}
     when, notes, wrong = _record(where, timing, Timing)
     faults += wrong
-    numbers, told, wrong = _record(where, rest, kind.Parameters, KEYS)
-    notes, faults = notes + told, faults + wrong
+    numbers = None
+    if kind is not None:  # else nobody can judge its numbers
+        rest = {key: value for key, value in table.items() if key not in KEYS}
+        numbers, told, wrong = _record(where, rest, kind.Parameters, KEYS)
+        notes, faults = notes + told, faults + wrong
     who, wrong = _who(where, table, agents, groups)
     faults += wrong
+    if when is not None:
+        faults += _when_faults(where, when, agents if who is None else len(who))
+    if kind is None:
+        return None, notes, faults
     if sequential and PERCEPTION & set(kind.rules):
         faults.append(
             f"{where}.kind = {kind.name!r} disturbs what agents know of each other; update = 'sequential' is for agents"
@@ -118,7 +122,7 @@ def _entry(
         )
     if when is None or numbers is None or who is None:
         return None, notes, faults
-    faults += _when_faults(where, when, kind, numbers, len(who))
+    faults += _end_faults(where, when, kind, numbers)
     count = 1 if when.number is None and when.per_hour is not None else when.number
     entry = Entry(
         kind, numbers, who, None if count is None else int(count), when.at, when.per_hour or 0.0,
@@ -133,7 +137,7 @@ def _record(
     """A record made from keys of an entry, in SI units, or None; notes; what is wrong."""
     document, notes, faults = units.converted({where: table}, {where: record})
     made, wrong = schema.check(where, document[where], record, beside)
-    return made, notes, faults + wrong
+    return (None if faults else made), notes, faults + wrong
 
 
 def _kind(
@@ -168,8 +172,8 @@ def _who(
     return None, [f"{where}.group = {table['group']!r}: unknown group; {known}"]
 
 
-def _when_faults(where: str, when: Timing, kind: Fault, numbers: Any, may: int) -> list[str]:
-    """What is wrong with times and numbers that are sound alone."""
+def _when_faults(where: str, when: Timing, may: int) -> list[str]:
+    """What is wrong with times that are sound alone; may : how many agents may be hit."""
     faults = []
     if (when.at is None) == (when.per_hour is None):
         faults.append(f"{where}: give at, when it begins, or per_hour, how often it comes")
@@ -179,6 +183,12 @@ def _when_faults(where: str, when: Timing, kind: Fault, numbers: Any, may: int) 
         faults.append(f"{where}.until = {when.until:g} s is not after at = {when.at:g} s")
     if when.number is not None and (when.number != int(when.number) or when.number > may):
         faults.append(f"{where}.number = {when.number:g} is not a whole number up to {may}, the agents that it may hit")
+    return faults
+
+
+def _end_faults(where: str, when: Timing, kind: Fault, numbers: Any) -> list[str]:
+    """Why a fault cannot end."""
+    faults = []
     if kind.leaves is not None and (when.lasts is not None or (when.at is not None and when.until is not None)):
         given = {"f": kind.record(*(getattr(numbers, name) for name in kind.fields))}
         if kind.leaves(*(given[name] for name in asks(kind.leaves, "leaves", kind.name))) <= 0.0:

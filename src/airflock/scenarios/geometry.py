@@ -13,6 +13,7 @@ from airflock.world import arena, start
 from airflock.world.place import half_sizes
 
 MOST_JITTER = 5.8  # standard deviations; no normal number of `core.random` is larger
+ROUNDED = 2e-3  # m; by how much an obstacle at an edge may reach outside: corners of files are told to the millimetre
 JAMMED = 0.5  # covered share at which random sequential placement of discs comes to a halt (it jams at 0.547)
 
 
@@ -176,19 +177,20 @@ def faults(
         if fault:
             found.append(f"world.corners {fault}")
     if world.arena != "square" and world.walls == "nearest_per_axis":
-        found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'")
+        found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'; set world.walls = 'every_edge'")
     plan = None if found else ground_plan(world)
     region, height = (None, 1.0) if found else _region(world, begin)
     if not found:
         found += _edge_faults(world) if started else start_faults(world, begin, agents) + _edge_faults(world)
     solid: list[Polygon] = []
+    within = None if plan is None or not world.obstacles else plan.buffer(ROUNDED, join_style="mitre")
     for number, corners in enumerate(world.obstacles):
         fault = polygon_fault(corners)
         if fault:
             found.append(f"world.obstacles[{number}] {fault}")
             continue
         shape = Polygon(corners)
-        if plan is not None and not plan.covers(shape):
+        if within is not None and not within.covers(shape):
             found.append(f"world.obstacles[{number}] reaches outside the arena")
         solid.append(shape.buffer(begin.wall_clearance))
     if started:

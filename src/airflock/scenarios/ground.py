@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from airflock.errors import ScenarioError
+from airflock.scenarios import schema, units
+from airflock.scenarios.schema import value_of
 from airflock.scenes.outlines import ground_of
 from airflock.untrusted import is_file, own_path
+from airflock.world import arena
 
 FROM_FILE = ("world.file", "world.simplify")
 GIVEN = ("corners", "obstacles", "heights")  # what the file says, and the scenario cannot say as well
@@ -27,20 +30,23 @@ def with_ground(
     if not isinstance(table, Mapping):
         return dict(document), settings, (), ()
     world = {**table, **{key[6:]: value for key, value in settings.items() if key.startswith("world.")}}
-    name = world.get("file", "")
+    name = value_of(world.get("file", ""))
     if not isinstance(name, str) or not name:
         return dict(document), settings, (), ()
     faults = [f"world.{key}: is given, and world.file as well; take one of them out" for key in GIVEN if key in world]
+    shape = value_of(settings.get("world.arena", "polygon"))
+    if shape != "polygon":
+        faults.append(f"world.arena = {shape!r}: is given, and world.file as well; take one of them out")
     path = own_path(name) if is_file(name) or folder is None else folder / own_path(name)
     faults += [] if is_file(path) else [f"world.file = {name!r}: no such file"]
-    simplify = world.get("simplify", 0.0)
-    if isinstance(simplify, bool) or not isinstance(simplify, (int, float)) or not 0.0 <= simplify <= 1000.0:
-        faults.append(f"world.simplify = {simplify!r} lies outside [0, 1000] m")
+    simplify, more = _metres(world)
+    faults += more
     kept = {key: value for key, value in table.items() if key not in ("file", "simplify", "arena", "walls")}
     rest = {key: value for key, value in settings.items() if key not in FROM_FILE}
     if not faults:
         try:
-            found = ground_of(path, simplify=float(simplify), space=str(world.get("dimensions", "2")) == "3")
+            space = str(value_of(world.get("dimensions", "2"))) == "3"
+            found = ground_of(path, simplify=simplify, space=space)
         except ScenarioError as fault:
             faults += str(fault).splitlines()
         else:
@@ -48,6 +54,14 @@ def with_ground(
     kept = {key: value for key, value in kept.items() if key not in GIVEN} | INSTEAD
     rest = {key: value for key, value in rest.items() if key.removeprefix("world.") not in (*GIVEN, *INSTEAD, "walls")}
     return {**document, "world": kept}, rest, (), tuple(faults)
+
+
+def _metres(world: Mapping[str, Any]) -> tuple[float, list[str]]:
+    """How far outlines may move, m, and what is wrong with it."""
+    given = {"world": {key: value for key, value in world.items() if key == "simplify"}}
+    told, _, faults = units.converted(given, {"world": arena.Parameters})
+    made, more = schema.check("world", told["world"], arena.Parameters)
+    return (made.simplify if made is not None else 0.0), faults + more
 
 
 def file_faults(world: Any) -> list[str]:

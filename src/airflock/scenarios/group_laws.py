@@ -121,6 +121,7 @@ def misfits(
 ) -> list[str]:
     """What of a scenario its groups cannot fly with their own numbers or law, one line each."""
     faults: list[str] = []
+    of_all = {*checks.body_faults(vehicle, parts, found), *checks.sensor_faults(sensor, parts)}  # told already
     for number, group in enumerate(groups):
         law, base = group.law or (found, parts["parameters"])
         own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in "pbs"}
@@ -132,7 +133,7 @@ def misfits(
         more = checks.body_faults(vehicle, told, law) + (checks.sensor_faults(sensor, told) if own["s"] else [])
         if group.law is not None and parts["silence"] is not None and parts["flight"] is not None:
             more += checks.silence_faults(parts["silence"].rule, parts["flight"], law)
-        faults += [f"groups[{number}]: {fault}" for fault in more]
+        faults += [f"groups[{number}]: {fault}" for fault in more if fault not in of_all]
     return faults
 
 

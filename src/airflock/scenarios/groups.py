@@ -56,6 +56,12 @@ def members(where: str, given: Any, agents: int) -> tuple[tuple[int, ...] | None
     return tuple(sorted(set(given))), []
 
 
+def names_of(groups: Sequence[Group], agents: int) -> tuple[str, ...]:
+    """Name of the group of each agent, "" in none; nothing where there are no groups."""
+    named = {agent: group.name for group in groups for agent in group.agents}
+    return tuple(named.get(agent, "") for agent in range(agents)) if named else ()
+
+
 def counted(given: Any, agents: int) -> Any:
     """A number of agents out of a share of the flock such as "20 %", at least one; anything else as it is."""
     share = SHARE.fullmatch(given) if isinstance(given, str) else None
@@ -163,12 +169,21 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
         else:
             values[key] = value
     apart = f"{where}.spread"
-    converted, notes, wrong = units.converted({where: values, apart: spreads}, {where: record, apart: record})
+    converted, told, unfit = units.converted({where: values, apart: spreads}, {where: record, apart: record})
+    notes, wrong = ([_as_written(line, where, apart) for line in lines] for lines in (told, unfit))
     made, more = schema.check(where, converted[where], record)
     faults += wrong + more
     off, more = _spreads(where, converted[apart], known)
     numbers = {key: float(getattr(made, key)) for key in converted[where]} if made is not None and not more else {}
     return numbers, off, notes, faults + more
+
+
+def _as_written(line: str, where: str, apart: str) -> str:
+    """A line about a spread under the key that a file has for it."""
+    if not line.startswith(f"{apart}."):
+        return line
+    key, _, rest = line.removeprefix(f"{apart}.").partition(" ")
+    return f"{where}.{key}.spread {rest}"
 
 
 def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:

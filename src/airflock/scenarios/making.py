@@ -8,6 +8,7 @@ from typing import Any
 from airflock.errors import ParameterError, ScenarioError
 from airflock.scenarios import (
     checks,
+    fault_keys,
     faulty,
     formats,
     geometry,
@@ -53,6 +54,8 @@ def make(
     """
     settings = keyed(settings, where)
     document, settings, faults = group_keys.with_groups(formats.current(document, where), settings)
+    document, settings, wrong = fault_keys.with_faults(document, settings)
+    faults += wrong
     short = {key: value for key, value in settings.items() if "." not in key and key not in TOP}
     document, left_out = with_kinds(document, settings)
     whole, unknown = merged(document, {key: value for key, value in settings.items() if key not in short})

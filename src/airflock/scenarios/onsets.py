@@ -1,7 +1,7 @@
 """Onsets: when faults begin and whom they hit, drawn beforehand; and the columns that are written when they do."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from airflock.core import random
@@ -25,6 +25,7 @@ class Onset(NamedTuple):
     lasts : s; ENDLESS without an end
     numbers : of the kind, by name
     leaves  : the agent is absent from now on, by a fault that has begun earlier
+    entry   : number of the entry of [[faults]] that says so; begin : step before which that fault begins
     """
 
     step: int
@@ -33,6 +34,8 @@ class Onset(NamedTuple):
     lasts: float
     numbers: tuple[float, ...]
     leaves: bool = False
+    entry: int = 0
+    begin: int = 0
 
 
 def onsets(scenario: Scenario, seed: int, world: int = 0) -> tuple[Onset, ...]:
@@ -41,6 +44,28 @@ def onsets(scenario: Scenario, seed: int, world: int = 0) -> tuple[Onset, ...]:
     for number, entry in enumerate(scenario.faults):
         found += _of_entry(scenario, entry, number, seed, world)
     return tuple(sorted(found, key=lambda onset: onset.step))
+
+
+def going_on(
+    before: Sequence[Onset], after: Sequence[Onset], now: int, lasting: Collection[int]
+) -> tuple[Onset, ...]:  # fmt: skip
+    """Faults of a flight for which others come into force before step `now`, in the order of their steps.
+
+    What has begun goes on where its fault is named by these as well, with their numbers, or by an entry that stays;
+    what would have begun earlier by these does not begin.
+
+    lasting : numbers of the entries before that stay as they are
+    """
+    named = {_which(onset): onset for onset in after}
+    begun = [named.get(_which(o), o) for o in before if o.begin < now and (_which(o) in named or o.entry in lasting)]
+    kept = {_which(onset)[:3] for onset in begun}
+    gone = [o for o in after if o.begin < now <= o.step and _which(o)[:3] in kept and o not in begun]
+    return tuple(sorted([*begun, *gone, *(o for o in after if o.begin >= now)], key=lambda onset: onset.step))
+
+
+def _which(onset: Onset) -> tuple[str, int, int, bool]:
+    """What makes a fault of an agent this one, whatever its numbers: when it began, of whom, and whether one leaves."""
+    return onset.kind, onset.agent, onset.begin, onset.leaves
 
 
 def _of_entry(scenario: Scenario, entry: Entry, number: int, seed: int, world: int) -> Iterator[Onset]:
@@ -54,9 +79,9 @@ def _of_entry(scenario: Scenario, entry: Entry, number: int, seed: int, world: i
         step = round(at / dt)
         gone = _leaves(kind, entry)
         for agent in _hit(entry, number, occurrence, seed, world):
-            yield Onset(step, kind.name, agent, lasts, numbers)
+            yield Onset(step, kind.name, agent, lasts, numbers, entry=number, begin=step)
             if gone < lasts:
-                yield Onset(step + round(gone / dt), kind.name, agent, lasts, numbers, leaves=True)
+                yield Onset(step + round(gone / dt), kind.name, agent, lasts, numbers, True, number, step)
 
 
 def _times(scenario: Scenario, entry: Entry, number: int, seed: int, world: int) -> Iterator[float]:

@@ -5,33 +5,27 @@ A file is untrusted: it is read through `untrusted`, and everything that is wron
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shapely.geometry import Polygon
+from shapely.geometry import LineString, Point, Polygon
 from shapely.validation import explain_validity
 
 from airflock.errors import ScenarioError, bounded
 from airflock.mavlink.coordinates import Site
-from airflock.untrusted import Element, FormatError, from_outside, json_object, read_text, xml
+from airflock.scenes import geojson, kml
+from airflock.scenes.rings import Outline, Ring
+from airflock.untrusted import from_outside, read_text
 
-MOST_CORNERS = 100_000  # of all polygons of a file
 MOST_KEPT = 500  # of one polygon that is flown in: each decision looks along lines of sight past all of them
 ENDLESS = 1e5  # m; heights of an obstacle that has none, where others have
 LARGE = 5000.0  # m; beyond, a degree is not the same everywhere
-Ring = list[tuple[float, float]]
+SAME = 1e-3  # m; corners that lie no farther apart are one
+STRAIGHT = 0.01  # m; a corner that moves an outline by less is none, as on a straight side with points on it
+MANY = 12  # corners, from which on it is told how many fewer would do
+COARSE = 1.0  # m; of what is told then
 Solid = tuple[str, Polygon, Mapping[str, float]]  # name, plan in m, and heights (m) of what must not be entered
-
-
-@dataclass(frozen=True)
-class Outline:
-    """One polygon of a file: its name, its rings in degrees (longitude, latitude), and heights (m) that it tells."""
-
-    name: str
-    shell: Ring
-    holes: list[Ring] = field(default_factory=list)
-    heights: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -53,112 +47,28 @@ def ground_of(path: Path, *, simplify: float = 0.0, space: bool = False) -> Grou
     """
     where = f"world.file = {bounded(str(path), 120)}"
     kinds: dict[str, Callable[[str], list[Outline]]] = {
-        ".geojson": geojson, ".json": geojson, ".kml": kml,
+        ".geojson": geojson.outlines_of, ".json": geojson.outlines_of, ".kml": kml.outlines_of,
     }  # fmt: skip
     if path.suffix.lower() not in kinds:
         hint = "; unzip it first" if path.suffix.lower() == ".kmz" else ""
         raise ScenarioError([f"{where}: the name ends in none of {', '.join(kinds)}{hint}"])
     with from_outside(where):
-        outlines = kinds[path.suffix.lower()](read_text(path))
+        found = kinds[path.suffix.lower()](read_text(path))
+    outlines, others = [one for one in found if not one.shape], [one for one in found if one.shape]
     if not outlines:
         raise ScenarioError([f"{where}: holds no polygon"])
     faults = [f"{where}: {fault}" for fault in dict.fromkeys(fault for one in outlines for fault in _degrees(one))]
     if faults:
         raise ScenarioError(faults)
-    return _ground(outlines, where, simplify, space)
+    return _ground(outlines, where, simplify, space, _left_out(others))
 
 
-def geojson(text: str) -> list[Outline]:
-    """Polygons of a GeoJSON text (RFC 7946), in its order."""
-    document = json_object(text)
-    crs = str(document.get("crs", "")).upper()
-    if crs and "CRS84" not in crs and "4326" not in crs:
-        raise FormatError("is in other coordinates than longitude and latitude (key crs); export it as WGS 84")
-    found = list(_features(document, ""))
-    if sum(len(ring) for one in found for ring in (one.shell, *one.holes)) > MOST_CORNERS:
-        raise FormatError(f"has more than {MOST_CORNERS} corners")
-    return found
-
-
-def _features(value: Any, name: str, properties: Mapping[str, Any] | None = None) -> Iterator[Outline]:
-    """Polygons of a GeoJSON object and of all that it holds."""
-    if not isinstance(value, Mapping):
-        return
-    kind = value.get("type")
-    if kind == "FeatureCollection":
-        for number, one in enumerate(_list(value.get("features"), "features")):
-            yield from _features(one, f"feature {number + 1}")
-    elif kind == "Feature":
-        given = value.get("properties")
-        given = given if isinstance(given, Mapping) else {}
-        yield from _features(value.get("geometry"), bounded(str(given.get("name") or name), 60), given)
-    elif kind == "GeometryCollection":
-        for one in _list(value.get("geometries"), "geometries"):
-            yield from _features(one, name, properties)
-    elif kind in ("Polygon", "MultiPolygon"):
-        polygons = _list(value.get("coordinates"), "coordinates")
-        for rings in [polygons] if kind == "Polygon" else polygons:
-            shell, *holes = [_ring(ring) for ring in _list(rings, "coordinates")] or [[]]
-            yield Outline(name or "polygon", shell, holes, _heights(properties or {}))
-
-
-def _heights(properties: Mapping[str, Any]) -> dict[str, float]:
-    """The properties floor and ceiling, m."""
-    found = {key: properties[key] for key in ("floor", "ceiling") if properties.get(key) is not None}
-    for key, value in found.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise FormatError(f"the property {key} = {bounded(repr(value), 40)} is not a height in m")
-    return {key: float(value) for key, value in found.items()}
-
-
-def _list(value: Any, key: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise FormatError(f"{key} is not a list")
-    return value
-
-
-def _ring(points: Any) -> Ring:
-    found = []
-    for point in _list(points, "a ring of coordinates"):
-        numbers = point if isinstance(point, list) else []
-        if len(numbers) < 2 or any(isinstance(n, bool) or not isinstance(n, (int, float)) for n in numbers[:2]):
-            raise FormatError(f"{bounded(repr(point), 40)} is not a point [longitude, latitude]")
-        found.append((float(numbers[0]), float(numbers[1])))
-    return _open(found)
-
-
-def kml(text: str) -> list[Outline]:
-    """Polygons of a KML text, in its order; heights are not read from it."""
-    return list(_placed(xml(text), ""))
-
-
-def _placed(element: Element, name: str) -> Iterator[Outline]:
-    """Polygons within an element, with the name of the nearest thing around them that has one."""
-    name = next((bounded(one.text, 60) for one in element.children if one.tag == "name" and one.text), name)
-    if element.tag == "Polygon":
-        shells = [_coordinates(one) for one in element.children if one.tag == "outerBoundaryIs"]
-        holes = [_coordinates(one) for one in element.children if one.tag == "innerBoundaryIs"]
-        yield Outline(name or "polygon", shells[0] if shells else [], holes)
-    for one in element.children:
-        yield from _placed(one, name)
-
-
-def _coordinates(boundary: Element) -> Ring:
-    texts = [two.text for one in boundary.children if one.tag == "LinearRing" for two in one.children
-             if two.tag == "coordinates"]  # fmt: skip
-    found = []
-    for point in (texts[0] if texts else "").split():
-        try:
-            longitude, latitude, *_ = (float(number) for number in point.split(","))
-        except ValueError:
-            raise FormatError(f"{bounded(repr(point), 40)} is not a point longitude,latitude") from None
-        found.append((longitude, latitude))
-    return _open(found)
-
-
-def _open(ring: Ring) -> Ring:
-    """A ring without its last point, where that is the first again, and without points that are given twice."""
-    return [point for point, after in zip(ring, [*ring[1:], ring[0]], strict=True) if point != after] if ring else []
+def _left_out(others: Sequence[Outline]) -> str:
+    """What a note says of shapes without an area, such as a tree that is a point."""
+    if not others:
+        return ""
+    several = f" and {len(others) - 1} more, no polygons, are" if len(others) > 1 else ", no polygon, is"
+    return f"; {others[0].name} ({others[0].shape}){several} left out"
 
 
 def _degrees(one: Outline) -> Iterator[str]:
@@ -172,20 +82,39 @@ def _degrees(one: Outline) -> Iterator[str]:
                 break
 
 
-def _ground(outlines: list[Outline], where: str, simplify: float, space: bool) -> Ground:
+def _flat(ring: Ring, site: Site, simplify: float) -> Polygon:
+    """A ring in metres about a site, without corners that are given twice or lie on a straight side."""
+    points = [site.local(latitude, longitude, 0.0)[:2] for longitude, latitude in ring]
+    apart = [point for point, after in zip(points, [*points[1:], points[0]], strict=True)
+             if math.dist(point, after) > SAME]  # fmt: skip
+    shape = Polygon(apart if len(apart) > 2 else points)
+    return _fewer(shape, max(simplify, STRAIGHT)) if shape.is_valid else shape
+
+
+def _fewer(shape: Polygon, most: float) -> Polygon:
+    """A polygon with fewer corners, none of which moves by more than `most`, m: also not the first one."""
+    few = shape.simplify(most)
+    ring = list(few.exterior.coords)[:-1]
+    if len(ring) > 3 and LineString([ring[-1], ring[1]]).distance(Point(ring[0])) <= STRAIGHT:
+        few = Polygon(ring[1:])
+    return few
+
+
+def _ground(outlines: list[Outline], where: str, simplify: float, space: bool, left_out: str) -> Ground:
     """The largest polygon as an arena, holes and other polygons as obstacles."""
     west, south, east, north = Polygon(max(outlines, key=lambda one: Polygon(one.shell).area).shell).bounds
     origin = round(0.5 * (south + north), 7), round(0.5 * (west + east), 7)
     site = Site(*origin, 0.0)
 
     def local(ring: Ring) -> Polygon:
-        metres = Polygon([site.local(latitude, longitude, 0.0)[:2] for longitude, latitude in ring])
-        return metres.simplify(simplify) if simplify > 0.0 and metres.is_valid else metres
+        return _flat(ring, site, simplify)
 
     shapes = [(one, local(one.shell), [local(hole) for hole in one.holes]) for one in outlines]
     arena, plan, holes = max(shapes, key=lambda shape: shape[1].area)
+    holes = [_cut(hole, plan, max(simplify, STRAIGHT)) for hole in holes]
     solid: list[Solid] = [(arena.name, hole, {}) for hole in holes]
-    solid += [(one.name, shape, one.heights) for one, shape, _ in shapes if one is not arena]
+    solid += [(one.name, _cut(shape, plan, max(simplify, STRAIGHT)), one.heights)
+              for one, shape, _ in shapes if one is not arena]  # fmt: skip
     faults = [f"{where}: {fault}" for fault in _faults(arena.name, plan, holes, solid)]
     if faults:
         raise ScenarioError(faults)
@@ -202,9 +131,29 @@ def _ground(outlines: list[Outline], where: str, simplify: float, space: bool) -
     far = f"; {across / 1000.0:.3g} km are much for a flat map" if across > LARGE else ""
     note = (
         f"{where}: {arena.name}, {len(keys['corners'])} corners and {plan.area:.4g} m², {len(solid)} obstacles; its "
-        f"origin is at latitude {origin[0]:.7f}, longitude {origin[1]:.7f}{dropped}{far}"
+        f"origin is at latitude {origin[0]:.7f}, longitude {origin[1]:.7f}{_many(plan)}{dropped}{far}{left_out}"
     )
     return Ground(keys, origin, note)
+
+
+def _cut(shape: Polygon, plan: Polygon, most: float) -> Polygon:
+    """What must not be entered, cut off where it reaches outside of a field by no more than `most`, m.
+
+    A wood that ends where the field does is outside by the rounding of its coordinates, or by what corners moved.
+    """
+    if not (shape.is_valid and plan.is_valid) or plan.covers(shape) or not plan.buffer(2.0 * most).covers(shape):
+        return shape
+    inside = shape.intersection(plan)
+    parts = [part for part in getattr(inside, "geoms", [inside]) if isinstance(part, Polygon)]
+    return max(parts, key=lambda part: part.area, default=shape)
+
+
+def _many(plan: Polygon) -> str:
+    """What a note says of an outline of many short sides, each of which laws feel for itself."""
+    count, fewer = (len(shape.exterior.coords) - 1 for shape in (plan, plan.simplify(COARSE)))
+    if count < MANY or 2 * fewer > count:
+        return ""
+    return f"; agents feel each of its sides for itself: world.simplify = {COARSE:g} leaves {fewer} of them"
 
 
 def _faults(name: str, plan: Polygon, holes: Sequence[Polygon], solid: Sequence[Solid]) -> list[str]:
@@ -213,7 +162,7 @@ def _faults(name: str, plan: Polygon, holes: Sequence[Polygon], solid: Sequence[
     for own, shape, _ in solid:
         of = "a hole of " if any(shape is hole for hole in holes) else ""
         found = list(_shape_faults(shape))
-        if not found and not faults and not plan.covers(shape):
+        if not found and not faults and not plan.buffer(SAME).covers(shape):
             found = [f"lies outside {name}" if plan.disjoint(shape) else f"reaches outside {name}"]
         faults += [f"{of}{own} {fault}" for fault in found]
     return faults

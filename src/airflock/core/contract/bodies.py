@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.contract.namespaces import names_of
+from airflock.core.parameters import Parameters
 from airflock.core.vocabulary import COMMANDS, asks
 from airflock.errors import RuleError
 
@@ -61,9 +62,9 @@ def body(namespace: Any, name: str = "") -> Body:
     Parameters
     ----------
     namespace : module, class or mapping
-        Holds Parameters, ACCEPTS (the command that it takes: velocity, acceleration or heading), INTEGRATION (whether
-        positions move with the "old" or the "new" velocity) and the rule move; if it likes, Memory (a NamedTuple whose
-        fields have the values of the start), which move asks for as `memory` and returns as x, y, z, Memory(...).
+        Holds ACCEPTS (the command that it takes: velocity, acceleration or heading), INTEGRATION (whether positions
+        move with the "old" or the "new" velocity) and the rule move; if it likes, Parameters, and Memory (a NamedTuple
+        whose fields have the values of the start), which move asks for as `memory` and returns as x, y, z, Memory(...).
     name : str, optional
         How the body is called; by default the namespace's.
 
@@ -82,15 +83,13 @@ def body(namespace: Any, name: str = "") -> Body:
     >>> import airflock
     >>> class Obedient:
     ...     ACCEPTS, INTEGRATION = "velocity", "new"
-    ...     class Parameters(airflock.Parameters):
-    ...         pass
     ...     def move(cx, cy, cz):
     ...         return cx, cy, cz
     >>> airflock.body(Obedient).accepts
     'velocity'
     """
     found, name = names_of(namespace, name)
-    for needed in ("Parameters", "ACCEPTS", "INTEGRATION", "move"):
+    for needed in ("ACCEPTS", "INTEGRATION", "move"):
         if needed not in found:
             raise RuleError(f"body {name} lacks {needed}")
     asks(found["move"], "move", name)
@@ -105,6 +104,6 @@ def body(namespace: Any, name: str = "") -> Body:
         if found.get(optional) is not None:
             asks(found[optional], optional, name)
     return Body(
-        name, found["Parameters"], found["ACCEPTS"], found["INTEGRATION"], found["move"],
+        name, found.get("Parameters", Parameters), found["ACCEPTS"], found["INTEGRATION"], found["move"],
         dict(found.get("VIOLATES", {})), memory, found.get("limits"), found.get("endures"),
     )  # fmt: skip

@@ -56,6 +56,8 @@ class CudaBuilder(Builder):
     apart = False
     ranges = False
     by_pairs = True
+    drifts = False
+    trails = False
 
     def __init__(self, plan: Plan, shape: Shape):
         super().__init__(plan.built(grid=False))

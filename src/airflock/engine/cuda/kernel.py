@@ -8,10 +8,10 @@ from airflock.engine.cuda.state import memory
 from airflock.engine.initial_rows import defaults
 from airflock.engine.passes.build import branch, columns, loop
 from airflock.engine.passes.driver import make
-from airflock.engine.passes.measure import measured
 from airflock.engine.plan import Plan
 from airflock.engine.schedule import ORDER, in_turn, order
-from airflock.engine.stages.flight import SLACK
+from airflock.engine.stages.approach import SLACK
+from airflock.engine.stages.measure import measured
 from airflock.engine.stages.words import START, ZERO
 
 ARGUMENTS = (

@@ -12,7 +12,7 @@ from airflock.engine import vectors
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
 from airflock.engine.specialise.values import Function
-from airflock.engine.stages.state import SCENE
+from airflock.engine.stages.state import FAULT, SCENE
 from airflock.rules.generate import Source, law_mark
 
 JIT = "@njit(**JIT)"
@@ -27,6 +27,8 @@ class Builder:
     ranges   : whether a loop over some of the lanes is one from the first of them to the last
     by_pairs : whether each pair of agents draws its random words by itself, not four receivers at once
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
+    drifts   : whether agents may be watched by how fast they are beside the drift of the flock
+    trails   : whether rows of faults come last in the work table
     drops    : whether the compiler drops a sum over agents that nobody reads
     """
 
@@ -37,11 +39,14 @@ class Builder:
     apart = True
     ranges = True
     by_pairs = False
+    drifts = True
+    trails = True
 
     def __init__(self, plan: Plan):
         self.plan = plan
         self.source = Source(JIT, plan.constants, plan.vectors)
-        self.rows: dict[str, int] = {}
+        self.first: dict[str, int] = {}
+        self.last: dict[str, int] = {}
         self.functions: list[str] = []
         self.stages: dict[str, Any] = {}  # functions of the driver by name, as other stages call them
         self.turns: dict[str, tuple[list[str], Function]] = {}  # in a sequential step: what it reads, its call
@@ -51,13 +56,26 @@ class Builder:
         return [f"{name} = work[{self.row(name)}]" for name in names]
 
     def row(self, name: str) -> int:
-        """Index of a row of the work table; unperturbed perception shares the rows of the truth."""
+        """Index of a row of the work table, from its end where it is negative.
+
+        Unperturbed perception shares the rows of the truth. Rows of faults and of who lies where come last, so that
+        the others lie to each other as they do in a flight without: loops take a fortieth longer where rows that are
+        written lie a page from rows that are read.
+        """
         plan = self.plan
         if not plan.believes and name in {f"m{a}" for a in "xyz"} | {f"mv{a}" for a in "xyz"}:
             name = name[1:]
         if not plan.told and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
             name = name[1:]
-        return self.rows.setdefault(name, len(self.rows))
+        if self.trails and (name.startswith(FAULT) or (name == "order" and not plan.grid)):
+            return self.last.setdefault(name, -1 - len(self.last))
+        return self.first.setdefault(name, len(self.first))
+
+    @property
+    def rows(self) -> dict[str, int]:
+        """Index of each row of the work table by its name."""
+        count = len(self.first) + len(self.last)
+        return self.first | {name: count + place for name, place in self.last.items()}
 
     @property
     def laws(self) -> list["Builder"]:

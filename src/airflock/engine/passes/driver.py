@@ -4,9 +4,8 @@ from collections.abc import Callable
 from functools import partial
 
 from airflock.engine import vectors
-from airflock.engine.passes import decide, flock, measure, move, perceive, slots
+from airflock.engine.passes import approach, decide, flock, measure, move, perceive, slots
 from airflock.engine.passes.build import Builder, columns
-from airflock.engine.passes.measure import measured
 from airflock.engine.passes.plain import plain
 from airflock.engine.plan import Plan
 from airflock.engine.primitives import DECLARED, primitives
@@ -72,7 +71,8 @@ def flight(plan: Plan) -> str:
     half : 1: step `first` has been sensed and decided already; 2: sense and decide at step `first`, and go no further
     held : how far agents may have come since pairs were last looked at (m), how far they may come (m), whether the rest
            of the collisions' memory is at its start, whether the flight has ended at a collision, whether agents have
-           their places (each 1 or 0)
+           their places (each 1 or 0); the drift of the flock then (m/s, three numbers) and its speed (m/s), and how
+           far from the origin agents may be (m)
     """
     return _text(stages(plan), plan.model.name)
 
@@ -87,11 +87,11 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     move.begin(build)
     if plan.sequential:
         _turns(build)
-    collision = measured(plan, "collision")
+    approach.nearest(build)
     names = [name for name, _, _ in columns(plan.metrics)]
     made = specialise(
         build, flight_.advance, stages=build.stages, order=events, sampled=_sampled(plan), slots=build.slots,
-        watched=collision if all(one.metric.within is not None for one in collision) else (),
+        watched=approach.watched(plan), drifts=approach.drifts(build), foretold=approach.foretold(build),
         collided=names.index("n_coll") if plan.stop else 0,
     )  # fmt: skip
     arguments = "row, whole, faces, edges, spans, scene, start, work, words, past, store, gust, mem, memory, labels"

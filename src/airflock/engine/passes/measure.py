@@ -7,15 +7,14 @@ from airflock.core.vocabulary import Mean
 from airflock.engine.passes import flock, grid
 from airflock.engine.passes.build import Builder, in_place
 from airflock.engine.passes.move import excursion
-from airflock.engine.plan import Plan
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import Call
 from airflock.engine.stages import measure as measuring
 from airflock.engine.stages.clusters import clusters_of
 from airflock.engine.stages.links import clusters_by_cells
-from airflock.engine.stages.measure import Measured
+from airflock.engine.stages.measure import Measured, measured
 from airflock.engine.stages.near import SURE, pairs_by_cells
-from airflock.engine.stages.words import fields, wants
+from airflock.engine.stages.words import wants
 from airflock.rules.reading import fields_read
 
 CLOCKS = ("sample", "collision")
@@ -96,15 +95,3 @@ def clusters(build: Builder, metric: Metric, parts: dict[str, list[str]]) -> Any
         parts[name] = build.clusters(metric)
         return Call(f"{name}()")
     return clusters_of
-
-
-def measured(plan: Plan, clock: str) -> tuple[Measured, ...]:
-    """Metrics of a clock, and where their numbers lie."""
-    found, value, row, total = [], 0, 0, 0
-    for metric in plan.metrics:
-        if metric.clock == clock:
-            found.append(Measured(metric, value, row, total))
-            total += len(fields(metric.Pair))
-        value += len(fields(metric.Sample))
-        row += len(fields(metric.Memory))
-    return tuple(found)

@@ -2,7 +2,9 @@
 
 import ast
 
+from airflock.engine.passes.approach import drifts, watched
 from airflock.engine.passes.build import Builder, in_place
+from airflock.engine.passes.noise import draw
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import Call, argument
 from airflock.engine.stages import faults, start
@@ -43,10 +45,13 @@ def move(build: Builder) -> None:
     if struck:
         found = specialise(build, faults.struck)
         build.function("struck(time, m, row, work)", found.lines, f"return {found.answer}")
-    made = specialise(build, motion.move, noise=Call(f"noise({NOISE})"), gusts=Call(f"gusts({GUSTS})"))
+    made = specialise(
+        build, motion.move, noise=Call(f"noise({NOISE})"), gusts=Call(f"gusts({GUSTS})"),
+        watched=bool(watched(plan)) or not build.drifts, drifts=drifts(build),
+    )  # fmt: skip
     parts: dict[str, tuple[str, list[str]]] = {}
     if build.wants(plan.body.move, "move", "gx", "gy", "gz"):
-        parts["noise"] = NOISE, [*specialise(build, outer.noise).lines, "return 0"]
+        parts["noise"] = NOISE, [*specialise(build, outer.noise, drawn=draw(build)).lines, "return 0"]
     if plan.windy:
         blown = specialise(build, air.gusts)
         parts["gusts"] = GUSTS, [*blown.lines, f"return {blown.answer}"]
@@ -58,4 +63,6 @@ def move(build: Builder) -> None:
             once = in_place(once, name, lines)
     lanes = ", hurt_first, hurt_end" * struck
     many = bool(plan.suffers("motion")) and not plan.body.Memory
-    build.stage("move", f"step, n, m, row, whole, work, words, gust{lanes}", once, made.body, made.answer, apart=many)
+    held = "held, " * drifts(build)
+    head = f"step, n, m, {held}row, whole, work, words, gust{lanes}"
+    build.stage("move", head, once, made.body, made.answer, apart=many)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from airflock.engine.passes.build import Builder
+from airflock.engine.passes.noise import draw
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import argument
 from airflock.engine.stages import faults, perceive, scene, silence, surfaces
@@ -13,6 +14,7 @@ class Plain(NamedTuple):
     """A stage, and what its function in a driver is called with.
 
     decision : the argument that is the number of the decision
+    draws    : it draws random numbers
     own      : it goes through agents, so that in a sequential update it is of the agent in turn
     """
 
@@ -20,10 +22,11 @@ class Plain(NamedTuple):
     arguments: str
     decision: str = "k_"
     own: bool = False
+    draws: bool = False
 
 
 PLAIN = {
-    "perceive": Plain(perceive.perceive, "k, slot, m, row, whole, work, ring, words", "k"),
+    "perceive": Plain(perceive.perceive, "k, slot, m, row, whole, work, ring, words", "k", draws=True),
     "tune": Plain(faults.tune, "k_, m, row, work"),
     "boundaries": Plain(surfaces.boundaries, "n, row, whole, work, faces, edges, spans, scene", own=True),
     "stop": Plain(silence.stop, "n, time, row, work, store", own=True),
@@ -37,7 +40,8 @@ PLAIN = {
 def plain(build: Builder, name: str) -> None:
     """The function of one of these stages; of a stage that asks a law, that for the law of the builder."""
     one = PLAIN[name]
-    made = specialise(build, one.stage, decision=argument(one.decision))
+    known = {"drawn": draw(build) if build.plan.noisy else None} if one.draws else {}
+    made = specialise(build, one.stage, decision=argument(one.decision), **known)
     if one.own:
         build.stage(f"{name}{build.mark}", one.arguments, made.once, made.body, made.answer)
     else:

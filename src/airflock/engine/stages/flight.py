@@ -6,6 +6,7 @@ from typing import Any
 
 from airflock.core.contract import Metric
 from airflock.engine.plan import Plan
+from airflock.engine.stages.approach import BEGUN, CALM, ENDED, GAP, SLACK, TRAVELLED, approached, set_out
 from airflock.engine.stages.measure import Measured
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import HALF, ONE, ZERO, ask, most, real
@@ -14,8 +15,6 @@ Stages = Mapping[str, Callable[..., Any]]  # by name: each takes what it asks fo
 Order = Mapping[str, tuple[str, ...]]  # stages of each event that a plan has (`engine.schedule`)
 Sampled = Iterable[tuple[int, str]]  # places among all values, and how they add up over time
 EVERY = 64  # decisions from one rearrangement to the next; a boid crosses about a cell meanwhile
-TRAVELLED, GAP, CALM, ENDED, BEGUN = range(5)  # places in `held` (`passes.driver.flight` says what each is)
-SLACK = 0.01  # m, covers the rounding of positions in single precision
 
 
 def add_up(sums: Any, values: Any, sampled: Sampled, count: int) -> None:
@@ -109,7 +108,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
     first: int, last: int, half: int, held: Any, flock: Flock, numbers: Any, whole: Any, n: int, m: int, past: Any,
     memory: Any, values: Any, sums: Any, frames: Any,
     *, plan: Plan, stages: Stages, order: Order, sampled: Mapping[str, tuple[Sampled, int]],
-    watched: tuple[Measured, ...], collided: int, slots: bool,
+    watched: tuple[Measured, ...], drifts: bool, foretold: bool, collided: int, slots: bool,
 ) -> int:  # fmt: skip
     """Fly the steps first to last - 1; returns the next one, or minus the first agent (from 1) that found no room.
 
@@ -117,6 +116,8 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
     past       : states that are not heard yet, by slot, component and agent
     sampled    : by stage: values that it samples, and which of the sums counts its instants
     watched    : metrics that look for collisions, if all of them promise a distance beyond which there are none
+    drifts     : whether it counts how fast agents are beside the drift of the flock, or how fast they are
+    foretold   : whether the least distance of a pair is looked for alone, as long as there is nothing to measure
     collided   : place of the value that ends a flight, where a scenario says so
     slots      : whether agents lie in slots
     """
@@ -142,6 +143,10 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
             break
         for name in order["watch"]:
             if step % whole.collide_every == 0:
+                if foretold and calm and travelled >= gap:
+                    gap = ask(stages["nearest"]) - width(tuple(one.metric for one in watched), numbers.q) - SLACK
+                    travelled = ZERO
+                    set_out(held, flock, n, plan=plan)
                 if watched and travelled < gap:  # nobody can have come near enough since pairs were last looked at
                     sums[sampled[name][1]] += 1
                     if not calm:
@@ -153,6 +158,8 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
                     gap = near - width(tuple(one.metric for one in watched), numbers.q) - SLACK
                     travelled = ZERO
                     calm = False
+                    if drifts:
+                        set_out(held, flock, n, plan=plan)
                 else:
                     take(name, time, values, sums, stages=stages, sampled=sampled)
         if plan.stop and values[collided] > HALF:
@@ -167,7 +174,11 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
             if plan.struck and (step == first or step % whole.decide_every == 0):  # between, nobody changes places
                 hurt_first, hurt_end = ask(stages["struck"], time=time)
             fastest = ask(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
-            travelled += 2.0 * math.sqrt(fastest) * numbers.c.dt
+            if drifts:  # noqa: SIM108 - a helper of several lines stands where it is assigned
+                nearer = approached(held, fastest, numbers.c.dt)
+            else:
+                nearer = 2.0 * math.sqrt(fastest) * numbers.c.dt
+            travelled += nearer
     held[TRAVELLED] = travelled
     held[GAP] = gap
     held[CALM] = ONE if calm else ZERO

@@ -49,6 +49,18 @@ class Measured(NamedTuple):
     total: int
 
 
+def measured(plan: Plan, clock: str) -> tuple[Measured, ...]:
+    """Metrics of a clock, and where their numbers lie."""
+    found, value, row, total = [], 0, 0, 0
+    for metric in plan.metrics:
+        if metric.clock == clock:
+            found.append(Measured(metric, value, row, total))
+            total += len(fields(metric.Pair))
+        value += len(fields(metric.Sample))
+        row += len(fields(metric.Memory))
+    return tuple(found)
+
+
 def means(total: Any, n: int, *, plan: Plan) -> Any:
     """Mean of a vector over n agents, from its sum."""
     return [total[a] / real(n) if a < plan.dimensions else ZERO for a in (X, Y, Z)]

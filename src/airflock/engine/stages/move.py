@@ -5,6 +5,7 @@ from typing import Any
 
 from airflock.core.fault import Fault
 from airflock.engine.plan import Plan
+from airflock.engine.stages.approach import beside
 from airflock.engine.stages.faults import hinder, lasts
 from airflock.engine.stages.state import Flock, column_of, numbers_of
 from airflock.engine.stages.words import (
@@ -76,11 +77,14 @@ def accelerate(
 
 def move(
     agents: Iterable[int], lanes: Iterable[int], flock: Flock, numbers: Any, step: int, n: int,
-    noise: Callable[[], None], gusts: Callable[[], Any], hurt_first: int, hurt_end: int, *, plan: Plan,
+    noise: Callable[[], None], gusts: Callable[[], Any], held: Any, hurt_first: int, hurt_end: int,
+    *, plan: Plan, watched: bool, drifts: bool,
 ) -> Any:  # fmt: skip
     """Velocities by the body, positions by the velocity before or after; returns the largest squared speed.
 
     noise, gusts         : the stages of these names, for this step
+    watched              : whether somebody wants to know that speed; else it is 0
+    drifts, held         : whether it is that beside the drift of the flock (`stages.approach`)
     hurt_first, hurt_end : lanes of those among whom somebody suffers from a fault of motion (`stages.faults.struck`)
     """
     x, v = flock.position, flock.velocity
@@ -98,8 +102,11 @@ def move(
     if plan.integration != "old":
         respond(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan)
     fastest = ZERO
-    for i in lanes:  # whole vectors, of which some lanes have no agent
-        speed2 = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
+    for i in lanes if watched else ():  # whole vectors, of which some lanes have no agent
+        if drifts:
+            speed2 = sum(beside(i, a, held, flock) * beside(i, a, held, flock) for a in range(plan.dimensions))
+        else:
+            speed2 = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
         fastest = most(fastest, choose(integer(i) < integer(n), speed2, ZERO))
     for a in range(plan.dimensions):
         for i in lanes:
@@ -110,4 +117,4 @@ def move(
         for i in agents:
             for a in range(plan.dimensions):
                 x[a][i], v[a][i] = plan.edge(x[a][i], v[a][i], getattr(numbers.w, SIDES[a]))
-    return fastest
+    return fastest if watched else ZERO

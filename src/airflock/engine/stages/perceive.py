@@ -11,7 +11,7 @@ from airflock.core import random
 from airflock.core.sensor import FIRST
 from airflock.engine.plan import Plan
 from airflock.engine.stages import faults
-from airflock.engine.stages.noise import normals, uniforms
+from airflock.engine.stages.noise import Draw, normals, uniforms
 from airflock.engine.stages.state import Flock, column_of, numbers_of
 from airflock.engine.stages.words import X, Y, Z, ask, fields, real, wants
 
@@ -31,16 +31,16 @@ def snapshot(flock: Flock, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
             )
 
 
-def drawn(flock: Flock, whole: Any, decision: int, m: int, *, plan: Plan) -> None:
+def chance(flock: Flock, whole: Any, decision: int, m: int, *, plan: Plan, drawn: Draw) -> None:
     """Random numbers that a sensor asks for: g0 to g11, u0 to u3."""
     if wants(plan.sensor.measure, "g0", "g1", "g2", "g3"):
-        normals(flock, flock.errors, whole, decision, SENSOR + 256 * FIRST, m, 0)
+        normals(flock, flock.errors, whole, decision, SENSOR + 256 * FIRST, m, 0, drawn)
     if wants(plan.sensor.measure, "g4", "g5", "g6", "g7"):
-        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST + 1), m, 4)
+        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST + 1), m, 4, drawn)
     if wants(plan.sensor.measure, "g8", "g9", "g10", "g11"):
-        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST + 2), m, 8)
+        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST + 2), m, 8, drawn)
     if wants(plan.sensor.measure, "u0", "u1", "u2", "u3"):
-        uniforms(flock, flock.chances, whole, decision, SENSOR + 256 * (FIRST + 3), m)
+        uniforms(flock, flock.chances, whole, decision, SENSOR + 256 * (FIRST + 3), m, drawn)
 
 
 def measure(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan: Plan) -> None:
@@ -64,18 +64,19 @@ def measure(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan
 
 
 def perceive(  # noqa: C901 - tests of the plan leave one way through
-    flock: Flock, numbers: Any, whole: Any, decision: int, slot: int, m: int, ring: Any, *, plan: Plan
-) -> None:
+    flock: Flock, numbers: Any, whole: Any, decision: int, slot: int, m: int, ring: Any, *, plan: Plan,
+    drawn: Draw = None,
+) -> None:  # fmt: skip
     """Advance the errors of what is measured and of what is sent, then measure and hear, with the faults of both."""
     axes, dims = range(plan.dimensions), plan.dimensions
     own, sent = (flock.own_error, flock.own_drift), (flock.sent_error, flock.sent_drift)
     errors = (((own, X), (own, Y), (sent, X), (sent, Y)), ((own, Z), (sent, Z)))
     if plan.senses:
-        drawn(flock, whole, decision, m, plan=plan)
+        chance(flock, whole, decision, m, plan=plan, drawn=drawn)
         measure(range(m), flock, numbers, real(decision) * numbers.c.period, plan=plan)
     elif plan.noisy:
         for draw, kinds in enumerate(errors[: dims - 1]):
-            normals(flock, flock.errors, whole, decision, SENSOR + 256 * draw, m, 0)
+            normals(flock, flock.errors, whole, decision, SENSOR + 256 * draw, m, 0, drawn)
             for g, ((error, drift), a) in enumerate(kinds):
                 for i in range(m):
                     error[a][i], drift[a][i] = ask(

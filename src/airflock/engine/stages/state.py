@@ -10,6 +10,7 @@ from airflock.engine.stages.records import Others
 from airflock.engine.stages.words import NOTHING, Itself, fields
 
 Row = Any  # one number per agent: row[i]
+FAULT = "fault_"  # what names of rows with numbers of a fault begin with
 # The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts
 # (rays cast at this decision, whether positions before are known); goals, aim (where the goal is, its number) and
 # reached (time of each, s; -1 before); later (bounds, time and number of each shape that is yet to appear; time -1 once
@@ -133,7 +134,7 @@ def tree(scene: Any) -> tuple[Any, Any, Any]:
 
 def fault_row(kind: str, what: str) -> str:
     """Name of the row with one number of a kind of fault."""
-    return f"fault_{kind}_{what}"
+    return f"{FAULT}{kind}_{what}"
 
 
 def own_row(letter: str, name: str) -> str:

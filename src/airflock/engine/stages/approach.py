@@ -1,0 +1,68 @@
+"""Approach: how near two agents may have come since pairs were last looked at, so that most steps look at none.
+
+A pair comes nearer by no more than what both move beside a velocity that they share. So what counts is how fast agents
+are beside the drift of the flock, the mean velocity when pairs were last looked at: a flock that flies past at 20 m/s
+without a change of shape has nothing to look for.
+"""
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from airflock.engine.plan import Plan
+from airflock.engine.stages.measure import offset
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import FAR, ONE, ZERO, between, choose, integer, least, most, real, vector
+
+# places in `held` (`passes.driver.flight` says what each is); DRIFT is the first of three
+TRAVELLED, GAP, CALM, ENDED, BEGUN, DRIFT, PACE, REACH = 0, 1, 2, 3, 4, 5, 8, 9
+HELD = 10
+SLACK = 0.01  # m
+ROUNDING = 5e-7  # how much nearer two agents come in a step by rounding in single precision, for each m from the origin
+SPAN = 32  # lanes that loops take at a time
+
+
+def set_out(held: Any, flock: Flock, n: int, *, plan: Plan) -> None:
+    """Keep the velocity with which the flock drifts, and how far from the origin agents are, m."""
+    mean = vector()
+    for a in range(plan.dimensions):
+        mean[a] = ZERO
+    far2 = ZERO
+    for i in range(n):
+        for a in range(plan.dimensions):
+            mean[a] = mean[a] + flock.velocity[a][i]
+        far2 = most(far2, sum(flock.position[a][i] * flock.position[a][i] for a in range(plan.dimensions)))
+    for a in range(plan.dimensions):
+        held[DRIFT + a] = mean[a] / most(real(n), ONE)
+    held[PACE] = math.sqrt(sum(held[DRIFT + a] * held[DRIFT + a] for a in range(plan.dimensions)))
+    held[REACH] = math.sqrt(far2)
+
+
+def approached(held: Any, fastest: Any, dt: Any) -> Any:
+    """How much nearer two agents may have come in a step, m.
+
+    fastest : largest squared speed beside the drift, m²/s²
+    """
+    held[REACH] = held[REACH] + (held[PACE] + math.sqrt(fastest)) * dt
+    return 2.0 * math.sqrt(fastest) * dt + ROUNDING * held[REACH]
+
+
+def beside(i: int, a: int, held: Any, flock: Flock) -> Any:
+    """Velocity of agent i along one axis beside the drift, m/s."""
+    return flock.velocity[a][i] - held[DRIFT + a]
+
+
+def nearest(lanes: Iterable[int], flock: Flock, numbers: Any, n: int, m: int, *, plan: Plan) -> Any:
+    """Least distance of a pair, m."""
+    own, d = vector(), vector()
+    nn = integer(n)
+    least2 = FAR
+    for i in range(n):
+        for a in range(plan.dimensions):
+            own[a] = flock.position[a][i]
+        near2 = FAR
+        for j in between(lanes, i // SPAN * SPAN, m):
+            r2 = offset(d, own, flock.position, j, numbers.w, plan=plan)
+            near2 = least(near2, choose((integer(j) > integer(i)) & (integer(j) < nn), r2, FAR))
+        least2 = least(least2, near2)
+    return math.sqrt(least2)
