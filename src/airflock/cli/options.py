@@ -43,7 +43,7 @@ Law = Annotated[
     str | None,
     typer.Option(metavar="NAME|FILE.py", help="Fly this law instead of the scenario's.", show_default=False),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 PlotFile = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw the trajectories of the first flight.")
 ]

@@ -93,7 +93,7 @@ def _untold(key: str, mean: Any) -> bool:
 
 
 def emit_json(value: Any) -> None:
-    """Print one JSON object; numbers that are no JSON (never expected) become null."""
+    """Print JSON on one line; numbers that are no JSON (never expected) become null."""
     sys.stdout.write(json.dumps(clean(value), ensure_ascii=False) + "\n")
 
 
