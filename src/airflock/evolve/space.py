@@ -139,14 +139,28 @@ def _order(axes: Sequence[Axis]) -> list[int]:
 
 
 def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scenario:
-    """The scenario with other numbers, without reading it again. Raises ParameterError outside declared ranges."""
+    """The scenario with other numbers, without reading it again. Raises ParameterError outside declared ranges.
+
+    Of faults, faults[0].per_hour and faults[0].number can be changed.
+    """
     changed: dict[str, dict[str, float]] = {}
     for key, value in parameters.items():
         section, _, name = key.rpartition(".")
         changed.setdefault(section, {})[name] = value
     fields = {section.key: section.field for section in ORDER}
     records = scenario.records
+    befalls = {section: changed.pop(section) for section in list(changed) if section.startswith("faults[")}
+    if befalls:
+        entries = [
+            replace(entry, **_of_entry(befalls.get(f"faults[{i}]", {}))) for i, entry in enumerate(scenario.faults)
+        ]
+        scenario = replace(scenario, faults=tuple(entries))
     return replace(scenario, **{fields[s]: replace(records[s], **values) for s, values in changed.items()})
+
+
+def _of_entry(values: Mapping[str, float]) -> dict[str, float | int]:
+    """Fields of an entry of faults; a number of agents is whole."""
+    return {name: round(value) if name == "number" else value for name, value in values.items()}
 
 
 def declared(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:
