@@ -73,7 +73,7 @@ def _tolerances(console: Any, tolerance: Any) -> None:
     title = f"safe: fewer than {level:g} % of flights with an event ({confidence:g} %)"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("number", "nominal", "safe to", "factor", "not shown at", "flights", ""):
-        table.add_column(name, justify="left" if name in ("number", "") else "right", no_wrap=name == "number")
+        table.add_column(name, justify="left" if name in ("number", "") else "right", no_wrap=name == "number", overflow="fold")
     for axis in tolerance["axis"]:
         bad = tables.number(axis["not_shown"]) if "not_shown" in axis else ""
         table.add_row(
