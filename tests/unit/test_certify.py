@@ -12,15 +12,18 @@ from typer.testing import CliRunner
 from airflock.certify.campaign import FOLDER, Campaign
 from airflock.certify.certificate import NOT_SAID, digest, sealed
 from airflock.certify.check import check
+from airflock.certify.environment import sound_keys, usual_keys
+from airflock.certify.flyer import Flyer
 from airflock.certify.run import certify, run
 from airflock.certify.seeds import COUNT, identity, seed
-from airflock.certify.environment import sound_keys, usual_keys
+from airflock.certify.tolerance import Screen, batch_of
 from airflock.cli.main import app
 from airflock.engine import score_flights
 from airflock.errors import AirflockError, ScenarioError, StudyError
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted
 from airflock.evolve.space import with_parameters
+from airflock.executors import Landed
 from airflock.executors.in_process import InProcess
 from airflock.limits.bounds import look, per_hour
 from airflock.limits.limit import read, read_all
@@ -178,6 +181,30 @@ def test_what_is_zero_is_moved_up_and_how_often_faults_strike_is_a_number_of_the
     assert many["safe"] == 16.0 and many["note"] == "motor"
 
 
+def test_each_number_has_its_share_of_the_time_that_is_left_and_compiling_takes_none_of_it(monkeypatch):
+    """The first number took all of a short time; those behind it were not tried."""
+    now = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+
+    class Executor:
+        def fly(self, flights):
+            now[0] += 30.0  # a driver is compiled
+            yield Landed(flights[0], {"r_min": 5.0})
+
+    class Kept:
+        flown = staticmethod(lambda _: {})
+        land = staticmethod(lambda *_: None)
+
+    screen = Screen(Flyer(campaign(), Kept(), Executor(), until=80.0), 0.02)
+    screen.share_time(4)
+    assert screen.flyer.left == 20.0
+    screen.begin(batch_of("tolerance", {"wind.gust": 1.0}), {"wind.gust": 1.0})
+    assert screen.flyer.left == 20.0 and now == [30.0]
+    now[0] += 5.0
+    screen.share_time(3)
+    assert screen.flyer.left == 25.0
+
+
 def test_numbers_of_faults_are_those_that_a_file_would_say():
     """Brute force: the flight of a scenario whose file says so."""
     faults = [{"kind": "motor", "at": 1.0, "number": 1}, {"kind": "stuck", "per_hour": 900.0, "lasts": 2.0}]
@@ -210,7 +237,9 @@ def test_numbers_that_are_not_sure_are_drawn_by_each_seed(tmp_path):
     assert 0.8 <= min(drawn) < 0.82 and 1.38 < max(drawn) <= 1.4 and asked.parameters(7) == asked.parameters(7)
     assert type(drawn[0]) is float  # the line that replays a flight has it after --set, where np.float64(1.1) is a text
     said = flown(asked, tmp_path / "a", 0.0).not_said
-    assert any("radio.delay anywhere in the given intervals, but not numbers that are wrong in it" in text for text in said)
+    assert any(
+        "radio.delay anywhere in the given intervals, but not numbers that are wrong in it" in text for text in said
+    )
     assert flown(campaign(), tmp_path / "b", 0.0).not_said == list(NOT_SAID)
     with pytest.raises(ScenarioError, match="no number has an interval"):
         certify("vasarhelyi_2018/real_6ms", LIMIT, uncertain=True)

@@ -221,7 +221,9 @@ def test_the_worst_flight_of_each_limit_is_played(tmp_path, monkeypatch):
     """Of several limits the first alone had all replays; the flight with the only contact had none."""
     monkeypatch.setattr("airflock.recordings.flights.simulate", lambda _, seed: seed)
     shows = []
-    monkeypatch.setattr("airflock.replays.build.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed)))
+    monkeypatch.setattr(
+        "airflock.replays.build.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed))
+    )
     worst = [{"limit": limit, "seed": seed} for limit, seeds in (("a", (1, 2, 3)), ("b", (4, 1))) for seed in seeds]
     made = SimpleNamespace(worst=worst, campaign=SimpleNamespace(parameters=lambda _: {}))
     found = SimpleNamespace(certificate=made, scenario=make(MINE, "mine"), folder=tmp_path)
@@ -238,7 +240,7 @@ def test_the_report_says_what_was_flown_and_which_files_it_is_about(done):
         with Store(folder / name, write=False) as store:
             for stage in rows:
                 seeds = [s for (s,) in store.rows(SEEDS, (stage,))]
-                assert f"<td>{len(seeds):,}</td><td>{min(seeds)} to {max(seeds)}," in page
+                assert f"<td>{len(seeds):,}</td><td>{min(seeds)} to {max(seeds)}</td>" in page
     assert hashlib.sha256((folder / "tuned.toml").read_bytes()).hexdigest() in page
     told = tomllib.loads((folder / "certificate.toml").read_text())
     assert told["seal"] in page and told["flown"]["rules"] in page

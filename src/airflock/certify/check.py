@@ -194,7 +194,7 @@ def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
 
 
 def _fixed(told: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: Limit, count: int) -> bool:
-    """Whether looks are the first of those that a limit fixes, at flights that there are; and no event is taken back."""
+    """Whether looks are the first of those that a limit fixes, at flights that there are, and no event is undone."""
     known = list(islice(due(campaign, limit), len(told)))
     sizes = [(flights, above, below) for flights, _, above, below in told]
     same = len(known) == len(told) and all(

@@ -41,7 +41,8 @@ def sound_axes(scenario: Scenario, axes: Mapping[str, Sequence[float]]) -> dict[
 def bounds_over(flyer: Flyer, axes: Mapping[str, Sequence[float]]) -> dict[str, Any]:
     """Verdict and bounds of every cell, on seeds that all cells share.
 
-    Returns plain values: level, keys, their units, values, and for each cell values, verdict, low, high (per flight), flights.
+    Returns plain values: level, keys, their units, values, and for each cell values, verdict, low, high (per flight),
+    flights.
     """
     screen = Screen(flyer, level_of(flyer.campaign), MAP)
     cells = []

@@ -33,8 +33,8 @@ TIME_OVER = "time was over"
 def tolerance(flyer: Flyer, counted: Count, keys: Sequence[str]) -> dict[str, Any]:
     """Largest value of each key at which the events of all limits stay below a level, and the next that is not shown.
 
-    Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal; none of zero),
-    flights, and the interval that the scenario's file gives, if any.
+    Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal; of zero
+    none), flights, and the interval that the scenario's file gives, if any.
     """
     campaign = flyer.campaign
     level = level_of(campaign)
@@ -45,8 +45,9 @@ def tolerance(flyer: Flyer, counted: Count, keys: Sequence[str]) -> dict[str, An
         told["reason"] = f"without any change, the scenario is not shown to stay below {100.0 * level:g} % per flight"
         return told
     known, said = environment(campaign.scenario), intervals(campaign.scenario.document)
-    for key in keys:
+    for done, key in enumerate(keys):
         flyer.say(f"tolerance of {key}")
+        screen.share_time(len(keys) - done)
         axis = _axis(screen, key, *known[key])
         told["axis"].append(axis | ({"interval": list(said[key])} if key in said else {}))
     return told
@@ -58,10 +59,13 @@ def level_of(campaign: Campaign) -> float:
 
 
 class Screen:
-    """Judges one value at a time against a level per flight, on seeds that all values share."""
+    """Judges one value at a time against a level per flight, on seeds that all values share.
+
+    end : moment of `time.monotonic` at which the time for all values is spent, s
+    """
 
     def __init__(self, flyer: Flyer, level: float, part: int = TOLERANCE):
-        self.flyer, self.level, self.part = flyer, level, part
+        self.flyer, self.level, self.part, self.end = flyer, level, part, flyer.until
         alpha = 1.0 - flyer.campaign.confidence
         most = MOST * needed(level, alpha * share(1))
         self.looks = list(takewhile(lambda due: due[0] <= most, schedule(level, alpha)))
@@ -73,7 +77,14 @@ class Screen:
             return
         for _ in self.flyer.fly(batch, [flight]):
             pass
-        self.flyer = replace(self.flyer, until=self.flyer.until + time.monotonic() - began)
+        waited = time.monotonic() - began
+        self.end += waited
+        self.flyer = replace(self.flyer, until=self.flyer.until + waited)
+
+    def share_time(self, parts: int) -> None:
+        """Give the next of so many parts its share of the time that is left."""
+        left = self.end - time.monotonic()
+        self.flyer = self.flyer.with_budget(left / parts)
 
     def _flights(self, parameters: Mapping[str, float], numbers: Sequence[int]) -> list[Flight]:
         campaign = self.flyer.campaign

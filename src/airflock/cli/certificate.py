@@ -73,11 +73,14 @@ def _tolerances(console: Any, tolerance: Any) -> None:
     title = f"safe: fewer than {level:g} % of flights with an event ({confidence:g} %)"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("number", "nominal", "safe to", "factor", "not shown at", "flights", ""):
-        table.add_column(name, justify="left" if name in ("number", "") else "right", no_wrap=name == "number", overflow="fold")
+        table.add_column(
+            name, justify="left" if name in ("number", "") else "right", no_wrap=name == "number", overflow="fold"
+        )
     for axis in tolerance["axis"]:
         bad = tables.number(axis["not_shown"]) if "not_shown" in axis else ""
+        factor = f"{axis['factor']:.3g}" if "factor" in axis else ""
         table.add_row(
-            axis["key"], tables.number(axis["nominal"]), tables.number(axis["safe"]), f"{axis['factor']:.3g}" if "factor" in axis else "", bad,
+            axis["key"], tables.number(axis["nominal"]), tables.number(axis["safe"]), factor, bad,
             f"{axis['flights']:,}", axis.get("note", ""),
         )  # fmt: skip
     console.print(table)

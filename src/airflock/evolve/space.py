@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.core.parameters import Quantity, declarations
+from airflock.scenarios.faulty import Entry
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER
 
@@ -151,16 +152,15 @@ def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scen
     records = scenario.records
     befalls = {section: changed.pop(section) for section in list(changed) if section.startswith("faults[")}
     if befalls:
-        entries = [
-            replace(entry, **_of_entry(befalls.get(f"faults[{i}]", {}))) for i, entry in enumerate(scenario.faults)
-        ]
+        entries = (_befallen(entry, befalls.get(f"faults[{i}]", {})) for i, entry in enumerate(scenario.faults))
         scenario = replace(scenario, faults=tuple(entries))
     return replace(scenario, **{fields[s]: replace(records[s], **values) for s, values in changed.items()})
 
 
-def _of_entry(values: Mapping[str, float]) -> dict[str, float | int]:
-    """Fields of an entry of faults; a number of agents is whole."""
-    return {name: round(value) if name == "number" else value for name, value in values.items()}
+def _befallen(entry: Entry, values: Mapping[str, float]) -> Entry:
+    """An entry of faults with other numbers; that of agents is whole."""
+    number = round(values["number"]) if "number" in values else entry.number
+    return replace(entry, per_hour=values.get("per_hour", entry.per_hour), number=number)
 
 
 def declared(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:

@@ -102,7 +102,9 @@ def tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     at = np.linspace(0.0, end, 200)
     inside = 1.0 + shape * (end - at) / scale
     with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.exp(-(end - at) / scale) if abs(shape) < 1e-9 else np.where(inside > 0.0, inside, 0.0) ** (-1.0 / shape)
+        share = (
+            np.exp(-(end - at) / scale) if abs(shape) < 1e-9 else np.where(inside > 0.0, inside, 0.0) ** (-1.0 / shape)
+        )
     return at, few / len(distances) * np.where(inside > 0.0, share, 0.0)
 
 
@@ -122,9 +124,9 @@ def _tolerances(axes: Axes, found: "Certificate") -> None:
             axes.plot(axis["not_shown"] / axis["nominal"], y, "|", ms=10, color=style.RED)
         if "interval" in axis and "factor" in axis:
             axes.plot([end / axis["nominal"] for end in axis["interval"]], [y, y], color="black", lw=2.0)
-        left = factor < 1.0
+        left, begin = factor < 1.0, "" if "factor" in axis else "0 to "
         axes.annotate(
-            f"{'' if 'factor' in axis else '0 to '}{axis['safe']:.3g} {unit}".rstrip(), (factor, y), (-4 if left else 4, 0),
+            f"{begin}{axis['safe']:.3g} {unit}".rstrip(), (factor, y), (-4 if left else 4, 0),
             textcoords="offset points", va="center", ha="right" if left else "left", fontsize=style.SMALL,
         )  # fmt: skip
     axes.set_xscale("log")
@@ -148,7 +150,9 @@ def _map(axes: Axes, found: "Certificate") -> None:
     if high.min() < told["level"] < high.max():
         axes.contour(columns, rows, high, levels=[told["level"]], colors=style.RED, linewidths=1.2)
     axes.plot([], [], color=style.RED, label=f"{100.0 * told['level']:g} % of flights")
-    across, down = (key if unit == "1" else f"{key}, {unit}" for key, unit in zip(told["keys"], told["units"], strict=True))
+    across, down = (
+        key if unit == "1" else f"{key}, {unit}" for key, unit in zip(told["keys"], told["units"], strict=True)
+    )
     style.dress(axes, down, across, grid=False)
     style.legend(axes, above=True)
     figure = axes.get_figure(root=True)

@@ -25,7 +25,9 @@ def flights(found: Tuned) -> list[tuple[str, str, str]]:
     if found.steps:
         tried, fresh = len(found.steps) - 1, plan.seeds * (1 + ROUNDS)
         rows.append(("hardening: sets that were tried", f"{tried * plan.seeds:,}", f"0 to {plan.seeds - 1}"))
-        rows.append(("hardening: what was kept", f"up to {ROUNDS * plan.seeds:,} a set", f"{plan.seeds} to {fresh - 1}"))
+        rows.append(
+            ("hardening: what was kept", f"up to {ROUNDS * plan.seeds:,} a set", f"{plan.seeds} to {fresh - 1}")
+        )
     return rows + _stored(found.folder / "certificate_flights")
 
 
@@ -38,7 +40,7 @@ def _stored(folder: Path) -> list[tuple[str, str, str]]:
             n, least, most = kept.get(name, (0, int(low), int(high)))
             kept[name] = (n + int(count), min(least, int(low)), max(most, int(high)))
     return [
-        (STAGES.get(name, name), f"{n:,}", f"{least} to {most}, none of them given by hand")
+        (STAGES.get(name, name), f"{n:,}", f"{least} to {most}")
         for name, (n, least, most) in sorted(kept.items(), key=lambda each: _place(each[0]))
     ]
 
