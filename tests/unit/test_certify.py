@@ -364,6 +364,17 @@ def test_all_faults_are_told_at_once_before_anything_flies(tmp_path):
         assert sum(told in line for line in lines) == 1, told
 
 
+def test_distances_are_not_certified_beside_collisions_that_are_looked_for_less_often():
+    """The radius of collisions stays the scenario's then, and so does how often they are looked for."""
+    both = ["r_min<1 at 1%", "n_coll>=1 at 1%"]
+    seldom = load("vasarhelyi_2018/real_6ms", {"metrics.collision_period": 1.0})
+    with pytest.raises(
+        ScenarioError, match="n_coll is measured every metrics.collision_period = 1 s, and r_min at every"
+    ):
+        read_all(both, seldom)
+    assert len(read_all(both, load("vasarhelyi_2018/real_6ms"))) == 2 and len(read_all(both[:1], seldom)) == 1
+
+
 @pytest.mark.parametrize(("limit", "status"), [("r_min<0.001 at 50%", 0), ("r_min<100 at 10%", 1)])
 def test_the_exit_status_says_whether_the_limit_is_shown(tmp_path, limit, status):
     small = ["--agents", "3", "--duration", "1", "--set", "dt=0.1", "--device", "python"]

@@ -1,8 +1,8 @@
 """Measures: what helps against collisions beside the numbers of the law, tried and told, and never part of a set.
 
-A neighbour whose packet is late seems to be where it was. Carried forward with the velocity in its packet, it is
-where it is by now. And who has lost a neighbour that could be near may stop (`core.silence`). Both are programs on board, which a set of
-numbers cannot bring along: whoever has them sets them in the scenario and tunes again.
+A neighbour whose packet is late seems to be where it was. Carried forward with the velocity in its packet, it is where
+it is by now. And who has lost a neighbour that could be near may stop (`core.silence`). Both are programs on board,
+which a set of numbers cannot bring along: whoever has them sets them in the scenario and tunes again.
 """
 
 from collections.abc import Sequence

@@ -133,6 +133,12 @@ def read_all(texts: list[str], scenario: Scenario) -> tuple[Limit, ...]:
             f"limits: {others[0]} is measured with metrics.r_coll = {scenario.metrics.r_coll:g} m, and r_min<"
             f"{max(radii):g} asks for more; certify them apart, or set metrics.r_coll = {max(radii):g}"
         )
+    often = scenario.metrics.collision_period
+    if radii and others and often is not None and often > scenario.flight.dt:
+        faults.append(
+            f"limits: {others[0]} is measured every metrics.collision_period = {often:g} s, and r_min at every motion "
+            "step; certify them apart, or leave out metrics.collision_period"
+        )
     events = [limit.event for limit in found]
     faults += [f"limit '{event}': given twice" for event in dict.fromkeys(events) if events.count(event) > 1]
     if faults:
