@@ -364,6 +364,15 @@ def test_all_faults_are_told_at_once_before_anything_flies(tmp_path):
         assert sum(told in line for line in lines) == 1, told
 
 
+@pytest.mark.parametrize(
+    ("rate", "said"), [("1e9/h", "every flight may have it"), ("1e-320/h", "no number of flights could show that")]
+)
+def test_limits_that_say_nothing_or_can_never_be_shown_are_refused(rate, said):
+    """The first was called shown, by no flight at all; the second ended in an overflow."""
+    with pytest.raises(ScenarioError, match=rf"limit 'r_min<1 at {rate}': allows the event in \S+ of flights: {said}"):
+        read(f"r_min<1 at {rate}", load("vasarhelyi_2018/real_6ms"))
+
+
 def test_distances_are_not_certified_beside_collisions_that_are_looked_for_less_often():
     """The radius of collisions stays the scenario's then, and so does how often they are looked for."""
     both = ["r_min<1 at 1%", "n_coll>=1 at 1%"]
