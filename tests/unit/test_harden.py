@@ -194,6 +194,11 @@ def test_carried_forward_is_the_same_radio_but_for_where_neighbours_are_believed
     assert carried.radio.fast_rate * carried.sensors.period >= 1.0  # something at every decision
 
 
+def test_a_study_that_is_not_over_or_in_which_nothing_flies_is_not_hardened(tmp_path):
+    with pytest.raises(ScenarioError, match=r"holds no best.toml: its search is not over, or nothing flies in it"):
+        cli_harden._optima(str(tmp_path), {}, trust=False)
+
+
 def test_what_does_not_fly_is_not_hardened(monkeypatch):
     flown_by(monkeypatch, lambda p, chance: {"fitness": 0.0, "r_min": 5.0, "n_coll": 0.0, "f_wall": 0.0})
     with pytest.raises(ScenarioError, match="does not fly, so it cannot be hardened: f_wall is zero in 100 %"):

@@ -264,6 +264,8 @@ def test_limits_are_by_default_on_collisions_and_where_there_are_walls_on_contac
     assert usual_limits(make({**MINE, "world": {"arena": "none"}, "start": {"kind": "ball"}}, "mine")) == [
         "r_min<3 at 0.01/h"
     ]
+    with pytest.raises(ScenarioError, match="metrics.kind = 'order' has no r_min to limit; say what is to be shown"):
+        usual_limits(load("vicsek_1995/ordered"))
 
 
 def test_search_hardening_and_certificate_hold_to_the_same_limits_on_seeds_that_never_meet(done):

@@ -14,6 +14,7 @@ from airflock.evolve.bounds import usual_space
 from airflock.evolve.run import Interrupted
 from airflock.evolve.safe import flights_that_count
 from airflock.evolve.search import Watch
+from airflock.metrics.registry import numbers_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.feasible import infeasible
@@ -167,7 +168,15 @@ def _mine(
 
 
 def usual_limits(scenario: Scenario) -> list[str]:
-    """Collisions, and contacts where there are walls or obstacles, rarer than once in a hundred flock hours each."""
+    """Collisions, and contacts where there are walls or obstacles, rarer than once in a hundred flock hours each.
+
+    Raises ScenarioError where distances are not measured.
+    """
+    if "r_min" not in numbers_of(scenario.measures, scenario.metrics):
+        kind = scenario.measures.name
+        raise ScenarioError(
+            [f"{scenario.name}: metrics.kind = {kind!r} has no r_min to limit; say what is to be shown with --limit"]
+        )
     contacts = ["clearance<0 at 0.01/h"] if has_walls(scenario) else []
     return [f"r_min<{scenario.metrics.r_coll:g} at 0.01/h", *contacts]
 
