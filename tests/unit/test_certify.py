@@ -10,17 +10,22 @@ import tomlkit
 from typer.testing import CliRunner
 
 from airflock.certify.campaign import FOLDER, Campaign
-from airflock.certify.certificate import digest, sealed
+from airflock.certify.certificate import NOT_SAID, digest, sealed
 from airflock.certify.check import check
+from airflock.certify.environment import sound_keys, usual_keys
+from airflock.certify.flyer import Flyer
 from airflock.certify.run import certify, run
 from airflock.certify.seeds import COUNT, identity, seed
-from airflock.certify.tolerance import sound_keys
+from airflock.certify.tolerance import Screen, batch_of
 from airflock.cli.main import app
+from airflock.engine import score_flights
 from airflock.errors import AirflockError, ScenarioError, StudyError
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted
+from airflock.evolve.space import with_parameters
+from airflock.executors import Landed
 from airflock.executors.in_process import InProcess
-from airflock.limits.bounds import per_hour
+from airflock.limits.bounds import look, per_hour
 from airflock.limits.limit import read, read_all
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
@@ -146,6 +151,72 @@ def test_the_tolerance_of_a_number_is_found_between_two_values(tmp_path):
     assert tau["factor"] == 8.0 and "not_shown" not in tau
 
 
+def test_a_campaign_goes_on_with_another_number_and_another_map_as_if_with_these_alone(tmp_path):
+    """Flights at other values of other numbers are kept in the same folder."""
+    flown(campaign(), tmp_path / "a", 0.0, keys=("radio.delay",), axes={"radio.delay": [1.0, 1.7], "body.tau": [1, 2]})
+    axes = {"body.noise": [0.1, 0.2], "radio.delay": [1.0, 1.7]}
+    again = flown(campaign(), tmp_path / "a", 0.0, keys=("body.tau",), axes=axes, resume=True)
+    alone = flown(campaign(), tmp_path / "b", 0.0, keys=("body.tau",), axes=axes)
+    assert again.tolerance == alone.tolerance and alone.tolerance["axis"][0]["factor"] == 8.0
+    assert again.over == alone.over and [cell["verdict"] for cell in alone.over["cell"]] == ["safe", "unsafe"] * 2
+
+
+def test_what_is_zero_is_moved_up_and_how_often_faults_strike_is_a_number_of_the_environment(tmp_path):
+    """Events begin at gusts of 3 m/s, and where the second fault strikes 5 times as often."""
+    faults = [{"kind": "motor", "at": 5.0, "number": 2}, {"kind": "stuck", "per_hour": 2.0, "lasts": 9.0}]
+    scenario = load("vasarhelyi_2018/real_6ms", {"faults": faults})
+    keys = usual_keys(scenario)
+    assert {"wind.gust", "radio.loss", "faults[0].number", "faults[1].per_hour"} <= set(keys)
+    assert "wind.at_6m" not in keys and keys[-2:] == ("radio.loss", "wind.gust")  # whose drivers must be compiled
+
+    def score(values, own):
+        near = values.get("wind.gust", 0.0) > 3.0 or values.get("faults[1].per_hour", 0.0) > 10.0
+        return {"r_min": 0.5 if near else 5.0} | ({"closest": 0.4, "first": [9.0]} if near else {})
+
+    asked = Campaign(scenario, read_all([LIMIT], scenario))
+    keys = ("wind.gust", "faults[1].per_hour", "faults[0].number")
+    gust, often, many = flown(asked, tmp_path / "a", 0.0, keys=keys, score=score).tolerance["axis"]
+    assert gust["nominal"] == 0.0 and 2.8 <= gust["safe"] <= 3.0 < gust["not_shown"] <= 3.1 and "factor" not in gust
+    assert 9.0 <= often["safe"] <= 10.0 < often["not_shown"] <= 11.0 and often["note"] == "stuck"
+    assert many["safe"] == 16.0 and many["note"] == "motor"
+
+
+def test_each_number_has_its_share_of_the_time_that_is_left_and_compiling_takes_none_of_it(monkeypatch):
+    """The first number took all of a short time; those behind it were not tried."""
+    now = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+
+    class Executor:
+        def fly(self, flights):
+            now[0] += 30.0  # a driver is compiled
+            yield Landed(flights[0], {"r_min": 5.0})
+
+    class Kept:
+        flown = staticmethod(lambda _: {})
+        land = staticmethod(lambda *_: None)
+
+    screen = Screen(Flyer(campaign(), Kept(), Executor(), until=80.0), 0.02)
+    screen.share_time(4)
+    assert screen.flyer.left == 20.0
+    screen.begin(batch_of("tolerance", {"wind.gust": 1.0}), {"wind.gust": 1.0})
+    assert screen.flyer.left == 20.0 and now == [30.0]
+    now[0] += 5.0
+    screen.share_time(3)
+    assert screen.flyer.left == 25.0
+
+
+def test_numbers_of_faults_are_those_that_a_file_would_say():
+    """Brute force: the flight of a scenario whose file says so."""
+    faults = [{"kind": "motor", "at": 1.0, "number": 1}, {"kind": "stuck", "per_hour": 900.0, "lasts": 2.0}]
+    said = [{**faults[0], "number": 3}, {**faults[1], "per_hour": 3600.0}]
+    small = {"agents": 4, "duration": 6.0, "dt": 0.1}
+    one = load("vasarhelyi_2018/4ms", {**small, "faults": faults})
+    moved = with_parameters(one, {"faults[0].number": 3.0, "faults[1].per_hour": 3600.0})
+    flights = [moved, load("vasarhelyi_2018/4ms", {**small, "faults": said}), one]
+    there, same, before = score_flights(flights, [1] * 3, device="python")
+    assert there == same != before
+
+
 def test_a_map_says_which_cells_are_safe_and_bounds_each(tmp_path):
     axes = {"radio.delay": [0.5, 1.0, 1.7], "body.tau": [0.5, 1.0]}
     told = flown(campaign(), tmp_path / "a", 0.0, axes=axes).over
@@ -165,6 +236,11 @@ def test_numbers_that_are_not_sure_are_drawn_by_each_seed(tmp_path):
     drawn = [asked.parameters(s)["radio.delay"] for s in range(500)]
     assert 0.8 <= min(drawn) < 0.82 and 1.38 < max(drawn) <= 1.4 and asked.parameters(7) == asked.parameters(7)
     assert type(drawn[0]) is float  # the line that replays a flight has it after --set, where np.float64(1.1) is a text
+    said = flown(asked, tmp_path / "a", 0.0).not_said
+    assert any(
+        "radio.delay anywhere in the given intervals, but not numbers that are wrong in it" in text for text in said
+    )
+    assert flown(campaign(), tmp_path / "b", 0.0).not_said == list(NOT_SAID)
     with pytest.raises(ScenarioError, match="no number has an interval"):
         certify("vasarhelyi_2018/real_6ms", LIMIT, uncertain=True)
 
@@ -202,6 +278,14 @@ def test_a_certificate_holds_all_that_it_takes_to_check_it(written, tmp_path):
     assert "yes" in found._repr_html_() and "Certificate of" in repr(found)
 
 
+def lucky(limit, flights):
+    """Counting that stopped where it looked best, its bound computed as if that had been fixed beforehand."""
+    only = limit["looks"][0]
+    found = look(flights, 0, only["above"], only["below"])
+    only.update(flights=flights, events=0, low=found.low, high=found.high)
+    limit.update(flights=flights, events=0, low=found.low, high=found.high, shown=True)
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
@@ -209,6 +293,7 @@ def test_a_certificate_holds_all_that_it_takes_to_check_it(written, tmp_path):
         (lambda d: d["limit"][0]["looks"][0].update(above=0.5), "its bounds do not follow from its counts"),
         (lambda d: d["check"]["digests"].__setitem__(3, "0" * 12), "flight 3, seed [0-9]+: other bits"),
         (lambda d: d["flights"].update(first_seed=7), "its seeds are not those that the scenario fixes"),
+        (lambda d: lucky(d["limit"][0], 20), "its looks are not those that the limit fixes"),
     ],
 )
 def test_what_is_changed_and_sealed_again_is_still_found(written, tmp_path, change, told):
@@ -277,6 +362,26 @@ def test_all_faults_are_told_at_once_before_anything_flies(tmp_path):
         "confidence = 2 lies outside", "--budget soon: write a time", "a.png: ending .png is not .toml",
     ):  # fmt: skip
         assert sum(told in line for line in lines) == 1, told
+
+
+@pytest.mark.parametrize(
+    ("rate", "said"), [("1e9/h", "every flight may have it"), ("1e-320/h", "no number of flights could show that")]
+)
+def test_limits_that_say_nothing_or_can_never_be_shown_are_refused(rate, said):
+    """The first was called shown, by no flight at all; the second ended in an overflow."""
+    with pytest.raises(ScenarioError, match=rf"limit 'r_min<1 at {rate}': allows the event in \S+ of flights: {said}"):
+        read(f"r_min<1 at {rate}", load("vasarhelyi_2018/real_6ms"))
+
+
+def test_distances_are_not_certified_beside_collisions_that_are_looked_for_less_often():
+    """The radius of collisions stays the scenario's then, and so does how often they are looked for."""
+    both = ["r_min<1 at 1%", "n_coll>=1 at 1%"]
+    seldom = load("vasarhelyi_2018/real_6ms", {"metrics.collision_period": 1.0})
+    with pytest.raises(
+        ScenarioError, match="n_coll is measured every metrics.collision_period = 1 s, and r_min at every"
+    ):
+        read_all(both, seldom)
+    assert len(read_all(both, load("vasarhelyi_2018/real_6ms"))) == 2 and len(read_all(both[:1], seldom)) == 1
 
 
 @pytest.mark.parametrize(("limit", "status"), [("r_min<0.001 at 50%", 0), ("r_min<100 at 10%", 1)])

@@ -8,12 +8,14 @@ from airflock.cli import harden as cli_harden
 from airflock.engine import score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import again, harden
+from airflock.evolve.measures import CARRIED, STOPS, measures
 from airflock.evolve.sensitivity import sensitivity
 from airflock.evolve.space import with_parameters
 from airflock.evolve.steps import Measured
 from airflock.evolve.store import Store
 from airflock.evolve.study import load_study
 from airflock.executors.in_process import InProcess
+from airflock.radios.links import received
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from inside import simulate
@@ -158,6 +160,43 @@ def test_a_contact_in_a_few_flights_is_found_on_further_fresh_seeds(monkeypatch)
     steps = harden.harden(load("vasarhelyi_2018/6ms"), range(60))
     assert steps[1].kept and steps[1].contacts == 0.0
     assert not steps[-1].kept and "no step was kept" in steps[-1].verdict
+
+
+def test_measures_beside_the_law_are_tried_where_agents_collide_and_are_no_part_of_the_set(monkeypatch):
+    """Late packets bring agents together; carried forward they do not. Stopping is tried where packets are lost."""
+
+    def score_flights(scenarios, seeds, **_):
+        near = [
+            s.radio.delay if s.transceiver.name == "constant" and s.silence.rule == "fly_on" else 0.0 for s in scenarios
+        ]
+        return [{"fitness": 0.9, "r_min": 9.0 - 8.0 * x, "n_coll": 1.0 * (x > 0.8), "f_coll": 0.9} for x in near]
+
+    monkeypatch.setattr(simulate, "score_flights", score_flights)
+    lossy = load("vasarhelyi_2018/6ms", {"radio.loss": 0.1, "radio.delay": 1.0})
+    steps = harden.harden(lossy, range(5))
+    tried = {step.name: step for step in steps[:-1] if step.verdict.startswith("no part of the set")}
+    assert list(tried) == [CARRIED, STOPS] and steps[-1].name == "on fresh seeds"
+    assert tried[CARRIED].gain == pytest.approx((8.0,) * 3) and not tried[CARRIED].kept
+    assert "0 % of flights have collisions, 100 % without it; --set radio.kind=links" in tried[CARRIED].verdict
+    assert make(harden.document(lossy, steps[-1]), "hardened").transceiver.name == "constant"
+    sound = load("vasarhelyi_2018/6ms", {"radio.delay": 0.5})
+    assert not any(step.name in (CARRIED, STOPS) for step in harden.harden(sound, range(5)))
+    assert [step.name for step, _, _ in measures([sound])] == [CARRIED]  # nothing is lost
+
+
+def test_carried_forward_is_the_same_radio_but_for_where_neighbours_are_believed_to_be():
+    """Every packet in range arrives, at every decision, as late as before."""
+    given = load("vasarhelyi_2018/4ms", {"radio.delay": 1.0, "radio.range": 500.0})
+    ((_, (carried,), _),) = measures([given])
+    for distance in (0.0, 1.0, 100.0, 499.0):
+        assert received(distance, 0.0, carried.radio) == 1.0
+    assert carried.radio.delay == 1.0 and carried.radio.range == 500.0
+    assert carried.radio.fast_rate * carried.sensors.period >= 1.0  # something at every decision
+
+
+def test_a_study_that_is_not_over_or_in_which_nothing_flies_is_not_hardened(tmp_path):
+    with pytest.raises(ScenarioError, match=r"holds no best.toml: its search is not over, or nothing flies in it"):
+        cli_harden._optima(str(tmp_path), {}, trust=False)
 
 
 def test_what_does_not_fly_is_not_hardened(monkeypatch):

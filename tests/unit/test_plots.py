@@ -7,6 +7,7 @@ import math
 import sys
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import imageio.v3 as iio
 import numpy as np
@@ -21,9 +22,11 @@ import airflock
 from airflock.cli.main import app
 from airflock.core.maths import bell, braking_curve, excess, peak, rising
 from airflock.errors import AirflockError, RecordingError
+from airflock.limits.bounds import look
 from airflock.models import vasarhelyi_2018
 from airflock.plots import flight as flight_view
 from airflock.plots import style
+from airflock.plots.certificate import certificate, tail
 from airflock.plots.exposure import develop, exposure, light
 from airflock.plots.film_stage import Stage
 from airflock.plots.heatmap import heatmap
@@ -634,3 +637,38 @@ def test_tracks_of_one_frame_are_drawn_without_a_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert airflock.plot(tracks).axes
+
+
+@pytest.mark.parametrize(
+    ("distances", "below"),
+    [
+        (lambda u: 10.0 * u, lambda d: d / 10.0),  # evenly spread: a tail that ends at 0 m
+        (lambda u: 10.0 + 2.0 * np.log(u), lambda d: np.exp((d - 10.0) / 2.0)),  # falls by e each 2 m
+    ],
+)
+def test_the_tail_of_a_certificate_is_that_of_distributions_that_are_generalised_pareto(distances, below):
+    values = distances((np.arange(5000) + 0.5) / 5000)
+    at, share = tail(values)
+    assert share[at > 0.0] == pytest.approx(below(at[at > 0.0]), rel=0.1, abs=1e-3)
+    assert share[-1] == pytest.approx(0.2, rel=1e-3) and tail(values[:99]) is None
+
+
+def test_a_certificate_draws_numbers_with_a_factor_and_numbers_from_zero():
+    """No factor leads away from zero: such a number has no bar, and its label says from where to where."""
+    axis = [
+        {"key": "radio.delay", "unit": "s", "nominal": 0.5, "safe": 1.0, "factor": 2.0, "interval": [0.4, 0.7]},
+        {"key": "radio.range", "unit": "m", "nominal": 80.0, "safe": 40.0, "factor": 0.5, "not_shown": 30.0},
+        {"key": "wind.gust", "unit": "m/s", "nominal": 0.0, "safe": 3.0, "not_shown": 4.0},
+    ]
+    limits = SimpleNamespace(verdicts=(), rows=(), tolerance={"axis": axis}, over={}, shown=True)
+    limits.campaign = SimpleNamespace(confidence=0.95, scenario=SimpleNamespace(name="mine"))
+    limits.verdicts = (
+        SimpleNamespace(looks=[look(100, 0, 0.05, 0.05)], probability=0.1, high=0.03, limit=SimpleNamespace(event="x")),
+    )
+    panel = certificate(limits).axes[1]
+    texts = {text.get_text(): text.get_ha() for text in panel.texts}
+    assert texts["1 s"] == "left" and texts["40 m"] == "right" and texts["0 to 3 m/s"] == "left"
+    widths = [bar.get_width() for bar in panel.patches]
+    assert sorted(widths) == pytest.approx([-0.5, 0.0, 1.0])
+    ends = [line.get_xdata() for line in panel.lines if line.get_color() == "black"]
+    assert len(ends) == 1 and ends[0] == pytest.approx([0.8, 1.4])

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from airflock.certify.branches import LineageFlyer
+from airflock.certify.campaign import Campaign
+from airflock.certify.flyer import Flyer
 from airflock.certify.splitting import Lineage, Particle, Repetition, estimate, repetition
+from airflock.evolve.store import Store
+from airflock.limits.limit import read_all
+from airflock.scenarios.files import load
 
 STEPS, HEIGHT = 100, 100.0
 
@@ -65,6 +71,17 @@ def test_a_branch_changes_nothing_before_it():
     assert one.branched(40, 7).branches == ((10, 5), (40, 7)) and one.branched(7, 9).branches == ((7, 9),)
     before, after = (dict(walk(x)) for x in (one, one.branched(60, 8)))
     assert {k: v for k, v in before.items() if k <= 60} == {k: v for k, v in after.items() if k <= 60}
+
+
+def test_splitting_that_goes_on_after_more_flights_takes_no_flight_of_the_one_before_for_its_own(tmp_path, monkeypatch):
+    """It starts from other flights then, so that flights of the same number are other ones."""
+    monkeypatch.setattr("airflock.certify.branches.falls", lambda _, lineage, *rest: [list(f) for f in walk(lineage)])
+    scenario = load("vasarhelyi_2018/real_6ms")
+    with Store(tmp_path) as store:
+        flyer = Flyer(Campaign(scenario, read_all(["r_min<1 at 1e-3/h"], scenario)), store, None)
+        for counted, seed in ((400, 1), (800, 2), (400, 1)):
+            (found,) = LineageFlyer(flyer, 0, 1, counted)(0, [Lineage(seed)])
+            assert found == [list(f) for f in walk(Lineage(seed))]
 
 
 def synthetic(p, ancestors=20):

@@ -56,7 +56,7 @@ def split(flyer: Flyer, counted: Count, threads: int | None = None, where: str =
         return _refused(target, "time ran out before there were enough flights to start from")
     share, runs, period = len(least) // REPETITIONS, [], sample_period(campaign.scenario)
     for number in range(REPETITIONS):
-        fly = LineageFlyer(flyer, number, threads)
+        fly = LineageFlyer(flyer, number, threads, len(counted.rows))
         mine = range(number * share, (number + 1) * share)
         rng = np.random.default_rng([int(campaign.hash[:12], 16), number])
 
@@ -108,16 +108,20 @@ class TimeOver(Exception):
 
 
 class LineageFlyer:
-    """Flies lineages of one repetition, and keeps how their distances fell."""
+    """Flies lineages of one repetition, and keeps how their distances fell.
 
-    def __init__(self, flyer: Flyer, number: int, threads: int | None):
-        self.flyer, self.number, self.threads = flyer, number, threads
+    counted : flights from which splitting starts; from more of them it starts anew
+    """
+
+    def __init__(self, flyer: Flyer, number: int, threads: int | None, counted: int):
+        self.flyer, self.number, self.threads, self.counted = flyer, number, threads, counted
 
     def __call__(self, batch: int, lineages: list[Lineage]) -> list[Falls]:
         """How the smallest distance fell in each flight; batch -1 is the start. Raises TimeOver."""
         from airflock.threads import in_threads
 
-        place, campaign, store = Batch("split", self.number, batch + 1), self.flyer.campaign, self.flyer.store
+        campaign, store = self.flyer.campaign, self.flyer.store
+        place = Batch(f"split of {self.counted}", self.number, batch + 1)
         flown = {i: values for (i, _), values in store.flown(place).items() if values is not None}
         missing = [i for i in range(len(lineages)) if i not in flown]
         if missing and self.flyer.time_over:

@@ -23,10 +23,11 @@ CHECKED = 100  # every so many flights one is kept for a check
 FEWEST = 20  # of them at least, where there are so many
 WORST = 5  # flights of each limit
 UNIT_WORDS = {"h": "per flock hour", "drone-h": "per drone hour", "flight": "per flight"}
+ALONE = "the confidence covers chance within this scenario,"
 NOT_SAID = (
     "the model was flown, not an aircraft: a collision here is a distance between two centres",
     "only the faults that the scenario contains are covered; no pilot, and no GNSS jump that hits all at once",
-    "the confidence covers chance within this scenario, not numbers that are wrong in it",
+    f"{ALONE} not numbers that are wrong in it",
     "this is not an airworthiness or SORA document",
 )
 
@@ -106,7 +107,7 @@ class Certificate:
             "shown": self.shown,
             "statements": self.statements,
             "confidence": c.confidence,
-            "not_said": list(NOT_SAID),
+            "not_said": self.not_said,
             "limit": [entry(c, verdict, self.hazards.get(i)) for i, verdict in enumerate(self.verdicts)],
             "flights": {
                 "count": len(self.rows),
@@ -165,6 +166,11 @@ class Certificate:
 
         return checked(self.document(), "certificate", scenario=self.campaign.scenario, threads=threads)
 
+    @property
+    def not_said(self) -> list[str]:
+        """What it does not say."""
+        return not_said(self.campaign)
+
     def __repr__(self) -> str:
         said = "shown" if self.shown else "not shown"
         return f"<Certificate of {self.campaign.scenario.name}: {said}; {' '.join(self.statements)}>"
@@ -178,8 +184,16 @@ class Certificate:
         ]
         rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in cells)
         table = f"<table><tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>{rows}</table>"
-        notes = "".join(f"<li>{escape(text)}</li>" for text in (*self.statements, *NOT_SAID))
+        notes = "".join(f"<li>{escape(text)}</li>" for text in (*self.statements, *self.not_said))
         return f"<p><b>{escape(self.campaign.scenario.name)}</b></p>{table}<ul>{notes}</ul>"
+
+
+def not_said(campaign: Campaign) -> list[str]:
+    """What a certificate does not say, with the numbers whose intervals were flown."""
+    if not campaign.intervals:
+        return list(NOT_SAID)
+    flown = f"the confidence covers chance, and {', '.join(campaign.intervals)} anywhere in the given intervals, but"
+    return [text.replace(ALONE, flown) for text in NOT_SAID]
 
 
 def value(row: Mapping[str, Any], score: str) -> float:

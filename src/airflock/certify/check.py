@@ -1,20 +1,23 @@
 """Check: a certificate read again, one flight in a hundred flown again, and its bounds computed again."""
 
+import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
 from airflock import __version__
 from airflock.certify.campaign import Campaign
 from airflock.certify.certificate import FORMAT, digest, seal
+from airflock.certify.counting import due
 from airflock.certify.flights import score_of
 from airflock.certify.seeds import COUNT, seed
 from airflock.errors import StudyError
 from airflock.evolve.folder import versions
 from airflock.limits.bounds import look
-from airflock.limits.limit import read_all
+from airflock.limits.limit import Limit, read_all
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.untrusted import from_outside, own_path, read_toml
@@ -185,7 +188,22 @@ def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
         right = abs(high - entry["high"]) <= 1e-9 * high and abs(low - entry["low"]) <= 1e-9 and shown == entry["shown"]
         if not right or paid > campaign.alpha * (1.0 + 1e-9):
             faults.append(f"limit '{limit.text}': its bounds do not follow from its counts")
+        elif not _fixed(told, campaign, limit, int(document["flights"]["count"])):
+            faults.append(f"limit '{limit.text}': its looks are not those that the limit fixes")
     return faults
+
+
+def _fixed(told: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: Limit, count: int) -> bool:
+    """Whether looks are the first of those that a limit fixes, at flights that there are, and no event is undone."""
+    known = list(islice(due(campaign, limit), len(told)))
+    sizes = [(flights, above, below) for flights, _, above, below in told]
+    same = len(known) == len(told) and all(
+        each[0] == right[0] and all(math.isclose(a, b, rel_tol=1e-9) for a, b in zip(each[1:], right[1:], strict=True))
+        for each, right in zip(sizes, known, strict=True)
+    )
+    events = [0, *(events for _, events, _, _ in told)]
+    grow = all(old <= new for old, new in pairwise(events))
+    return same and grow and all(events <= flights <= count for flights, events, _, _ in told)
 
 
 def _flown_again(

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
@@ -133,11 +133,11 @@ class _Counting:
             rows.append(self.scores[len(rows)])
             for i, verdict in enumerate(verdicts):
                 self.events[i] += verdict.limit.happened(rows[-1])
-                due = _next(self.campaign, verdict)
-                if due is not None and due[0] == len(rows):
-                    verdict.looks.append(look(len(rows), self.events[i], *due[1:]))
+                coming = _next(self.campaign, verdict)
+                if coming is not None and coming[0] == len(rows):
+                    verdict.looks.append(look(len(rows), self.events[i], *coming[1:]))
         still = [verdict for verdict in verdicts if _open(self.campaign, verdict)]
-        self.aims = [due[0] for verdict in still if (due := _next(self.campaign, verdict))]
+        self.aims = [coming[0] for verdict in still if (coming := _next(self.campaign, verdict))]
         self._note()
         left = self.flyer.left
         if not still or left <= 0.0:
@@ -185,13 +185,18 @@ def _open(campaign: Campaign, verdict: Verdict) -> bool:
     return not verdict.shown and not verdict.refuted
 
 
-def _next(campaign: Campaign, verdict: Verdict) -> tuple[int, float, float] | None:
-    """Flights at the next look, and the error probabilities spent on its upper and on its lower bound."""
+def due(campaign: Campaign, limit: Limit) -> Iterator[tuple[int, float, float]]:
+    """All looks at a limit: flights, and the error probabilities spent on the upper and on the lower bound."""
+    probability = campaign.probability(limit)
     if campaign.flights:
-        return None if verdict.looks else (campaign.flights, campaign.alpha, campaign.alpha)
-    if verdict.probability is None:  # `run` gives every campaign without a rate a number of flights
-        return None
-    return next(islice(schedule(verdict.probability, campaign.alpha), len(verdict.looks), None))
+        yield campaign.flights, campaign.alpha, campaign.alpha
+    elif probability is not None:  # `run` gives every campaign without a rate a number of flights
+        yield from schedule(probability, campaign.alpha)
+
+
+def _next(campaign: Campaign, verdict: Verdict) -> tuple[int, float, float] | None:
+    """The next look."""
+    return next(islice(due(campaign, verdict.limit), len(verdict.looks), None), None)
 
 
 def least(campaign: Campaign, limit: Limit) -> int:

@@ -7,10 +7,9 @@ from typing import Any
 
 from airflock.certify.flyer import Flyer
 from airflock.certify.seeds import MAP
-from airflock.certify.tolerance import Screen, level_of
+from airflock.certify.tolerance import Screen, batch_of, level_of
 from airflock.errors import ScenarioError
 from airflock.evolve.space import declared
-from airflock.evolve.store import Batch
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
 
@@ -42,18 +41,21 @@ def sound_axes(scenario: Scenario, axes: Mapping[str, Sequence[float]]) -> dict[
 def bounds_over(flyer: Flyer, axes: Mapping[str, Sequence[float]]) -> dict[str, Any]:
     """Verdict and bounds of every cell, on seeds that all cells share.
 
-    Returns plain values: level, keys, values, and for each cell values, verdict, low, high (per flight), flights.
+    Returns plain values: level, keys, their units, values, and for each cell values, verdict, low, high (per flight),
+    flights.
     """
     screen = Screen(flyer, level_of(flyer.campaign), MAP)
     cells = []
     for number, values in enumerate(product(*axes.values())):
         flyer.say(f"map: cell {number + 1} of {math.prod(len(v) for v in axes.values())}")
         parameters = dict(zip(axes, values, strict=True))
-        batch = Batch("map", 0, number)
+        batch = batch_of("map", parameters)
         flyer.store.ask(batch, [list(values)], [parameters])
         verdict, found = screen.judged(batch, parameters)
         cell: dict[str, Any] = {"values": list(values), "verdict": verdict, "low": 0.0, "high": 1.0, "flights": 0}
         if found is not None:
             cell |= {"low": found.low, "high": found.high, "flights": found.flights, "events": found.events}
         cells.append(cell)
-    return {"level": screen.level, "keys": list(axes), "axes": [list(v) for v in axes.values()], "cell": cells}
+    units = [declared(flyer.campaign.scenario)[key][0].unit for key in axes]
+    told: dict[str, Any] = {"level": screen.level, "keys": list(axes), "units": units}
+    return told | {"axes": [list(values) for values in axes.values()], "cell": cells}

@@ -9,8 +9,6 @@ def show(certificate: Any) -> None:
     """Print all that it says, and what it does not say."""
     from rich.console import Console
 
-    from airflock.certify.certificate import NOT_SAID
-
     console = Console()
 
     def line(text: str, **how: Any) -> None:
@@ -29,7 +27,7 @@ def show(certificate: Any) -> None:
     _map(console, certificate.over)
     for text in certificate.splitting.get("statements", ()):
         line(text)
-    line(f"Not said: {'; '.join(NOT_SAID)}.", style="dim")
+    line(f"Not said: {'; '.join(certificate.not_said)}.", style="dim")
 
 
 def _verdicts(console: Any, certificate: Any) -> None:
@@ -75,11 +73,14 @@ def _tolerances(console: Any, tolerance: Any) -> None:
     title = f"safe: fewer than {level:g} % of flights with an event ({confidence:g} %)"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("number", "nominal", "safe to", "factor", "not shown at", "flights", ""):
-        table.add_column(name, justify="left" if name in ("number", "") else "right")
+        table.add_column(
+            name, justify="left" if name in ("number", "") else "right", no_wrap=name == "number", overflow="fold"
+        )
     for axis in tolerance["axis"]:
         bad = tables.number(axis["not_shown"]) if "not_shown" in axis else ""
+        factor = f"{axis['factor']:.3g}" if "factor" in axis else ""
         table.add_row(
-            axis["key"], tables.number(axis["nominal"]), tables.number(axis["safe"]), f"{axis['factor']:.3g}", bad,
+            axis["key"], tables.number(axis["nominal"]), tables.number(axis["safe"]), factor, bad,
             f"{axis['flights']:,}", axis.get("note", ""),
         )  # fmt: skip
     console.print(table)

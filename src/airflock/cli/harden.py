@@ -105,6 +105,8 @@ def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
     from airflock.scenarios.files import load
 
     folder = Path(where)
+    if folder.is_dir() and not (folder / BEST).is_file():
+        raise ScenarioError([f"{where}: holds no {BEST}: its search is not over, or nothing flies in it"])
     files = [folder / BEST, *further_best(folder)] if folder.is_dir() else [where]
     return [load(path, settings, trust=trust) for path in files]
 

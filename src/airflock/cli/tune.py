@@ -30,7 +30,9 @@ def tune(
             show_default="collisions and contacts with walls at 0.01/h each",
         ),
     ] = None,
-    confidence: Annotated[float, typer.Option(help="Confidence of the certificate.")] = 0.95,
+    confidence: Annotated[
+        float | None, typer.Option(help="Confidence of the certificate.", show_default="0.95")
+    ] = None,
     like: Annotated[
         str | None,
         typer.Option(
@@ -43,7 +45,9 @@ def tune(
     warm: Annotated[
         bool, typer.Option("--warm", help="Start the search at the scaled numbers, not in the middle of all ranges.")
     ] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the work in the folder.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the work in the folder; --limit may be left out.")
+    ] = False,
     changes: options.Set = None,
     trust: options.Trust = False,
     agents: options.Agents = None,
@@ -62,6 +66,7 @@ def tune(
     """
     from airflock.scenarios.files import load
     from airflock.tune.run import tune
+    from airflock.tune.start import start_of
 
     faults: list[str] = []
     seconds, base = 1.0, None
@@ -76,7 +81,7 @@ def tune(
             base = load(like or scenario[0], options.settings(changes, agents, duration), trust=trust)
     options.refuse(faults)
     assert base is not None
-    tables.say_notes(base.notes)
+    tables.say_notes(start_of(base)[0].notes if like is None else base.notes)  # as it will fly
     options.compile_first(base, 32, "cpu")
     what: Any = base if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}

@@ -16,17 +16,29 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from airflock.errors import ScenarioError
 from airflock.evolve.folder import plain
 from airflock.evolve.intervals import interval
 from airflock.evolve.landscape import ZERO, why_zero
+from airflock.evolve.measures import measures
 from airflock.evolve.objective_table import read_limits
 from airflock.evolve.safe import allowed, excess
 from airflock.evolve.search_table import Search
 from airflock.evolve.space import declared
-from airflock.evolve.steps import RECIPE, ROOM, Measured, Step, Table, against, flown, moved, recipe
+from airflock.evolve.steps import (
+    RECIPE,
+    ROOM,
+    Measured,
+    Step,
+    Table,
+    against,
+    flown,
+    joined,
+    moved,
+    recipe,
+    rows_of,
+    together,
+)
 from airflock.limits.chance import chance
 from airflock.limits.limit import Limit
 from airflock.scenarios import formats
@@ -38,7 +50,7 @@ SLACK = 0.02  # by which the mean of one may fall, and the share of flights with
 COST = 0.05  # of fitness, at most
 WALLS = ("clearance", "phi_wall", "n_contacts")  # scores of what flies into walls and obstacles
 ROUNDS = 3  # of fresh seeds: 4 % of flights with a contact pass 60 seeds in 30 % of all cases, 180 in 7 %
-MOST = 19  # rounds of flights, with all whole and half steps and the fresh seeds
+MOST = 22  # rounds of flights, with all whole and half steps, the fresh seeds and measures beside the law
 RESERVE = Search().reserve  # how many times rarer than allowed an event is to look, as in a search
 
 
@@ -77,8 +89,9 @@ def harden(
     Returns
     -------
     list of Measured
-        The optimum, each step that was tried with whether it was kept and why, and last what is left on fresh seeds:
-        parameters, fitness, r_min (m), what it costs and gains, partial fitnesses, contacts with walls.
+        The optimum, each step that was tried with whether it was kept and why, where agents still come too near what
+        measures beside the law would gain (`evolve.measures`), and last what is left on fresh seeds: parameters,
+        fitness, r_min (m), what it costs and gains, partial fitnesses, contacts with walls.
 
     Raises
     ------
@@ -112,8 +125,8 @@ def harden(
         found += trial.tried(step)
     for step in ROOM if trial.touches() and not touched else ():
         found += trial.tried(step)
-    found.append(trial.on_fresh_seeds())
-    return found
+    last = trial.on_fresh_seeds()
+    return [*found, *trial.beside(), last]
 
 
 class _Trial:
@@ -193,11 +206,26 @@ class _Trial:
             after = self._lasting(before)
             if not after:
                 self.kept.pop()
+                self.table = []
         parameters = self.kept[-1][1]
-        was, now = (together(_joined(rounds)) for rounds in (before, after or before))
+        was, now = (together(joined(rounds)) for rounds in (before, after or before))
         left = [step.name for step, _ in self.kept[1:]]
         said = f"kept: {', '.join(left)}" if left else "no step was kept: the optimum is unchanged"
         return replace(against(was, now, Step("on fresh seeds", {}, said), parameters), verdict=said, kept=bool(left))
+
+    def beside(self) -> list[Measured]:
+        """What measures beside the numbers of the law would gain for what was kept, where agents come too near."""
+        now, parameters = self.table or self._fly(self.kept[-1][1], self.seeds), self.kept[-1][1]
+        before, near = together(now), [limit for limit in self.limits if limit not in self.at_walls]
+        if not (before["n_coll"] > 0.0).any() and self._excess(now, near) == 0.0:
+            return []
+        found = []
+        for step, scenarios, said in measures(self.scenarios):
+            after = together([flown(each, [parameters], self.seeds, self.threads, self.done)[0] for each in scenarios])
+            was, is_now = (100.0 * float((table["n_coll"] > 0.0).mean()) for table in (before, after))
+            verdict = f"no part of the set: {is_now:.0f} % of flights have collisions, {was:.0f} % without it; {said}"
+            found.append(replace(against(before, after, step, parameters), kept=False, verdict=verdict))
+        return found
 
     def _lasting(self, before: list[list[Table]]) -> list[list[Table]]:
         """Rounds of flights with what is kept, none if they break what held; `before` is of the optimum and grows."""
@@ -206,7 +234,7 @@ class _Trial:
             if len(before) < count:
                 before.append(self._fly(self.kept[0][1], seeds))
             after.append(self._fly(self.kept[-1][1], seeds))
-            if self._broken(_joined(before[:count]), _joined(after)):
+            if self._broken(joined(before[:count]), joined(after)):
                 return []
         return after
 
@@ -224,7 +252,7 @@ class _Trial:
         """Which limit a step breaks that was kept, or breaks more than before, in words; empty if none."""
         for limit in self.limits:
             most = allowed(limit, scenario)
-            was, now = (chance(limit, _rows(table)) for table in (before, after))
+            was, now = (chance(limit, rows_of(table)) for table in (before, after))
             if now > max(was, most / RESERVE):
                 return f"undone: {limit.event} in about {now:.2g} of flights, before {was:.2g}; allowed are {most:.2g}"
         return ""
@@ -235,30 +263,9 @@ class _Trial:
 
     def _excess(self, tables: Sequence[Table], limits: Sequence[Limit]) -> float:
         return math.fsum(
-            float(excess(limits, scenario, [_rows(table)], RESERVE)[0])
+            float(excess(limits, scenario, [rows_of(table)], RESERVE)[0])
             for scenario, table in zip(self.scenarios, tables, strict=True)
         )
-
-
-def _rows(table: Table) -> list[dict[str, float]]:
-    """Scores of each flight, from a table of them."""
-    names = list(table)
-    return [dict(zip(names, row, strict=True)) for row in np.array([table[name] for name in names]).T.tolist()]
-
-
-def _joined(rounds: Sequence[Sequence[Table]]) -> list[Table]:
-    """One table for each scenario, of the flights of all rounds."""
-    return [
-        {name: np.concatenate([t[name] for t in tables]) for name in tables[0]} for tables in zip(*rounds, strict=True)
-    ]
-
-
-def together(tables: Sequence[Table]) -> Table:
-    """One table of the flights in all scenarios, of what is measured in each of them."""
-    if len(tables) == 1:
-        return tables[0]
-    names = [name for name in tables[0] if all(name in table for table in tables)]
-    return {name: np.concatenate([table[name] for table in tables]) for name in names}
 
 
 def _broken(before: Table, after: Table) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.core.parameters import Quantity, declarations
+from airflock.scenarios.faulty import Entry
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER
 
@@ -139,14 +140,27 @@ def _order(axes: Sequence[Axis]) -> list[int]:
 
 
 def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scenario:
-    """The scenario with other numbers, without reading it again. Raises ParameterError outside declared ranges."""
+    """The scenario with other numbers, without reading it again. Raises ParameterError outside declared ranges.
+
+    Of faults, faults[0].per_hour and faults[0].number can be changed.
+    """
     changed: dict[str, dict[str, float]] = {}
     for key, value in parameters.items():
         section, _, name = key.rpartition(".")
         changed.setdefault(section, {})[name] = value
     fields = {section.key: section.field for section in ORDER}
     records = scenario.records
+    befalls = {section: changed.pop(section) for section in list(changed) if section.startswith("faults[")}
+    if befalls:
+        entries = (_befallen(entry, befalls.get(f"faults[{i}]", {})) for i, entry in enumerate(scenario.faults))
+        scenario = replace(scenario, faults=tuple(entries))
     return replace(scenario, **{fields[s]: replace(records[s], **values) for s, values in changed.items()})
+
+
+def _befallen(entry: Entry, values: Mapping[str, float]) -> Entry:
+    """An entry of faults with other numbers; that of agents is whole."""
+    number = round(values["number"]) if "number" in values else entry.number
+    return replace(entry, per_hour=values.get("per_hour", entry.per_hour), number=number)
 
 
 def declared(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:

@@ -173,3 +173,24 @@ def against(
     fitness, near, hits = (float(after[name].mean()) for name in ("fitness", "r_min", "n_coll"))
     cost, gain = (mean, low, high), (won, least, most)
     return Measured(step.name, step.reason, parameters, fitness, near, hits, cost, gain, parts, contacts, room)
+
+
+def rows_of(table: Table) -> list[dict[str, float]]:
+    """Scores of each flight, from a table of them."""
+    names = list(table)
+    return [dict(zip(names, row, strict=True)) for row in np.array([table[name] for name in names]).T.tolist()]
+
+
+def joined(rounds: Sequence[Sequence[Table]]) -> list[Table]:
+    """One table for each scenario, of the flights of all rounds."""
+    return [
+        {name: np.concatenate([t[name] for t in tables]) for name in tables[0]} for tables in zip(*rounds, strict=True)
+    ]
+
+
+def together(tables: Sequence[Table]) -> Table:
+    """One table of the flights in all scenarios, of what is measured in each of them."""
+    if len(tables) == 1:
+        return tables[0]
+    names = [name for name in tables[0] if all(name in table for table in tables)]
+    return {name: np.concatenate([table[name] for table in tables]) for name in names}

@@ -17,6 +17,7 @@ FORM = re.compile(rf"\s*(\w+)\s*(<=|>=|<|>)\s*({NUMBER})\s*(?:(at|in)\s*({NUMBER
 UNITS = {"h": "h", "flock hour": "h", "hour": "h", "drone-h": "drone-h", "drone hour": "drone-h", "flight": "flight"}
 OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 EXAMPLES = "write SCORE<VALUE at RATE/h, such as 'r_min<1 at 1e-3/h', or SCORE>=VALUE in SHARE, as 'phi_vel>=3 in 99%'"
+RAREST = 1e-18  # probability per flight below which a limit is a slip of the pen
 OF_R_COLL = ("n_coll", "phi_coll", "f_coll", "fitness")  # scores that metrics.r_coll changes
 
 
@@ -103,7 +104,12 @@ def read(text: str, scenario: Scenario) -> Limit:
         fault = "a distance must be above 0 m"
     if fault:
         raise ScenarioError([f"{where}: {fault}"])
-    return Limit(text.strip(), score, sign, float(value), often, unit, timed)
+    limit = Limit(text.strip(), score, sign, float(value), often, unit, timed)
+    allowed = limit.probability(scenario.flight.duration / 3600.0, scenario.agents)
+    if allowed is not None and not RAREST <= allowed < 1.0:
+        said = "every flight may have it" if allowed >= 1.0 else "no number of flights could show that"
+        raise ScenarioError([f"{where}: allows the event in {allowed:g} of flights: {said}"])
+    return limit
 
 
 def _lasting(scenario: Scenario, score: str, sign: str, value: float) -> bool:
@@ -132,6 +138,12 @@ def read_all(texts: list[str], scenario: Scenario) -> tuple[Limit, ...]:
         faults.append(
             f"limits: {others[0]} is measured with metrics.r_coll = {scenario.metrics.r_coll:g} m, and r_min<"
             f"{max(radii):g} asks for more; certify them apart, or set metrics.r_coll = {max(radii):g}"
+        )
+    often = scenario.metrics.collision_period
+    if radii and others and often is not None and often > scenario.flight.dt:
+        faults.append(
+            f"limits: {others[0]} is measured every metrics.collision_period = {often:g} s, and r_min at every motion "
+            "step; certify them apart, or leave out metrics.collision_period"
         )
     events = [limit.event for limit in found]
     faults += [f"limit '{event}': given twice" for event in dict.fromkeys(events) if events.count(event) > 1]

@@ -4,15 +4,16 @@ import math
 
 from airflock.certify.campaign import Campaign
 from airflock.certify.counting import least
+from airflock.certify.run import COUNTED
 from airflock.tune.plan import CERTIFY, Plan
 
 
 def infeasible(campaign: Campaign, plan: Plan) -> list[str]:
     """A line for each limit that the plan's flights could not show even if nothing ever happened in them."""
-    able = int(plan.seconds * plan.rate)
+    able = int(COUNTED * plan.seconds * plan.rate)
     return [
         f"{limit.text}: needs {flights:,} flights without an event to be shown, and there is time for {able:,}; "
-        f"give --budget {_time(1.1 * flights / plan.rate / CERTIFY)}, or ask for a larger limit"
+        f"give --budget {_time(1.1 * flights / plan.rate / CERTIFY / COUNTED)}, or ask for a larger limit"
         for limit in campaign.limits
         if (flights := least(campaign, limit)) > able
     ]

@@ -10,7 +10,7 @@ from airflock.evolve.folder import read, write
 from airflock.evolve.steps import Measured
 from airflock.scenarios import formats
 from airflock.scenarios.scenario import Scenario
-from airflock.tune.plan import Plan
+from airflock.tune.plan import CONFIDENCE, Plan
 from airflock.tune.result import PLAN, START
 from airflock.untrusted import from_outside, json_object, read_text
 
@@ -52,7 +52,9 @@ def read_plan(path: Path) -> tuple[Plan, str]:
     found = read(path)
     try:
         search = {str(key): value for key, value in found["search"].items()}
-        made = Plan(search, int(found["seeds"]), float(found["seconds"]), float(found["rate"]))
+        limits = [str(text) for text in found.get("limits", ())]
+        sure = float(found.get("confidence", CONFIDENCE))
+        made = Plan(search, int(found["seeds"]), float(found["seconds"]), float(found["rate"]), limits, sure)
     except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
         raise StudyError(f"{path}: is damaged: no plan of a tuning is in it; give another --out") from fault
     if not (0 < made.seeds <= MOST_SEEDS and 0.0 <= made.seconds < 1e9 and 0.0 < made.rate < 1e9):

@@ -1,21 +1,27 @@
 """What to do with a tuned set: watch its worst flights, and prepare the first real one."""
 
+from itertools import zip_longest
+
 from airflock.core.parameters import declarations, with_unit
 from airflock.errors import CardError
 from airflock.evolve.space import with_parameters
 from airflock.tune.result import TUNED, Tuned
 
-REPLAYS = 3  # of the worst flights, at most
+REPLAYS = 3  # of the worst flights; more where there are more limits
 SHOWN = ("speed_max", "accel", "response", "brake", "soft_margin", "base", "mission_time")  # limits that the set moves
 
 
 def replays(found: Tuned) -> dict[int, str]:
-    """Seed → file beside the report that plays this flight; of the worst flights of each limit, the worst first."""
+    """Seed → file beside the report that plays this flight: the worst of each limit, then their second worst."""
     from airflock.recordings.flights import simulate
     from airflock.replays.build import replay
 
     made = found.certificate
-    seeds = list(dict.fromkeys(int(entry["seed"]) for entry in made.worst))[:REPLAYS]
+    of_limit: dict[str, list[int]] = {}
+    for entry in made.worst:
+        of_limit.setdefault(str(entry["limit"]), []).append(int(entry["seed"]))
+    in_turn = [seed for row in zip_longest(*of_limit.values()) for seed in row if seed is not None]
+    seeds = list(dict.fromkeys(in_turn))[: max(REPLAYS, len(of_limit))]
     written = {}
     for number, seed in enumerate(seeds, 1):
         flown = with_parameters(found.scenario, made.campaign.parameters(seed))

@@ -1,6 +1,6 @@
 """Plan: how a budget of time is shared between searching, hardening and certifying; written once, then kept."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from airflock import __version__
@@ -13,6 +13,7 @@ LEAST = 6  # generations
 FLIGHTS = 2  # of a candidate: from two on, chance can be told from merit
 AVERAGES = 2  # of the last means of the search, which also fly in its final
 USUAL = 100  # flights of a finalist
+CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -21,12 +22,15 @@ class Plan:
 
     search : keys of the table [search]; seeds: flights of each step of hardening; seconds: of certifying
     rate   : flights per second that the plan was made with
+    limits, confidence : what is to be shown; goes on with these unless others are given
     """
 
     search: dict[str, Any]
     seeds: int
     seconds: float
     rate: float
+    limits: list[str] = field(default_factory=list)
+    confidence: float = CONFIDENCE
 
     def document(self) -> dict[str, Any]:
         """The plan as plain values."""

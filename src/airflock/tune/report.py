@@ -2,6 +2,7 @@
 
 import base64
 import io
+import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -20,6 +21,7 @@ from airflock.plots.certificate import certificate
 from airflock.plots.convergence import convergence
 from airflock.scenarios.portrait import sentence
 from airflock.tune.assumed import defaults, said
+from airflock.tune.flown import circumstances, flights
 from airflock.tune.next_flight import card, replays
 from airflock.tune.result import STUDY, Tuned
 
@@ -69,6 +71,7 @@ def page(found: Tuned, pictures: Sequence[str], captions: Sequence[str], shows: 
         *_summary(found),
         *_assumed(found),
         *_identified(found.identified),
+        *_flown(found),
         *_searched(found),
         *_hardened(found),
         *_certified(found),
@@ -105,6 +108,15 @@ def _assumed(found: Tuned) -> list[str]:
     ]
 
 
+def _flown(found: Tuned) -> list[str]:
+    """How many flights each stage flew on which seeds, and how."""
+    return [
+        "<h2>What was flown</h2>",
+        _table(("for", "flights", "seeds"), flights(found)),
+        _list(circumstances(found)),
+    ]
+
+
 def _searched(found: Tuned) -> list[str]:
     """What the search found: fitness, limits, and each number before and after."""
     r, before = found.result, declared(found.start)
@@ -130,14 +142,29 @@ def _searched(found: Tuned) -> list[str]:
 def _hardened(found: Tuned) -> list[str]:
     """What each step of hardening cost and gained."""
     rows = [
-        (s.name, f"{s.fitness:.3f}", f"{s.cost[0]:.3f}", f"{s.r_min:.2f} m", f"{s.gain[0]:.2f} m", s.verdict)
+        (s.name, f"{s.fitness:.3f}", _between(s.cost, ".3f"), f"{s.r_min:.2f}", _between(s.gain, ".2f"),
+         _known(100.0 * s.contacts, ".1f"), _known(s.clearance, ".2f"), s.verdict)
         for s in found.steps
-    ]
-    heads = ("step", "fitness", "cost", "r_min", "gain", "verdict")
+    ]  # fmt: skip
+    heads = (
+        "step", "fitness", "cost (95 %)", "smallest distance, m", "gain, m (95 %)", "flights with a contact, %",
+        "room at walls, m", "verdict",
+    )  # fmt: skip
     return [
         "<h2>What hardening cost and gained</h2>",
         _table(heads, rows) if rows else f"<p>Not hardened: {escape(found.why)}</p>",
     ]
+
+
+def _between(told: tuple[float, float, float], form: str) -> str:
+    """A mean with its interval."""
+    mean, low, high = (format(value, form) for value in told)
+    return f"{mean} ({low} to {high})"
+
+
+def _known(value: float, form: str) -> str:
+    """A number, or nothing where nobody looked."""
+    return "" if math.isnan(value) else format(value, form)
 
 
 def _certified(found: Tuned) -> list[str]:
@@ -150,7 +177,9 @@ def _certified(found: Tuned) -> list[str]:
     ]
     rows = [
         (a["key"], with_unit(f"{a['nominal']:.4g}", a["unit"]), with_unit(f"{a['safe']:.4g}", a["unit"]),
-         f"{a['factor']:.3g}", a.get("note", ""))
+         f"{a['factor']:.3g}" if "factor" in a else "",
+         with_unit(f"{a['not_shown']:.4g}", a["unit"]) if "not_shown" in a else "", f"{a['flights']:,}",
+         a.get("note", ""))
         for a in made.tolerance.get("axis", ())
     ]  # fmt: skip
     return [
@@ -158,7 +187,11 @@ def _certified(found: Tuned) -> list[str]:
         made._repr_html_(),
         _list(hazards),
         "<h2>How far numbers may change</h2>",
-        _table(("number", "nominal", "safe to", "factor", ""), rows)
+        f"<p>One number at a time; safe is where fewer than {100.0 * made.tolerance['level']:g} % of flights are shown "
+        f"to have an event, with {100.0 * made.tolerance['confidence']:g} % confidence at each value.</p>"
+        if rows
+        else "",
+        _table(("number", "nominal", "safe to", "factor", "not shown at", "flights", ""), rows)
         if rows
         else f"<p>{escape(str(made.tolerance.get('reason', 'not asked for')))}</p>",
     ]

@@ -4,20 +4,23 @@ import math
 import os
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from airflock.certify.request import campaign_of
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.bounds import usual_space
+from airflock.evolve.run import Interrupted
 from airflock.evolve.safe import flights_that_count
 from airflock.evolve.search import Watch
+from airflock.metrics.registry import numbers_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.feasible import infeasible
 from airflock.tune.folder import keep_plan, kept_plan
 from airflock.tune.logs import TOLD, FromLogs, Paths, identified
-from airflock.tune.plan import plan_of
+from airflock.tune.plan import CONFIDENCE, plan_of
 from airflock.tune.result import Tuned
 from airflock.tune.stages import Note, certificate, hardening, rate_of, search
 from airflock.tune.start import has_walls, start_of
@@ -32,7 +35,7 @@ def tune(
     *,
     budget: float = 1200.0,
     limit: Sequence[str] = (),
-    confidence: float = 0.95,
+    confidence: float | None = None,
     like: Scenario | str | os.PathLike[str] | None = None,
     heard: str | os.PathLike[str] | None = None,
     warm: bool = False,
@@ -58,8 +61,8 @@ def tune(
         What is to be shown, as `airflock.certify` takes it; by default that collisions (`metrics.r_coll`) are rarer
         than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
         that look as if they kept these limits before all others.
-    confidence : float
-        Confidence of the certificate, in (0, 1).
+    confidence : float, optional
+        Confidence of the certificate, in [0.5, 1); by default 0.95.
     like : Scenario, str or path, optional
         The scenario whose law, field and speed are tuned with the numbers that the logs tell of the drones.
     heard : str or path, optional
@@ -67,7 +70,7 @@ def tune(
     warm : bool
         Search from the start's own numbers on, which its speed scales, instead of the middle of all ranges.
     resume : bool
-        Continue the work in the folder.
+        Continue the work in the folder; limits and confidence that are not given are as in the first call.
     settings : mapping, optional
         Keys of the scenario to change.
     threads : int, optional
@@ -103,12 +106,14 @@ def tune(
     folder = own_path(out)
     mine, logs = _mine(folder, scenario, like, heard, settings, trust)
     start, notes = start_of(mine)
-    limits = list(limit) or usual_limits(start)
-    asked = campaign_of(start, limits, confidence)  # refused before anything flies
-    telling = flights_that_count([each for each in asked.limits if each.rate is not None], start)
     plan = kept_plan(folder, start, resume)
+    limits = list(limit) or (plan.limits if plan else []) or usual_limits(start)
+    sure = (plan.confidence if plan else CONFIDENCE) if confidence is None else confidence
+    asked = campaign_of(start, limits, sure)  # refused before anything flies
+    telling = flights_that_count([each for each in asked.limits if each.rate is not None], start)
     if plan is None:
-        plan = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling)
+        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling)
+        plan = replace(made, limits=limits, confidence=sure)
         keep_plan(folder, start, plan)
     searched = [each.text for each in asked.limits if each.rate is not None]
     if logs is not None and not (folder / TOLD).is_file():
@@ -116,23 +121,26 @@ def tune(
     short = infeasible(asked, plan)
     for line in short:
         _say(note, line)
-    _say(note, STAGES[0])
-    result = search(folder, start, plan, searched, threads, watch)
     notes = [*notes, *usual_space(start)[1], *short]
-    if result.dead:
-        raise StudyError(f"{mine.name}: {result.dead}")
-    _say(note, STAGES[1])
-    tuned, steps, why = hardening(folder, plan, searched, threads, trust)
-    _say(note, STAGES[2])
-    shown = certificate(folder, tuned, limits, confidence, plan, threads, note)
-    found = Tuned(
-        folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
-        {} if logs is None else logs.told,
-    )  # fmt: skip
-    _say(note, STAGES[3])
-    from airflock.tune.report import save
+    try:
+        _say(note, STAGES[0])
+        result = search(folder, start, plan, searched, threads, watch)
+        if result.dead:
+            raise StudyError(f"{mine.name}: {result.dead}")
+        _say(note, STAGES[1])
+        tuned, steps, why = hardening(folder, plan, searched, threads, trust)
+        _say(note, STAGES[2])
+        shown = certificate(folder, tuned, limits, sure, plan, threads, note)
+        found = Tuned(
+            folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
+            {} if logs is None else logs.told,
+        )  # fmt: skip
+        _say(note, STAGES[3])
+        from airflock.tune.report import save
 
-    save(found)
+        save(found)
+    except KeyboardInterrupt as stop:
+        raise Interrupted(f"interrupted: stages that are over are kept in {folder}; continue with --resume") from stop
     return found
 
 
@@ -160,7 +168,15 @@ def _mine(
 
 
 def usual_limits(scenario: Scenario) -> list[str]:
-    """Collisions, and contacts where there are walls or obstacles, rarer than once in a hundred flock hours each."""
+    """Collisions, and contacts where there are walls or obstacles, rarer than once in a hundred flock hours each.
+
+    Raises ScenarioError where distances are not measured.
+    """
+    if "r_min" not in numbers_of(scenario.measures, scenario.metrics):
+        kind = scenario.measures.name
+        raise ScenarioError(
+            [f"{scenario.name}: metrics.kind = {kind!r} has no r_min to limit; say what is to be shown with --limit"]
+        )
     contacts = ["clearance<0 at 0.01/h"] if has_walls(scenario) else []
     return [f"r_min<{scenario.metrics.r_coll:g} at 0.01/h", *contacts]
 

@@ -85,7 +85,7 @@ def certificate(
     note: Note | None,
 ) -> Certificate:
     """The certificate of the tuned set, saved in the folder."""
-    from airflock.certify.tolerance import usual_keys
+    from airflock.certify.environment import usual_keys
 
     campaign = campaign_of(tuned, limits, confidence)
     path = folder / "certificate_flights"
