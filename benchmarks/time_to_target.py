@@ -140,18 +140,22 @@ def table(folder):
                 f"{mean:+.4f} ({low:+.4f} to {high:+.4f}) | {told} | {other:+.4f} ({least:+.4f} to {most:+.4f}) |"
             )
         if len(rows) > 1 and all(len(row["judged"]) == MOST for row in rows):
-            together(what, rows, known)
+            together(what, rows, known, [row["judged"] for row in found if row["search"] == "full study"])
 
 
-def together(what, rows, known):
-    """What several runs of one search say."""
+def together(what, rows, known, studies):
+    """What several runs of one search say; studies: fitness of full studies on the judge's seeds."""
     reached = [spans(row["judged"][:PAIRS], known["S1"])[2] > TARGET for row in rows]
     seconds = [row["seconds"] if good else np.inf for row, good in zip(rows, reached, strict=True)]
     print(f"\n{what}: {sum(reached)} of {len(rows)} reached; median {np.median(seconds):.0f} processor s\n")
-    less = np.array([row["judged"] for row in rows]) - np.array(known["full"])
-    for name, values in (("flights", less.mean(axis=0)), ("runs", less.mean(axis=1))):
-        mean, _, low, high = interval(values.tolist())
-        print(f"less the full study, interval over {name}: {mean:+.4f} ({low:+.4f} to {high:+.4f})\n")
+    others = {"the full study that is shipped": known["full"]}
+    if studies and all(len(judged) == MOST for judged in studies):
+        others[f"the mean of {len(studies)} full studies here"] = np.mean(studies, axis=0)
+    for other, fitness in others.items():
+        less = np.array([row["judged"] for row in rows]) - np.array(fitness)
+        for name, values in (("flights", less.mean(axis=0)), ("runs", less.mean(axis=1))):
+            mean, _, low, high = interval(values.tolist())
+            print(f"less {other}, interval over {name}: {mean:+.4f} ({low:+.4f} to {high:+.4f})\n")
 
 
 def curves(folder, what):
