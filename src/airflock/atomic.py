@@ -9,7 +9,7 @@ import stat
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 
@@ -68,9 +68,16 @@ def _let_go(handle: int) -> int:
 
 
 def write(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
-    """Write text (UTF-8) or bytes; an OSError, which names the path, leaves the old file, or none, in place."""
-    with atomic(path) as temporary:
-        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+    """Write text (UTF-8) or bytes; an OSError, which names the path, leaves the old file, or none, in place.
+
+    A memoryview is released in any case: Python 3.12 crashes where an error holds one of a BytesIO that has gone.
+    """
+    with content if isinstance(content, memoryview) else nullcontext(), atomic(path) as temporary:
+        if isinstance(content, memoryview):
+            with open(temporary, "wb") as file:  # Path.write_bytes makes another view, which an error would hold
+                file.write(content)
+        else:
+            temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 @cache

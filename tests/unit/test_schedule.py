@@ -103,8 +103,8 @@ class Flown:
         return flight.advance(
             first, last, half, self.held, SimpleNamespace(number=Itself()), self.numbers, self.whole, 3, 3, None,
             np.zeros((9, 3)), self.values, self.sums, np.zeros((0, 6, 3)), plan=plan, stages=self.stages,
-            order=order(plan), sampled=driver._sampled(plan), watched=measured(plan, "collision"), collided=0,
-            slots=False,
+            order=order(plan), sampled=driver._sampled(plan), watched=measured(plan, "collision"),
+            drifts=False, foretold=False, collided=0, slots=False,
         )  # fmt: skip
 
 

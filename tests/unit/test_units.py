@@ -136,4 +136,4 @@ def test_a_conversion_is_told_with_its_key_in_the_order_of_the_file():
     notes = make({"model": {"kind": "vasarhelyi_2018"}, "radio": keys, "groups": groups, "faults": faults}).notes
     told = [note.partition(" = ")[0] for note in notes if " is " in note]
     assert told[:3] == ["radio.loss", "radio.range", "radio.delay"]
-    assert told[3:6] == ["groups[0].body.spread.tau", "faults[0].at", "faults[0].share"]
+    assert told[3:6] == ["groups[0].body.tau.spread", "faults[0].at", "faults[0].share"]

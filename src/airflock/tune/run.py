@@ -62,7 +62,7 @@ def tune(
         than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
         that look as if they kept these limits before all others.
     confidence : float, optional
-        Confidence of the certificate, in [0.5, 1); by default 0.95.
+        Confidence of the certificate, a share in [0.5, 1); by default 0.95.
     like : Scenario, str or path, optional
         The scenario whose law, field and speed are tuned with the numbers that the logs tell of the drones.
     heard : str or path, optional
