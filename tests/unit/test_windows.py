@@ -36,6 +36,8 @@ for name in ("geteuid", "getuid", "uname", "fork", "getloadavg", "sysconf", "sys
              "sched_getaffinity", "O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_NOCTTY"):
     if hasattr(os, name):
         delattr(os, name)
+if hasattr(os, "process_cpu_count"):  # what Python 3.13 makes it where nobody tells the own processors
+    os.process_cpu_count = os.cpu_count
 del signal.SIGXCPU
 """
 
