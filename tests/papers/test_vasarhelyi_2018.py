@@ -19,22 +19,10 @@ from airflock_papers.flights import Flights, with_changes
 from airflock_papers.statements import load
 from airflock_papers.vasarhelyi_2018 import PAPER, evolved, fig1, outdoor, pressure, report, table_s2, tuning
 from airflock_papers.vasarhelyi_2018.published import REFIT, SPEEDS, optimum, program_runs
+from airflock_papers.vasarhelyi_2018.table_s1 import COLUMNS
 from airflock_papers.vasarhelyi_2018.table_s2 import PROGRAM
 
 FOLDER = Path(__file__).parents[2] / "papers" / "vasarhelyi_2018"
-TABLE_S1 = (
-    "r0_rep",
-    "p_rep",
-    "r0_frict",
-    "c_frict",
-    "v_frict",
-    "p_frict",
-    "a_frict",
-    "r0_shill",
-    "v_shill",
-    "p_shill",
-    "a_shill",
-)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +61,7 @@ def test_most_values_that_flew_lie_inside_the_working_ranges():
     statements, outside = load(PAPER.package), {}
     for speed in (4, 6, 8):
         flew = airflock.load(f"vasarhelyi_2018/real_{speed}ms").parameters
-        quotes = {name: statements[f"s1.range.{name}.{speed}ms"].quote for name in TABLE_S1}
+        quotes = {name: statements[f"s1.range.{name}.{speed}ms"].quote for name in COLUMNS}
         ends = {name: re.findall(r"\[(.*), (.*)\]", quote)[0] for name, quote in quotes.items()}
         outside[speed] = {n for n, (low, high) in ends.items() if not float(low) <= getattr(flew, n) <= float(high)}
     assert outside == {

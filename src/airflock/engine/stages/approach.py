@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from airflock.engine.plan import Plan
+from airflock.engine.stages.faults import BLOCK
 from airflock.engine.stages.measure import offset
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import FAR, ONE, ZERO, between, choose, integer, least, most, real, vector
@@ -19,7 +20,6 @@ TRAVELLED, GAP, CALM, ENDED, BEGUN, DRIFT, PACE, REACH = 0, 1, 2, 3, 4, 5, 8, 9
 HELD = 10
 SLACK = 0.01  # m
 ROUNDING = 5e-7  # how much nearer two agents come in a step by rounding in single precision, for each m from the origin
-SPAN = 32  # lanes that loops take at a time
 
 
 def set_out(held: Any, flock: Flock, n: int, *, plan: Plan) -> None:
@@ -61,7 +61,7 @@ def nearest(lanes: Iterable[int], flock: Flock, numbers: Any, n: int, m: int, *,
         for a in range(plan.dimensions):
             own[a] = flock.position[a][i]
         near2 = FAR
-        for j in between(lanes, i // SPAN * SPAN, m):
+        for j in between(lanes, i // BLOCK * BLOCK, m):
             r2 = offset(d, own, flock.position, j, numbers.w, plan=plan)
             near2 = least(near2, choose((integer(j) > integer(i)) & (integer(j) < nn), r2, FAR))
         least2 = least(least2, near2)

@@ -143,10 +143,11 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
             break
         for name in order["watch"]:
             if step % whole.collide_every == 0:
+                if drifts and travelled >= gap:
+                    set_out(held, flock, n, plan=plan)
                 if foretold and calm and travelled >= gap:
                     gap = ask(stages["nearest"]) - width(tuple(one.metric for one in watched), numbers.q) - SLACK
                     travelled = ZERO
-                    set_out(held, flock, n, plan=plan)
                 if watched and travelled < gap:  # nobody can have come near enough since pairs were last looked at
                     sums[sampled[name][1]] += 1
                     if not calm:
@@ -158,8 +159,6 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
                     gap = near - width(tuple(one.metric for one in watched), numbers.q) - SLACK
                     travelled = ZERO
                     calm = False
-                    if drifts:
-                        set_out(held, flock, n, plan=plan)
                 else:
                     take(name, time, values, sums, stages=stages, sampled=sampled)
         if plan.stop and values[collided] > HALF:
