@@ -1,5 +1,6 @@
 """The hand-written CUDA C evaluation from Python: built with NVRTC, fed with a scenario's numbers."""
 
+import re
 import subprocess
 import tempfile
 from collections.abc import Callable
@@ -7,12 +8,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from c_reference import PARAMETERS, SCORES, parameters_of
+from c_reference import SCORES, parameters_of
 
 from airflock import gpu as device
 from airflock.scenarios.timing import clock
 
 HERE = Path(__file__).parent
+SOURCE = HERE / "vasarhelyi.cu"
+
+
+def fields() -> list[str]:
+    """Names of the numbers that vasarhelyi.cu reads, in their order: fewer than vasarhelyi.h has."""
+    found = re.search(r"struct parameters \{([^}]*)\};", SOURCE.read_text())
+    if found is None:
+        raise LookupError("vasarhelyi.cu has no struct parameters")
+    declarations = [line.split(None, 1)[1] for line in found[1].split(";") if line.strip()]
+    return [member.strip() for line in declarations for member in line.split(",")]
 
 
 def built(per_agent: int, arch: str) -> Any:
@@ -20,7 +31,7 @@ def built(per_agent: int, arch: str) -> Any:
     from cuda.core import Program, ProgramOptions
 
     options = ProgramOptions(std="c++17", arch=arch, use_fast_math=True, define_macro=[("PER_AGENT", str(per_agent))])
-    return Program((HERE / "vasarhelyi.cu").read_text(), "c++", options).compile("cubin")
+    return Program(SOURCE.read_text(), "c++", options).compile("cubin")
 
 
 class CudaC:
@@ -48,7 +59,7 @@ class CudaC:
         given = (_address(rows), *whole, np.uint32(1), _address(scores))
         stream = self.device.default_stream
 
-        def go() -> Any:
+        def go(kept: Any = rows) -> Any:  # the kernel knows an address only: what lies there must not be given back
             run(stream, LaunchConfig(grid=flocks, block=threads), self.kernel, *given)
             stream.sync()
             return scores
@@ -67,9 +78,9 @@ def times_of(scenario: Any) -> dict[str, int]:
 
 
 def numbers_of(scenario: Any) -> Any:
-    """Parameters of vasarhelyi.h in their order."""
+    """Numbers of a scenario in the order of vasarhelyi.cu."""
     known = parameters_of(scenario)
-    return np.array([getattr(known, name) for name in PARAMETERS], np.float32)
+    return np.array([getattr(known, name) for name in fields()], np.float32)
 
 
 def trial(source: Path) -> str:

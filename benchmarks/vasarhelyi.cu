@@ -5,7 +5,7 @@
    (one load of 16 bytes per neighbour), clusters are bits, and the pairs of the collision check are left out while
    nobody can be near enough. PER_AGENT threads share the pairs of an agent and its random numbers.
 
-   The rows of `all` are parameters of vasarhelyi.h in their order. At most 128 agents. Built with -DPER_AGENT=1, 2 or 4.
+   The rows of `all` are the numbers of `struct parameters` below, named as in vasarhelyi.h. At most 128 agents. Built with -DPER_AGENT=1, 2 or 4.
    C linkage: airflock's benchmark finds the kernel by its name. */
 #ifndef PER_AGENT
 #define PER_AGENT 1
@@ -18,7 +18,7 @@
 typedef unsigned int word;
 
 enum { SENSOR = 1, OUTER = 2, START = 3, ATTEMPTS = 20000 };
-enum { NUMBERS = 28, SCORES = 13 };
+enum { SCORES = 13 };
 
 struct parameters {
     float v_flock, r0_rep, p_rep, r0_frict, c_frict, v_frict, p_frict, a_frict, r0_shill, v_shill, p_shill, a_shill;

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from airflock.scenarios import cost
 from airflock.scenarios.files import load
 from flocks import scenario
 from gpus import runtime
-from inside import MOST_THREADS, Flown, shape_of, simulate
+from inside import MOST_THREADS, Flown, Shape, shape_of, simulate
 
 SMALL = scenario(agents=3, duration=0.2, world__side=60.0)
 
@@ -42,7 +43,8 @@ def test_a_missing_gpu_is_an_error_where_it_is_named_and_a_note_where_not(absent
     assert said == ["device auto: cpu, no driver"]
 
 
-def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present):
+def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypatch):
+    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 2)
     said = []
     assert picked([SMALL], "auto", say=said.append) == "cpu"
     many = scenario(agents=100, duration=600.0)
@@ -66,6 +68,12 @@ def test_plain_python_scores_like_the_compiled_flight(seed):
     plain = score_flights([SMALL], [seed], device="python")[0]
     compiled = score_flights([SMALL], [seed], precision=64)[0]
     assert {k: v for k, v in plain.items()} == pytest.approx(compiled, rel=1e-9, abs=1e-9)
+
+
+def test_a_table_has_one_thread_for_an_agent_or_all_of_the_block():
+    whole = Shape(128, 32, 32, registers=False)
+    with pytest.raises(AssertionError):  # shuffles within a loop whose turns differ: the threads wait for ever
+        replace(whole, per_agent=4, threads=128)
 
 
 @pytest.mark.parametrize("agents", [1, 2, 31, 32, 33, 100, 128, 129, 500, 1000, 1024, 1025, 5000])

@@ -17,7 +17,8 @@ class Shape:
     lanes     : agents that the shared tables hold, a multiple of 32
     per_agent : threads that share the pair loop of one agent, a power of two up to 32
     threads   : of the block
-    registers : each thread keeps the state of its agent in registers, else all states lie in a table
+    registers : each thread keeps the state of its agent in registers, else all states lie in a table, and an agent has
+                one thread, or the whole block: others would come to their sums in different turns, and wait for ever
     simulated : text for Numba's CUDA simulator, which knows neither shuffles nor alignment
     """
 
@@ -26,6 +27,9 @@ class Shape:
     threads: int
     registers: bool = True
     simulated: bool = False
+
+    def __post_init__(self) -> None:
+        assert self.registers or self.per_agent in (1, self.threads)
 
     @property
     def warps(self) -> int:
