@@ -52,7 +52,7 @@ def table(found: dict[str, Any], sizes: Any) -> tuple[str, bool]:
     for what, bound, figure, holds, disagreement in rows(sizes):
         try:
             value = figure(found)
-        except (AttributeError, KeyError, IndexError, TypeError, ZeroDivisionError):  # its part failed, and says so above
+        except (AttributeError, LookupError, TypeError, ZeroDivisionError):  # its part failed, and says so above
             value = None
         fine = value is not None and holds(value)
         wrong |= disagreement and value is not None and not fine
