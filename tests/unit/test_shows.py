@@ -45,6 +45,15 @@ def test_a_show_is_one_flight_and_its_recording_is_scored(interpreted, failure, 
     assert values["n_coll"] == sum(formed.collisions for formed in found.formed)
 
 
+def test_one_driver_flies_a_whole_show(interpreted, seed):
+    """It was compiled for those who stay, and once more when the first one fell."""
+    points = points_of("A", 6, seed=0)
+    show = master.Master(scenario_of(6), ranks(6), points, seed, comes_and_goes=True)
+    driver = show.flight._state.driver
+    show.form(points, [(2, "fall", 0.3)])
+    assert show.flight.present.sum() == 5 and show.flight._state.driver is driver
+
+
 def test_faults_of_the_scenario_fly_in_a_show(interpreted, seed):
     """Once, at their time, and one who drops out by itself is missed like the others."""
     entries = [

@@ -19,6 +19,7 @@ CHECK = 5.0  # s; how often the master looks once all should be there
 LOOK = 1.0  # s; how often it looks for drones that make no progress
 PATIENCE = 60.0  # s; how long it waits for a shape at most
 HALF = 0.35  # m; half side of the box that stands for a drone that hovers
+NEVER = 1e-30  # 1/h; how often drones drop out by themselves: more than never, so that one driver flies the whole show
 
 Frames = NDArray[np.float64]
 
@@ -67,8 +68,8 @@ class Master:
         start = np.zeros((6, len(ranks)))
         start[:3] = ranks.T
         keys: dict[str, Any] = {"goals.points": self._aims(), "duration": PATIENCE}
-        if comes_and_goes:  # one driver for the whole show
-            keys["faults"] = [*scenario.document.get("faults", ()), {"kind": "fails", "per_hour": 0.0}]
+        if comes_and_goes:
+            keys["faults"] = [*scenario.document.get("faults", ()), {"kind": "fails", "per_hour": NEVER}]
         self.flight = Flight(remade(scenario, keys), seed, precision=64, record=True, start=start)
         self.progress, self.looked = Progress(LOOK), 0.0
         self.way, self.left = (np.zeros((0, 3)), np.zeros((0, 3))), (0.0, 0.0)
