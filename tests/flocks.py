@@ -36,6 +36,11 @@ def interpreted(found, seed=0, start=None):
     return fly(found, seed, precision=64, record=True, start=start, device="python")
 
 
+def measured_plainly(scenario, frames, period, **more):
+    """Stands for `measure_frames` where recordings are scored: interpreted, as are the flights here."""
+    return measure_frames(scenario, frames, period, **more | {"precision": 64, "device": "python"})
+
+
 def from_start(found, *agents):
     """Interpreted flight from given (x, y, vx, vy) or (x, y, z, vx, vy, vz) of each agent."""
     return interpreted(replace(found, flight=replace(found.flight, agents=float(len(agents)))), 0, np.array(agents).T)

@@ -69,6 +69,7 @@ WHOLE = {"receive": everything, "late": waits, "carry": half, "Packet": Kept}
 @pytest.mark.parametrize("dims", ["2", "3"])
 def test_a_radio_that_asks_for_everything_flies_compiled_as_the_reference_does(dims, seed):
     keys = SMALL | {"world.dimensions": dims, "world.obstacles": ISLANDS, "radio.loss": 0.2, "duration": 6.0}
+    keys |= {"metrics.kind": "order"}
     scenario = load(PAPER, keys, radio=airflock.radio(WHOLE, "whole"))
     known = fly_plainly(scenario, seed)
     devices = ("python", "cpu") if dims == "2" else ("python",)

@@ -7,7 +7,7 @@ import airflock
 from airflock.errors import ScenarioError
 from flocks import interpreted
 
-FLOCK = {"agents": 10, "duration": 40.0, "world.side": 120.0, "metrics.period": 0.2}
+FLOCK = {"agents": 10, "duration": 40.0, "world.side": 120.0, "metrics.period": 0.2, "metrics.kind": "order"}
 BLACKOUT = {"faults": [{"kind": "radio_deaf", "at": 20.0, "lasts": 15.0}]}
 
 

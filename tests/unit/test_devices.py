@@ -16,7 +16,7 @@ from flocks import scenario
 from gpus import runtime
 from inside import MOST_THREADS, Flown, Shape, shape_of, simulate
 
-SMALL = scenario(agents=3, duration=0.2, world__side=60.0)
+SMALL = scenario(agents=3, duration=0.2, world__side=60.0, world__walls="nearest_per_axis")  # others have its driver
 
 
 @pytest.fixture
