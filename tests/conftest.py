@@ -2,6 +2,7 @@
 
 import gc
 import os
+from importlib import import_module
 
 import hypothesis
 import pytest
@@ -43,6 +44,12 @@ def gpu():
 
     if trouble() is not None:
         pytest.skip(f"{trouble()}; AIRFLOCK_NEED_GPU makes this a failure")
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Studies end without their pictures, which take longer than all the rest; tests/unit/test_studies.py has them."""
+    monkeypatch.setattr(import_module("airflock.evolve.run"), "draw", lambda *_: [])
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ from airflock.scenarios.files import load
 from needed import needed
 
 distributed = needed("distributed")
-pytestmark = pytest.mark.filterwarnings("ignore")
+pytestmark = [pytest.mark.filterwarnings("ignore"), pytest.mark.usefixtures("undrawn")]
 TABLES = (
     "SELECT * FROM candidate",
     "SELECT stage, run, generation, candidate, repeat, seed, scores, reason FROM flight",

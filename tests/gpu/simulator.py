@@ -1,14 +1,16 @@
 """Numba's CUDA simulator, quick and safe: the threads of a block are threads of Python, which meet at barriers.
 
-Numba has a manager that asks all of them in a loop where they are, in half of the time that a test takes. Here who comes
-last to a barrier lets the others go. Each device function looked for the module `cuda` among the globals of the kernel,
-which the kernel has exchanged already. Threads change places often, so that none is ahead of the others between two
-barriers; they meet a gap in the simulator then: two of them that come to the same `cuda.shared.array` at once may get an
-array each, and what one writes the other never sees.
+Numba's manager asks all of them in a loop where they are, in half of the time that a test takes. Here who comes last to a
+barrier lets the others go. And each call of a device function looks for the module `cuda` among the globals of the
+kernel, where the kernel has exchanged it already: not here. Threads change places often, so that none is ahead of the
+others between two barriers. They meet a gap in the simulator then: two of them that come to the same `cuda.shared.array`
+at once may get an array each, and what one writes the other never sees.
 """
 
 import sys
 import threading
+
+import numpy as np
 
 SWITCH = 1e-5  # s
 LITTER = 9  # any number that a mark, a count or a distance could be
@@ -39,17 +41,14 @@ class Block:
     """The threads of a block, in the place of Numba's manager: who comes last to a barrier, or ends, lets all go on."""
 
     def __init__(self, function, grid, block, debug):
-        import numpy as np
-
         self._block_dim = block  # by these names a thread of Numba's asks for them
         self.block_state = np.zeros(block, bool)
         self.function, self.debug = function, debug
         self.meeting = threading.Lock()
-        self.flying, self.waiting = 0, []
+        self.flying, self.waiting, self.failed = 0, [], None
 
     def run(self, place, *arguments):
         """Fly all threads of one block to their ends, and raise what the first one raised."""
-        import numpy as np
         from numba.cuda.simulator.kernel import BlockThread
 
         def target():
@@ -63,7 +62,6 @@ class Block:
 
         threads = [BlockThread(target, self, place, at, self.debug) for at in np.ndindex(*self._block_dim)]
         self.flying = len(threads)
-        self.failed = None
         for thread in threads:
             thread.gate = threading.Lock()
             thread.gate.acquire()

@@ -29,13 +29,14 @@ def landed(folder):
         return 0  # not yet made
 
 
-def test_evolve_prints_json_its_best_flies_and_hardens(tmp_path):
+def test_evolve_prints_json_its_best_flies_and_hardens(tmp_path, request):
     asked = ["evolve", NAME, "--population", 4, "--generations", 2, *SHORT, "--json", "--out", tmp_path / "a"]
     done = called(*asked)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["working_ranges"]["candidates"] == 8 and found["fitness"]["seeds"] == 100
     assert tomllib.loads((tmp_path / "a" / "result.toml").read_text())["parameters"] == found["parameters"]
+    request.getfixturevalue("undrawn")  # one set of pictures is enough
     flown = called("run", tmp_path / "a" / "best.toml", "--json", "--first-seed", 3)
     assert flown.returncode == 0 and "fitness" in json.loads(flown.stdout)["runs"][0]
     again = called(*asked)

@@ -16,6 +16,8 @@ from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
 from airflock.executors.in_process import InProcess
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 WHOLE = 600.0
 
 

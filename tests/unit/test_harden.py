@@ -20,6 +20,8 @@ from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from inside import simulate
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def test_recipe_moves_the_way_of_table_s4_and_stays_inside_ranges():
     plans = harden.recipe(load("vasarhelyi_2018/6ms"))

@@ -13,6 +13,8 @@ from airflock.evolve.search import search, total_flights, windowed
 from airflock.evolve.store import Batch, Store
 from airflock.executors.in_process import InProcess
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SAFE = 0.288  # where expected() is largest
 
 

@@ -8,6 +8,8 @@ from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.study import load_study
 from processes import called
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def study_file(folder, law, objective):
     (folder / "obj.py").write_text(law)

@@ -13,6 +13,8 @@ from airflock.evolve.racing import still_needed
 from airflock.evolve.run import Interrupted, run
 from airflock.executors.in_process import InProcess
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 RACE = {"racing": "optimistic", "random_numbers": "generation", "seeds": 4, "population": 16, "generations": 8}
 
 

@@ -31,6 +31,8 @@ from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from inside import simulate
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 FAR = {"radio.delay": 0.8}
 
 

@@ -91,6 +91,7 @@ def test_pareto_studies_keep_a_front(tmp_path):
     assert (tmp_path / "a" / "pareto.png").is_file() and 1 <= len(result.finalists) <= 3
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_genetic_algorithm_and_common_random_numbers(tmp_path):
     study = toys.study(algorithm="ga", seeds=2, random_numbers="study")
     finished(tmp_path / "a", study)
@@ -98,6 +99,7 @@ def test_genetic_algorithm_and_common_random_numbers(tmp_path):
         assert store.rows("SELECT count(DISTINCT seed) FROM flight WHERE stage='search'") == [(2,)]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_ctrl_c_keeps_what_has_landed_and_resume_ends_the_same(tmp_path, done):
     study = toys.study(population=16, generations=25, restarts=1)
 
@@ -174,6 +176,7 @@ def test_folders_are_never_written_over(tmp_path):
         open_folder(tmp_path / "c", study, resume=False)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_study_goes_on_with_what_its_folder_holds(tmp_path):
     """Settings, keys of the search and limits need not be asked for again; what is, counts."""
     first = {"agents": 5, "radio.kind": "links", "model.p_rep": 0.1}, {"generations": 2, "seeds": 2}, "r_min<3 at 1%"
@@ -229,6 +232,7 @@ def test_unknown_order_parameters_name_the_known_ones(tmp_path):
         finished(tmp_path / "a", toys.study({"objective": {"maximise": "beauty"}}))
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_own_fitness_is_read_from_beside_the_study(tmp_path):
     (tmp_path / "mine.py").write_text("def hurry(score):\n    return 2.0 * score['phi_vel']\n")
     (tmp_path / "study.toml").write_text(
@@ -243,6 +247,7 @@ def test_own_fitness_is_read_from_beside_the_study(tmp_path):
     assert study.objectives[0].of_candidate([{"phi_vel": 3.0}]) == 6.0 and study.space.keys == ("model.p_rep",)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_law_in_a_file_of_its_own_comes_along_with_the_winner(tmp_path):
     law = Path(airflock.__file__).parent / "models" / "viragh_2014.py"
     (tmp_path / "mine.py").write_text(law.read_text())
@@ -291,6 +296,7 @@ def test_a_study_that_is_made_takes_no_keys_beside_itself(tmp_path):
     assert not (tmp_path / "s").exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_public_door_evolves_a_short_flight_with_a_fitness_of_ones_own(tmp_path):
     """Real flights, from the call to a scenario that flies: faster is better, and the faster speed is found."""
     space = {"model": {"v_flock": {"low": 1.0, "high": 5.0}}}
