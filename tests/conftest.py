@@ -53,6 +53,14 @@ def undrawn(monkeypatch):
 
 
 @pytest.fixture
+def scored_plainly(monkeypatch):
+    """Recordings are scored by plain Python: one of few frames in less time than its driver takes to compile."""
+    from flocks import measured_plainly
+
+    monkeypatch.setattr(import_module("airflock.recordings.scores"), "measure_frames", measured_plainly)
+
+
+@pytest.fixture
 def seed(request):
     """Seed of a random test; printed, so that a failure shows it."""
     value = request.config.getoption("--seed")

@@ -14,6 +14,8 @@ from airflock.recordings.scores import measure
 from airflock.scenarios.files import load, presets
 from inside import course, cpu
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 SMALL = {"agents": 8, "duration": 6.0, "start.kind": "ball", "start.radius": 40.0}
 OPEN = {"world.arena": "none", "world.walls": "every_edge"}
 PAPER = "vasarhelyi_2018/4ms"

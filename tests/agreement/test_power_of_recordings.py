@@ -9,6 +9,8 @@ from airflock.recordings.layout import dataset
 from airflock.recordings.scores import aero_settings, measure
 from formations import FOOT, drags, vee, wing_of
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 WING = {
     "wing.segments": "5",
     "wing.span": 2.0,

@@ -8,6 +8,8 @@ from airflock.recordings.measures.contacts import contacts
 from airflock.scenarios.files import load
 from flocks import measured
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 ISLAND = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [0.0, 1.0], [-2.0, 2.0]]
 KEYS = {
     "world.side": 40.0, "world.obstacles": [ISLAND], "metrics.kind": "contacts", "metrics.r_body": 0.5, "agents": 2,

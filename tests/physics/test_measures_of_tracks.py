@@ -15,6 +15,8 @@ from airflock.recordings.measures.states import states
 from airflock.recordings.scores import score
 from airflock.scenarios.files import load
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 
 def recording(place, speed, period=0.1):
     """From position and velocity (time, axis, individual)."""

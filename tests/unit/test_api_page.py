@@ -19,8 +19,6 @@ from raising import raised
 import airflock
 from airflock import errors
 from airflock.display import master
-from airflock.recordings import scores
-from flocks import measured_plainly
 
 PAGE = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8")
 CALLED = re.findall(r"^\.\. autofunction:: (\S+)$", PAGE, re.M)
@@ -87,14 +85,13 @@ def test_every_argument_and_result_has_a_type_and_each_argument_its_meaning(name
 
 
 @pytest.mark.parametrize("name", [*FUNCTIONS, *OPENED])
-def test_every_example_runs(name, tmp_path, monkeypatch):
+def test_every_example_runs(name, tmp_path, monkeypatch, scored_plainly):
     monkeypatch.chdir(tmp_path)
     if name.startswith("airflock.plots."):  # a picture is that of any flight: its law need not be compiled
         monkeypatch.setattr(airflock, "simulate", partial(airflock.simulate, device="python"))
         monkeypatch.setattr(master, "Flight", partial(master.Flight, device="python"))
     if name == "airflock.Flight.fault":  # which no other example has in its driver
         monkeypatch.setattr(airflock, "open", partial(airflock.open, device="python"))
-    monkeypatch.setattr(scores, "measure_frames", measured_plainly)
     finder = doctest.DocTestFinder(recurse=False)
     (test,) = [found for found in finder.find(the(name), name, globs={}) if found.examples]
     told = []

@@ -9,6 +9,8 @@ from airflock.errors import RecordingError
 from airflock.recordings.layout import dataset
 from airflock.recordings.scores import measure
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 BY = {"metrics.kind": "zapotecatl", "metrics.max_e": 2.25, "metrics.r_b": 0.05}
 
 

@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 
 from airflock.metrics import registry
-from airflock.recordings import scores
 from airflock.scenarios.laws import MODELS
-from flocks import measured_plainly
 
 DOCS = Path(__file__).parents[2] / "docs"
 sys.path.insert(0, str(DOCS))
@@ -76,7 +74,7 @@ def test_every_order_parameter_has_formula_and_range():
     assert all(entry["formula"] and entry["range"] for entry in known.values())
 
 
-def test_every_order_parameter_is_shown_by_two_flocks_that_differ_in_it(monkeypatch):
+def test_every_order_parameter_is_shown_by_two_flocks_that_differ_in_it(monkeypatch, scored_plainly):
     pytest.importorskip("sphinx")
     monkeypatch.syspath_prepend(str(DOCS / "_ext"))
     from pictures import LOW_AND_HIGH, OF_MODEL, pairs
@@ -86,7 +84,6 @@ def test_every_order_parameter_is_shown_by_two_flocks_that_differ_in_it(monkeypa
     assert set(OF_MODEL) == set(MODELS)
     assert all((DOCS / "gallery" / f"{example}.py").is_file() for example in OF_MODEL.values())
     source = (DOCS / "gallery" / f"{LOW_AND_HIGH[0]}.py").read_text(encoding="utf-8")
-    monkeypatch.setattr(scores, "measure_frames", measured_plainly)
     example = {}
     exec(source.partition("def drawn(")[0], example)  # the flocks and how they are measured; nothing is drawn
     for names, *flocks in example["PAIRS"]:

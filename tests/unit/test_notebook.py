@@ -20,6 +20,8 @@ from airflock.metrics import registry
 from airflock.recordings.measures import milling
 from processes import called
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 NAME = "vasarhelyi_2018/4ms"
 
 

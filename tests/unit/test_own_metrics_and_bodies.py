@@ -15,6 +15,8 @@ from airflock.recordings.flights import flown_document
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.files import load
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 SMALL = {"agents": 4, "duration": 2.0, "world.side": 60.0, "start.separation": 5.0}
 METRIC = '''
 """How far agents are spread along the east."""

@@ -44,6 +44,8 @@ from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.stage.arrows import vectors
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 RADIUS, PACE = 50.0, 4.0
 
 

@@ -13,6 +13,8 @@ from airflock.recordings.attributes import name_of
 from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.scores import measure, over_time
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 
 def log(position, velocity=None, period=0.1):
     """A flight log (time, individual, 2) without anything that only a simulation knows."""

@@ -13,6 +13,8 @@ from airflock.engine import Flight
 from airflock.recordings.scores import measure
 from airflock.world.goals import glide
 
+pytestmark = pytest.mark.usefixtures("scored_plainly")
+
 
 @pytest.fixture
 def interpreted(monkeypatch):
