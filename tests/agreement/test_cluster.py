@@ -85,7 +85,7 @@ def test_workers_killed_at_random_change_nothing(tmp_path, doomed, seed):
 
     def killer():
         chance = random.Random(seed)
-        while not over.wait(chance.uniform(0.2, 0.6)):
+        while len(kills) < 4 and not over.wait(chance.uniform(0.2, 0.6)):  # a worker takes a second to start
             worker = chance.choice(list(doomed.workers.values()))
             # one at a time: a worker that dies before it has started is given up by its nanny
             if worker.pid and len(doomed.scheduler_info["workers"]) == 2:
@@ -94,7 +94,7 @@ def test_workers_killed_at_random_change_nothing(tmp_path, doomed, seed):
 
     thread = threading.Thread(target=killer)
     open_folder(tmp_path / "there", study, resume=False)
-    executor = Cluster([toy_task(0.03)], doomed.scheduler_address)
+    executor = Cluster([toy_task(0.06)], doomed.scheduler_address)
     thread.start()
     try:
         found = run(study, tmp_path / "there", executor)

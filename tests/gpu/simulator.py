@@ -1,10 +1,10 @@
 """Numba's CUDA simulator, quick and safe: the threads of a block are threads of Python, which meet at barriers.
 
-Numba's manager asks all of them in a loop where they are, in half of the time that a test takes. Here who comes last to a
-barrier lets the others go. And each call of a device function looks for the module `cuda` among the globals of the
+Numba's manager asks all of them in a loop where they are, in half of the time that a test takes. Here who comes last to
+a barrier lets the others go. And each call of a device function looks for the module `cuda` among the globals of the
 kernel, where the kernel has exchanged it already: not here. Threads change places often, so that none is ahead of the
-others between two barriers. They meet a gap in the simulator then: two of them that come to the same `cuda.shared.array`
-at once may get an array each, and what one writes the other never sees.
+others between two barriers. They meet a gap in the simulator then: two that come to the same `cuda.shared.array` at
+once may get an array each, and what one writes the other never sees.
 """
 
 import sys

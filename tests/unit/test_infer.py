@@ -49,11 +49,12 @@ def vicsek(agents=10, frames=300, eta=0.8, seed=3, noise=0.01, missing=0.02):
 
 
 def walkers(agents=10, frames=300, seed=5):
-    """Individuals that turn at random, each by itself."""
+    """Individuals that turn at random, each by itself, in the box of the others: their laws have the same drivers."""
     g = np.random.default_rng(seed)
     angle = np.cumsum(g.normal(0.0, 0.2, (frames, agents)), axis=0) + g.uniform(-np.pi, np.pi, agents)
     step = SPEED * PERIOD * np.stack([np.cos(angle), np.sin(angle)], axis=2)
     place = np.cumsum(step, axis=0) + g.uniform(-2.0, 2.0, (agents, 2))
+    place -= SIDE * np.floor((place + 0.5 * SIDE) / SIDE)
     return dataset(place + g.normal(0.0, 0.01, place.shape))
 
 
@@ -87,7 +88,7 @@ def test_the_law_that_made_the_tracks_is_found_with_its_numbers():
 
 @pytest.mark.usefixtures("brief")
 def test_walks_at_random_are_explained_by_none():
-    found = airflock.infer(walkers(), ["couzin_2002", "vicsek_1995"], check=0)
+    found = airflock.infer(walkers(), ["couzin_2002", "vicsek_1995"], settings=BOX, check=0)
     assert found.best is None, [(law.name, law.gain, law.error) for law in found.laws]
     assert found.verdict == "none of these explains the tracks better than going straight on"
     with pytest.raises(AirflockError, match="nothing can be written"):

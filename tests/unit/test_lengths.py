@@ -11,7 +11,6 @@ from airflock.recordings.lengths import IN_BODIES, in_bodies
 from airflock.recordings.scores import measure, not_told, scenario_of
 from processes import called
 
-
 GIVEN = {
     "r_coll": 1.0, "r_cluster": 3.0, "r_comm": 2.0, "r_b": 0.8, "r_flock": 5.0, "max_e": 20.0, "v_flock": 3.0,
     "v_tol": 1.0, "r_body": 0.5, "r_tol": 2.0, "r_safe": 1.0, "centre_x": 26.0, "centre_y": 26.0,
