@@ -71,7 +71,7 @@ def brief(monkeypatch):
 
 @pytest.mark.usefixtures("brief")
 def test_the_law_that_made_the_tracks_is_found_with_its_numbers():
-    found = airflock.infer(vicsek(), ["couzin_2002", "vicsek_1995"], settings=BOX, check=4)
+    found = airflock.infer(vicsek(frames=200), ["couzin_2002", "vicsek_1995"], settings=BOX, check=4)
     assert found.best is not None and found.best.name == "vicsek_1995", found.verdict
     radius, speed, eta = (found.best.numbers[key] for key in ("model.r", "body.speed", "model.eta"))
     assert radius.low < RADIUS < radius.high and radius.high / radius.low < 1.5
