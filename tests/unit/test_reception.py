@@ -34,7 +34,7 @@ def test_beyond_the_range_nobody_is_heard_again():
 
 
 def test_packets_are_missed_as_often_as_the_radio_says_for_the_distance():
-    lossy = {"radio.loss": 0.5, "radio.loss_at": 80.0, "radio.range": 1000.0}
+    lossy = {"radio.loss": 0.5, "radio.loss_at": 80.0, "radio.range": 1000.0, "metrics.kind": "order"}
     recording = flown(**lossy, duration=60.0)
     k = airflock.load("vasarhelyi_2018/4ms", lossy).radio
     place = recording["position"].values[:, :, 0].astype(float)

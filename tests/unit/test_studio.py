@@ -294,6 +294,7 @@ def test_a_law_that_stops_flying_stops_the_flight_and_the_moment_before_is_there
         "def decide(own, p):\n    return p.push * (own.hx + 1.0), own.hy, own.hz\n"
     )
     text = "agents = 3\nduration = 10.0\n[model]\nkind = 'wild.py'\n[world]\nside = 100.0\n"
+    text += "[metrics]\nkind = 'order'\n"
     (tmp_path / "wild.toml").write_text(text)
     player = Player(FlightRequest(str(tmp_path / "wild.toml"), trust=True))
     player.fly(500)
@@ -637,12 +638,12 @@ def test_repulsion_and_alignment_of_a_selected_agent_are_those_of_the_paper(inte
 
 
 def test_rays_of_a_selected_boid_end_where_the_world_begins():
-    player = Player(FlightRequest("kidger/city", {"agents": 6}, 1))
-    player.fly(30)
-    points, tones = Perceiving().of(player.side, 0, 1.0, 60.0).lines["rays"]
+    side = Side(Origin.of("kidger/city", {"agents": 6}), 1)
+    side.flight = airflock.open(side.preset, 1, device="python").advance(steps=30)
+    points, tones = Perceiving().of(side, 0, 1.0, 60.0).lines["rays"]
     length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
     free = (tones == colours.GREEN).all(axis=1)
-    assert len(points) >= 1 and (length <= player.scenario.parameters.r_ray + 1e-4).all()
+    assert len(points) >= 1 and (length <= side.scenario.parameters.r_ray + 1e-4).all()
     np.testing.assert_allclose(length[free], length.max(), rtol=1e-4)
     assert (length[~free] < length[free].max(initial=np.inf)).all()
 

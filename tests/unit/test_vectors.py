@@ -120,7 +120,7 @@ def test_a_flight_is_that_of_the_reference_and_every_component_counts():
 
 
 def test_compiled_is_interpreted_and_a_flight_may_change_a_component():
-    scenario = terms()
+    scenario = terms(**{"metrics.kind": "order"})
     compiled = fly(scenario, 3, precision=64, record=True)
     assert np.abs(compiled.frames - interpreted(scenario, 3).frames).max() < 1e-9
     flight = airflock.open(scenario, 3, device="python").advance(1.0).change({"model.w_2": 1.5})
