@@ -53,6 +53,12 @@ def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypat
     assert said[1].startswith("device auto: cuda")
 
 
+def test_auto_leaves_to_the_cpu_what_one_thread_of_a_gpu_would_solve(present):
+    said = []
+    assert picked([load("dimock_2003/physical")] * 10_000, "auto", say=said.append) == "cpu"
+    assert said == ["device auto: cpu, dimock_2003 solves for the whole flock, which one thread of a GPU does"]
+
+
 def test_work_grows_with_flights_agents_and_time():
     base = cost.seconds_of(scenario(agents=100, duration=100.0))
     assert cost.seconds_of(scenario(agents=100, duration=200.0)) == pytest.approx(2.0 * base, rel=0.02)

@@ -58,7 +58,7 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
         for fault in filter(None, map(no_room, largest.values(), largest)):
             raise DeviceError(f"device = cuda: {fault}; or choose device = cpu")
         return Choice(device)
-    missing = trouble() or next(filter(None, faults), None)
+    missing = trouble() or next(filter(None, [*faults, *map(slower, largest)]), None)
     if missing is not None:
         return Choice("cpu", missing)
     seconds = total_seconds(scenarios) / cores()
@@ -95,6 +95,14 @@ def no_cuda(plan: Plan, agents: int) -> str | None:
 
     fault = refused(plan, agents)
     return None if fault is None else f"{agents} agents are more than one block flies ({MOST_TOGETHER}), and {fault}"
+
+
+def slower(plan: Plan) -> str | None:
+    """Why a GPU that could fly a plan is no help with it; None where it is."""
+    from airflock.engine.passes.flock import owners
+
+    solving = [owner.name if owner.kind == "survey" else plan.model.name for owner in owners(plan)]
+    return f"{solving[0]} solves for the whole flock, which one thread of a GPU does" if solving else None
 
 
 def fly_one(scenario: Scenario, plan: Plan, seed: int, device: str, start: Any = None) -> Flown:
