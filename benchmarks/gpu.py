@@ -73,7 +73,7 @@ def ours(scenario: Any, flocks: int, per_agent: int) -> Callable[[], Any]:
     driver = launch.flight_driver(plan, shape)
     jobs = [tables(scenario, plan, 1 + flock) for flock in range(flocks)]
     own = launch.arrays(plan, driver, shape, jobs, None)
-    kernel = driver.fly[flocks, shape.threads]
+    kernel = launch.configured(driver.fly, flocks, shape.threads)
     given = [own[name] for name in ARGUMENTS]
 
     def go() -> Any:
