@@ -2,6 +2,7 @@
 
 import re
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -132,3 +133,15 @@ def test_few_flocks_are_no_warning_of_numbas(monkeypatch):
     monkeypatch.setattr(config, "CUDA_LOW_OCCUPANCY_WARNINGS", 1)
     assert configured(Kernel(), 1, 128) == ((1, 128), 0)
     assert config.CUDA_LOW_OCCUPANCY_WARNINGS == 1  # a user's own kernels are warned of as before
+
+
+def test_the_first_launch_of_a_kernel_compiles_without_what_changes_nothing():
+    from numba.cuda.core.targetconfig import TargetConfig
+
+    from inside import at_first
+
+    usual = TargetConfig.__hash__
+    for overloads, spared in (({}, True), ({"signature": "kernel"}, False)):
+        with at_first(SimpleNamespace(overloads=overloads)):
+            assert (TargetConfig.__hash__ is not usual) is spared
+        assert TargetConfig.__hash__ is usual

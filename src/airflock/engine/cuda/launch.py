@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.cpu import Flown
+from airflock.engine.cuda.compile_shortcuts import at_first
 from airflock.engine.cuda.individuals import due, presence
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
@@ -105,7 +106,8 @@ def _fly(
 ) -> list[Flown]:
     """One launch."""
     own = arrays(plan, driver, shape, jobs, starts)
-    configured(driver.fly, len(jobs), shape.threads)(*(own[name] for name in ARGUMENTS))
+    with at_first(driver.fly):
+        configured(driver.fly, len(jobs), shape.threads)(*(own[name] for name in ARGUMENTS))
     return results(plan, jobs, own)
 
 
