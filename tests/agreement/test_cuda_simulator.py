@@ -77,3 +77,13 @@ def test_random_integers_of_a_kernel_are_those_of_plain_python(seed):
 def test_threads_that_ask_for_a_shared_array_at_once_get_the_same_one():
     """Numba's simulator gave each of them its own: a kernel then read what nobody had written, once in some runs."""
     assert simulated("shared_arrays.py") == 0
+
+
+def test_threads_wait_for_all_that_still_fly_and_one_that_fails_ends_the_launch():
+    """Each thread in turn adds one between two barriers: all see the same count. Those who have ended keep nobody."""
+    found = simulated("barriers.py")
+    whole = found["whole"]
+    assert whole == [[turn + 1] * len(whole[0]) for turn in range(len(whole))]
+    for turn, row in enumerate(found["early"]):
+        assert row == [turn + 1 if thread >= turn else 0 for thread in range(len(row))]
+    assert "tid=[3, 0, 0]" in found["said"] and "as asked" in found["said"] and found["past"] == 0
