@@ -35,7 +35,7 @@ from airflock.tune.start import start_of
 SEEDS = "SELECT seed FROM flight WHERE stage=?"
 MINE = {
     "agents": 4, "duration": 20.0, "dt": 0.1, "model": {"kind": "vasarhelyi_2018", "v_flock": 6.0, "p_rep": 0.2},
-    "world": {"side": 120.0}, "radio": {"delay": 0.4},
+    "world": {"side": 120.0, "walls": "nearest_per_axis"}, "radio": {"delay": 0.4},  # a driver of others
 }  # fmt: skip
 
 
