@@ -111,14 +111,24 @@ def test_a_lonely_agent_flies_on_and_its_instants_do_not_count():
     assert np.isnan(flight.state).all() and flight.scores()["phi_vel"] == before["phi_vel"]
 
 
-def test_random_numbers_of_the_others_do_not_depend_on_who_left():
-    """Noise and lost packets are drawn by the numbers of agents, not by their places in memory."""
-    far = {"agents": 5, "duration": 3.0, "radio.range": 0.0, "radio.loss": 0.5, **OPEN}
-    scenario = load(PAPER, {**far, "start.kind": "ball", "start.radius": 500.0})
-    known = airflock.open(scenario, 4, device="python").advance(2.0)
-    flight = airflock.open(scenario, 4, device="python").advance(0.5).remove(1).advance(1.5)
-    others = [0, 2, 3, 4]
-    assert np.array_equal(flight.state[:, others], known.state[:, others])
+@pytest.mark.parametrize("agents", [5, 15])
+@pytest.mark.parametrize("first", ["last", 1])
+def test_random_numbers_of_the_others_do_not_depend_on_who_left(agents, first):
+    """Noise and lost packets are drawn by the numbers of agents, not by their places in memory.
+
+    Of 15 agents, lanes behind them are filled up; after the last one has left, the others still lie at their numbers.
+    """
+    far = {"agents": agents, "duration": 3.0, "radio.range": 0.0, "radio.loss": 0.5, **OPEN}
+    far |= {"start.kind": "ball", "start.radius": 800.0}
+    gone = [agents - 1 if first == "last" else first, 2]
+    known = airflock.open(load(PAPER, far), 4, device="python").advance(2.0)
+    by_hand = airflock.open(load(PAPER, far), 4, device="python").advance(0.5)
+    by_hand.remove(gone[0]).advance(0.7).remove(gone[1]).advance(0.8)
+    faults = [{"kind": "fails", "at": at, "agents": [agent]} for at, agent in zip((0.5, 1.2), gone, strict=True)]
+    by_fault = airflock.open(load(PAPER, far | {"faults": faults}), 4, device="python").advance(2.0)
+    others = [agent for agent in range(agents) if agent not in gone]
+    for flight in (by_hand, by_fault):
+        assert np.array_equal(flight.state[:, others], known.state[:, others])
 
 
 @pytest.mark.parametrize(
