@@ -8,6 +8,7 @@ from typing import Any
 from airflock.core import random
 from airflock.core.agent import State, answer
 from airflock.core.parameters import Quantity, declarations
+from airflock.scenarios.groups import Share
 from airflock.scenarios.scenario import Scenario
 
 
@@ -101,6 +102,7 @@ def own_parameters(scenario: Scenario, section: str, record: Any, agent: int, se
             if agent in group.agents and isinstance(declared, Quantity):
                 value = group.numbers.get((letter, name), getattr(record, name))
                 spread = group.spread.get((letter, name), 0.0)
+                spread *= abs(value) if isinstance(spread, Share) else 1.0
                 if spread > 0.0:
                     words = random.words(seed, random.SPREAD, 0, place, agent, "pbs".index(letter))
                     value += spread * random.normal_pair(*words[:2])[0]

@@ -9,7 +9,7 @@ from typing import Any
 
 from airflock.core import random
 from airflock.core.contract import Model
-from airflock.core.parameters import Choice, Quantity, declarations
+from airflock.core.parameters import Choice, Quantity, declarations, with_unit
 from airflock.scenarios import schema, units
 from airflock.scenarios.group_laws import Laws
 
@@ -19,8 +19,36 @@ LETTERS = {
     "sensors": "s",
 }  # sections of which numbers may differ, and what drivers call them
 KEYS = ("name", "agents", *LETTERS)
+OF_IT = "a share of the number such as '10 %'"
 SHARE = re.compile(r"\s*([0-9]{1,3}(?:\.[0-9]{1,6})?)\s*%\s*")  # of a flock
 ONE = {"body": "one body carries all", "sensors": "all measure by one sensor"}
+
+
+class Share(float):
+    """A standard deviation that is a share of the number itself."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Share) and float(self) == float(other)
+
+    __hash__ = float.__hash__
+
+    @classmethod
+    def written(cls, given: Any) -> "Share | None":
+        """That of a text or table such as "10 %"; None where it says another unit, or none."""
+        match = units.NUMBER.fullmatch(given) if isinstance(given, str) else None
+        value, unit = (match[1], match[2]) if match else ("", "")
+        if isinstance(given, Mapping):
+            value, unit = given.get("value"), given.get("unit")
+        if isinstance(value, bool) or not isinstance(unit, str) or units.factor(unit, "1") in (None, 1.0):
+            return None
+        try:
+            return cls(float(f"{float(value) / 100.0:.12g}"))
+        except (TypeError, ValueError):
+            return None
+
+    def of(self, value: float) -> float:
+        """The standard deviation of a number."""
+        return self * abs(value)
 
 
 @dataclass(frozen=True)
@@ -29,7 +57,7 @@ class Group:
 
     agents  : their numbers, in order
     numbers : (letter, name) → value that they have instead of the flock's
-    spread  : (letter, name) → standard deviation by which each agent differs from it
+    spread  : (letter, name) → standard deviation by which each agent differs from it, or what share of it that is
     law     : model and parameters that they fly by, where these are not the flock's but for numbers
     """
 
@@ -162,7 +190,9 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             faults.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
         elif isinstance(value, Mapping) and "spread" in value:
             unit = {"unit": value["unit"]} if "unit" in value else {}
-            spreads[key] = {"value": value["spread"], **unit} if unit else value["spread"]
+            share = _share(value["spread"], known.get(key))
+            absolute = {"value": value["spread"], **unit} if unit else value["spread"]
+            spreads[key] = absolute if share is None else share
             rest = {name: entry for name, entry in value.items() if name != "spread"}
             inner = rest.get("value")  # set anew beside a spread that has a unit, it may be a table of its own
             values |= {key: inner if isinstance(inner, Mapping) else rest} if "value" in rest else {}
@@ -170,7 +200,8 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             values[key] = value
     apart = f"{where}.spread"
     converted, told, unfit = units.converted({where: values, apart: spreads}, {where: record, apart: record})
-    notes, wrong = ([_as_written(line, where, apart) for line in lines] for lines in (told, unfit))
+    notes = [_as_written(line, where, apart) for line in told]
+    wrong = [f"{_as_written(line, where, apart)}{_or_share(line, apart, known)}" for line in unfit]
     made, more = schema.check(where, converted[where], record)
     faults += wrong + more
     off, more = _spreads(where, converted[apart], known)
@@ -186,6 +217,19 @@ def _as_written(line: str, where: str, apart: str) -> str:
     return f"{where}.{key}.spread {rest}"
 
 
+def _share(given: Any, declared: Any) -> Share | None:
+    """A spread that is a share of the number; of a number that is a share itself "10 %" is 0.1."""
+    relative = isinstance(declared, Quantity) and declared.unit not in ("", "1")
+    return Share.written(given) if relative else None
+
+
+def _or_share(line: str, apart: str, known: Mapping[str, Any]) -> str:
+    """What else may be written, at the end of a line about the unit of a spread."""
+    key = line.removeprefix(f"{apart}.").partition(" ")[0]
+    declared = known.get(key) if line.startswith(f"{apart}.") else None
+    return f", or {OF_IT}" if isinstance(declared, Quantity) and declared.unit not in ("", "1") else ""
+
+
 def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
     """Standard deviations in declared units."""
     found, faults = {}, []
@@ -195,10 +239,19 @@ def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> 
         if not isinstance(declared, Quantity):
             faults.append(f"{where}.{key}: unknown number")
         elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
-            faults.append(f"{where}.{key}.spread = {value!r} is not a standard deviation of 0 {declared.unit} or more")
+            other = _or_share(f"{where}.spread.{key}", f"{where}.spread", known)
+            least = with_unit("0", declared.unit)
+            faults.append(
+                f"{where}.{key}.spread = {_told(value)} is not a standard deviation of {least} or more{other}"
+            )
         else:
-            found[key] = float(value)
+            found[key] = value if isinstance(value, Share) else float(value)
     return found, faults
+
+
+def _told(spread: Any) -> str:
+    """A spread as it was written."""
+    return f"'{100.0 * spread:g} %'" if isinstance(spread, Share) else repr(spread)
 
 
 def varied(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -231,7 +284,9 @@ def own_numbers(groups: Sequence[Group], agents: int, letter: str, name: str, re
             values = [0.0 if agent in group.agents else value for agent, value in enumerate(values)]
             continue
         usual = float(getattr(own_record, name) or 0.0)
-        own, spread = group.numbers.get((letter, name), usual), group.spread.get((letter, name), 0.0)
+        own = group.numbers.get((letter, name), usual)
+        given = group.spread.get((letter, name), 0.0)
+        spread = given.of(own) if isinstance(given, Share) else given
         for agent in group.agents:
             value = own
             if spread > 0.0:
