@@ -8,8 +8,8 @@ from typing import Any
 from airflock.core import random
 from airflock.core.agent import State, answer
 from airflock.core.parameters import Quantity, declarations
-from airflock.scenarios.groups import Share
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.spreads import Share
 
 
 @dataclass

@@ -62,7 +62,7 @@ def with_groups(
             own, (name, _, spread) = table.get(section, {}), name.partition(".")
             if isinstance(own, Mapping):
                 before = own.get(name)
-                table[section] = {**own, name: _spread_anew(before, value) if spread else _kept(before, value)}
+                table[section] = {**own, name: _spread_anew(before, value) if spread else kept(before, value)}
     return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, faults
 
 
@@ -92,7 +92,7 @@ def _advice(key: str, document: Mapping[str, Any], tables: Mapping[str, Mapping[
     return f"did you mean {FIRST}{group}.{places[near]}.{near}?"
 
 
-def _kept(before: Any, value: Any) -> Any:
+def kept(before: Any, value: Any) -> Any:
     """A value with the spread that the number had before, which keeps its unit."""
     if not isinstance(before, Mapping) or "spread" not in before or isinstance(value, Mapping):
         return value

@@ -1,6 +1,5 @@
 """The groups of a scenario file: agents that share numbers or a law, and how far each agent is off these numbers."""
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,9 +8,10 @@ from typing import Any
 
 from airflock.core import random
 from airflock.core.contract import Model
-from airflock.core.parameters import Choice, Quantity, declarations, with_unit
+from airflock.core.parameters import Choice, Quantity, declarations
 from airflock.scenarios import schema, units
 from airflock.scenarios.group_laws import Laws
+from airflock.scenarios.spreads import checked, deviation, or_share, share_of
 
 LETTERS = {
     "model": "p",
@@ -19,36 +19,8 @@ LETTERS = {
     "sensors": "s",
 }  # sections of which numbers may differ, and what drivers call them
 KEYS = ("name", "agents", *LETTERS)
-OF_IT = "a share of the number such as '10 %'"
 SHARE = re.compile(r"\s*([0-9]{1,3}(?:\.[0-9]{1,6})?)\s*%\s*")  # of a flock
 ONE = {"body": "one body carries all", "sensors": "all measure by one sensor"}
-
-
-class Share(float):
-    """A standard deviation that is a share of the number itself."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Share) and float(self) == float(other)
-
-    __hash__ = float.__hash__
-
-    @classmethod
-    def written(cls, given: Any) -> "Share | None":
-        """That of a text or table such as "10 %"; None where it says another unit, or none."""
-        match = units.NUMBER.fullmatch(given) if isinstance(given, str) else None
-        value, unit = (match[1], match[2]) if match else ("", "")
-        if isinstance(given, Mapping):
-            value, unit = given.get("value"), given.get("unit")
-        if isinstance(value, bool) or not isinstance(unit, str) or units.factor(unit, "1") in (None, 1.0):
-            return None
-        try:
-            return cls(float(f"{float(value) / 100.0:.12g}"))
-        except (TypeError, ValueError):
-            return None
-
-    def of(self, value: float) -> float:
-        """The standard deviation of a number."""
-        return self * abs(value)
 
 
 @dataclass(frozen=True)
@@ -190,7 +162,7 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             faults.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
         elif isinstance(value, Mapping) and "spread" in value:
             unit = {"unit": value["unit"]} if "unit" in value else {}
-            share = _share(value["spread"], known.get(key))
+            share = share_of(value["spread"], known.get(key))
             absolute = {"value": value["spread"], **unit} if unit else value["spread"]
             spreads[key] = absolute if share is None else share
             rest = {name: entry for name, entry in value.items() if name != "spread"}
@@ -201,10 +173,10 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
     apart = f"{where}.spread"
     converted, told, unfit = units.converted({where: values, apart: spreads}, {where: record, apart: record})
     notes = [_as_written(line, where, apart) for line in told]
-    wrong = [f"{_as_written(line, where, apart)}{_or_share(line, apart, known)}" for line in unfit]
+    wrong = [f"{_as_written(line, where, apart)}{or_share(line, apart, known)}" for line in unfit]
     made, more = schema.check(where, converted[where], record)
     faults += wrong + more
-    off, more = _spreads(where, converted[apart], known)
+    off, more = checked(where, converted[apart], known)
     numbers = {key: float(getattr(made, key)) for key in converted[where]} if made is not None and not more else {}
     return numbers, off, notes, faults + more
 
@@ -215,43 +187,6 @@ def _as_written(line: str, where: str, apart: str) -> str:
         return line
     key, _, rest = line.removeprefix(f"{apart}.").partition(" ")
     return f"{where}.{key}.spread {rest}"
-
-
-def _share(given: Any, declared: Any) -> Share | None:
-    """A spread that is a share of the number; of a number that is a share itself "10 %" is 0.1."""
-    relative = isinstance(declared, Quantity) and declared.unit not in ("", "1")
-    return Share.written(given) if relative else None
-
-
-def _or_share(line: str, apart: str, known: Mapping[str, Any]) -> str:
-    """What else may be written, at the end of a line about the unit of a spread."""
-    key = line.removeprefix(f"{apart}.").partition(" ")[0]
-    declared = known.get(key) if line.startswith(f"{apart}.") else None
-    return f", or {OF_IT}" if isinstance(declared, Quantity) and declared.unit not in ("", "1") else ""
-
-
-def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
-    """Standard deviations in declared units."""
-    found, faults = {}, []
-    for key, entry in given.items():
-        value = entry.get("value", entry) if isinstance(entry, Mapping) else entry
-        declared = known.get(key)
-        if not isinstance(declared, Quantity):
-            faults.append(f"{where}.{key}: unknown number")
-        elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
-            other = _or_share(f"{where}.spread.{key}", f"{where}.spread", known)
-            least = with_unit("0", declared.unit)
-            faults.append(
-                f"{where}.{key}.spread = {_told(value)} is not a standard deviation of {least} or more{other}"
-            )
-        else:
-            found[key] = value if isinstance(value, Share) else float(value)
-    return found, faults
-
-
-def _told(spread: Any) -> str:
-    """A spread as it was written."""
-    return f"'{100.0 * spread:g} %'" if isinstance(spread, Share) else repr(spread)
 
 
 def varied(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -285,8 +220,7 @@ def own_numbers(groups: Sequence[Group], agents: int, letter: str, name: str, re
             continue
         usual = float(getattr(own_record, name) or 0.0)
         own = group.numbers.get((letter, name), usual)
-        given = group.spread.get((letter, name), 0.0)
-        spread = given.of(own) if isinstance(given, Share) else given
+        spread = deviation(group.spread.get((letter, name), 0.0), own)
         for agent in group.agents:
             value = own
             if spread > 0.0:
