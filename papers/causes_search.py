@@ -1,4 +1,4 @@
-"""Fly again what shows why sentences on Dimock and Selig's search are not reproduced: `python papers/causes_search.py NAME [SEEDS]`.
+"""Fly again what shows why Dimock and Selig's search is not reproduced: `python papers/causes_search.py NAME [SEEDS]`.
 
 Names: takeover (ga.timid, ga.sporadic.rise), early (ga.early), rows (ga.row). One line a set of searches or flights;
 the figures stand as reasons in the page's statements.
@@ -10,48 +10,112 @@ from typing import Any
 
 import numpy as np
 
-from airflock.evolve.genetic import decode, genetic
+from airflock.evolve.genetic import BinaryGenetic, decode
 from airflock_papers.breaks import in_words
-from airflock_papers.dimock_2003.flights import Birds, Start, Task, in_row, spacing
-from airflock_papers.dimock_2003.ga import EARLY, GREEDY, HORSESHOE, READINGS, Reading, Run, losses_of, settings_of
-from airflock_papers.dimock_2003.units import HIGH, LOW, Gains
+from airflock_papers.dimock_2003.flights import Birds, Start, Task, holds_vee, in_row, spacing
+from airflock_papers.dimock_2003.ga import (
+    EARLY,
+    GENERATIONS,
+    GREEDY,
+    HORSESHOE,
+    POPULATION,
+    READINGS,
+    SEEDS,
+    Reading,
+    Run,
+    losses_of,
+    settings_of,
+)
+from airflock_papers.dimock_2003.units import FOOT, HIGH, LOW, Gains
 
-TAKEN, TENTH, BY = 10, 10, 0.75  # generation, generations that are compared, share of the controllers (ga.timid)
-PAGE = READINGS["mean"]
-SEARCHES: tuple[tuple[dict[str, Any], dict[str, float]], ...] = (
-    ({}, {}),
-    ({"start": (5.0, 5.0)}, {}),
-    ({"model.centroid": "n"}, {}),
-    *(({"model.avoidance": form}, {}) for form in ("present", "pairwise", "barrier")),
-    *(({"model.cohesion": form}, {}) for form in ("C2", "C3", "C5", "C6", "C7")),
-    ({"wing.segments": "5"}, {}),
-    ({"metrics.r_coll": 0.762}, {}),
-    ({}, {"crossover": 0.6}),
-    ({}, {"mutation": 0.001}),
+TAKEN, TENTH, BY = 10, 10, 0.75  # generation, generations that are compared, share of the controllers
+PRESSURE = 2  # controllers of a tournament
+SEARCHES: tuple[dict[str, Any], ...] = (
+    {},
+    {"start": (5.0, 5.0)},
+    {"model.centroid": "n"},
+    *({"model.avoidance": form} for form in ("present", "pairwise", "barrier")),
+    {"wing.segments": "5"},
+    {"metrics.r_coll": 0.762},
+    {"crossover": 0.6},
+    {"mutation": 0.001},
+    *({"pressure": k} for k in (3, 4, 8)),
+)
+OPERATORS = ("crossover", "mutation")
+# keys, gains that are set, spacings of the start aside (ft): flights of random controllers with a high K_d
+DRAG = {"k_c": 0.0, "k_a": 0.0}
+ROWS: tuple[tuple[dict[str, Any], dict[str, float], float], ...] = (
+    ({}, {}, 6.5),
+    ({}, DRAG, 6.5),
+    ({}, {}, 2.5),
+    *(({"wing.core": round(core * FOOT, 4)}, gains, 6.5) for core in (0.5, 1.0, 1.5) for gains in ({}, DRAG)),
+    *(({"model.v_max": v}, gains, 6.5) for v in (0.3, 1.0, 3.0) for gains in ({}, DRAG)),
+    *(({"model.v_max": 1.0}, {name: 0.0}, 6.5) for name in DRAG),
+    ({"model.v_max": 1.0, "wing.core": round(FOOT, 4)}, DRAG, 6.5),
 )
 
 
-def searched(keys: dict[str, Any], operators: dict[str, float], seed: int, generations: int) -> tuple[Birds, Run]:
-    """A search as the page's, with keys of the scenario and operators of the algorithm changed."""
-    start = Start(*(("vee", *keys["start"]) if "start" in keys else ("vee", 5.0, 6.5)))
-    changes = {key: value for key, value in keys.items() if key not in ("start", "model.centroid")}
-    run = Run(Reading(keys.get("model.centroid", PAGE.centroid), start), seed)
-    birds = Birds(threads=1, changes=changes)
+def searched(keys: dict[str, Any], seed: int, generations: int) -> tuple[Birds, Run]:
+    """A search as the page's, with keys of the scenario, the start or operators of the algorithm changed."""
+    start = Start("vee", *keys["start"]) if "start" in keys else READINGS["mean"].start
+    own = {key: value for key, value in keys.items() if key.partition(".")[0] in ("model", "wing", "metrics")}
+    run = Run(Reading(own.pop("model.centroid", READINGS["mean"].centroid), start), seed)
+    birds = Birds(changes=own)
     losses = losses_of(birds, run)
-    genetic(lambda bits: losses(decode(bits)), 50, population=50, generations=generations, seed=seed, **operators)
+    state = BinaryGenetic(50, POPULATION, seed, **{name: keys[name] for name in OPERATORS if name in keys})
+    state.algorithm.mating.selection.pressure = keys.get("pressure", PRESSURE)
+    for _ in range(generations):
+        state.tell(losses(decode(state.ask())))
     return birds, run
 
 
 def takeover(seeds: int = 8, first: int = 101) -> None:
     """Share of controllers with a small K_a in generation 10, and of those that collide, by what is left open."""
-    for keys, operators in SEARCHES:
-        runs = [searched(keys, operators, seed, TAKEN + TENTH)[1] for seed in range(first, first + seeds)]
+    stretches = (slice(TENTH), slice(TENTH, 2 * TENTH))
+    for keys in SEARCHES:
+        runs = [searched(keys, seed, TAKEN + TENTH)[1] for seed in range(first, first + seeds)]
         small = np.array([run.timid[TAKEN] for run in runs])
-        before, after = (np.array([np.mean(run.lost[part]) for run in runs]) for part in (slice(TENTH), slice(TENTH, 2 * TENTH)))
+        before, after = (np.array([np.mean(run.lost[part]) for run in runs]) for part in stretches)
         tell(
-            in_words({**keys, **operators}) or "as the page",
-            f"{int((small > BY).sum())} of {seeds} over {BY:.0%} by generation {TAKEN}, median {np.median(small):.0%}; "
-            f"colliding {before.mean():.1%} then {after.mean():.1%}, more in {int((after > before).sum())} of {seeds}",
+            in_words(keys) or "as the page",
+            f"{(small > BY).sum()} of {seeds} over {BY:.0%} by generation {TAKEN}, median {np.median(small):.0%}; "
+            f"{before.mean():.1%} collide in the first ten, {after.mean():.1%} in the next, more in "
+            f"{(after > before).sum()} of {seeds}",
+        )
+
+
+def early(seeds: int = 16, first: int = 101) -> None:
+    """How far birds swing aside (ft) under the best controller of generation 5, and under the last of the page."""
+
+    def told(keys: dict[str, Any], seed: int, generations: int) -> tuple[float, bool]:
+        birds, run = searched(keys, seed, generations)
+        (flight,) = birds.fly("", [Task(run.gains, run.reading.start)], **settings_of(run.reading))
+        return spacing(flight)[1], holds_vee(flight)
+
+    sets = ((f"generation {EARLY}", range(first, first + seeds), EARLY + 1), ("the last", SEEDS, GENERATIONS))
+    for name, chosen, generations in sets:
+        swings, held = zip(*(told({}, seed, generations) for seed in chosen), strict=True)
+        listed = ", ".join(f"{swing:.2f}" for swing in sorted(swings))
+        tell(name, f"a V in {sum(held)} of {len(held)}, swing {listed} ft")
+
+
+def rows(seeds: int = 150, first: int = 7) -> None:
+    """Where birds are after 20 s under random controllers with a high K_d, one horseshoe a wing."""
+    for keys, fixed, aside in ROWS:
+        rng, tasks = np.random.default_rng(first), []
+        while len(tasks) < seeds:
+            drawn = dict(zip(Gains._fields, LOW + (HIGH - LOW) * rng.random(5), strict=True))
+            gains = Gains(**drawn | {"k_d": GREEDY + GREEDY * rng.random()} | fixed)
+            if gains.r_c >= gains.r_a:
+                tasks.append(Task(gains, Start(sy=aside)))
+        whole = {"model.centroid": READINGS["mean"].centroid, **HORSESHOE, **keys}
+        flown = [flight for flight in Birds().fly("", tasks, scatter=True, **whole) if len(flight.frames)]
+        wide = [float(np.ptp(flight.frames[-1, 1])) / FOOT for flight in flown]
+        alone = "".join(f", {name} = {value:g}" for name, value in fixed.items())
+        tell(
+            f"{in_words(keys) or 'as the page'}{alone}, start {aside:g} ft aside",
+            f"{np.mean([in_row(flight) for flight in flown]):.1%} end in a row, {sum(f.collided for f in flown)} of "
+            f"{len(flown)} collide; {np.median(wide):.0f} ft wide",
         )
 
 
@@ -60,8 +124,10 @@ def tell(name: str, found: str) -> None:
     print(f"{name}: {found}", flush=True)  # noqa: T201
 
 
-CAUSES: dict[str, Callable[..., None]] = {each.__name__: each for each in (takeover,)}
+CAUSES: dict[str, Callable[..., None]] = {each.__name__: each for each in (takeover, early, rows)}
 
 if __name__ == "__main__":
     name, *seeds = sys.argv[1:] or [""]
+    if name not in CAUSES or len(seeds) > 1 or not all(text.isdecimal() and 0 < int(text) <= 1000 for text in seeds):
+        sys.exit(f"usage: python papers/causes_search.py {'|'.join(CAUSES)} [SEEDS], 1 to 1000 of them")
     CAUSES[name](*map(int, seeds))

@@ -2,8 +2,9 @@
 
 Alignment, cohesion or the goal alone is compared with boids that fly by none of the four rules, over the same seeds;
 gravity with boids without it, and the final set with one that avoids no obstacles. A boid is stuck if it flies slower
-than a tenth of the drone speed throughout the last ten seconds. A straggler is a boid with nobody within `r_cohes`, the farthest that it sees others; its focus is the
-cosine between its heading and the way to the goal, while it is more than a second's flight away from it.
+than a tenth of the drone speed throughout the last ten seconds. A straggler is a boid with nobody within `r_cohes`, the
+farthest that it sees others; its focus is the cosine between its heading and the way to the goal, while it is more than
+a second's flight away from it.
 """
 
 from collections.abc import Callable

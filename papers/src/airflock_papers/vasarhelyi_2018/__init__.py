@@ -2,10 +2,10 @@
 
 Parts: s2 (Table S2), fig1 (algorithm A against B), fig2 (range and delay), fig34 (outdoor flights), pressure (30 to
 1000 drones), limits (what keeps the fitness below 1), tuning (what Tables S3 and S4 say of each parameter), real (shill
-agents of Table S4, wind), beyond (a higher velocity, optima that keep farther apart). Each part flies and measures; statements.toml says what the paper
-prints of it. Flown only when they are asked for by name: s1 (Table S1, the evolution itself), which takes hours;
-optima and gains, the same sentences of the optima that ship; searches, what s1 found of its own course; rounding, the
-search inside the digits of Table S1.
+agents of Table S4, wind), beyond (a higher velocity, optima that keep farther apart). Each part flies and measures;
+statements.toml says what the paper prints of it. Flown only when they are asked for by name: s1 (Table S1, the
+evolution itself), which takes hours; optima and gains, the same sentences of the optima that ship; searches, what s1
+found of its own course; rounding, the search inside the digits of Table S1.
 """
 
 from airflock_papers.paper import Paper, by_modules

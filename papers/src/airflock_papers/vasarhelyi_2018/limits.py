@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from xarray import Dataset
 
 from airflock.recordings.flights import simulate
@@ -46,16 +47,18 @@ class Flown(NamedTuple):
     turns: dict[int, list[dict[str, float]]]
 
 
-def in_turns(recording: Dataset) -> dict[str, float]:
-    """Order parameters in the quarter that turns fastest, less those in the quarter that turns slowest.
-
-    Directions are those of the mean velocity, smoothed over a second, from SETTLED on.
-    """
-    times = recording["time"].values
+def turn_rate(recording: Dataset) -> NDArray[np.float64]:
+    """How fast the mean velocity, smoothed over a second, turns at each instant, rad/s."""
     mean = recording["velocity"].values[:, :2, 0, :].astype(np.float64).mean(axis=2)  # (time, axis)
     window = np.ones(SMOOTH) / SMOOTH
     smooth = np.stack([np.convolve(part, window, mode="same") for part in mean.T])
-    rate = np.abs(np.gradient(np.unwrap(np.arctan2(smooth[1], smooth[0])), times))
+    times = recording["time"].values
+    return np.asarray(np.abs(np.gradient(np.unwrap(np.arctan2(smooth[1], smooth[0])), times)))
+
+
+def in_turns(recording: Dataset) -> dict[str, float]:
+    """Order parameters in the quarter that turns fastest, less those in the slowest quarter, from SETTLED on."""
+    times, rate = recording["time"].values, turn_rate(recording)
     course = over_time(recording)
     course = course[(course.index >= SETTLED) & (course.index <= times[-1] - SMOOTH * (times[1] - times[0]))]
     turning = np.interp(course.index.to_numpy(), times, rate)
