@@ -1,7 +1,7 @@
 """Fly again what shows why Dimock and Selig's search is not reproduced: `python papers/causes_search.py NAME [SEEDS]`.
 
-Names: takeover (ga.timid, ga.sporadic.rise), early (ga.early), rows (ga.row). One line a set of searches or flights;
-the figures stand as reasons in the page's statements.
+Names: takeover (ga.timid, ga.sporadic.rise), early (ga.early), rows and exploited (ga.row). One line a set of
+searches or flights; the figures stand as reasons in the page's statements.
 """
 
 import sys
@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from airflock.evolve.genetic import BinaryGenetic, decode
+from airflock.evolve.genetic import BinaryGenetic, decode, genetic
 from airflock_papers.breaks import in_words
 from airflock_papers.dimock_2003.flights import Birds, Start, Task, holds_vee, in_row, spacing
 from airflock_papers.dimock_2003.ga import (
     EARLY,
+    FIRST,
     GENERATIONS,
     GREEDY,
     HORSESHOE,
@@ -26,10 +27,11 @@ from airflock_papers.dimock_2003.ga import (
     losses_of,
     settings_of,
 )
-from airflock_papers.dimock_2003.units import FOOT, HIGH, LOW, Gains
+from airflock_papers.dimock_2003.units import FOOT, FT_LBF, HIGH, LOW, Gains
 
 TAKEN, TENTH, BY = 10, 10, 0.75  # generation, generations that are compared, share of the controllers
 PRESSURE = 2  # controllers of a tournament
+LIMITS = (1.0, 3.0)  # m/s
 SEARCHES: tuple[dict[str, Any], ...] = (
     {},
     {"start": (5.0, 5.0)},
@@ -119,12 +121,29 @@ def rows(seeds: int = 150, first: int = 7) -> None:
         )
 
 
+def exploited(seeds: int = 3, first: int = 1) -> None:
+    """What searches of one horseshoe a wing come to, where velocities are limited."""
+    for v in LIMITS:
+        for seed in range(first, first + seeds):
+            run = Run(FIRST, seed)
+            losses = losses_of(Birds(changes={"model.v_max": v}), run)
+            genetic(lambda bits, of=losses: of(decode(bits)), 50, seed=seed)
+            half = len(run.rows) // 2
+            parts = [[row for k_d, row in part if k_d >= GREEDY] for part in (run.rows, run.rows[half:])]
+            whole, second = (f"{np.mean(part):.0%} of {len(part)}" if part else "none" for part in parts)
+            tell(
+                f"v_max of {v:g} m/s, seed {seed}",
+                f"flights with a high K_d in a row: {whole}, in the second half {second}; best "
+                f"{run.best[-1] / FT_LBF:.0f} ft lbf/s",
+            )
+
+
 def tell(name: str, found: str) -> None:
     """One line."""
     print(f"{name}: {found}", flush=True)  # noqa: T201
 
 
-CAUSES: dict[str, Callable[..., None]] = {each.__name__: each for each in (takeover, early, rows)}
+CAUSES: dict[str, Callable[..., None]] = {each.__name__: each for each in (takeover, early, rows, exploited)}
 
 if __name__ == "__main__":
     name, *seeds = sys.argv[1:] or [""]

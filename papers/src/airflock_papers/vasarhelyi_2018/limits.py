@@ -4,6 +4,7 @@ Pairs fly the same seeds. In turns: of each recorded flight the quarter of insta
 turns fastest, less the quarter in which it turns slowest.
 """
 
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from xarray import Dataset
 
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import over_time
+from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
@@ -32,18 +34,23 @@ CASES: dict[str, dict[str, Any]] = {
     "no delay": {"radio.delay": 0.0},
     "no noise": {"sensors.noise": 0.0, "body.noise": 0.0},
 }
-# claim: the two cases that are compared, and the order parameters in which they differ
-PAIRS: dict[str, tuple[str, str, tuple[str, ...]]] = {
-    "delay": ("as it is", "no delay", ("phi_corr",)),
-    "noise": ("as it is", "no noise", ("phi_corr",)),
-    "dense": ("as it is", "sparser", ("phi_corr", "n_coll")),
+# claim: the two cases that are compared, the order parameters in which they differ, and speeds, m/s
+PAIRS: dict[str, tuple[str, str, tuple[str, ...], tuple[int, ...]]] = {
+    "delay": ("as it is", "no delay", ("phi_corr",), SPEEDS),
+    "noise": ("as it is", "no noise", ("phi_corr",), SPEEDS),
+    "dense": ("as it is", "sparser", ("phi_corr", "n_coll"), SPEEDS),
+    "arena": ("smaller arena", "as it is", ("fitness",), FASTER),
+}
+SAID = {  # quantity and place of a claim, where they are not the order parameter and the two cases
+    "arena": ("fitness in a smaller arena", f"arena of {BEFORE:g} m less the one of Table S2"),
+    "turns": ("{} in turns", "the quarter of instants that turns fastest less the slowest"),
 }
 
 
 class Flown(NamedTuple):
-    """Order parameters by (case, speed, seed); by speed what every recorded flight loses in turns."""
+    """Order parameters by seed of every case and speed (m/s); by speed what every recorded flight loses in turns."""
 
-    scored: pd.DataFrame
+    scored: dict[tuple[str, int], pd.DataFrame]
     turns: dict[int, list[dict[str, float]]]
 
 
@@ -68,48 +75,65 @@ def in_turns(recording: Dataset) -> dict[str, float]:
     }
 
 
+def cases() -> dict[tuple[str, int], Scenario]:
+    """Every side of every pair, by case and speed (m/s)."""
+    found = {(name, v): optimum(v, keys) for name, keys in CASES.items() for v in SPEEDS}
+    for v in SPEEDS:
+        found["sparser", v] = optimum(v, {"model.r0_rep": SPARSER * found["as it is", v].parameters.r0_rep})
+    for v in FASTER:
+        found["as it is", v] = optimum(v, APART)
+        found["smaller arena", v] = optimum(v, {**APART, "world.side": BEFORE})
+    return found
+
+
+def claims() -> Iterator[tuple[str, str, int]]:
+    """Pair, order parameter and speed (m/s) of every claim on a pair."""
+    for name, (_, _, columns, speeds) in PAIRS.items():
+        yield from ((name, column, v) for v in speeds for column in columns)
+
+
 def fly(flights: Flights) -> Flown:
-    """Fly both sides of every pair, and record the optima."""
+    """Fly both sides of every pair, and record the optima; of what is asked for no others."""
     scored, recorded = flights.count(SEEDS, 6), flights.count(RECORDED, 6)
-    optima = {v: optimum(v) for v in SPEEDS}
-    cases = {(name, v): optimum(v, keys) for name, keys in CASES.items() for v in SPEEDS}
-    cases |= {("sparser", v): optimum(v, {"model.r0_rep": SPARSER * optima[v].parameters.r0_rep}) for v in SPEEDS}
-    cases |= {("as it is", v): optimum(v, APART) for v in FASTER}
-    cases |= {("smaller arena", v): optimum(v, {**APART, "world.side": BEFORE}) for v in FASTER}
-    count = flights.counter("What turns cost", len(optima) * recorded)
-    changed = {v: flights.as_changed(scenario) for v, scenario in optima.items()}
-    turns = {
-        v: list(
-            in_threads(
-                [lambda s=scenario, seed=seed: in_turns(simulate(s, seed)) for seed in range(recorded)],
-                flights.threads,
-                count,
-            )
-        )
-        for v, scenario in changed.items()
-    }
-    return Flown(flights.score("What keeps the fitness below 1", cases, scored).sort_index(), turns)
+    wanted = flights.wanted
+    pairs = [(name, v) for name, column, v in claims() if wanted is None or _id(name, column, v) in wanted]
+    needed = {(case, v) for name, v in pairs for case in PAIRS[name][:2]}
+    recordings = [v for v in SPEEDS if wanted is None or any(_id("turns", name, v) in wanted for name in IN_TURNS)]
+    count = flights.counter("What turns cost", len(recordings) * recorded)
+
+    def job(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
+        return lambda: in_turns(simulate(scenario, seed))
+
+    turns = {}
+    for v in recordings:
+        scenario = flights.as_changed(optimum(v))
+        turns[v] = list(in_threads([job(scenario, seed) for seed in range(recorded)], flights.threads, count))
+    flown = {}
+    for key, scenario in cases().items():
+        if key in needed:
+            name, v = key
+            flown[key] = flights.score(f"What limits the fitness, {name}, {v} m/s", {"": scenario}, scored)
+    return Flown(flown, turns)
 
 
 def measured(flown: Flown) -> list[Measured]:
-    """Paired differences, the optimum less the other; in turns; in a smaller arena."""
+    """Paired differences, in pairs and in turns."""
     found = []
-    for name, (one, other, columns) in PAIRS.items():
-        for v in SPEEDS:
-            for column in columns:
-                a, b = (flown.scored.loc[(case, v), column] for case in (one, other))
-                note = f"{a.mean():.4g} {one}, {b.mean():.4g} {other}"
-                at = f"{v} m/s, {one} less {other}"
-                found.append(Measured(f"limits.{name}.{column}.{v}ms", column, at, statistics.mean(a - b), note))
+    for name, column, v in claims():
+        one, other = ((case, v) for case in PAIRS[name][:2])
+        if not {one, other} <= set(flown.scored):
+            continue
+        a, b = (flown.scored[side][column] for side in (one, other))
+        quantity, at = SAID.get(name, (column, f"{one[0]} less {other[0]}"))
+        note = f"{a.mean():.4g} {one[0]}, {b.mean():.4g} {other[0]}"
+        found.append(Measured(_id(name, column, v), quantity, f"{v} m/s, {at}", statistics.mean(a - b), note))
+    quantity, at = SAID["turns"]
     for v, rows in flown.turns.items():
         for column in IN_TURNS:
             lost = statistics.mean([row[column] for row in rows])
-            at = f"{v} m/s, the quarter of instants that turns fastest less the slowest"
-            found.append(Measured(f"limits.turns.{column}.{v}ms", f"{column} in turns", at, lost))
-    for v in FASTER:
-        small, large = (flown.scored.loc[(case, v), "fitness"] for case in ("smaller arena", "as it is"))
-        note = f"{small.mean():.4g} against {large.mean():.4g}"
-        at = f"{v} m/s, arena of {BEFORE:g} m less the one of Table S2"
-        gap = statistics.mean(small - large)
-        found.append(Measured(f"limits.arena.fitness.{v}ms", "fitness in a smaller arena", at, gap, note))
+            found.append(Measured(_id("turns", column, v), quantity.format(column), f"{v} m/s, {at}", lost))
     return found
+
+
+def _id(name: str, column: str, v: int) -> str:
+    return f"limits.{name}.{column}.{v}ms"
