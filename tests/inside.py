@@ -76,6 +76,8 @@ NAMES = {
     "with_reciprocals": ("cuda.reciprocals", "with_reciprocals"),
     "MOST_THREADS": ("cuda.shape", "MOST_THREADS"),
     "Shape": ("cuda.shape", "Shape"),
+    "at_first": ("cuda.compile_shortcuts", "at_first"),
+    "configured": ("cuda.launch", "configured"),
     "shape_of": ("cuda.shape", "shape_of"),
     "no_cuda": ("devices", "no_cuda"),
     "no_room": ("devices", "no_room"),

@@ -53,6 +53,30 @@ def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypat
     assert said[1].startswith("device auto: cuda")
 
 
+def test_auto_leaves_to_many_cores_what_one_thread_of_a_gpu_would_solve(present, monkeypatch):
+    many, said = [load("dimock_2003/physical")] * 10_000, []
+    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 16)
+    assert picked(many, "auto", say=said.append) == "cpu"
+    assert said == ["device auto: cpu, about 19 s of work on 16 cores, where the GPU would take 1.1e+02 s"]
+    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 1)
+    assert picked(many, "auto") == "cuda"
+
+
+def test_one_long_flight_is_no_work_for_a_gpu(present, monkeypatch):
+    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 1)
+    long = load("zapotecatl_2016/best", {"duration": 2e4})
+    assert cost.seconds_of(long) > 50.0
+    assert picked([long], "auto") == "cpu"
+    assert picked([long] * 1000, "auto") == "cuda"
+
+
+def test_a_big_flock_has_all_of_a_gpu_to_itself(present, monkeypatch):
+    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 16)
+    keys = {"agents": 100_000, "world.edges": "periodic", "world.arena": "square", "world.side": 46.0,
+            "world.height": 46.0, "start.separation": 0.0, "metrics.kind": "order", "dt": 0.02}  # fmt: skip
+    assert picked([load("zapotecatl_2016/literal", {**keys, "duration": 400.0})], "auto") == "cuda"
+
+
 def test_work_grows_with_flights_agents_and_time():
     base = cost.seconds_of(scenario(agents=100, duration=100.0))
     assert cost.seconds_of(scenario(agents=100, duration=200.0)) == pytest.approx(2.0 * base, rel=0.02)
@@ -86,7 +110,7 @@ def test_every_flock_fits_on_the_threads_of_its_block(agents, flocks):
     assert shape.threads % 32 == 0
     if shape.registers:
         assert shape.threads == shape.lanes * shape.per_agent
-    assert shape_of(agents, 15_000).per_agent <= shape.per_agent  # full GPUs share nothing
+    assert shape_of(agents, 15_000).per_agent == 1  # full GPUs share nothing
 
 
 @pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "kidger/city", "zapotecatl_2016/best", "dimock_2003/physical"])

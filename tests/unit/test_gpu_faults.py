@@ -2,6 +2,7 @@
 
 import re
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -117,3 +118,30 @@ def test_as_many_agents_fit_as_are_said_to(name, machine):
     assert line(fit + 33) is not None  # agents lie in groups of 32
     need, room = (float(text) for text in re.search(words, line(agents)).groups()[:2])
     assert need > room == pytest.approx(0.9 * free)
+
+
+def test_few_flocks_are_no_warning_of_numbas(monkeypatch):
+    from numba.cuda.core import config
+
+    from inside import configured
+
+    class Kernel:
+        def __getitem__(self, grid):
+            return grid, config.CUDA_LOW_OCCUPANCY_WARNINGS
+
+    monkeypatch.delenv("NUMBA_ENABLE_CUDASIM", raising=False)
+    monkeypatch.setattr(config, "CUDA_LOW_OCCUPANCY_WARNINGS", 1)
+    assert configured(Kernel(), 1, 128) == ((1, 128), 0)
+    assert config.CUDA_LOW_OCCUPANCY_WARNINGS == 1  # a user's own kernels are warned of as before
+
+
+def test_the_first_launch_of_a_kernel_compiles_without_what_changes_nothing():
+    from numba.cuda.core.targetconfig import TargetConfig
+
+    from inside import at_first
+
+    usual = TargetConfig.__hash__
+    for overloads, spared in (({}, True), ({"signature": "kernel"}, False)):
+        with at_first(SimpleNamespace(overloads=overloads)):
+            assert (TargetConfig.__hash__ is not usual) is spared
+        assert TargetConfig.__hash__ is usual

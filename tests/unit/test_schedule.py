@@ -26,8 +26,11 @@ def calls(text, function, names):
     """Calls of these names in a function of a driver, as they stand in its text."""
     (node,) = (n for n in ast.parse(text).body if isinstance(n, ast.FunctionDef) and n.name == function)
     loops = (n for n in ast.walk(node) if isinstance(n, (ast.For, ast.While)))
-    over = "i in" if function == "turns" else "step"
-    found = [n for n in ast.walk(next(n for n in loops if over in ast.unparse(n)[:12])) if isinstance(n, ast.Call)]
+    over = (
+        ("i in",) if function == "turns" else ("step", "while True")
+    )  # a kernel ends its loop in the middle of a step
+    (first, *_) = (n for n in loops if any(words in ast.unparse(n)[:12] for words in over))
+    found = [n for n in ast.walk(first) if isinstance(n, ast.Call)]
     found.sort(key=lambda n: (n.lineno, n.col_offset))
     return [name for n in found if (name := getattr(n.func, "id", "").removesuffix("_of")) in names]
 

@@ -1,5 +1,6 @@
 """Devices: on what flights run. `auto` picks by the size of the work and by what there is, and says what it picked."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -8,16 +9,22 @@ import numpy as np
 
 from airflock.engine import cpu
 from airflock.engine.cpu import Flown
+from airflock.engine.passes.flock import owners
 from airflock.engine.plan import Plan
 from airflock.engine.tables import tables
 from airflock.errors import DeviceError, ScenarioError
-from airflock.scenarios.cost import total_seconds
+from airflock.scenarios.cost import seconds_of, total_seconds
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import cores
 
 DEVICES = ("auto", "cpu", "cuda", "python")
 MOST_TOGETHER = 20_000  # agents whose pairs one block of a GPU can look at in reasonable time
 WORTH = 5.0  # s of work on all cores from which a GPU is worth its start
+# How much longer a block of a GPU takes for one flock than a core does, and how many flocks a multiprocessor flies in
+# the time of one (an H200 beside a core of its machine, benchmarks/RESULTS.md).
+SOLVING, SEEING, IN_TURN, USUAL = 120.0, 4.0, 6.0, 1.0
+SIDE_BY_SIDE = 2.5
+BY_CELLS = 40.0  # cores that a GPU stands for with one big flock (100,000 boids)
 
 
 @dataclass(frozen=True)
@@ -67,7 +74,35 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
     missing = next(filter(None, map(no_room, largest.values(), largest)), None)
     if missing is not None:
         return Choice("cpu", missing)
+    there = seconds_on_gpu(scenarios, plans)
+    if there > seconds:
+        return Choice(
+            "cpu", f"about {seconds:.2g} s of work on {cores()} cores, where the GPU would take {there:.2g} s"
+        )
     return Choice("cuda", f"about {seconds:.2g} s of work on {cores()} cores would be left to the CPU")
+
+
+def seconds_on_gpu(scenarios: Sequence[Scenario], plans: Sequence[Plan]) -> float:
+    """Seconds that a GPU takes for these flights, about: one flock as slowly as its law lets it, many side by side."""
+    from airflock.gpu import multiprocessors
+
+    kinds = {id(scenario): (scenario, plan) for scenario, plan in zip(scenarios, plans, strict=True)}
+    counts = Counter(map(id, scenarios))
+    alone = together = longest = 0.0
+    for kind, (scenario, plan) in kinds.items():
+        if by_cells(scenario, plan, plan.given_start):
+            alone += counts[kind] * seconds_of(scenario) / BY_CELLS
+        else:
+            one = _slower(plan) * seconds_of(scenario)
+            together, longest = together + counts[kind] * one, max(longest, one)
+    return alone + max(longest, together / (SIDE_BY_SIDE * multiprocessors()))
+
+
+def _slower(plan: Plan) -> float:
+    """How much longer a block of a GPU takes for a flock than a core."""
+    if owners(plan):
+        return SOLVING  # which one thread does
+    return IN_TURN if plan.sequential else SEEING if plan.scene else USUAL
 
 
 def by_cells(scenario: Scenario, plan: Plan, given: bool = False) -> bool:

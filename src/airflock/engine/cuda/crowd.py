@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airflock.engine.cpu import Flown
 from airflock.engine.cuda.cells import COMMON, NEAR, crowd, rest_columns
+from airflock.engine.cuda.launch import configured
 from airflock.engine.cuda.memory import SHARE, unfit
 from airflock.engine.initial_rows import defaults
 from airflock.engine.measuring import measured
@@ -136,7 +137,7 @@ class Crowd:
         """Agents at random places, or at given ones: (component, agent)."""
         dims = self.plan.dimensions
         if start is None:
-            self.driver.begin[self._grid(self.agents)](self.near, self.rest, *self.common)
+            configured(self.driver.begin, *self._grid(self.agents))(self.near, self.rest, *self.common)
             return
         near = np.zeros((self.agents, NEAR), self.tables.row.dtype)
         near[:, :dims], near[:, 4 : 4 + dims] = np.asarray(start)[:dims].T, np.asarray(start)[dims:].T
@@ -152,20 +153,23 @@ class Crowd:
 
     def advance(self, steps: int = 1) -> None:
         """Fly this many motion steps; returns while the GPU may still be at work."""
-        d, every = self.driver, self.times["decide_every"]
-        each, scan = self._grid(self.agents), (self.blocks, int(d.SCAN))
+        each, scan = self._grid(self.agents), (self.blocks, int(self.driver.SCAN))
         most = self._grid(max(self.agents, len(self.counts)))
+        count, within, before, list_, copy, move = (
+            configured(getattr(self.driver, name), *grid)
+            for name, grid in (("count_agents", each), ("sum_within", scan), ("sum_before", scan),
+                               ("list_agents", most), ("copy_agents", each), ("advance", each))
+        )  # fmt: skip
         for _ in range(steps):
-            meet = self.step % every == 0
+            meet = self.step % self.times["decide_every"] == 0
             if meet:
-                d.count_agents[each](self.near, self.common[-2], self.common[-1], self.counts, self.cell, self.rank)
-                d.sum_within[scan](self.counts, self.starts, self.sums)
-                d.sum_before[scan](self.counts, self.starts, self.sums)
-                d.list_agents[most](self.near, self.cell, self.rank, self.starts, self.counts, self.listed)
-                tables_ = (self.near, self.rest, self.cell, self.starts, self.listed, self.sorted, self.rest_sorted)
-                d.copy_agents[each](*tables_)
+                count(self.near, self.common[-2], self.common[-1], self.counts, self.cell, self.rank)
+                within(self.counts, self.starts, self.sums)
+                before(self.counts, self.starts, self.sums)
+                list_(self.near, self.cell, self.rank, self.starts, self.counts, self.listed)
+                copy(self.near, self.rest, self.cell, self.starts, self.listed, self.sorted, self.rest_sorted)
             state = (self.near, self.rest, self.sorted, self.rest_sorted, self.starts)
-            d.advance[each](*state, np.int32(meet), np.int32(self.step), *self.common)
+            move(*state, np.int32(meet), np.int32(self.step), *self.common)
             self.step += 1
 
     def state(self) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -9,7 +9,7 @@ from airflock.engine.initial_rows import defaults
 from airflock.engine.passes.build import branch, columns, loop
 from airflock.engine.passes.driver import make
 from airflock.engine.plan import Plan
-from airflock.engine.schedule import ORDER, in_turn, order
+from airflock.engine.schedule import in_turn, order
 from airflock.engine.stages.approach import SLACK
 from airflock.engine.stages.measure import measured
 from airflock.engine.stages.words import START, ZERO
@@ -38,20 +38,19 @@ def flight(plan: Plan, shape: Shape) -> str:
 
 
 def _time(build: CudaBuilder) -> list[str]:
-    """The loop over time; counters instead of remainders, which a GPU divides for."""
+    """The loop over time. Most steps only move: what happens now and then is asked for together."""
     plan = build.plan
-    heard = plan.late
     count = len(columns(plan.metrics))
     first = [START.get(how, ZERO).spelled for _, how, _ in columns(plan.metrics)]
     lines = branch(
         "tid == 0", [f"totals[{c}, 0] = {s}; totals[{c}, 1] = ZERO" for c, s in enumerate(first)] or ["pass"]
     )
     lines += ["count_sample = integer(0); count_collision = integer(0); k = integer(0); slot_out = integer(0)"]
-    lines += ["to_decide = integer(0); to_sample = integer(0); to_collide = integer(0)"]
-    lines += ["moved = ZERO; gap = ZERO; calm = False; frame = integer(0); answer = ZERO"]
+    lines += ["next_decide = integer(0); next_sample = integer(0); next_collide = integer(0); next_ = integer(0)"]
+    lines += ["moved = ZERO; gap = ZERO; looked = integer(0); look = False; frame = integer(0); answer = ZERO"]
     lines += [f"value{c} = ZERO" for c in range(count)]
-    if heard:
-        lines += ["to_hear = integer((decide_every - delay % decide_every) % decide_every)"]
+    if plan.late:
+        lines += ["next_hear = integer((decide_every - delay % decide_every) % decide_every)"]
         lines += ["slot_in = integer(((delay + decide_every - 1) // decide_every) % slots)"]
     lines += ["begun = integer(0)"] * bool(plan.faults)
     step = ["time = real(step) * row_c.dt", *begin_faults(build)]
@@ -59,20 +58,32 @@ def _time(build: CudaBuilder) -> list[str]:
         step += ["hurt_first = integer(0)", "hurt_end = integer(n) if begun > 0 else integer(0)"]
     if plan.absence:  # an instant of one of several agents, or of none, is not counted
         step += ["counted = integer(1) if n >= least(integer(2), born) else integer(0)"]
-    for event in ORDER:
-        step += PARTS[event](build)
+    send, world = _send(build), _world(build)
+    step += [*send, *world, *_look(build)] if world else _look(build)
+    now_and_then = [*_decide(build), *_watch(build), *_sample(build), *_next(build)]
+    step += branch("look or step == next_", now_and_then if world else [*send, *now_and_then])
+    step += [*branch("step == steps", ["break"]), *_advance(build)]
     # counted by hand in 32 bits: a range counts in 64, twice
     turn = [f"    {line}" for text in [*step, "step = integer(step + 1)"] for line in text.splitlines()]
-    return [*lines, "step = integer(0)", "while step <= steps:", *turn]
+    return [*lines, "step = integer(0)", "while True:", *turn]
+
+
+def _next(build: CudaBuilder) -> list[str]:
+    """The next step at which anything is due but motion, and a look for collisions."""
+    due = ["next_sample"] if build.plan.sequential else ["next_decide", "next_sample"]
+    found = due[0]
+    for other in [*due[1:], *["next_hear"] * build.plan.late]:
+        found = f"least({found}, {other})"
+    return [f"next_ = {found}"]
 
 
 def _send(build: CudaBuilder) -> list[str]:
     """The state that is sent goes into the slot of the ring from which it will be heard."""
     if not build.plan.late:
         return []
-    put = ["slot = slot_in", build.stages["snapshot"].call(), "to_hear = decide_every"]
+    put = ["slot = slot_in", build.stages["snapshot"].call(), "next_hear = integer(step + decide_every)"]
     put += ["slot_in = integer(slot_in + 1) if slot_in + 1 < slots else integer(0)"]
-    return [*branch("to_hear == 0", put), "to_hear = integer(to_hear - 1)"]
+    return branch("step == next_hear", put)
 
 
 def _world(build: CudaBuilder) -> list[str]:
@@ -91,14 +102,11 @@ def _world(build: CudaBuilder) -> list[str]:
 def _decide(build: CudaBuilder) -> list[str]:
     """What is due of all that looks at the others, who show themselves for it once; then a decision."""
     meets, watched = not build.plan.sequential, bool(order(build.plan)["watch"])
-    lines = _look(build) if watched else []
-    lines += ["meet = to_decide == 0" if meets else "meet = False", "take = to_sample == 0"]
+    lines = ["meet = step == next_decide" if meets else "meet = False", "take = step == next_sample"]
     shown = [*branch("meet", _perceived(build))] if meets else []
     show = ["cuda.syncthreads()", *_shown(build), *shown, "cuda.syncthreads()"]
     lines += branch(" or ".join(["meet", "take", *["look"] * watched]), show)
-    if meets:
-        lines += [*branch("meet", _choose(build)), "to_decide = integer(to_decide - 1)"]
-    return lines
+    return [*lines, *branch("meet", _choose(build))] if meets else lines
 
 
 def _watch(build: CudaBuilder) -> list[str]:
@@ -111,28 +119,17 @@ def _watch(build: CudaBuilder) -> list[str]:
 
 
 def _sample(build: CudaBuilder) -> list[str]:
-    return [*branch("take", _taken(build)), "to_sample = integer(to_sample - 1)"]
-
-
-def _move(build: CudaBuilder) -> list[str]:
-    return branch("step < steps", _advance(build))
-
-
-PARTS = {"send": _send, "world": _world, "decide": _decide, "watch": _watch, "sample": _sample, "move": _move}
+    return branch("take", _taken(build))
 
 
 def _look(build: CudaBuilder) -> list[str]:
     """Whether to look for collisions: while nobody can have come near enough, a vote of all threads says no."""
+    if not order(build.plan)["watch"]:
+        return []
     watched = _within(build) is not None
     vote = "cuda.syncthreads_or(integer(1) if moved >= gap else integer(0)) != 0" if watched else "True"
-    body = [
-        f"look = {vote}",
-        "to_collide = collide_every",
-        f"count_collision = integer(count_collision + {_one(build)})",
-    ]
-    if watched:
-        body += branch("not look and not calm", [*_forget(build), "calm = True"])
-    return ["look = False", *branch("to_collide == 0", body), "to_collide = integer(to_collide - 1)"]
+    body = [f"look = {vote}", "next_collide = integer(step + collide_every)", *_counted(build)]
+    return ["look = False", *branch("step == next_collide", body)]
 
 
 def _within(build: CudaBuilder) -> str | None:
@@ -183,22 +180,24 @@ def _choose(build: CudaBuilder) -> list[str]:
         if name == "tune":
             continue  # told to the others before they meet
         lines += [build.stages[name].call(k_="k"), *barrier]
-    lines += ["k = integer(k + 1); to_decide = decide_every"]
+    lines += ["k = integer(k + 1); next_decide = integer(step + decide_every)"]
     return [*lines, "slot_out = integer(slot_out + 1) if slot_out + 1 < slots else integer(0)"]
 
 
 def _looked(build: CudaBuilder) -> list[str]:
+    """Contacts at this instant. Who was not looked at since an earlier one was in none: memories begin anew."""
     lines = [build.stages["measure_collision"].call(), *_added(build, "collision")]
     width = _within(build)
     if width is None:
         return lines
-    return [*lines, f"gap = answer - {width} - real({SLACK})", "moved = ZERO; calm = False"]
+    anew = branch("step - looked > collide_every", _forget(build) or ["pass"])
+    return [*anew, *lines, f"gap = answer - {width} - real({SLACK})", "moved = ZERO; looked = step"]
 
 
 def _taken(build: CudaBuilder) -> list[str]:
     """One sample: order parameters and, where they are kept, positions, velocities and commands."""
     plan = build.plan
-    lines = ["to_sample = sample_every", f"count_sample = integer(count_sample + {_one(build)})"]
+    lines = ["next_sample = integer(step + sample_every)", f"count_sample = integer(count_sample + {_one(build)})"]
     if order(plan)["sample"]:
         lines += [build.stages["measure_sample"].call(), *_added(build, "sample")]
     if plan.record:
@@ -226,6 +225,11 @@ def _one(build: CudaBuilder) -> str:
     return "counted" if build.plan.absence else "1"
 
 
+def _counted(build: CudaBuilder) -> list[str]:
+    """Looks for collisions are counted where not every one counts; else their number follows from that of the steps."""
+    return ["count_collision = integer(count_collision + counted)"] * build.plan.absence
+
+
 def _number(build: CudaBuilder) -> str:
     """Number of the agent of this thread."""
     return f"integer({own(build, 'order')})" if build.slots else "i"
@@ -249,6 +253,8 @@ def _end(build: CudaBuilder) -> list[str]:
     who = _number(build)
     left = [f"states[block, {c}, {who}] = {own(build, name)}" for c, name in enumerate(build.plan.motion)]
     lines = agents(build, left)
+    if order(build.plan)["watch"] and not build.plan.absence:
+        lines += ["count_collision = integer(step // collide_every + 1)"]
     count = len(columns(build.plan.metrics))
     last = [f"all_sums[block, {c}, {h}] = totals[{c}, {h}]" for c in range(count) for h in range(2)]
     last += [

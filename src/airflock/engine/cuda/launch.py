@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.cpu import Flown
+from airflock.engine.cuda.compile_shortcuts import at_first
 from airflock.engine.cuda.individuals import due, presence
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
@@ -21,7 +23,7 @@ from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
 from airflock.engine.totals import combined, goals_reached
 from airflock.errors import DeviceError
-from airflock.gpu import free_memory, multiprocessors, required, runtime
+from airflock.gpu import free_memory, multiprocessors, required, runtime, simulating
 
 AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress
 
@@ -104,8 +106,21 @@ def _fly(
 ) -> list[Flown]:
     """One launch."""
     own = arrays(plan, driver, shape, jobs, starts)
-    driver.fly[len(jobs), shape.threads](*(own[name] for name in ARGUMENTS))
+    with at_first(driver.fly):
+        configured(driver.fly, len(jobs), shape.threads)(*(own[name] for name in ARGUMENTS))
     return results(plan, jobs, own)
+
+
+def configured(kernel: Any, blocks: int, threads: int) -> Any:
+    """A kernel for so many blocks. Numba warns of fewer than 128; here they are as many as there are flocks."""
+    if simulating():
+        return kernel[blocks, threads]
+    settings: Any = import_module("numba.cuda.core.config")
+    warned, settings.CUDA_LOW_OCCUPANCY_WARNINGS = settings.CUDA_LOW_OCCUPANCY_WARNINGS, 0
+    try:
+        return kernel[blocks, threads]
+    finally:
+        settings.CUDA_LOW_OCCUPANCY_WARNINGS = warned
 
 
 def arrays(

@@ -6,7 +6,9 @@ WARP = 32
 MOST_THREADS = 1024  # of one block, on every GPU so far
 MOST_REGISTERED = 1024  # agents whose state stays in registers; more are kept in a table in the GPU's memory
 REGISTERS = 65_536  # of a multiprocessor, on every GPU so far
-SATURATED = 96  # of a thread where flocks fill a GPU: 52 bytes are spilled, none in a pair loop (counted for sm_90)
+ROOMY = 128  # of a thread where a multiprocessor has few flocks: nothing is spilled
+SATURATED = 96  # of a thread where flocks fill a GPU: some are spilled, none in a pair loop (counted for sm_90)
+MANY = 16  # blocks of 128 threads for a multiprocessor from which more warps are worth more than more registers
 UNROLL = 2  # pairs per turn of a pair loop: 4 cost registers and were slower (trial, H200)
 
 
@@ -19,6 +21,7 @@ class Shape:
     threads   : of the block
     registers : each thread keeps the state of its agent in registers, else all states lie in a table, and an agent has
                 one thread, or the whole block: others would come to their sums in different turns, and wait for ever
+    crowded   : flocks fill the GPU many times over
     simulated : text for Numba's CUDA simulator, which knows neither shuffles nor alignment
     """
 
@@ -26,6 +29,7 @@ class Shape:
     per_agent: int
     threads: int
     registers: bool = True
+    crowded: bool = True
     simulated: bool = False
 
     def __post_init__(self) -> None:
@@ -40,12 +44,13 @@ class Shape:
     def bounds(self) -> tuple[int, int]:
         """Threads of a block, and blocks that a multiprocessor shall hold at least: so many registers a thread gets.
 
-        Where one thread serves an agent flocks fill the GPU, and warps that wait for each other's results hide it: left
-        alone a thread takes 159 registers, and 12 warps fit where 20 do with 96. Otherwise each flock has a
-        multiprocessor to itself, and all the registers it can use.
+        Warps that wait for each other's results hide it where flocks fill the GPU. Left alone a thread takes 159
+        registers; with 128 none is spilled. On an H200 a flock of 100 agents flies 60 s in 5.4 ms with 128
+        registers and in 6.1 with 96; 1,000 flocks in 19.4 and 20.0, 5,000 in 89.2 and 85.5. Fewer are slower.
         """
-        crowded = self.registers and self.per_agent == 1
-        return self.threads, max(1, REGISTERS // (SATURATED * self.threads)) if crowded else 1
+        registers = SATURATED if self.crowded else ROOMY
+        alone = not self.registers or self.per_agent > 1  # a multiprocessor, and all the registers that it can use
+        return self.threads, 1 if alone else max(1, REGISTERS // (registers * self.threads))
 
     @property
     def words(self) -> int:
@@ -59,9 +64,10 @@ def shape_of(
 ) -> Shape:  # fmt: skip
     """Layout for many flocks of this size on a GPU with this many multiprocessors.
 
-    Few flocks leave most of a GPU idle: then several threads share the pairs of one agent. When there are flocks enough
-    to fill it, one thread per agent wastes nothing (trial on an H200: the change pays below some 3 flocks of 100 agents
-    per multiprocessor).
+    Few flocks leave most of a GPU idle. Where a flock is one warp, several threads then share the pairs of one agent;
+    larger ones have warps enough to hide each other's waiting, and sums over threads cost more than they save (100
+    agents for 60 s, one flock on an H200: 5.4 ms with one thread per agent, 6.0 with two; 30 agents, a hundred flocks:
+    5.2 ms with one, 4.3 with two, 3.9 with four; a thousand: 5.6, 8.6 and 11.8).
 
     sequential : one agent after another
     whole      : some rule solves for the whole flock, which one thread does
@@ -75,8 +81,7 @@ def shape_of(
         return Shape(lanes, 1, WARP, registers=False)
     if agents > MOST_REGISTERED:
         return Shape(lanes, 1, MOST_THREADS, registers=False)
-    per_agent = 1
-    busy = flocks * lanes / (processors * 3.0 * 128.0)  # 1.0: as full as pays
-    while not apart and per_agent < 4 and 2 * per_agent * lanes <= MOST_THREADS and busy * per_agent < 1.0:
+    per_agent, busy = 1, flocks * lanes / (processors * 128.0)  # 1.0: a warp for each that can run at once
+    while not apart and lanes == WARP and per_agent < 4 and busy * per_agent < 1.0:
         per_agent *= 2
-    return Shape(lanes, per_agent, lanes * per_agent)
+    return Shape(lanes, per_agent, lanes * per_agent, crowded=busy > MANY)
