@@ -30,6 +30,7 @@ from airflock_papers.dimock_2003.ga import (
 from airflock_papers.dimock_2003.units import FOOT, FT_LBF, HIGH, LOW, Gains
 
 TAKEN, TENTH, BY = 10, 10, 0.75  # generation, generations that are compared, share of the controllers
+EARLIER: tuple[dict[str, Any], ...] = ({}, {"model.centroid": "n"})  # readings of ga.early
 PRESSURE = 2  # controllers of a tournament
 LIMITS = (1.0, 3.0)  # m/s
 SEARCHES: tuple[dict[str, Any], ...] = (
@@ -95,10 +96,11 @@ def early(seeds: int = 16, first: int = 101) -> None:
         return spacing(flight)[1], holds_vee(flight)
 
     sets = ((f"generation {EARLY}", range(first, first + seeds), EARLY + 1), ("the last", SEEDS, GENERATIONS))
-    for name, chosen, generations in sets:
-        swings, held = zip(*(told({}, seed, generations) for seed in chosen), strict=True)
-        listed = ", ".join(f"{swing:.2f}" for swing in sorted(swings))
-        tell(name, f"a V in {sum(held)} of {len(held)}, swing {listed} ft")
+    for keys in EARLIER:
+        for name, chosen, generations in sets:
+            swings, held = zip(*(told(keys, seed, generations) for seed in chosen), strict=True)
+            listed = ", ".join(f"{swing:.2f}" for swing in sorted(swings))
+            tell(f"{in_words(keys) or 'as the page'}, {name}", f"a V in {sum(held)} of {len(held)}, swing {listed} ft")
 
 
 def rows(seeds: int = 150, first: int = 7) -> None:
