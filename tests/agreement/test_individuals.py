@@ -111,14 +111,24 @@ def test_a_lonely_agent_flies_on_and_its_instants_do_not_count():
     assert np.isnan(flight.state).all() and flight.scores()["phi_vel"] == before["phi_vel"]
 
 
-def test_random_numbers_of_the_others_do_not_depend_on_who_left():
-    """Noise and lost packets are drawn by the numbers of agents, not by their places in memory."""
-    far = {"agents": 5, "duration": 3.0, "radio.range": 0.0, "radio.loss": 0.5, **OPEN}
-    scenario = load(PAPER, {**far, "start.kind": "ball", "start.radius": 500.0})
-    known = airflock.open(scenario, 4, device="python").advance(2.0)
-    flight = airflock.open(scenario, 4, device="python").advance(0.5).remove(1).advance(1.5)
-    others = [0, 2, 3, 4]
-    assert np.array_equal(flight.state[:, others], known.state[:, others])
+@pytest.mark.parametrize("agents", [5, 15])
+@pytest.mark.parametrize("first", ["last", 1])
+def test_random_numbers_of_the_others_do_not_depend_on_who_left(agents, first):
+    """Noise and lost packets are drawn by the numbers of agents, not by their places in memory.
+
+    Of 15 agents, lanes behind them are filled up; after the last one has left, the others still lie at their numbers.
+    """
+    far = {"agents": agents, "duration": 3.0, "radio.range": 0.0, "radio.loss": 0.5, **OPEN}
+    far |= {"start.kind": "ball", "start.radius": 800.0}
+    gone = [agents - 1 if first == "last" else first, 2]
+    known = airflock.open(load(PAPER, far), 4, device="python").advance(2.0)
+    by_hand = airflock.open(load(PAPER, far), 4, device="python").advance(0.5)
+    by_hand.remove(gone[0]).advance(0.7).remove(gone[1]).advance(0.8)
+    faults = [{"kind": "fails", "at": at, "agents": [agent]} for at, agent in zip((0.5, 1.2), gone, strict=True)]
+    by_fault = airflock.open(load(PAPER, far | {"faults": faults}), 4, device="python").advance(2.0)
+    others = [agent for agent in range(agents) if agent not in gone]
+    for flight in (by_hand, by_fault):
+        assert np.array_equal(flight.state[:, others], known.state[:, others])
 
 
 @pytest.mark.parametrize(
@@ -228,16 +238,70 @@ def test_a_radio_that_is_silent_or_deaf(kind, heard, hears, radio):
     assert bool(flight.look(2).heard) == hears
 
 
-def test_a_frozen_radio_tells_the_moment_at_which_it_froze():
-    quiet = {"sensors.noise": 0.0, "radio.delay": 0.4, "radio.range": 1e4}
-    faults = [{"kind": "radio_frozen", "at": 1.0, "agents": [2], "lasts": 2.0}]
-    flight = airflock.open(load(PAPER, {**SMALL, **quiet, "faults": faults}), 1, device="python").advance(1.0)
-    then = flight.state[:, 2]
-    for _ in range(24):
+def told_of(flight, who):
+    """What agent 0 has just heard of another one."""
+    (found,) = (other.state for other in flight.look(0).heard if other.who == who)
+    return found
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+def test_a_frozen_radio_repeats_the_packet_that_it_sent_last(noise):
+    """With its errors: they are part of what was sent. Two faults, so that the second one repeats a newer packet."""
+    keys = {"sensors.noise": noise, "radio.delay": 0.4, "radio.range": 1e4, "duration": 8.0}
+    hit = {"kind": "radio_frozen", "agents": [2]}
+    faults = [hit | {"at": 1.0, "lasts": 2.0}, hit | {"at": 3.6, "lasts": 1.0}]
+    flight = airflock.open(load(PAPER, {**SMALL, **keys, "faults": faults}), 1, device="python")
+    told = []
+    for _ in range(30):
         flight.advance(0.2).sense()
-        (told,) = (other.state for other in flight.look(0).heard if other.who == 2)
-        frozen = 1.4 <= flight.time + 1e-9 < 3.4 - 1e-9  # what was sent then arrives 0.4 s later
-        assert (told[:2] == pytest.approx(then[:2])) == frozen
+        told.append(told_of(flight, 2))
+    for k in range(2, 30):
+        sent = 0.2 * (k + 1) - 0.4  # s; what was sent then arrives 0.4 s later
+        frozen = 1.0 <= sent + 1e-9 < 3.0 or 3.6 <= sent + 1e-9 < 4.6
+        assert (told[k] == told[k - 1]) == frozen, sent
+
+
+def test_a_frozen_receiver_repeats_the_position_that_it_reported_last():
+    """It was thought to report its true position when it froze, which no receiver knows."""
+    faults = [{"kind": "gnss_frozen", "at": 1.1, "agents": [2], "lasts": 2.0}]
+    flight = airflock.open(load(PAPER, {**SMALL, "radio.range": 1e4, "faults": faults}), 1, device="python")
+    believed, told = [], []
+    for _ in range(25):
+        flight.advance(0.2).sense()
+        believed.append(tuple(flight.look(2).own[:2]))
+        told.append(told_of(flight, 2)[:2])
+    still = [0.2 * (k + 1) for k in range(1, 25) if believed[k] == believed[k - 1]]
+    assert still == pytest.approx(np.arange(1.2, 3.1, 0.2))
+    heard = [0.2 * (k + 1) for k in range(1, 25) if told[k] == told[k - 1]]
+    assert heard == pytest.approx(np.arange(2.2, 4.1, 0.2)), "a second later, by the delay"
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_a_fault_that_is_named_in_flight_repeats_what_was_last(joined):
+    flight = airflock.open(load(PAPER, {**SMALL, "radio.range": 1e4, "radio.delay": 0.0}), 1, device="python")
+    flight.advance(2.0)
+    if joined:
+        flight.remove(2).advance(0.6).add(2, [5.0, -4.0], [1.0, 0.0]).advance(0.6)
+    flight.sense()
+    last = flight.look(2).own, told_of(flight, 2)
+    flight.advance(0.1).fault("gnss_frozen", agents=[2]).fault("radio_frozen", agents=[2]).advance(0.1).sense()
+    assert flight.look(2).own[:2] == pytest.approx(last[0][:2], abs=1e-6)
+    assert told_of(flight, 2) == pytest.approx(last[1], abs=1e-6)
+    flight.advance(1.0).sense()
+    assert flight.look(2).own[:2] == pytest.approx(last[0][:2], abs=1e-6)
+    assert told_of(flight, 2) == pytest.approx(last[1], abs=1e-6)
+
+
+@pytest.mark.parametrize("kinds", [("gnss_offset", "gnss_frozen"), ("gnss_frozen", "gnss_offset")])
+def test_what_is_frozen_was_off_already_and_is_off_no_further(kinds):
+    keys = {**SMALL, "sensors.noise": 0.0, "radio.range": 1e4}
+    at = {"gnss_offset": 0.0, "gnss_frozen": 2.0}
+    faults = [{"kind": kind, "at": at[kind], "agents": [2]} for kind in kinds]
+    flight = airflock.open(load(PAPER, {**keys, "faults": faults}), 1, device="python").advance(1.8).sense()
+    last = flight.look(2).own
+    assert last.x == pytest.approx(flight.look(2).true.x + 10.0, abs=1e-5)
+    flight.advance(1.0).sense()
+    assert flight.look(2).own[:2] == pytest.approx(last[:2], abs=1e-5)
 
 
 def test_a_clock_that_is_ahead_extrapolates_too_far():

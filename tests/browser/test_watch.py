@@ -200,6 +200,29 @@ def test_an_obstacle_is_thrown_in_a_gust_blows_and_agents_are_removed(browser, t
         assert not tab.faults
 
 
+def test_sliders_of_faults_change_them_also_of_one_that_was_set_off_by_hand(browser, tab):
+    faults = [{"kind": "motor", "at": 0.0, "agents": [1], "share": 0.5}]
+    with flying(settings={"agents": 12, "faults": faults}) as (player, view, _):
+        opened(tab, view)
+        tab.get_by_text("Tune", exact=True).click()
+
+        def pressed(folder, number):
+            tab.get_by_text(folder, exact=True).click(timeout=PATIENCE * 1000)
+            slider = tab.locator(f'[role=slider][aria-label*="{number}"]').last
+            slider.wait_for(timeout=PATIENCE * 1000)
+            tab.wait_for_timeout(1000)  # the folder unfolds
+            slider.focus(timeout=PATIENCE * 1000)
+            slider.press("ArrowRight")
+
+        pressed("fault 0: motor", "share")
+        until(lambda: player.scenario.faults[0].numbers.share > 0.5, "the slider of a fault changes nothing")
+        until(lambda: "--set faults.0.share=" in tab.inner_text("body"), "the command does not tell it")
+        player.ask(lambda: player.flight.fault("pretender", [3], wait=False))
+        pressed("fault 1: pretender", "east")
+        until(lambda: player.scenario.faults[1].numbers.east > 20.0, "that of one set off by hand changes nothing")
+        assert not tab.faults
+
+
 def test_sliders_of_a_group_change_that_group_alone(browser, tab):
     """One number that the file gives it, and one of a law that only it has; the flock's own stay."""
     groups = [

@@ -38,6 +38,7 @@ from airflock.onboard.ports import open_port
 from airflock.onboard.run import fly as fly_node
 from airflock.radios import jitter, links
 from airflock.radios.registry import RADIOS
+from airflock.recordings.flights import simulate
 from airflock.recordings.scores import measure
 from fleets import card, fleet, scenario
 
@@ -167,6 +168,11 @@ def test_numbers_of_a_block_of_packets_are_those_of_each_pair():
 # ----------------------------------------------------------------------------------------------- single drones differ
 
 
+def start_of(found, seed):
+    """Where the simulated agents of a seed start, (component, agent)."""
+    return np.array([[*s[:2], *s[3:5]] for s in compare.first_states(found, seed)]).T
+
+
 WEAK = [{"name": "slow", "agents": 1, "model": {"v_flock": 2.0}, "body": {"tau": {"value": 1.4, "spread": 0.1}}},
         {"name": "rest"}]  # fmt: skip
 OTHER = [{"name": "other", "agents": [1], "model": {"kind": "viragh_2014", "v_flock": 3.0}}, {"name": "rest"}]
@@ -177,6 +183,8 @@ BEFALLEN = {
     "drift": {"faults": [{"kind": "gnss_drift", "at": 1.0, "agents": [0]}]},
     "deaf": {"faults": [{"kind": "radio_deaf", "at": 0.5, "lasts": 1.5, "agents": [2]}]},
     "stuck": {"faults": [{"kind": "stuck", "at": 2.0, "agents": [2]}]},
+    "pretender": {"faults": [{"kind": "pretender", "at": 1.0, "agents": [1], "east": -6.0}]},
+    "frozen radio": {"faults": [{"kind": "radio_frozen", "at": 1.0, "lasts": 3.0, "agents": [1]}]},
 }
 
 
@@ -217,11 +225,66 @@ def test_laws_of_members_stand_on_the_card():
     assert made.groups == ()  # neither law asks for them
 
 
-@pytest.mark.parametrize("kind", ["pretender", "clock", "battery", "fails"])
-def test_a_fault_that_no_fleet_flies_is_refused_with_what_to_do(kind):
-    found = scenario(2, 1.0, faults=[{"kind": kind, "at": 0.5}])
-    with pytest.raises(ScenarioError, match=rf"faults.kind = '{kind}': .*; (fly|give)"):
+def test_a_fault_that_no_fleet_flies_is_refused_with_what_to_do():
+    found = scenario(2, 1.0, faults=[{"kind": "clock", "at": 0.5}])
+    with pytest.raises(ScenarioError, match=r"faults.kind = 'clock': .*; give"):
         compare.fly(found, compare.software_card(found), 0)
+
+
+def test_whoever_stays_flies_on_what_a_drone_sent_before_it_dropped_out():
+    """As in a simulation from which it drops out later by the delay: until then its last packets are on their way."""
+    crowd = {"world.side": 60.0, "start.separation": 6.0}
+
+    def without(at):
+        return compare.sampled(scenario(3, 6.0, **crowd, faults=[{"kind": "fails", "at": at, "agents": [1]}]), 0.2)
+
+    found = without(1.0)
+    flown = compare.fly(found, compare.software_card(found, silent=False), 1).array()[:, :, :2]
+    known = [
+        simulate(without(1.0 + later), 1, precision=64, start=start_of(found, 1), device="python")
+        .position.transpose("time", "individual", "space", "keypoint").values.reshape(-1, 3, 2)
+        for later in (found.radio.delay, 0.0)
+    ]  # fmt: skip
+    apart = [np.abs(flown[: len(one)] - one)[:, [0, 2]].max() for one in known]
+    assert apart[0] < 0.05 < 0.5 < apart[1]
+
+
+@pytest.mark.parametrize("fault", [{"kind": "fails", "at": 2.0}, {"kind": "battery", "at": 1.0, "endurance": 1.0}])
+def test_a_drone_that_drops_out_falls_silent_and_comes_down(fault):
+    found = compare.sampled(scenario(3, 12.0, faults=[{**fault, "agents": [1]}]), 0.2)
+    flown = compare.fly(found, compare.software_card(found, silent=False), 1)
+    rows = flown.array()
+    assert np.isfinite(rows[:10, 1]).all() and np.isnan(rows[10:, 1]).all() and np.isfinite(rows[:, [0, 2]]).all()
+    assert flown.vehicles[1].state.z == 0.0 and not flown.vehicles[1].armed and flown.vehicles[0].state.z > 5.0
+    assert flown.ages()[-1, [0, 2], 1].min() > 8.0, "nothing was sent after 2 s"
+    assert [(t, who) for t, who, note in flown.log if "drops out" in note] == [(2.0, 2)]
+    assert measure(compare.recording(flown))[0]["present"] == pytest.approx(
+        (3 * 10 + 2 * (len(rows) - 10)) / (3 * len(rows))
+    )
+
+
+def test_who_pretends_lies_to_the_others_alone():
+    """The packet is signed and of the same time; only the position in it is another one."""
+    found = compare.sampled(
+        scenario(2, 3.0, faults=[{"kind": "pretender", "at": 1.0, "agents": [1], "east": 7.0}]), 0.2
+    )
+    flown = compare.fly(found, compare.software_card(found, silent=False), 1)
+    peer, late = flown.nodes[0].peers.all[2], flown.ages()[-1, 0, 1]
+    true = flown.array()[-1 - round(late / 0.2), 1]
+    assert peer.state is not None and peer.state.x - true[0] == pytest.approx(7.0, abs=0.01)
+    assert peer.state.y == pytest.approx(true[1], abs=0.01)
+    assert flown.array()[-1, 1, 9] == pytest.approx(flown.array()[-1, 1, 0], abs=0.01), "it knows where it is"
+    assert sum(flown.nodes[0]._receive.refused.values()) == 0
+
+
+def test_a_vehicle_without_motors_lies_on_the_ground_whatever_it_is_asked():
+    """It fell through the ground where it was asked to climb."""
+    v = vehicle()
+    v.state, v.armed, v.mode, v.motor = State(0.0, 0.0, 3.0, 0.0, 0.0, 0.0), True, "OURS", False
+    for k in range(1500):
+        v.target, v.target_at = (0.0, 0.0, 2.0), 0.01 * k
+        v.step(0.01 * k, 0.01)
+    assert v.state.z == 0.0
 
 
 # ------------------------------------------------------------------------------------------------ whole missions

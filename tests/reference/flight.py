@@ -46,19 +46,20 @@ class Agent:
     """One agent in the air.
 
     state      : true position (m) and velocity (m/s)
-    pilot      : what decides; b, s: the numbers of its body and sensor; kept, sensed: what these remember
+    pilot      : what decides; b, s: the numbers of its body and sensor; remembered, sensed: what these remember
     command    : what it flies by: its pilot's last command, if no fault has overruled it
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
     rays       : how many it cast at its last decision
     links      : by the number of another agent, what the radio keeps of what that one sends
-    faults     : by kind, the latest that has hit it; present : whether it is there
+    faults     : by kind, the latest that has hit it; kept : of each kind what it may repeat
+    present    : whether it is there
     """
 
     state: State
     pilot: Pilot
     b: Any = None
     s: Any = None
-    kept: Any = None
+    remembered: Any = None
     sensed: Any = None
     command: Vector = ZERO
     own: State = State(*ZERO, *ZERO)
@@ -66,6 +67,7 @@ class Agent:
     rays: float = 0.0
     links: dict[int, Link] = field(default_factory=dict)
     faults: dict[str, Suffering] = field(default_factory=dict)
+    kept: dict[tuple[str, str], State] = field(default_factory=dict)
     present: bool = True
 
 
@@ -177,7 +179,7 @@ def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any
         agent.faults = dict(sorted(agent.faults.items(), key=lambda item: order.index(item[0])))
     for number, agent in enumerate(flock if scenario.lands else ()):
         low = agent.present and agent.state.z <= scenario.ground
-        if low and scenario.vehicle.lasts(memory=agent.kept, b=agent.b, wing=scenario.wing) <= 0.0:
+        if low and scenario.vehicle.lasts(memory=agent.remembered, b=agent.b, wing=scenario.wing) <= 0.0:
             agent.present, left = False, True
             for other in flock:
                 other.pilot.forget(number)
@@ -222,15 +224,16 @@ def decisions(
             drift(scenario, seed, number, i, agent, time)
     times, dt, (place, course) = clock(scenario), scenario.flight.dt, world
     sent = (number * times["decide_every"] - times["delay"]) * dt
+    kinds, dims, of_sent = scenario.fault_kinds, scenario.dimensions, (("sense", "sent"), ("tell", "told"))
     said = [
         state
         if scenario.transceiver.see is not None
-        else misled(agent, ("sense", "tell"), sent, plus(state, agent.sent), scenario.dimensions)
+        else misled(agent, kinds, of_sent, sent, plus(state, agent.sent), dims)
         for state, agent in zip(past, flock, strict=True)
     ]
     for i in [k for k, agent in enumerate(flock) if agent.present] if turn is None else turn:
         agent, pilot = flock[i], flock[i].pilot
-        own = misled(agent, ("sense",), time, plus(agent.state, agent.own), scenario.dimensions)
+        own = misled(agent, kinds, (("sense", "believed"),), time, plus(agent.state, agent.own), dims)
         near = hear(scenario, seed, number, i, flock, said, time, place, own)
         made = pilot.decide(
             own, time + ahead(agent, time), goal=course.of(i), time=time, only=near,
@@ -449,10 +452,10 @@ def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust
     moved = answer(
         body.move,
         "move",
-        given | {"dt": dt, "b": agent.b, "memory": agent.kept, "wing": scenario.wing},
+        given | {"dt": dt, "b": agent.b, "memory": agent.remembered, "wing": scenario.wing},
         body.name,
     )
-    velocity, agent.kept = (*moved[:2], moved[2] if three else 0.0), moved[3] if body.Memory else None
+    velocity, agent.remembered = (*moved[:2], moved[2] if three else 0.0), moved[3] if body.Memory else None
     for suffering in agent.faults.values():
         told = {f"n{axis}": velocity[c] for c, axis in enumerate("xyz")} | {"dt": dt}
         velocity = suffering.asked("motion", step * dt, **{k: given[k] for k in MOVING}, **told) or velocity

@@ -9,6 +9,7 @@ from airflock.core import random
 from airflock.core.agent import State, answer
 from airflock.core.parameters import Quantity, declarations
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.spreads import Share
 
 
 @dataclass
@@ -101,6 +102,7 @@ def own_parameters(scenario: Scenario, section: str, record: Any, agent: int, se
             if agent in group.agents and isinstance(declared, Quantity):
                 value = group.numbers.get((letter, name), getattr(record, name))
                 spread = group.spread.get((letter, name), 0.0)
+                spread *= abs(value) if isinstance(spread, Share) else 1.0
                 if spread > 0.0:
                     words = random.words(seed, random.SPREAD, 0, place, agent, "pbs".index(letter))
                     value += spread * random.normal_pair(*words[:2])[0]
@@ -109,12 +111,20 @@ def own_parameters(scenario: Scenario, section: str, record: Any, agent: int, se
     return replace(record, **changed)
 
 
-def misled(agent: Any, rules: Sequence[str], time: float, state: State, dims: int) -> State:
-    """A state as the faults of an agent leave it."""
+def misled(
+    agent: Any, kinds: Sequence[Any], rules: Sequence[tuple[str, str]], time: float, state: State, dims: int
+) -> State:
+    """A state as the faults of an agent leave it; what each may repeat is the one that it was last given before.
+
+    rules : each with the name under which the agent keeps that state
+    """
     flat = {} if dims == 3 else {"z": 0.0, "vz": 0.0}
-    for rule in rules:
-        for suffering in agent.faults.values():
-            found = suffering.asked(rule, time, **state._asdict())
+    for rule, name in rules:
+        for kind in kinds:
+            suffering, key = agent.faults.get(kind.name), (kind.name, name)
+            given = {f"at_{each}": value for each, value in agent.kept.get(key, state)._asdict().items()}
+            found = None if suffering is None else suffering.asked(rule, time, **state._asdict(), **given)
+            agent.kept[key] = agent.kept.get(key, state) if found is not None else state
             state = state if found is None else State(*found)._replace(**flat)
     return state
 

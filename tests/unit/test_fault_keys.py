@@ -135,6 +135,6 @@ def test_a_group_does_not_repeat_what_is_wrong_with_all():
 
 
 def test_a_spread_is_named_as_it_is_written():
-    groups = [{"name": "all", "model": {"p_rep": {"value": 0.1, "spread": "10 %"}}}]
+    groups = [{"name": "all", "model": {"p_rep": {"value": 0.1, "spread": "10 m"}}}]
     (line,) = lines_of({"groups": groups})
-    assert line.startswith("groups[0].model.p_rep.spread = 10 %: the unit is 1/s")
+    assert line.startswith("groups[0].model.p_rep.spread = 10 m: the unit is 1/s")

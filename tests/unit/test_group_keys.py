@@ -36,6 +36,10 @@ def frames(scenario, seed):
         ("groups.light.model.p_rep", 0.1, (2, "model", "p_rep"), 0.1),
         ("groups.old.ones.model.v_flock", 2.0, (1, "model", "v_flock"), 2.0),
         ("groups.light.model.kind", "viragh_2014", (2, "model", "kind"), "viragh_2014"),
+        ("groups.heavy.body.tau.spread", "20 %", (0, "body", "tau"), {"value": "2000 ms", "spread": "20 %"}),
+        ("groups.heavy.body.tau.spread", "0.3 s", (0, "body", "tau"), {"value": "2000 ms", "spread": 0.3}),
+        ("groups.old.ones.model.v_flock.spread", 0.2, (1, "model", "v_flock"), {"spread": 0.2}),
+        ("groups.light.model.p_rep.spread", "40 %", (2, "model", "p_rep"), {"spread": "40 %"}),
     ],
 )
 def test_a_key_means_what_the_file_would(key, value, place, written, seed):
@@ -55,6 +59,48 @@ def test_a_spread_keeps_its_unit_beside_a_value_that_is_set_anew():
     table = {"name": "heavy", "agents": 2, "body": {"tau": {"value": 1500.0, "spread": 100.0, "unit": "ms"}}}
     (found,) = flock({"groups.heavy.body.tau": 3.0}, [table]).groups
     assert found.numbers["b", "tau"] == 3.0 and found.spread["b", "tau"] == pytest.approx(0.1)
+
+    (found,) = flock({"groups.heavy.body.tau.spread": "50 ms"}, [table]).groups
+    assert found.numbers["b", "tau"] == 1.5 and found.spread["b", "tau"] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("share", ["10 %", "10%", "10 percent", {"value": 10, "unit": "%"}])
+def test_a_spread_may_be_a_share_of_its_number_whatever_that_becomes(share, seed):
+    """Each agent deviates by as many standard deviations as with the same spread in its unit."""
+    groups = [
+        {"name": "all", "body": {"tau": {"value": "2 s", "spread": share}}, "model": {"p_rep": {"spread": share}}}
+    ]
+    for keys, tau, p_rep in (({}, 2.0, 0.03), ({"groups.all.body.tau": 4.0, "model.p_rep": 0.6}, 4.0, 0.6)):
+        plain = [{"name": "all", "body": {"tau": {"value": tau, "spread": 0.1 * tau}}, "model": {"p_rep": p_rep}}]
+        found, known = flock(keys, groups), flock({}, plain)
+        assert found.own_numbers("b", "tau", seed) == pytest.approx(known.own_numbers("b", "tau", seed))
+        plain[0]["model"]["p_rep"] = {"value": found.parameters.p_rep, "spread": 0.1 * found.parameters.p_rep}
+        known = flock({}, plain)
+        assert found.own_numbers("p", "p_rep", seed) == pytest.approx(known.own_numbers("p", "p_rep", seed))
+
+
+def test_of_a_number_that_is_a_share_itself_a_percentage_is_a_hundredth():
+    (found,) = flock({}, [{"name": "all", "model": {"c_frict": {"spread": "10 %"}}}]).groups
+    assert found.spread["p", "c_frict"] == 0.1 and flock({}, [{"body": {"tau": {"spread": "0 %"}}}]).groups
+
+
+@pytest.mark.parametrize(
+    ("spread", "said"),
+    [
+        (
+            "10 furlongs",
+            "= 10 furlongs: the unit is s, or one of us, ms, min, h, or a share of the number such as '10 %'",
+        ),
+        ("-5 %", "= '-5 %' is not a standard deviation of 0 s or more, or a share of the number such as '10 %'"),
+        ("wide", "= 'wide' is not a standard deviation of 0 s or more, or a share of the number such as '10 %'"),
+        ("10", "has no unit; give 10 without quotes, or '10 s' .*, or a share of the number such as '10 %'"),
+    ],
+)
+def test_a_wrong_spread_is_one_line_with_all_that_is_possible(spread, said):
+    with pytest.raises(ScenarioError, match=said) as found:
+        flock({"groups.heavy.body.tau.spread": spread})
+    (line,) = str(found.value).splitlines()
+    assert line.startswith(f"{PAPER}: groups[0].body.tau.spread")
 
 
 def test_an_open_flight_takes_a_key_of_a_group(seed):

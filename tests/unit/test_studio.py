@@ -31,7 +31,7 @@ from airflock.stage.shades import Shade
 from airflock.studio import charts, door, measures
 from airflock.studio.background import Study, around, summary, varied
 from airflock.studio.collisions import BOTH, Collisions
-from airflock.studio.controls import controls_of, span
+from airflock.studio.controls import controls_of, controls_of_faults, span
 from airflock.studio.drawing import Flock, arrival
 from airflock.studio.flights import FlightRequest
 from airflock.studio.moments import Moments
@@ -775,6 +775,96 @@ def test_a_fault_is_an_event_and_back_takes_it_away(interpreted, player):
     np.testing.assert_array_equal(player.flight.state, live)
     player.back(0.5)
     assert not player.flight.events and not player.flight.faults
+
+
+MOTOR = {"kind": "motor", "at": 0.5, "agents": [2], "share": 0.5}
+
+
+def test_every_number_of_a_fault_has_a_slider_inside_its_range():
+    faulty = airflock.load("vasarhelyi_2018/faulty")
+    found = [control for part in controls_of_faults(faulty.faults).values() for control in part]
+    names = [(k, name) for k, entry in enumerate(faulty.faults) for name in entry.fault.fields]
+    assert [control.key for control in found] == [f"faults.{k}.{name}" for k, name in names]
+    for control, (k, name) in zip(found, names, strict=True):
+        declared = {key: d for key, d, _ in declarations(faulty.faults[k].numbers)}[name]
+        assert declared.low <= control.low <= control.value <= control.high <= declared.high
+        assert control.high - control.low > 100.0 * control.step and control.value == value_of(faulty, control.key)
+
+
+def test_a_number_of_a_fault_is_tuned_and_undone_as_any_other(interpreted):
+    player = Player(FlightRequest(PRESET, FEW | {"faults": [MOTOR]}, seed=3))
+    player.side.fly_to(1.0)
+    player.change("faults.0.share", 0.0)
+    player.side.fly_to(2.0)
+    assert value_of(player.scenario, "faults.0.share") == 0.0
+    before = player.side.flight.state[2:, 2].copy()
+    player.side.fly_to(2.5)
+    assert np.array_equal(player.side.flight.state[2:, 2], before), "without a motor it keeps its velocity"
+    assert "--set faults.0.share=0" in player.command
+    assert player.side.undo() == {"faults.0.share": 0.5} and player.scenario.faults[0].numbers.share == 0.5
+    player.change("faults.motor.share", 0.1)
+    assert player.side.to_preset() == {"faults.motor.share": 0.5} and not player.changed
+
+
+def test_a_fault_that_was_set_off_by_hand_has_sliders_but_is_no_part_of_the_scenario(interpreted, player):
+    """Its numbers can be undone; the command that opens the scenario again does not name a fault that is not there."""
+    player.side.fly_to(1.0)
+    start = player.side.flight.snapshot()
+    player.side.flight.fault("pretender", [3]).advance(0.5)
+    keys = [control.key for part in controls_of_faults(player.scenario.faults).values() for control in part]
+    assert keys == ["faults.0.east", "faults.0.north", "faults.0.up"]
+    player.change("faults.0.east", -7.0)
+    player.change("faults.0.east", 9.0)
+    assert value_of(player.scenario, "faults.0.east") == 9.0 and "faults" not in player.command
+    assert player.side.undo() == {"faults.0.east": -7.0} and player.side.undo() == {"faults.0.east": 20.0}
+    player.change("faults.0.up", 3.0)
+    assert player.side.to_preset() == {"faults.0.up": 0.0}
+    player.change("faults.0.lasts", 2.0)
+    assert player.side.undo() == {"faults.0.lasts": None} and not np.isfinite(player.scenario.faults[0].lasts)
+    player.side.restore(start)
+    assert not player.scenario.faults and not player.changed
+
+
+FILE = """
+extends = "base.toml"
+
+[radio]
+delay = { value = 400, unit = "ms", source = "data sheet" }
+"""
+BASE = """
+extends = "vasarhelyi_2018/4ms"
+agents = 6
+
+[[groups]]
+name = "heavy"
+agents = 2
+body = { tau = { value = 2000, spread = 100, unit = "ms" }, a_max = "3 m/s^2" }
+
+[[groups]]
+name = "light"
+
+[[faults]]       # weak
+kind = "motor"
+at = 1.0
+share = 0.5
+"""
+
+
+@pytest.mark.parametrize("name", ["base.toml", "mine.toml"])
+def test_groups_faults_and_units_are_saved_as_they_were_tuned(interpreted, tmp_path, name):
+    """A number of a group could not be saved, and one in its own unit was saved as if it were in that unit."""
+    (tmp_path / "mine.toml").write_text(FILE)
+    (tmp_path / "base.toml").write_text(BASE)
+    player = Player(FlightRequest(str(tmp_path / name), seed=3))
+    tuned = {
+        "groups.heavy.body.tau": 3.0, "groups.heavy.body.a_max": 4.0, "groups.light.model.p_rep": 0.2,
+        "faults.0.share": 0.25, "radio.delay": 0.5,
+    }  # fmt: skip
+    for key, value in tuned.items():
+        player.change(key, value)
+    found = airflock.load(player.save_toml(tmp_path / "tuned.toml"))
+    assert {key: value_of(found, key) for key in tuned} == tuned
+    assert found.groups[0].spread == {("b", "tau"): 0.1} and found.faults[0].at == 1.0
 
 
 def test_a_flight_begins_before_it_is_compiled_and_goes_on_as_if_it_had_been(tmp_path, monkeypatch):

@@ -26,6 +26,9 @@ RULES: Mapping[str, tuple[int, str]] = {
     "motion": (3, "its velocity after the step, m/s"),
     "leaves": (1, "time from the fault's beginning until it is absent, s"),
 }
+STATE = tuple(f"at_{letter}{axis}" for letter in ("", "v") for axis in "xyz")  # "at_x" to "at_vz"
+# who asks `sense` or `tell`, and for which state: the one believed, the one sent of it, and that which is told instead
+ASKED: Mapping[str, str] = {"believed": "sense", "sent": "sense", "told": "tell"}
 KEYS = ("kind", "at", "until", "lasts", "per_hour", "agents", "group", "number")  # of an entry of [[faults]]
 
 
@@ -79,9 +82,19 @@ class Fault:
 
     @property
     def onset(self) -> tuple[str, ...]:
-        """What of the agent's state its rules want to know as it was when the fault began, such as "at_x"."""
-        asked = {name for kind, rule in self.rules.items() for name in asks(rule, kind, self.name)}
-        return tuple(sorted(name for name in asked if name.startswith("at_")))
+        """What of the agent's true state and command its rules want to know as it was when the fault began."""
+        asked = {(kind, name) for kind, rule in self.rules.items() for name in asks(rule, kind, self.name)}
+        asked -= {(kind, name) for kind in ASKED.values() for name in STATE}
+        return tuple(sorted({name for _, name in asked if name.startswith("at_")}))
+
+    def kept(self, asked: str) -> tuple[str, ...]:
+        """What of the state that a rule disturbs it wants to know as it was last before the fault, such as "at_x".
+
+        asked : one of ASKED, as which the rule `sense` or `tell` is asked
+        """
+        rule = self.rules.get(ASKED[asked])
+        names = () if rule is None else asks(rule, ASKED[asked], self.name)
+        return tuple(name for name in STATE if name in names)
 
 
 def fault(namespace: Any, name: str = "") -> Fault:

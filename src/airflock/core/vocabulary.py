@@ -219,6 +219,7 @@ ONSET = {
     **{f"at_{name}": f"true {text}, when the fault began" for name, text in STATE.items()},
     **{f"at_{name}": f"{text}, when the fault began" for name, text in COMMAND.items()},
 }
+_LAST = {f"at_{name}": f"{text}, as it was last before the fault began" for name, text in STATE.items()}
 CLUSTER = {
     "n": "members of the cluster",
     "hx": "sum of their headings, east",
@@ -264,8 +265,8 @@ VOCABULARY: dict[str, dict[str, str]] = {
         "beyond": "distance, m",
         "q": "metric parameters",
     },
-    "sense": {**STATE, **ONSET, "f": "the fault's parameters"},
-    "tell": {**STATE, **ONSET, "f": "the fault's parameters"},
+    "sense": {**STATE, **ONSET, **_LAST, "f": "the fault's parameters"},
+    "tell": {**STATE, **ONSET, **_LAST, "f": "the fault's parameters"},
     "radio": {"reach": "radio.range, m", "since": ONSET["since"], "f": "the fault's parameters"},
     "clock": {"since": ONSET["since"], "f": "the fault's parameters"},
     "overrule": {**COMMAND, **ONSET, "f": "the fault's parameters"},

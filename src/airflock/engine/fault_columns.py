@@ -1,11 +1,14 @@
-"""Fault columns: what is written when a fault begins, and when others come into force while it lasts."""
+"""Fault columns: what is written when a fault begins, and when others come into force while it lasts.
+
+What a rule may repeat of the state that it disturbs is no such column: decisions keep it (`stages.faults.mislead`).
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from airflock.core.fault import Fault
+from airflock.core.fault import ASKED, Fault
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import fault_row
+from airflock.engine.stages.state import fault_row, kept_row
 from airflock.scenarios.onsets import Onset
 
 if TYPE_CHECKING:
@@ -43,6 +46,16 @@ def renew(state: "State", due: Sequence[Onset]) -> None:
                 found = named.get((agents[lane], float(work[onset, lane])))
                 numbers = dict(zip(kind.fields, found.numbers, strict=True)) if found else {}
                 _write(state, kind, lane, {"lasts": found.lasts if found else 0.0, **numbers})
+
+
+def kept_rows(plan: Plan) -> dict[str, tuple[str, str]]:
+    """Rows of what rules of faults may repeat: each with the row of that state now and of the true one."""
+    return {
+        kept_row(kind.name, asked, what): (("m" if asked == "believed" else "h") + what[3:], what[3:])
+        for kind in plan.faults
+        for asked in ASKED
+        for what in kind.kept(asked)
+    }
 
 
 def _began(state: "State", onset: Onset) -> Any:

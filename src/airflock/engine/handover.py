@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.fault_columns import kept_rows
 from airflock.engine.initial_rows import first_memories, rows_of_metrics
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.slots import sorted_by_cells
@@ -16,9 +17,10 @@ from airflock.engine.state import State
 def carry(old: State, new: State, step: int) -> None:
     """Fill `new`, of the same agents and dimensions, with what `old` holds before `step`.
 
-    Rows that only the new plan has are filled from what they stand for: a measured position from the true one. What is
-    under way by radio stays under way. Sums over time begin anew, what metrics remember of each agent goes on.
-    Pairs are looked at again (`held` is new): the new numbers may call a distance a collision that the old did not.
+    Rows that only the new plan has are filled from what they stand for: a measured position from the true one, what a
+    fault may repeat from what was believed or heard last. What is under way by radio stays under way. Sums over time
+    begin anew, what metrics remember of each agent goes on. Pairs are looked at again (`held` is new): the new numbers
+    may call a distance a collision that the old did not.
     """
     lanes = _lanes(old, new)
     _rows(old, new, lanes)
@@ -62,11 +64,17 @@ def _lanes(old: State, new: State) -> NDArray[np.int64]:
 def _rows(old: State, new: State, lanes: NDArray[np.int64]) -> None:
     """Rows of the work table, whole lanes."""
     work, before, had = new.arrays["work"], old.arrays["work"], old.driver.ROWS
+    repeated = kept_rows(new.plan)
     other = {name for name in new.plan.beginnings if not _goes_on(name, old.plan, new.plan)}
     for name, place in new.driver.ROWS.items():
         if name in other:  # another body or sensor begins to remember anew
             continue
-        source = name if name in had else name[1:] if name[0] in "mh" and name[1:] in new.plan.motion else None
+        stand = [
+            name,
+            *repeated.get(name, ()),
+            *([name[1:]] if name[0] in "mh" and name[1:] in new.plan.motion else []),
+        ]
+        source = next((row for row in stand if row in had), None)
         if source is not None:
             work[place] = before[had[source]][lanes]
     if new.has_slots and "order" not in had:

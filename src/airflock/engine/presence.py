@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.fault_columns import kept_rows
 from airflock.engine.initial_rows import first_memories, memories, of_pairs
 from airflock.scenes.tree import AWAY
 
@@ -41,6 +42,9 @@ def join(state: "State", agent: int, position: list[float], velocity: list[float
         for prefix in ("", "m", "h", "before_", "from_"):
             if prefix + name in rows:
                 work[rows[prefix + name], before] = value
+    for name, (_, true) in kept_rows(state.plan).items():
+        if name in rows:
+            work[rows[name], before] = motion[true]
     state.arrays["past"][:, :, before] = list(motion.values())
     state.look_at_pairs()
 

@@ -108,9 +108,9 @@ class State:
 
         It stops on the way where a fault is due. What is due at a step is done before it is flown or sensed.
         """
-        if not self.tables.due:
-            return self._watched(first, last, half, frames)
         due = sorted({onset.step for onset in self.tables.due if first <= onset.step < last})
+        if not due:
+            return self._watched(first, last, half, frames)
         step, skipped, every = first, -(-first // self.whole("sample_every")), self.whole("sample_every")
         for stop in [*(step for step in due if step > first or not half & 1), last]:
             if step < stop or stop == last:
@@ -163,7 +163,9 @@ class State:
             self.arrays["sums"][:] = kept
         if self.plan.absence and not half & 2:
             instants = max(done - first, 0) + int(self.ended)  # that of a collision, too, at which the flight ends
-            self.arrays["there"] += np.array([self.here, self.agents]) * instants
+            there = self.arrays["there"]
+            there[0] += self.here * instants
+            there[1] += self.agents * instants
         return done
 
     @property

@@ -11,7 +11,13 @@ class Parameters(Record):
     """The rest of a battery."""
 
     endurance: float = quantity(
-        60.0, "s", low=0.0, high=1e6, source="our choice", meaning="time from the warning to the landing"
+        60.0,
+        "s",
+        low=0.0,
+        high=1e6,
+        usual=(0.0, 300.0),
+        source="our choice",
+        meaning="time from the warning to the landing",
     )
     share: float = quantity(
         0.5, "1", low=0.0, high=1.0, source="our choice", meaning="share of the acceleration that is left at the end"

@@ -13,7 +13,9 @@ from airflock.core.parameters import quantity
 class Parameters(Record):
     """A constant error of the time."""
 
-    ahead: float = quantity(1.0, "s", low=-1e4, high=1e4, source="our choice", meaning="how far the clock is ahead")
+    ahead: float = quantity(
+        1.0, "s", low=-1e4, high=1e4, usual=(-5.0, 5.0), source="our choice", meaning="how far the clock is ahead"
+    )
 
 
 def clock(f):

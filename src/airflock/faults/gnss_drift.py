@@ -10,11 +10,23 @@ from airflock.core.parameters import quantity
 class Parameters(Record):
     """An error of the position that grows up to a largest one."""
 
-    east: float = quantity(0.5, "m/s", low=-100.0, high=100.0, source="our choice", meaning="drift towards the east")
-    north: float = quantity(0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="drift towards the north")
-    up: float = quantity(0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="drift upwards")
+    east: float = quantity(
+        0.5, "m/s", low=-100.0, high=100.0, usual=(-3.0, 3.0), source="our choice", meaning="drift towards the east"
+    )
+    north: float = quantity(
+        0.0, "m/s", low=-100.0, high=100.0, usual=(-3.0, 3.0), source="our choice", meaning="drift towards the north"
+    )
+    up: float = quantity(
+        0.0, "m/s", low=-100.0, high=100.0, usual=(-1.0, 1.0), source="our choice", meaning="drift upwards"
+    )
     grows: float = quantity(
-        60.0, "s", low=0.0, high=1e6, source="our choice", meaning="time after which the error stops growing"
+        60.0,
+        "s",
+        low=0.0,
+        high=1e6,
+        usual=(0.0, 300.0),
+        source="our choice",
+        meaning="time after which the error stops growing",
     )
 
 

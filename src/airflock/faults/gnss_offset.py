@@ -10,9 +10,15 @@ from airflock.core.parameters import quantity
 class Parameters(Record):
     """A constant error of the position."""
 
-    east: float = quantity(10.0, "m", low=-1e4, high=1e4, source="our choice", meaning="error towards the east")
-    north: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="error towards the north")
-    up: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="error upwards")
+    east: float = quantity(
+        10.0, "m", low=-1e4, high=1e4, usual=(-50.0, 50.0), source="our choice", meaning="error towards the east"
+    )
+    north: float = quantity(
+        0.0, "m", low=-1e4, high=1e4, usual=(-50.0, 50.0), source="our choice", meaning="error towards the north"
+    )
+    up: float = quantity(
+        0.0, "m", low=-1e4, high=1e4, usual=(-20.0, 20.0), source="our choice", meaning="error upwards"
+    )
 
 
 def sense(x, y, z, vx, vy, vz, f):

@@ -8,16 +8,34 @@ from airflock.core.parameters import quantity
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """A straight track from the place where the fault began."""
+    """A straight track from the place where the agent believed itself before the fault."""
 
     east: float = quantity(
-        3.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="velocity of the false track, east"
+        3.0,
+        "m/s",
+        low=-100.0,
+        high=100.0,
+        usual=(-10.0, 10.0),
+        source="our choice",
+        meaning="velocity of the false track, east",
     )
     north: float = quantity(
-        0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="velocity of the false track, north"
+        0.0,
+        "m/s",
+        low=-100.0,
+        high=100.0,
+        usual=(-10.0, 10.0),
+        source="our choice",
+        meaning="velocity of the false track, north",
     )
     up: float = quantity(
-        0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="velocity of the false track, up"
+        0.0,
+        "m/s",
+        low=-100.0,
+        high=100.0,
+        usual=(-3.0, 3.0),
+        source="our choice",
+        meaning="velocity of the false track, up",
     )
 
 

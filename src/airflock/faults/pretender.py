@@ -10,9 +10,15 @@ from airflock.core.parameters import quantity
 class Parameters(Record):
     """Where it pretends to be, from where it is."""
 
-    east: float = quantity(20.0, "m", low=-1e4, high=1e4, source="our choice", meaning="pretended offset, east")
-    north: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="pretended offset, north")
-    up: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="pretended offset, up")
+    east: float = quantity(
+        20.0, "m", low=-1e4, high=1e4, usual=(-50.0, 50.0), source="our choice", meaning="pretended offset, east"
+    )
+    north: float = quantity(
+        0.0, "m", low=-1e4, high=1e4, usual=(-50.0, 50.0), source="our choice", meaning="pretended offset, north"
+    )
+    up: float = quantity(
+        0.0, "m", low=-1e4, high=1e4, usual=(-20.0, 20.0), source="our choice", meaning="pretended offset, up"
+    )
 
 
 def tell(x, y, z, vx, vy, vz, f):

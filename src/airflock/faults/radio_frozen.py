@@ -2,5 +2,5 @@
 
 
 def tell(at_x, at_y, at_z, at_vx, at_vy, at_vz):
-    """Position (m) and velocity (m/s) as they were."""
+    """Position (m) and velocity (m/s) as they were last sent."""
     return at_x, at_y, at_z, at_vx, at_vy, at_vz

@@ -139,12 +139,17 @@ def departure(
     plain = places(start)
     ours = recording(fleet).position.transpose("time", "individual", "space", "keypoint").values.reshape(-1, n, dims)
     count = min(len(plain), len(ours))
-    apart = np.linalg.norm(ours[:count] - plain[:count], axis=-1).max(axis=1)
-    chaos = np.max([np.linalg.norm(nudged(k) - plain, axis=-1).max(axis=1) for k in range(NUDGES)], axis=0)
+    apart = _farthest(ours[:count] - plain[:count])
+    chaos = np.max([_farthest(nudged(k) - plain) for k in range(NUDGES)], axis=0)
     period = fleet.card.period
     kept = [t for t in times if round(t / period) < count]
     at = [round(t / period) for t in kept]
     return Departure(kept, [float(apart[k]) for k in at], [float(chaos[k]) for k in at])
+
+
+def _farthest(apart: Any) -> Any:
+    """Largest length over agents, (time,), of differences (time, agent, axis); who is absent does not count."""
+    return np.nanmax(np.linalg.norm(apart, axis=-1), axis=1, initial=0.0)
 
 
 class Line(NamedTuple):

@@ -10,11 +10,8 @@ from airflock.errors import ScenarioError
 from airflock.scenarios.onsets import onsets
 from airflock.scenarios.scenario import Scenario
 
-FLOWN = ("sense", "radio", "overrule", "motion")  # rules of faults that act on a vehicle or on the ether
-INSTEAD = {
-    "tell": "a drone sends the position that it flies by; fly the simulator with it",
+INSTEAD = {  # rules of faults that no fleet flies
     "clock": "a clock that jumps in flight sends a drone home; give a table of --faults with kind = 'clock'",
-    "leaves": "a drone lands by its own mission; give a table of --faults with kind = 'battery' or 'motor'",
 }
 
 
@@ -58,7 +55,7 @@ def refused(scenario: Scenario) -> list[str]:
         f"faults.kind = {kind.name!r}: {INSTEAD[rule]}"
         for kind in scenario.fault_kinds
         for rule in kind.rules
-        if rule not in FLOWN
+        if rule in INSTEAD
     ]
 
 
@@ -74,6 +71,8 @@ class Case(NamedTuple):
 class Faults:
     """Faults of the scenario as they befall the drones of a fleet: the same ones at the same times as in a simulation.
 
+    gone : places of drones that have dropped out: the node is dead, the motors are off
+
     Raises ScenarioError for kinds that a fleet cannot fly.
     """
 
@@ -82,8 +81,10 @@ class Faults:
         if wrong:
             raise ScenarioError(wrong)
         self._kinds = {kind.name: kind for kind in scenario.fault_kinds}
-        self._due = [each for each in onsets(scenario, seed) if not each.leaves] if self._kinds else []
+        self._due = list(onsets(scenario, seed)) if self._kinds else []
+        self.gone: set[int] = set()
         self._dt, self._cases = scenario.flight.dt, {}  # type: ignore[var-annotated]
+        self._last: dict[tuple[int, str, str], State] = {}  # what a rule was last given before its fault
         self._reach = min(scenario.radio.range, 1e8)
 
     def __bool__(self) -> bool:
@@ -93,6 +94,10 @@ class Faults:
         """Let begin what is due before a motion step; states are true ones (m, m/s), commands in m/s."""
         while self._due and self._due[0].step <= step:
             onset = self._due.pop(0)
+            if onset.leaves:
+                self.gone.add(onset.agent)
+            if onset.agent in self.gone:
+                continue
             known = {f"at_{name}": value for name, value in states[onset.agent]._asdict().items()}
             known |= dict(zip(("at_cx", "at_cy", "at_cz"), commands[onset.agent], strict=True))
             numbers = self._kinds[onset.kind].record(*onset.numbers)
@@ -109,8 +114,27 @@ class Faults:
 
     def sensed(self, drone: int, now: float, state: State) -> State:
         """Own state as the navigation of a drone tells it."""
-        for kind, case in self._lasting(drone, "sense", now):
-            state = State(*self._ask(kind, "sense", case, now, **state._asdict()))
+        return self._misled("sense", drone, now, state)
+
+    @property
+    def lies(self) -> bool:
+        """Whether a drone may send another state than the one that it flies by."""
+        return any("tell" in kind.rules for kind in self._kinds.values())
+
+    def told(self, drone: int, now: float, state: State) -> State:
+        """The state that a drone sends."""
+        return self._misled("tell", drone, now, state)
+
+    def _misled(self, rule: str, drone: int, now: float, state: State) -> State:
+        """A state as a rule leaves it, which may repeat the one that it was last given before its fault."""
+        lasting = dict(self._lasting(drone, rule, now))
+        for kind in self._kinds.values():
+            if kind in lasting:
+                last = self._last.setdefault((drone, kind.name, rule), state)
+                given = {f"at_{name}": value for name, value in last._asdict().items()} | state._asdict()
+                state = State(*self._ask(kind, rule, lasting[kind], now, **given))
+            elif rule in kind.rules:
+                self._last[drone, kind.name, rule] = state
         return state
 
     def overruled(self, drone: int, now: float, command: Sequence[float]) -> tuple[float, float, float]:

@@ -4,6 +4,7 @@ At each motion step: telemetry and packets that are due arrive, nodes whose tick
 """
 
 import hashlib
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -17,6 +18,7 @@ from airflock.fleet.dice import OuterNoise, SensorDice
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault, clock_error
 from airflock.fleet.individuals import Faults, records_of, sensors_of
+from airflock.fleet.rogue import retold
 from airflock.fleet.starting import KEY, SINCE, Station, in_the_air, lift_of, vehicle_of
 from airflock.fleet.vehicle import SUFFERED
 from airflock.mavlink.coordinates import Geodetic
@@ -28,6 +30,7 @@ from airflock.scenarios.scenario import Scenario
 
 STARTED = 1_800_000_000_000_000  # virtual Unix time of 0 s, µs
 UNREAD = ("attitude", "home", "battery")  # messages that no node reads; in lock-step nobody else is there
+ABSENT = (math.nan,) * 15  # a row of a drone that has dropped out
 NEVER = -1e8  # s; a peer whose last state held before this has not been heard
 
 
@@ -94,7 +97,7 @@ class Fleet:
             for k in range(round(delay / period), 0, -1):
                 early.autopilot(vehicle.pack_state(), -k * period)
                 for datagram in early.say_status(-k * period):
-                    self.ether.send(-k * period, who, datagram)
+                    self.ether.send(-k * period, who, self._told(who, -k * period, datagram))
 
     # ------------------------------------------------------------------------------------------------------ flight
 
@@ -126,6 +129,7 @@ class Fleet:
         now = self.now
         if self._befalls:
             self._befalls.strike(self.steps, [v.state for v in self.vehicles], [v.target for v in self.vehicles])
+            self._drop_out(now)
         if self.steps % self._tick == 0:
             self._exchange(now)
         if self.steps % self._every == 0:
@@ -140,7 +144,7 @@ class Fleet:
         """Telemetry, packets and decisions of one tick."""
         if self.steps % self._every == 0:
             self._measure(self.steps // self._every)
-        dead = [self._is_dead(node.member, now) for node in self.nodes]
+        dead = [i in self.gone or self._is_dead(node.member, now) for i, node in enumerate(self.nodes)]
         for node, vehicle, gone in zip(self.nodes, self.vehicles, dead, strict=True):
             told = vehicle.telemetry(now)
             if not gone:
@@ -157,7 +161,25 @@ class Fleet:
             for data in out.autopilot:
                 node.autopilot(vehicle.receive(data, now), now)
             for datagram in out.radios[0]:
-                self.ether.send(now, i, datagram, at)
+                self.ether.send(now, i, self._told(i, now, datagram), at)
+
+    def _drop_out(self, now: float) -> None:
+        """Let the drones come down that faults have just taken out of the flight."""
+        for i in sorted(self._befalls.gone):
+            if not self.vehicles[i].off:
+                self.vehicles[i].off = True
+                self.log.append((now, self.nodes[i].member, "drops out by a fault: node and motors are off"))
+
+    @property
+    def gone(self) -> set[int]:
+        """Places of the drones that have dropped out by a fault of the scenario."""
+        return self._befalls.gone
+
+    def _told(self, who: int, now: float, datagram: bytes) -> bytes:
+        """What a drone sends in place of a packet, by its faults."""
+        if not self._befalls.lies:
+            return datagram
+        return retold(datagram, self.card.site, partial(self._befalls.told, who, now))
 
     def _clear(self, here: tuple[float, float, float], there: tuple[float, float, float]) -> bool:
         """Whether nothing stands between two places of vehicles, m."""
@@ -178,16 +200,24 @@ class Fleet:
     # --------------------------------------------------------------------------------------------------- recording
 
     def _keep(self) -> None:
-        self.frames.append(
-            [(*v.state, *n.command, *(n.wire.state or v.state)) for v, n in zip(self.vehicles, self.nodes, strict=True)]
-        )  # fmt: skip
+        both = enumerate(zip(self.vehicles, self.nodes, strict=True))
+        rows = [
+            (*v.state, *n.command, *(n.wire.state or v.state)) if i not in self.gone else ABSENT for i, (v, n) in both
+        ]
+        self.frames.append(rows)
         self.stamps.append(
-            [[n.peers.all[m].at if m != n.member else -1e9 for m in self.card.members] for n in self.nodes]
+            [
+                [n.peers.all[m].at if m != n.member and i not in self.gone else -1e9 for m in self.card.members]
+                for i, n in enumerate(self.nodes)
+            ]
         )
         self.standing.append([n.stands for n in self.nodes])
 
     def array(self) -> NDArray[np.float64]:
-        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them."""
+        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them.
+
+        Of drones that have dropped out nan, as in the recording of a simulation.
+        """
         return np.array(self.frames)
 
     def ages(self) -> NDArray[np.float64]:
@@ -207,7 +237,7 @@ class Fleet:
     @property
     def airborne(self) -> bool:
         """Whether any drone still flies by its node."""
-        return any(phase in FLY for phase in self.phases())
+        return any(phase in FLY for i, phase in enumerate(self.phases()) if i not in self.gone)
 
 
 def start_states(frames: Any, dims: int) -> list[State]:

@@ -68,6 +68,7 @@ class Vehicle:
         self.now, self.due, self.rates = 0.0, dict.fromkeys(telemetry.RATES, 0.0), dict(telemetry.RATES)
         self.error: tuple[float, ...] = (0.0,) * 6
         self.accuracy, self.motor, self.steps = 0.7, True, 0
+        self.off = False  # for good: it has dropped out of the flight
         self.lifting, self._holding = False, Holding()
         asked = asks(body.move, "move", body.name)
         for name in asked:
@@ -301,7 +302,8 @@ class Vehicle:
             self.memory = type(self.memory)() if self.memory is not None else None
             return
         (x, y, z, vx, vy, vz), c = self.state, self.wish()
-        command = c if self.motor else (vx, vy, vz - 5.0)
+        falls = self.off or not self.motor
+        command = (vx, vy, vz - 5.0) if falls else c
         if self.faults is not None:
             command = self.faults.overruled(self.place, now, command)
         eu, ev, ew = self.error[3:]
@@ -313,6 +315,6 @@ class Vehicle:
             velocity = self.faults.moved(self.place, now, self.state, command, velocity, dt)
         ux, uy, uz = (vx, vy, vz) if self._old else velocity
         self.state = State(x + ux * dt, y + uy * dt, z + uz * dt, *velocity)
-        if self.state.z <= 0.0 and c[2] <= 0.0:
+        if self.state.z <= 0.0 and (c[2] <= 0.0 or falls):
             self.state = State(self.state.x, self.state.y, 0.0, *STILL)
-            self.armed = self.armed and self.mode not in (LAND, RTL)
+            self.armed = self.armed and self.mode not in (LAND, RTL) and not self.off

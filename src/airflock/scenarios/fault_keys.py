@@ -1,9 +1,10 @@
-"""Keys of faults: `faults.KIND.KEY` or `faults.NUMBER.KEY`, by which settings and sweeps change an entry."""
+"""Keys of faults: `faults.KIND.KEY` or `faults.NUMBER.KEY`, by which settings, sweeps and sliders change an entry."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from airflock.core.parameters import Declaration, declarations
 from airflock.scenarios.schema import value_of
 from airflock.spelling import as_name, meant
 
@@ -29,9 +30,50 @@ def with_faults(
         number, fault = _entry(entry, name, tables)
         if number is None:
             faults.append(f"{key}: {fault}")
+        elif value is None:  # as it is without
+            tables[number].pop(name, None)
         else:
             tables[number][name] = value
     return {**document, "faults": tables}, {key: v for key, v in others.items() if key != "faults"}, faults
+
+
+def is_fault_key(key: str) -> bool:
+    """Whether a key names something of a fault."""
+    return key.startswith(FIRST)
+
+
+def fault_of(tables: Sequence[Mapping[str, Any]], key: str) -> tuple[int | None, str]:
+    """Number of the entry that a key means, None where there is none, and the name of what it sets."""
+    entry, _, name = key.removeprefix(FIRST).rpartition(".")
+    return _entry(entry, name, tables)[0], name
+
+
+def declared_of_faults(entries: Sequence[Any]) -> Iterator[tuple[str, str, Declaration, Any]]:
+    """Key, kind, declaration and value of the numbers of each fault.
+
+    Keys are those by number: a kind may come again while a flock flies.
+    """
+    for number, entry in enumerate(entries):
+        for name, declared, _ in declarations(entry.numbers):
+            yield f"{FIRST}{number}.{name}", entry.fault.name, declared, getattr(entry.numbers, name)
+
+
+def has_fault(scenario: Any, key: str) -> bool:
+    """Whether a scenario has the fault that a key names."""
+    return fault_of(_kinds(scenario), key)[0] is not None
+
+
+def value_in_fault(scenario: Any, key: str) -> Any:
+    """Value of a key of a fault; None where there is no such fault, or nothing is said of when it begins and ends."""
+    number, name = fault_of(_kinds(scenario), key)
+    if number is None:
+        return None
+    written = scenario.document["faults"][number].get(name)
+    return getattr(scenario.faults[number].numbers, name, written)
+
+
+def _kinds(scenario: Any) -> list[dict[str, str]]:
+    return [{"kind": entry.fault.name} for entry in scenario.faults]
 
 
 def _entry(entry: str, name: str, tables: Sequence[Mapping[str, Any]]) -> tuple[int | None, str]:

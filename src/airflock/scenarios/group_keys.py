@@ -1,4 +1,7 @@
-"""Keys of groups: `groups.NAME.SECTION.KEY`, by which settings, sliders and open flights change a group."""
+"""Keys of groups: `groups.NAME.SECTION.KEY`, by which settings, sliders and open flights change a group.
+
+A tolerance is the key of its number and `.spread`.
+"""
 
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
@@ -8,7 +11,7 @@ from airflock.core.parameters import Declaration, declarations
 from airflock.scenarios.groups import LETTERS
 from airflock.spelling import meant
 
-FIRST = "groups."
+FIRST, SPREAD = "groups.", "spread"
 FORM = "write groups.NAME.SECTION.KEY, for instance groups.heavy.body.tau"
 
 
@@ -18,9 +21,11 @@ def is_group_key(key: str) -> bool:
 
 
 def parts_of(key: str) -> tuple[str, str, str]:
-    """Group, section and name that a key consists of; empty words where it has too few."""
-    rest = key.removeprefix(FIRST).rsplit(".", 2)
-    return (rest[0], rest[1], rest[2]) if len(rest) == 3 else ("", "", "")
+    """Group, section and name that a key consists of, the name with `.spread`; empty words where it has too few."""
+    rest = key.removeprefix(FIRST).rsplit(".", 3)
+    if len(rest) == 4 and rest[1] in LETTERS and rest[3] == SPREAD:
+        return rest[0], rest[1], f"{rest[2]}.{SPREAD}"
+    return (".".join(rest[:-2]), rest[-2], rest[-1]) if len(rest) > 2 else ("", "", "")
 
 
 def with_groups(
@@ -54,8 +59,10 @@ def with_groups(
             faults.append(f"{key}: unknown group {group!r}; {hint}")
         else:
             table = tables[names.index(group)]
-            own = table.get(section, {})
-            table[section] = {**own, name: _kept(own.get(name), value)} if isinstance(own, Mapping) else own
+            own, (name, _, spread) = table.get(section, {}), name.partition(".")
+            if isinstance(own, Mapping):
+                before = own.get(name)
+                table[section] = {**own, name: _spread_anew(before, value) if spread else kept(before, value)}
     return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, faults
 
 
@@ -85,12 +92,22 @@ def _advice(key: str, document: Mapping[str, Any], tables: Mapping[str, Mapping[
     return f"did you mean {FIRST}{group}.{places[near]}.{near}?"
 
 
-def _kept(before: Any, value: Any) -> Any:
+def kept(before: Any, value: Any) -> Any:
     """A value with the spread that the number had before, which keeps its unit."""
     if not isinstance(before, Mapping) or "spread" not in before or isinstance(value, Mapping):
         return value
     unit = {"unit": before["unit"]} if "unit" in before else {}
     return {"value": {"value": value} if unit else value, "spread": before["spread"], **unit}
+
+
+def _spread_anew(before: Any, spread: Any) -> dict[str, Any]:
+    """What a group has of a number, with another spread; the value keeps its unit."""
+    if not isinstance(before, Mapping):
+        return {"spread": spread} if before is None else {"value": before, "spread": spread}
+    if "value" not in before:
+        return {"spread": spread}
+    value = {"value": before["value"], "unit": before["unit"]} if "unit" in before else before["value"]
+    return {"value": value, "spread": spread}
 
 
 def declared_of_groups(scenario: Any) -> Iterator[tuple[str, Declaration, Any]]:

@@ -1,6 +1,5 @@
 """The groups of a scenario file: agents that share numbers or a law, and how far each agent is off these numbers."""
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,6 +11,7 @@ from airflock.core.contract import Model
 from airflock.core.parameters import Choice, Quantity, declarations
 from airflock.scenarios import schema, units
 from airflock.scenarios.group_laws import Laws
+from airflock.scenarios.spreads import checked, deviation, or_share, share_of
 
 LETTERS = {
     "model": "p",
@@ -29,7 +29,7 @@ class Group:
 
     agents  : their numbers, in order
     numbers : (letter, name) → value that they have instead of the flock's
-    spread  : (letter, name) → standard deviation by which each agent differs from it
+    spread  : (letter, name) → standard deviation by which each agent differs from it, or what share of it that is
     law     : model and parameters that they fly by, where these are not the flock's but for numbers
     """
 
@@ -162,7 +162,9 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             faults.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
         elif isinstance(value, Mapping) and "spread" in value:
             unit = {"unit": value["unit"]} if "unit" in value else {}
-            spreads[key] = {"value": value["spread"], **unit} if unit else value["spread"]
+            share = share_of(value["spread"], known.get(key))
+            absolute = {"value": value["spread"], **unit} if unit else value["spread"]
+            spreads[key] = absolute if share is None else share
             rest = {name: entry for name, entry in value.items() if name != "spread"}
             inner = rest.get("value")  # set anew beside a spread that has a unit, it may be a table of its own
             values |= {key: inner if isinstance(inner, Mapping) else rest} if "value" in rest else {}
@@ -170,10 +172,11 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             values[key] = value
     apart = f"{where}.spread"
     converted, told, unfit = units.converted({where: values, apart: spreads}, {where: record, apart: record})
-    notes, wrong = ([_as_written(line, where, apart) for line in lines] for lines in (told, unfit))
+    notes = [_as_written(line, where, apart) for line in told]
+    wrong = [f"{_as_written(line, where, apart)}{or_share(line, apart, known)}" for line in unfit]
     made, more = schema.check(where, converted[where], record)
     faults += wrong + more
-    off, more = _spreads(where, converted[apart], known)
+    off, more = checked(where, converted[apart], known)
     numbers = {key: float(getattr(made, key)) for key in converted[where]} if made is not None and not more else {}
     return numbers, off, notes, faults + more
 
@@ -184,21 +187,6 @@ def _as_written(line: str, where: str, apart: str) -> str:
         return line
     key, _, rest = line.removeprefix(f"{apart}.").partition(" ")
     return f"{where}.{key}.spread {rest}"
-
-
-def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
-    """Standard deviations in declared units."""
-    found, faults = {}, []
-    for key, entry in given.items():
-        value = entry.get("value", entry) if isinstance(entry, Mapping) else entry
-        declared = known.get(key)
-        if not isinstance(declared, Quantity):
-            faults.append(f"{where}.{key}: unknown number")
-        elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
-            faults.append(f"{where}.{key}.spread = {value!r} is not a standard deviation of 0 {declared.unit} or more")
-        else:
-            found[key] = float(value)
-    return found, faults
 
 
 def varied(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -231,7 +219,8 @@ def own_numbers(groups: Sequence[Group], agents: int, letter: str, name: str, re
             values = [0.0 if agent in group.agents else value for agent, value in enumerate(values)]
             continue
         usual = float(getattr(own_record, name) or 0.0)
-        own, spread = group.numbers.get((letter, name), usual), group.spread.get((letter, name), 0.0)
+        own = group.numbers.get((letter, name), usual)
+        spread = deviation(group.spread.get((letter, name), 0.0), own)
         for agent in group.agents:
             value = own
             if spread > 0.0:

@@ -2,10 +2,12 @@
 
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from airflock.core.parameters import Choice, Quantity, declarations, with_unit
+from airflock.scenarios.fault_keys import declared_of_faults
+from airflock.scenarios.faulty import Entry
 from airflock.scenarios.group_keys import declared_of_groups, parts_of
 from airflock.scenarios.scenario import Scenario
 
@@ -69,6 +71,15 @@ def controls_of(scenario: Scenario, usual: Mapping[str, tuple[float, float]] | N
             group, section, _ = parts_of(key)
             found.setdefault(f"group {group}: {section}", []).append(slider(key, declared, value))
     return {part: made for part, made in found.items() if made}
+
+
+def controls_of_faults(entries: Sequence[Entry]) -> dict[str, list[Control]]:
+    """Controls of the numbers of each fault of a scenario, in the order of its entries; many kinds have none."""
+    found: dict[str, list[Control]] = {}
+    for key, kind, declared, value in declared_of_faults(entries):
+        if isinstance(declared, Quantity):
+            found.setdefault(f"fault {key.split('.')[1]}: {kind}", []).append(slider(key, declared, value))
+    return found
 
 
 def slider(key: str, declared: Quantity, value: float, studied: tuple[float, float] | None = None) -> Control:

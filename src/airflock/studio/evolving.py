@@ -50,7 +50,7 @@ class Evolving(Room):
             )
         scores = side.flight.scores()
         objective = "fitness" if "fitness" in scores else self.page.measuring.name
-        text = toml_of(side.origin.where, side.settings, side.origin.document)
+        text = toml_of(side.origin.where, side.settings, side.origin.document, side.preset.document)
         folder = free(Path(f"{stem(player)}_study"))
         space = around(side.scenario, varied(side.origin.where))
         self.study = Study(

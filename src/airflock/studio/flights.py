@@ -219,7 +219,7 @@ class Flights:
     def save_toml(self, path: Path) -> Path:
         """Write the preset's file with the keys changed here, its comments and sources kept."""
         origin = self.side.origin
-        atomic.write(path, toml_of(origin.where, self.side.settings, origin.document))
+        atomic.write(path, toml_of(origin.where, self.side.settings, origin.document, self.side.preset.document))
         return path
 
     def save_recording(self, path: Path) -> Path:

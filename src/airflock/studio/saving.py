@@ -12,31 +12,55 @@ import xarray as xr
 from airflock.engine import Flight
 from airflock.errors import FlightError
 from airflock.recordings.flights import simulate
+from airflock.scenarios.fault_keys import fault_of, is_fault_key
 from airflock.scenarios.files import presets
+from airflock.scenarios.group_keys import is_group_key, kept, parts_of
 
 
-def toml_of(where: str, settings: Mapping[str, Any], given: Mapping[str, Any] | None = None) -> str:
+def toml_of(
+    where: str,
+    settings: Mapping[str, Any],
+    given: Mapping[str, Any] | None = None,
+    whole: Mapping[str, Any] | None = None,
+) -> str:
     """Text of a preset or scenario file with keys set anew; comments, units and sources of the others stay.
 
     given : the scenario of a recording, instead of a file
+    whole : what the scenario consists of with all that it extends, for groups and faults that the file does not write
     """
     path = presets().get(where) or Path(where)
     text = path.read_text(encoding="utf-8") if given is None else tomlkit.dumps(given)
     document: Any = tomlkit.parse(text)
     for key, value in settings.items():
-        section, _, name = key.partition(".")
-        if not name:
-            table, name = document, section
-        else:
-            table = document.setdefault(section, tomlkit.table())
+        table, name = _place(document, key, whole or {})
         known = table.get(name)
-        if isinstance(known, Mapping) and "value" in known and not isinstance(value, Mapping):
+        if is_group_key(key) and not isinstance(value, Mapping):
+            table[name] = kept(known, value)
+        elif isinstance(known, Mapping) and "value" in known and not isinstance(value, Mapping):
             known["value"] = value  # type: ignore[index]
+            known.pop("unit", None)  # type: ignore[attr-defined]
             known["source"] = f"tuned by hand; before: {known.get('source', 'not given')}"  # type: ignore[index]
         else:
             table[name] = value
     document.pop("published", None)  # those figures belong to the untouched scenario
     return tomlkit.dumps(document)
+
+
+def _place(document: Any, key: str, whole: Mapping[str, Any]) -> tuple[Any, str]:
+    """The table of a document that holds a key, which is made if need be, and the key's name in it."""
+    section, _, name = key.partition(".")
+    if not name:
+        return document, section
+    if not (is_group_key(key) or is_fault_key(key)):
+        return document.setdefault(section, tomlkit.table()), name
+    if section not in document:
+        document[section] = [dict(entry) for entry in whole.get(section, ())]
+    if is_fault_key(key):
+        number, name = fault_of(document[section], key)
+        return document[section][number], name
+    group, part, name = parts_of(key)
+    names = [entry.get("name", f"group_{number}") for number, entry in enumerate(document[section])]
+    return document[section][names.index(group)].setdefault(part, tomlkit.inline_table()), name
 
 
 def free(path: Path) -> Path:

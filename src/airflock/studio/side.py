@@ -18,6 +18,7 @@ from airflock.recordings import attributes
 from airflock.recordings.files import load_recording
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.events import Event
+from airflock.scenarios.fault_keys import has_fault, is_fault_key, value_in_fault
 from airflock.scenarios.files import load
 from airflock.scenarios.group_keys import is_group_key, value_in_group
 from airflock.scenarios.scenario import Scenario
@@ -94,6 +95,7 @@ class Side:
             _, self.flight = origin.flight(seed, "python")
         self.changed: dict[str, Any] = {}
         self._before: list[dict[str, Any]] = []
+        self._by_hand: dict[str, Any] = {}  # numbers of faults that were set off by hand, as they were at first
         self._gust: tuple[float, dict[str, Any]] | None = None  # how long it blows, s; what is set back after it
         self._calm: float | None = None  # when it ends, s
 
@@ -148,8 +150,8 @@ class Side:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All keys that differ from the file."""
-        return {**self.origin.settings, **self.changed}
+        """All keys that differ from the file; not those of faults that were set off by hand, which it does not have."""
+        return {**self.origin.settings, **{key: v for key, v in self.changed.items() if not self._is_by_hand(key)}}
 
     def command(self, seed: int) -> str:
         """The command that opens the present scenario again."""
@@ -199,6 +201,7 @@ class Side:
         self.flight.restore(moment)
         self._gust = self._calm = None
         self.changed, self._before = self._changes(), []
+        self._by_hand = {key: value for key, value in self._by_hand.items() if key in self.changed}
 
     def _changes(self) -> dict[str, Any]:
         """Keys that are changed at the present moment of the flight, with their values."""
@@ -206,13 +209,23 @@ class Side:
         for event in self.flight.events:
             if event.kind == "change":
                 found |= event.data
-        return {key: value for key, value in found.items() if value != value_of(self.preset, key)}
+        return {key: value for key, value in found.items() if value != self._at_first(key)}
+
+    def _at_first(self, key: str) -> Any:
+        """Value of a key in the preset; of a fault that was set off by hand its value then."""
+        return self._by_hand.get(key) if self._is_by_hand(key) else value_of(self.preset, key)
+
+    def _is_by_hand(self, key: str) -> bool:
+        """Whether a key is of a fault that was set off by hand."""
+        return is_fault_key(key) and not has_fault(self.preset, key)
 
     # ----------------------------------------------------------------------------------------------- tuning
 
     def change(self, settings: Mapping[str, Any]) -> None:
         """Set keys of the scenario from now on; what must be compiled comes into force when that is done."""
+        by_hand = {key: value_of(self.scenario, key) for key in settings if self._is_by_hand(key)}
         self.flight.change(settings, wait=False)
+        self._by_hand = {**by_hand, **self._by_hand}
         self._before.append(dict(self.changed))
         self.changed = {**self.changed, **settings}
 
@@ -227,7 +240,7 @@ class Side:
 
     def _return_to(self, wanted: dict[str, Any]) -> dict[str, Any]:
         keys = [key for key in self.changed if wanted.get(key) != self.changed[key]]
-        values = {key: wanted[key] if key in wanted else value_of(self.preset, key) for key in keys}
+        values = {key: wanted[key] if key in wanted else self._at_first(key) for key in keys}
         if values:
             self.flight.change(values, wait=False)
         self.changed = dict(wanted)
@@ -288,9 +301,11 @@ def in_space(state: NDArray[Any], dimensions: int) -> tuple[NDArray[Any], NDArra
 
 
 def value_of(scenario: Scenario, key: str) -> Any:
-    """Value of a key such as model.p_rep or groups.heavy.body.tau."""
+    """Value of a key such as model.p_rep, groups.heavy.body.tau or faults.0.share; None of a fault that it lacks."""
     if is_group_key(key):
         return value_in_group(scenario, key)
+    if is_fault_key(key):
+        return value_in_fault(scenario, key)
     section, _, name = key.partition(".")
     if not name:
         return getattr(scenario.flight, section)

@@ -1,6 +1,7 @@
 """Tuning: sliders and menus of every parameter of the side in hand, undo, and what can be saved of it."""
 
 import html
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,9 +9,10 @@ from airflock.errors import AirflockError, ScenarioError
 from airflock.evolve.bounds import studied
 from airflock.scenarios.change import LASTING
 from airflock.scenarios.document import TOP
+from airflock.scenarios.fault_keys import is_fault_key
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.short_keys import whole_keys
-from airflock.studio.controls import Control, controls_of
+from airflock.studio.controls import Control, controls_of, controls_of_faults
 from airflock.studio.drawing import NAMES
 from airflock.studio.player import Player
 from airflock.studio.room import Room, note
@@ -34,6 +36,8 @@ class Tuning(Room):
         self._handles: dict[str, tuple[Any, Control]] = {}
         self._folders: list[Any] = []
         self._made_for: Any = None
+        self._of_faults: list[Any] = []
+        self._faults: Any = None
         panel, player = self.panel, self.player
         panel.row(
             {
@@ -57,18 +61,35 @@ class Tuning(Room):
         preset, two = self.player.preset, len(self.player.sides) > 1
         made_for = preset.model, preset.records.keys(), self.player.side.origin.where, self.player.hand if two else None
         if made_for != self._made_for:
-            for folder in self._folders:
+            for folder in [*self._folders, *self._of_faults]:
                 folder.remove()
-            self._folders, self._handles, self._made_for = [], {}, made_for
-            with self.tab:
-                for section, controls in controls_of(preset, studied(preset)).items():
-                    name = f"{NAMES[self.player.hand]}: {section}" if two else section
-                    folder = self.panel.folder(name, section.startswith("model"))
-                    self._folders.append(folder)
-                    with folder:
-                        for control in controls:
-                            self._handles[control.key] = self.panel.control(control, self._change), control
+            self._of_faults, self._faults, self._handles, self._made_for = [], None, {}, made_for
+            self._folders = self._made(controls_of(preset, studied(preset)))
+        self._rebuild_faults()
         self.show_values()
+
+    def _rebuild_faults(self) -> None:
+        """Make the controls of faults again where others are in force: some may have been set off by hand."""
+        entries = self.player.scenario.faults
+        faults = [entry.fault.name for entry in entries]
+        if faults != self._faults:
+            for folder in self._of_faults:
+                folder.remove()
+            self._handles = {key: made for key, made in self._handles.items() if not is_fault_key(key)}
+            self._of_faults, self._faults = self._made(controls_of_faults(entries)), faults
+
+    def _made(self, controls: Mapping[str, list[Control]]) -> list[Any]:
+        """Folders of controls, by section."""
+        folders = []
+        with self.tab:
+            for section, own in controls.items():
+                name = f"{NAMES[self.player.hand]}: {section}" if len(self.player.sides) > 1 else section
+                folder = self.panel.folder(name, section.startswith("model"))
+                folders.append(folder)
+                with folder:
+                    for control in own:
+                        self._handles[control.key] = self.panel.control(control, self._change), control
+        return folders
 
     def show_values(self) -> None:
         """Show the values in force."""
@@ -113,7 +134,8 @@ class Tuning(Room):
         self.panel.say("Saved", str(path.absolute()))
 
     def refresh(self) -> None:
-        """The command that opens this scenario again, with a button that copies it."""
+        """The command that opens this scenario again, with a button that copies it; controls of faults that are new."""
+        self._rebuild_faults()
         command = html.escape(self.player.command, quote=True)
         self.command.content = note(f"<code>{command}</code><br>{copying(command)}")
 

@@ -1,6 +1,7 @@
 """Noise: what draws random words for all agents, as a function of a driver."""
 
 from airflock.engine.passes.build import Builder
+from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import Function, argument
 from airflock.engine.stages import noise
@@ -15,9 +16,10 @@ def draw(build: Builder) -> Function | None:
     if not build.apart or build.plan.sequential:
         return None
     if "draw" not in build.stages:
-        made = specialise(build, noise.draw, order=argument("order") if build.slots else Itself())
-        order = "order, " * build.slots
+        leave = build.slots and not sorted_by_cells(build.plan)
+        made = specialise(build, noise.draw, order=argument("order") if build.slots else Itself(), leave=leave)
+        known = "n, " * leave + "m, " + "order, " * build.slots
         build.function(
-            f"draw(m, {order}step, stream, world, seed_low, seed_high, u0, u1, u2, u3)", ["apart()", *made.lines]
+            f"draw({known}step, stream, world, seed_low, seed_high, u0, u1, u2, u3)", ["apart()", *made.lines]
         )
     return build.stages["draw"]  # type: ignore[no-any-return]

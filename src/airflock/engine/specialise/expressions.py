@@ -31,7 +31,7 @@ from airflock.engine.stages.words import Itself, Named, Nothing
 # of the driver, whatever they are called with
 KEPT: dict[Any, str] = {
     word: word.__name__ for word in (words.real, words.integer, words.least, words.most, words.choose, words.copy_block)
-} | {words.repeat: "range", words.side_by_side: "prange"}
+} | {words.place: "u64", words.repeat: "range", words.side_by_side: "prange"}
 LOCALS: dict[Any, str] = {word: word.__name__ for word in (words.vector, words.totals, words.aliases)}
 STAGES = words.__name__.rpartition(".")[0]
 OPERATORS: dict[type, Callable[..., Any]] = {

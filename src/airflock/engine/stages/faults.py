@@ -4,10 +4,10 @@ A fault of an agent is a column: when it began, how long it lasts (0 where there
 rules want to know of that moment. Columns are written between two steps (`engine.fault_columns`), and only read here.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
-from airflock.core.fault import Fault
+from airflock.core.fault import ASKED, Fault
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Axes, Flock
 from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, ask, choose, least, most, real
@@ -55,19 +55,29 @@ def about(i: int, kind: Fault, time: Any, flock: Flock, *, plan: Plan) -> Any:
 
 
 def mislead(
-    lanes: Iterable[int], kind: Fault, rule: Callable[..., Any] | None, time: Any, position: Axes, velocity: Axes,
+    lanes: Iterable[int], kind: Fault, asked: str, decision: int, time: Any, position: Axes, velocity: Axes,
     flock: Flock, numbers: Any, *, plan: Plan,
 ) -> None:  # fmt: skip
-    """Disturb states by the rule `sense` or `tell` of a kind of fault.
+    """Disturb states by the rule `sense` or `tell` of a kind of fault; before it begins, keep what it may repeat.
 
-    time : at which these states were taken, s
+    asked : as which of `core.fault.ASKED`
+    time  : at which these states were taken, s
     """
     for i in lanes:
-        t = ask(
-            rule, x=position[X][i], y=position[Y][i], z=position[Z][i], vx=velocity[X][i], vy=velocity[Y][i],
-            vz=velocity[Z][i], **about(i, kind, time, flock, plan=plan),
-        )  # fmt: skip
         on = lasts(i, kind, time, flock, numbers)
+        for rows, at in ((position, "at_"), (velocity, "at_v")):
+            for a in [a for a in range(plan.dimensions) if at + "xyz"[a] in kind.kept(asked)]:
+                flock.kept(kind.name, asked, at + "xyz"[a])[i] = choose(
+                    on & (decision > 0), flock.kept(kind.name, asked, at + "xyz"[a])[i], rows[a][i]
+                )
+        t = ask(
+            kind.rules[ASKED[asked]], x=position[X][i], y=position[Y][i], z=position[Z][i], vx=velocity[X][i],
+            vy=velocity[Y][i], vz=velocity[Z][i], **about(i, kind, time, flock, plan=plan),
+            **{
+                name: flock.kept(kind.name, asked, name)[i] if name[-1] in plan.axes else ZERO
+                for name in kind.kept(asked)
+            },
+        )  # fmt: skip
         for a in range(plan.dimensions):
             position[a][i] = choose(on, t[a], position[a][i])
         for a in range(plan.dimensions):

@@ -9,7 +9,7 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import BEGUN, CALM, ENDED, GAP, SLACK, TRAVELLED, approached, set_out
 from airflock.engine.stages.measure import Measured
 from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import HALF, ONE, ZERO, ask, most, real
+from airflock.engine.stages.words import HALF, ONE, ZERO, ask, most, place, real
 
 Stages = Mapping[str, Callable[..., Any]]  # by name: each takes what it asks for, of the rest it knows
 Order = Mapping[str, tuple[str, ...]]  # stages of each event that a plan has (`engine.schedule`)
@@ -40,7 +40,9 @@ def forget(metrics: tuple[Measured, ...], memory: Any, n: int) -> None:
                 memory[one.row + c, i] = float(start)
 
 
-def record(step: int, first: int, flock: Flock, frames: Any, whole: Any, n: int, *, plan: Plan) -> None:
+def record(
+    step: int, first: int, flock: Flock, frames: Any, whole: Any, n: int, *, plan: Plan, slots: bool
+) -> None:  # fmt: skip
     """Keep positions, velocities and commands as a frame, where there are any: frames[frame, component, agent].
 
     The first frame is that of the first sample at or after the step `first`. Whether a flight is recorded is asked of
@@ -51,7 +53,8 @@ def record(step: int, first: int, flock: Flock, frames: Any, whole: Any, n: int,
         for i in range(n):
             for part, row in enumerate((flock.position, flock.velocity, flock.command)):
                 for a in range(plan.dimensions):
-                    frames[frame, part * plan.dimensions + a, flock.number[i]] = row[a][i]
+                    c = part * plan.dimensions + a
+                    frames[frame, c, place(flock.number[i]) if slots else i] = row[a][i]
 
 
 def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
@@ -168,7 +171,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
         if step % whole.sample_every == 0:
             for name in order["sample"]:
                 take(name, time, values, sums, stages=stages, sampled=sampled)
-            record(step, first, flock, frames, whole, n, plan=plan)
+            record(step, first, flock, frames, whole, n, plan=plan, slots=slots)
         if step < whole.steps:
             if plan.struck and (step == first or step % whole.decide_every == 0):  # between, nobody changes places
                 hurt_first, hurt_end = ask(stages["struck"], time=time)

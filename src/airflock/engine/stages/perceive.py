@@ -111,8 +111,8 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
     then = now - real(whole.delay) * numbers.c.dt
     x, v, hx, hv = flock.measured_position, flock.measured_velocity, flock.heard_position, flock.heard_velocity
     for kind in plan.suffers("sense"):
-        faults.mislead(range(m), kind, kind.sense, now, x, v, flock, numbers, plan=plan)
+        faults.mislead(range(m), kind, "believed", decision, now, x, v, flock, numbers, plan=plan)
         if not plan.sees:
-            faults.mislead(range(m), kind, kind.sense, then, hx, hv, flock, numbers, plan=plan)
+            faults.mislead(range(m), kind, "sent", decision, then, hx, hv, flock, numbers, plan=plan)
     for kind in plan.suffers("tell") if not plan.sees else ():
-        faults.mislead(range(m), kind, kind.tell, then, hx, hv, flock, numbers, plan=plan)
+        faults.mislead(range(m), kind, "told", decision, then, hx, hv, flock, numbers, plan=plan)

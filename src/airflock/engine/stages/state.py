@@ -114,6 +114,10 @@ class Flock:
         """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
         return self.take(fault_row(kind, what))
 
+    def kept(self, kind: str, asked: str, what: str) -> Row:
+        """Of a kind of fault: a component of the state that a rule disturbs, as it was last before the fault began."""
+        return self.take(kept_row(kind, asked, what))
+
     def shared(self, owner: str, name: str) -> Row:
         """A column of Shared, that a rule of the whole flock fills: of the "model" or of a metric, by its name."""
         return self.take(f"shared_{owner}_{name}")
@@ -135,6 +139,11 @@ def tree(scene: Any) -> tuple[Any, Any, Any]:
 def fault_row(kind: str, what: str) -> str:
     """Name of the row with one number of a kind of fault."""
     return f"{FAULT}{kind}_{what}"
+
+
+def kept_row(kind: str, asked: str, what: str) -> str:
+    """Name of the row with what a rule of a kind of fault was last given, `asked` as one of `core.fault.ASKED`."""
+    return fault_row(kind, f"{asked}_{what}")
 
 
 def own_row(letter: str, name: str) -> str:

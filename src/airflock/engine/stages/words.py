@@ -61,6 +61,11 @@ def integer(value: Any) -> Any:
     return int(value)
 
 
+def place(value: Any) -> Any:
+    """A whole number that is a place in a row: a driver need not ask whether it counts from the row's end."""
+    return int(value)
+
+
 def least(a: Any, b: Any) -> Any:
     """The lesser of two numbers; of a number and nan the number."""
     return b if a != a or b < a else a
