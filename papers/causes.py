@@ -1,8 +1,8 @@
 """Fly again what shows why some sentences are not reproduced: `python papers/causes.py NAME [SEEDS]`.
 
 Names: diagonal (fig4.diagonal), shill (model.shill_terms.6ms), collisions (minimum.f_collision), fitness
-(controller.fitness), ranges (s1.range), nearest (fig3.minimum). One line a set of flights; the figures stand as reasons
-in the pages' statements.
+(controller.fitness), ranges (s1.range), nearest (fig3.minimum), algorithm_a (fig1.a), turns (limits.turns), against
+(limits.delay, limits.noise). One line a set of flights; the figures stand as reasons in the pages' statements.
 """
 
 import sys
@@ -21,7 +21,10 @@ from airflock_papers.breaks import in_words
 from airflock_papers.dimock_2003.controller import STARTS
 from airflock_papers.dimock_2003.flights import Birds, Task
 from airflock_papers.dimock_2003.units import BEST, FT_LBF
-from airflock_papers.vasarhelyi_2018 import outdoor, real
+from airflock_papers.vasarhelyi_2018 import fig1, outdoor, real
+from airflock_papers.vasarhelyi_2018.limits import IN_TURNS, QUARTER, turn_rate
+from airflock_papers.vasarhelyi_2018.published import optimum
+from airflock_papers.vasarhelyi_2018.tuning import SETTLED, SPEEDS
 
 # Table S4, columns of 4 and 6 m/s: m and 1/s
 REPULSION = {4: {"model.r0_rep": 15.0, "model.p_rep": 0.3}, 6: {"model.r0_rep": 35.0, "model.p_rep": 0.1}}
@@ -57,6 +60,20 @@ NEAREST: dict[str, tuple[str, dict[str, Any]]] = {
     "8 m/s, repulsion of 6 m/s": ("real_8ms", REPULSION[6]),
     "8 m/s, repulsion of 4 m/s": ("real_8ms", REPULSION[4]),
 }
+# Algorithm A at the delay of Table S5: constants of the caption, what it leaves open, and the delay
+OF_A: tuple[dict[str, float], ...] = (
+    {},
+    *({"model.p_rep": p} for p in (0.5, 0.2, 0.1, 0.05)),
+    *({"model.r0_rep": r} for r in (15.0, 10.0)),
+    *({"model.c_frict": c} for c in (100.0, 10.0, 3.0)),
+    *({"model.r_min_frict": r} for r in (10.0, 20.0)),
+    *({"agents": n} for n in (10, 30, 50)),
+    {"sensors.noise": 0.0, "body.noise": 0.0},
+    *({"body.tau": tau} for tau in (0.5, 0.2)),
+    {"body.a_max": 20.0},
+    *({"radio.delay": t} for t in (0.7, 0.5, 0.3)),
+)
+LAGS = (-4.0, -2.0, 0.0, 1.0, 2.0, 3.0, 4.0)  # s, from a turn to the order that is looked at
 READINGS: tuple[dict[str, Any], ...] = (
     {},
     *({"dt": dt} for dt in (0.05, 0.01)),
@@ -167,6 +184,51 @@ def nearest(seeds: int = 10, first: int = 6000) -> None:
         tell(name, f"{shares.mean():.3f} ± {half:.3f}, mean {np.mean([each.mean() for each in least]):.1f} m")
 
 
+def algorithm_a(seeds: int = 6, first: int = 100) -> None:
+    """Order and speed (m/s) of Algorithm A, by constants, and its nearest neighbours (m)."""
+    for keys in OF_A:
+        flown = airflock.score(fig1.algorithm_a(keys), range(first, first + seeds))
+        corr, vel, near = (flown[name].mean() for name in ("phi_corr", "phi_vel", "r_min_mean"))
+        tell(in_words(keys) or "as the page", f"phi_corr {corr:.2f}, phi_vel {vel:.2f} m/s, nearest {near:.1f} m")
+
+
+def turns(seeds: int = 20, first: int = 0) -> None:
+    """What the optima of Table S1 lose in turns and some time after them, by whether the flock circles."""
+    for v in SPEEDS:
+        found: dict[str, list[list[float]]] = {"circles": [], "flies to and fro": []}
+        for seed in range(first, first + seeds):
+            recording = airflock.simulate(optimum(v), seed)
+            times, rate, course = recording["time"].values, turn_rate(recording), over_time(recording)
+            course = course[(course.index >= SETTLED) & (course.index <= times[-1] - 2.0 * max(LAGS))]
+            row = list(np.quantile(rate[times >= SETTLED], [QUARTER, 1.0 - QUARTER]))
+            for name in IN_TURNS:
+                for lag in LAGS:
+                    then = np.interp(course.index.to_numpy() - lag, times, rate)
+                    slow, fast = np.quantile(then, [QUARTER, 1.0 - QUARTER])
+                    row.append(course[name][then >= fast].mean() - course[name][then <= slow].mean())
+            found["circles" if turning(recording) > 0.8 else "flies to and fro"].append(row)
+        for name, rows in found.items():
+            if rows:
+                slow, fast, *lost = np.mean(rows, axis=0)
+                lost = [f"{lag:+g} s {x:+.3f}" for lag, x in zip(LAGS * len(IN_TURNS), lost, strict=True)]
+                half = len(LAGS)
+                tell(
+                    f"{v} m/s, {name}, {len(rows)} flights",
+                    f"turns by {slow:.3f} to {fast:.3f} rad/s; phi_vel {', '.join(lost[:half])}; "
+                    f"phi_corr {', '.join(lost[half:])}",
+                )
+
+
+def against(seeds: int = 40, first: int = 0) -> None:
+    """Correlation of the optima of Table S1 by the delay and by the noise, which are 1 s and once the paper's."""
+    for v in SPEEDS:
+        sets = [(f"delay of {t:g} s", {"radio.delay": t}) for t in (0.0, 1.0, 2.0, 3.0)]
+        sets += [(f"{k:g} times the noise", {"sensors.noise": 0.005 * k, "body.noise": 0.2 * k}) for k in (0.0, 4.0)]
+        for name, keys in sets:
+            x = airflock.score(optimum(v, keys), range(first, first + seeds))["phi_corr"]
+            tell(f"{v} m/s, {name}", f"mean {x.mean():.4f} ± {x.std():.4f}, median {x.median():.4f}")
+
+
 def fitness(seeds: int = 1) -> None:
     """Power of the published gains, ft lbf/s, over the 28 starts, by reading; no seed changes anything.
 
@@ -196,7 +258,7 @@ def tell(name: str, found: str) -> None:
 
 
 CAUSES: dict[str, Callable[..., None]] = {
-    each.__name__: each for each in (diagonal, shill, collisions, fitness, ranges, nearest)
+    each.__name__: each for each in (diagonal, shill, collisions, fitness, ranges, nearest, algorithm_a, turns, against)
 }
 
 if __name__ == "__main__":

@@ -45,7 +45,15 @@ def test_stragglers_are_those_whom_nobody_is_near() -> None:
     velocity[:, :, 0] = np.cross(goal, (0.0, 0.0, 1.0))  # across the way to the goal
     velocity[:, :, 1] = np.cross(goal - place[0, :, 1], (0.0, 0.0, 1.0))
     velocity[1, 2, :] = (-3.0, -3.0, -3.0)
-    found = alone.measures(recording(place[:1], velocity[:1]), sight=40.0)
+    found = alone.measures(recording(place[:1], velocity[:1]), sight=40.0, top=60.0)
     assert found["focus"] == pytest.approx(1.0) and found["alone"] == pytest.approx(1 / 3)
-    falling = alone.measures(recording(place[1:], velocity[1:]), sight=40.0)
+    falling = alone.measures(recording(place[1:], velocity[1:]), sight=40.0, top=60.0)
     assert falling["fall"] == pytest.approx(3.0) and falling["climb"] == 0.0
+
+
+def test_who_moves_once_at_the_end_is_not_stuck() -> None:
+    """Of three boids one stands, one stands until its last instant, one has never flown slower than half the limit."""
+    place, velocity = np.zeros((2, 3, 3)), np.zeros((2, 3, 3))
+    velocity[:, 0, 2] = 30.0
+    velocity[1, 1, 1] = 7.0
+    assert alone.measures(recording(place, velocity), sight=40.0, top=60.0)["stuck"] == pytest.approx(1 / 3)

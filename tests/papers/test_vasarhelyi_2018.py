@@ -17,7 +17,7 @@ from airflock_papers import bounds, statistics
 from airflock_papers.claims import Claim, judge, read_claims
 from airflock_papers.flights import Flights, with_changes
 from airflock_papers.statements import load
-from airflock_papers.vasarhelyi_2018 import PAPER, evolved, fig1, outdoor, pressure, report, table_s2, tuning
+from airflock_papers.vasarhelyi_2018 import PAPER, evolved, fig1, limits, outdoor, pressure, report, table_s2, tuning
 from airflock_papers.vasarhelyi_2018.published import REFIT, SPEEDS, optimum, program_runs
 from airflock_papers.vasarhelyi_2018.table_s1 import COLUMNS
 from airflock_papers.vasarhelyi_2018.table_s2 import PROGRAM
@@ -242,6 +242,41 @@ def test_under_its_change_a_pair_is_one_scenario_so_that_nothing_differs():
                     assert not bounds.holds(claim.bound, {"ours": 0.0, "low": 0.0, "high": 0.0}), claim.id
                 else:
                     assert claim.bound in ("ours == 0", "ours <= 0"), claim.id  # that there is none
+
+
+def test_under_its_change_a_pair_of_what_limits_the_fitness_is_one_scenario():
+    """As of the pairs of tuning: the difference is 0, and no claim that there is one holds."""
+    statements, sides = load("airflock_papers.vasarhelyi_2018"), limits.cases()
+    for name, column, v in limits.claims():
+        both = limits.PAIRS[name][:2]
+        claim = statements[f"limits.{name}.{column}.{v}ms"]
+        one, other = (with_changes(sides[case, v], claim.breaks) for case in both)
+        assert sides[both[0], v].document != sides[both[1], v].document and one.document == other.document, claim.id
+        assert not bounds.holds(claim.bound, {"ours": 0.0, "low": 0.0, "high": 0.0}), claim.id
+
+
+def test_of_what_limits_the_fitness_no_other_pair_is_flown(monkeypatch):
+    flown = []
+    monkeypatch.setattr(Flights, "score", lambda self, title, scenarios, seeds: flown.append(title))
+    limits.fly(Flights(wanted=frozenset({"limits.dense.n_coll.6ms"})))
+    assert [title.partition(", ")[2] for title in flown] == ["as it is, 6 m/s", "sparser, 6 m/s"]
+
+
+@pytest.mark.parametrize("slows", [0.0, 0.5])
+def test_what_turns_cost_is_what_a_flock_loses_that_slows_down_in_them(slows):
+    """A square track with rounded corners: nothing is lost at a steady speed, half of it if corners are flown so."""
+    flight = airflock.load("vasarhelyi_2018/4ms", {"agents": 3, "duration": 400.0})
+    recording = airflock.simulate(flight, 0).copy(deep=True)
+    time = recording["time"].values
+    corner = (time % 40.0) > 28.0  # s: a side of 28, a quarter circle of 12
+    angle = 0.5 * np.pi * (time // 40.0 + np.clip((time % 40.0 - 28.0) / 12.0, 0.0, 1.0))
+    speed = 4.0 * (1.0 - slows * corner)
+    recording["velocity"].values[:, :2] = (speed * np.array([np.cos(angle), np.sin(angle)])).T[:, :, None, None]
+    recording["velocity"].values[:, 2:] = 0.0
+    recording["position"].values[:] = 5.0 * np.arange(3)  # one cluster at all times
+    found = limits.in_turns(recording)
+    assert found["phi_vel"] == pytest.approx(-4.0 * slows, abs=0.1)
+    assert found["phi_corr"] == pytest.approx(0.0, abs=1e-6)  # all fly as one throughout
 
 
 def test_of_what_is_asked_for_no_other_pair_is_flown(monkeypatch):

@@ -35,6 +35,7 @@ SEEDS = {
     ("vasarhelyi_2018", "fig34"): 10,
     ("vasarhelyi_2018", "optima"): 40,
     ("vasarhelyi_2018", "pressure"): 20,
+    ("vasarhelyi_2018", "limits"): 40,
     ("vasarhelyi_2018", "tuning"): 40,
     ("vasarhelyi_2018", "real"): 10,
     ("zapotecatl_2016", "sequential"): 6,

@@ -3,7 +3,7 @@
 QUANTITIES: dict[str, tuple[str, ...]] = {
     # order parameters, by their names in metrics/
     "phi_vel": ("velocity", "speed", "vel"),
-    "phi_corr": ("correlation", "corr", "coherence", "align"),
+    "phi_corr": ("correlation", "corr", "coherence", "align", "synchronization"),
     "phi_coll": ("coll",),
     "n_coll": ("colli", "N^coll", "safe", "safety"),
     "r_min_mean": ("closest-neighbor distance", "interagent distance", "r_ij", "sparser", "tighter", "spread"),
@@ -29,6 +29,10 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "agility": ("sluggish", "agility"),
     "reach": ("wall",),
     "top_speed": ("speed up", "speed"),
+    # what keeps the fitness below 1 (vasarhelyi_2018/limits.py)
+    "phi_vel in turns": ("speed",),
+    "phi_corr in turns": ("velocity correlation",),
+    "fitness in a smaller arena": ("smaller arena",),
     # what was said of the real drones (vasarhelyi_2018/real.py)
     "wall term": ("interaction magnitudes at walls",),
     "tolerated": ("tolerated",),
@@ -81,6 +85,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "overruled": ("overruling", "overruled"),
     "erratic": ("erratic", "irregular"),
     "bank": ("bank",),
+    "stuck": ("stuck",),
     "climb": ("ascension",),
     "fall": ("fall",),
     "focus on the goal": ("focused on the goal",),

@@ -41,7 +41,11 @@ READINGS = (
 SECTIONS = (
     Section("readings.", "The reading of separation", READINGS),
     Section("conduct.", "Collisions, and how boids behave", "Final set, 20 seeds; 120 s in each scene."),
-    Section("only.", "One rule alone", "30 s in open air, 20 seeds, against boids without the rule on the same seeds."),
+    Section(
+        "only.",
+        "One rule alone, or missing",
+        "30 s in open air, 20 seeds, against boids without the rule on the same seeds; obstacle avoidance in the city.",
+    ),
     Section(
         "schemes.",
         "Five recombination schemes in a city and a forest",

@@ -45,6 +45,13 @@ SECTIONS = (
     Section("fig4.", "Fig. 4: patterns"),
     Section("pressure.", "30 to 1000 drones", "At 4 m/s, side of the arena 250 m · sqrt(N/100).", ("pressure",)),
     Section(
+        "limits.",
+        "What keeps the fitness below 1",
+        "Optima of Table S1; 40 pairs of flights on the same seeds. In turns: in the quarter of instants in which the "
+        "mean velocity of the flock turns fastest, less the quarter in which it turns slowest, in 10 recorded flights "
+        "from 100 s on.",
+    ),
+    Section(
         "model.",
         "Sentences on the model",
         "Wall term: Eqs 8 and 9, m/s, mean over drones that any wall acts on; 10 recorded flights a side.",
