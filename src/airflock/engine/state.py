@@ -1,6 +1,5 @@
 """State: the arrays of one flight. What it carries from step to step lies in one buffer, so that one copy keeps it."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -108,7 +107,7 @@ class State:
 
         It stops on the way where a fault is due. What is due at a step is done before it is flown or sensed.
         """
-        due = sorted({onset.step for onset in self.tables.due if first <= onset.step < last})
+        due = sorted({onset.step for onset in self.tables.due if first <= onset.step < last}) if self.tables.due else []
         if not due:
             return self._watched(first, last, half, frames)
         step, skipped, every = first, -(-first // self.whole("sample_every")), self.whole("sample_every")
@@ -153,7 +152,7 @@ class State:
 
     def _fly(self, first: int, last: int, half: int, frames: NDArray[Any] | None) -> int:
         """One call of the driver. An instant with fewer than two of several agents is not counted."""
-        few = self.begun and self.here < min(2, self.agents)
+        few = self.plan.absence and self.begun and self.here < min(2, self.agents)
         if few and not self.here:
             self.arrays["there"][1] += self.agents * (last - first)  # time passes
             return last
@@ -214,15 +213,16 @@ class State:
     @property
     def finite(self) -> bool:
         """Whether the positions and velocities of all agents are finite."""
-        with np.errstate(invalid="ignore"):  # 0 times what is not finite is nan
-            return math.isfinite(sum(run.dot(nothing) for run, nothing in self._moving))
+        return not any(
+            0 in np.isfinite(run, told).tobytes() for run, told in self._moving
+        )  # as bytes: `all` takes longer
 
     @cached_property
     def _moving(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-        """Rows of motion as runs of memory, mostly one, each with zeros of its size."""
+        """Rows of motion as runs of memory, mostly one, each with room for what is found of it."""
         together = np.split(self._motion, np.flatnonzero(np.diff(self._motion) != 1) + 1)
         runs = [self.arrays["work"][rows[0] : rows[-1] + 1].reshape(-1) for rows in together]
-        return [(run, np.zeros_like(run)) for run in runs]
+        return [(run, np.zeros(run.shape, bool)) for run in runs]
 
     def compile(self) -> "State":
         """Have the driver compiled; nothing is flown, and agents get no places. Returns the state."""
