@@ -213,9 +213,8 @@ class State:
     @property
     def finite(self) -> bool:
         """Whether the positions and velocities of all agents are finite."""
-        return not any(
-            0 in np.isfinite(run, told).tobytes() for run, told in self._moving
-        )  # as bytes: `all` takes longer
+        # as bytes: `all` of so few takes three times as long
+        return not any(0 in np.isfinite(run, told).tobytes() for run, told in self._moving)
 
     @cached_property
     def _moving(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:

@@ -190,7 +190,8 @@ def _looked(build: CudaBuilder) -> list[str]:
     width = _within(build)
     if width is None:
         return lines
-    anew = branch("step - looked > collide_every", _forget(build) or ["pass"])
+    forget = _forget(build)
+    anew = branch("step - looked > collide_every", forget) if forget else []
     return [*anew, *lines, f"gap = answer - {width} - real({SLACK})", "moved = ZERO; looked = step"]
 
 
