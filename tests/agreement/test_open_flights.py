@@ -315,7 +315,7 @@ def test_what_makes_no_sense_is_one_line(scenario, call, said):
 
 @pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "vasarhelyi_2018/real_gnss"])
 def test_what_an_agent_perceives_makes_up_its_command(name):
-    from airflock.core.agent import answer
+    from airflock.core.vocabulary import answer
 
     scenario = load(name, {"agents": 12, "duration": 20.0, "radio.range": 200.0})
     flight = airflock.open(scenario, 3, precision=64).advance(5.0)

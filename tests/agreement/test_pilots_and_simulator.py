@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 
 import airflock
 from airflock.body.registry import BODIES
-from airflock.core.agent import State, answer
+from airflock.core.agent import State
 from airflock.core.contract import model
 from airflock.core.hearing import Hearing
 from airflock.core.parameters import choices
 from airflock.core.pilot import Pilot
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import complete, could_be_near, counts, of_standing
+from airflock.core.vocabulary import answer
 from airflock.errors import RuleError
 from airflock.fleet.prepare import plain
 from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995

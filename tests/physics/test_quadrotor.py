@@ -12,7 +12,7 @@ import airflock
 from airflock.body import quadrotor
 from airflock.body.battery import hovering, left
 from airflock.body.quadrotor import Memory, Parameters, move
-from airflock.core.agent import answer
+from airflock.core.vocabulary import answer
 from airflock.errors import RuleError, ScenarioError
 from airflock.scenarios.files import load
 

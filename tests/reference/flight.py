@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from airflock.body import dryden, wind
 from airflock.checking.flock import of_model
 from airflock.core import radio, random
-from airflock.core.agent import State, answer
+from airflock.core.agent import State
 from airflock.core.contract import Metric
 from airflock.core.hearing import Hearing
 from airflock.core.maths import norm
 from airflock.core.parameters import choices
 from airflock.core.pilot import Pilot
+from airflock.core.vocabulary import answer
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.surroundings import Course, Place, reach_of_walls
 from airflock.scenarios.timing import clock

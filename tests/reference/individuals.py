@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from airflock.core import random
-from airflock.core.agent import State, answer
+from airflock.core.agent import State
 from airflock.core.parameters import Quantity, declarations
+from airflock.core.vocabulary import answer
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.spreads import Share
 

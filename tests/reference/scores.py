@@ -3,11 +3,12 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from airflock.checking.flock import Survey, of_metric
-from airflock.core.agent import START, State, answer, combined, reduced
+from airflock.checking.flock import Survey, solver
+from airflock.core.agent import START, State, combined, reduced
 from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
-from airflock.core.vocabulary import Mean
+from airflock.core.vocabulary import Mean, answer
+from airflock.rules.probe import shapes_of
 from airflock.scenarios.surroundings import Place
 
 Record = Any  # a NamedTuple of floats that a metric declares
@@ -92,11 +93,19 @@ class Scores:
             given["clusters"] = self._clusters(metric, metric.cluster, flock)
         return answer(metric.sample, "sample", given, metric.name)
 
+    def _survey(self, metric: Metric, agents: int) -> Survey | None:
+        """A metric's rule of the whole flock, with scratch that lasts for the flight; None if it has none."""
+        if metric.survey is None:
+            return None
+        given = {"q": self.q, "wing": self.wing}
+        shapes = shapes_of(metric.workspace, agents, given)
+        return solver(metric.survey, "survey", metric.Shared, shapes, given, metric.name)
+
     def _agents(self, metric: Metric, rule: Callable[..., Any], flock: Sequence[State], mean: Mean) -> Record:
         if metric.Memory is not None:
             self.memories.setdefault(metric.name, {})
         if metric.name not in self.surveys:
-            self.surveys[metric.name] = of_metric(metric, len(flock), self.q, self.wing)
+            self.surveys[metric.name] = self._survey(metric, len(flock))
         survey = self.surveys[metric.name]
         shared = survey(flock) if survey else [None] * len(flock)
         terms = []

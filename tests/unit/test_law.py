@@ -12,8 +12,8 @@ import pytest
 from airflock.body.registry import BODIES
 from airflock.core import maths
 from airflock.core.contract import model
-from airflock.core.contract.metrics import MEASURING
 from airflock.core.vocabulary import VOCABULARY, asks
+from airflock.core.vocabulary.metrics import METRIC
 from airflock.errors import RuleError
 from airflock.metrics.registry import METRICS
 from airflock.rules import law
@@ -135,7 +135,7 @@ def test_every_shipped_body_and_order_parameter_is_lawful():
     for body in BODIES.values():
         assert law.faults(body.move) == []
     for metric in METRICS.values():
-        for kind in MEASURING:
+        for kind in METRIC:
             if getattr(metric, kind) is not None:
                 assert law.faults(getattr(metric, kind)) == [], (metric.name, kind)
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from airflock.core import random
+from airflock.core.contract.declared import CLOCKS
 from airflock.engine import plan_of
 from flocks import ISLANDS, NOTCHED, scenario
 from inside import WHOLE, Flock, Itself, Surroundings, clusters_of, stages, tables
 from inside import passes_decide as decide
 from inside import passes_driver as driver
-from inside import passes_measure as measure
 from inside import passes_perceive as perceive
 from inside import stages_approach as approach
 from inside import stages_decide as deciding
@@ -230,7 +230,7 @@ class World:
         return found
 
 
-@pytest.mark.parametrize("clock", measure.CLOCKS)
+@pytest.mark.parametrize("clock", CLOCKS)
 @pytest.mark.parametrize("name", CASES)
 def test_order_parameters_as_they_stand_are_those_of_the_driver_made_of_them(name, clock, seed):
     text, direct = World(name, seed).samples(clock)

@@ -11,11 +11,11 @@ from airflock.checking.given import with_values
 from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.scenes import MIRROR, turn_about_vertical
 from airflock.checking.single import run
-from airflock.checking.units import COMMAND_UNITS, OTHERS, factor, rescaled
-from airflock.core.agent import answer
+from airflock.checking.units import OTHERS, factor, rescaled
 from airflock.core.contract import Body
+from airflock.core.contract.declared import COMMANDS
 from airflock.core.parameters import choices
-from airflock.core.vocabulary import asks
+from airflock.core.vocabulary import answer, asks
 from airflock.rules import law
 from airflock.scenarios.families import BODY
 from airflock.scenarios.seeds import sound_seed
@@ -152,7 +152,7 @@ def _time_step(found: Body, b: Any, motions: list[Motion]) -> str:
 
 def _units(found: Body, b: Any, motions: list[Motion], seed: int) -> str:
     for units in OTHERS:
-        scale = {name: factor(unit or COMMAND_UNITS[found.accepts], units) for name, unit in VECTORS.items()}
+        scale = {name: factor(unit or COMMANDS[found.accepts], units) for name, unit in VECTORS.items()}
         other = rescaled(b, units)
         for number, motion in enumerate(motions):
             scaled = {k: scale[k] * v for k, v in motion.items()}

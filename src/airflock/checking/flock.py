@@ -1,11 +1,11 @@
 """Rules of the whole flock, on lists of floats."""
 
 from collections.abc import Callable, Sequence
-from inspect import signature
 from typing import Any
 
-from airflock.core.agent import State, answer
-from airflock.core.contract import Metric
+from airflock.core.agent import State
+from airflock.core.vocabulary import answer
+from airflock.rules.probe import shapes_of
 from airflock.scenarios.scenario import Scenario
 
 Survey = Callable[[Sequence[State]], list[Any]]  # states of all agents → what the rule found for each
@@ -18,26 +18,11 @@ def of_model(scenario: Scenario) -> Survey | None:
         return None
     given = {"p": scenario.parameters, "wing": scenario.wing, "aero": scenario.aero}
     shapes = shapes_of(model.workspace, scenario.agents, given)
-    return _solver(model.flock, "flock", model.Shared, shapes, given, model.name)
+    return solver(model.flock, "flock", model.Shared, shapes, given, model.name)
 
 
-def of_metric(metric: Metric, agents: int, q: Any, wing: Any) -> Survey | None:
-    """The survey of a metric, likewise."""
-    if metric.survey is None or metric.workspace is None:
-        return None
-    shapes = shapes_of(metric.workspace, agents, {"q": q, "wing": wing})
-    return _solver(metric.survey, "survey", metric.Shared, shapes, {"q": q, "wing": wing}, metric.name)
-
-
-def shapes_of(workspace: Callable[..., Any], agents: int, records: dict[str, Any]) -> Any:
-    """Shapes of the scratch: what `workspace` returns for n and the records that it asks for."""
-    given = {**records, "n": agents}
-    return workspace(*(given[name] for name in signature(workspace).parameters))
-
-
-def _solver(
-    rule: Callable[..., None], kind: str, record: Any, shapes: Any, given: dict[str, Any], owner: str
-) -> Survey:
+def solver(rule: Callable[..., None], kind: str, record: Any, shapes: Any, given: dict[str, Any], owner: str) -> Survey:
+    """A rule of the whole flock with scratch of these shapes; record : the columns that it fills."""
     work = type(shapes)(*[[[0.0] * columns for _ in range(rows)] for rows, columns in shapes])
 
     def solve(flock: Sequence[State]) -> list[Any]:

@@ -23,9 +23,10 @@ from airflock.checking.scenes import (
     turned,
 )
 from airflock.checking.single import run
-from airflock.checking.units import COMMAND_UNITS, OTHERS, factor, rescaled_scenario
+from airflock.checking.units import OTHERS, factor, rescaled_scenario
 from airflock.core.agent import Heard, State, first_memory, meet_neighbours, meet_surfaces, pair_percept
 from airflock.core.contract import Model, model
+from airflock.core.contract.declared import COMMANDS
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import Own, Percept, asks
 from airflock.engine import fly, plan_of
@@ -227,7 +228,7 @@ def _units(law: Law, scenes: Sequence[Scene], seed: int) -> str:
     expected = [law.command(scene) for scene in scenes]
     for units in OTHERS:
         other = replace(law, scenario=rescaled_scenario(law.scenario, units))
-        by = factor(COMMAND_UNITS[law.model.command], units)
+        by = factor(COMMANDS[law.model.command], units)
         answers = [other.command(in_units(scene, units)) / by for scene in scenes]
         fault = _worst(answers, expected, seed, CLOSE_IN_FLIGHT)
         if fault:
@@ -240,7 +241,7 @@ def _units_in_flight(law: Law, seed: int) -> str:
     frames = _flown(law.scenario, start, seed)
     sizes = np.abs(frames).max(axis=(0, 2)) + 1e-9
     for units in OTHERS:
-        known = (factor(unit, units) for unit in ("m", "m/s", COMMAND_UNITS[law.model.command]))
+        known = (factor(unit, units) for unit in ("m", "m/s", COMMANDS[law.model.command]))
         scale = np.repeat(list(known), dims)[:, None]
         other = _flown(rescaled_scenario(law.scenario, units), start * scale[: 2 * dims], seed) / scale
         bad = np.argwhere(np.abs(other - frames) > CLOSE_IN_FLIGHT * sizes[:, None])

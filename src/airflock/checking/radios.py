@@ -10,10 +10,10 @@ from airflock.checking.given import with_values
 from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.single import run
 from airflock.checking.units import OTHERS, Units, rescaled
-from airflock.core.agent import answer
 from airflock.core.parameters import choices
-from airflock.core.radio import RULES, Radio
-from airflock.core.vocabulary import VOCABULARY, asks
+from airflock.core.radio import Radio
+from airflock.core.vocabulary import VOCABULARY, answer, asks
+from airflock.core.vocabulary.radios import RULES
 from airflock.rules import law
 from airflock.scenarios.families import RADIO
 from airflock.scenarios.seeds import sound_seed

@@ -1,12 +1,10 @@
 """What the words of the vocabulary are: a number, a record, a column of numbers; and what each kind of rule returns."""
 
-LAW = ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide")
+from airflock.core.vocabulary import bodies, faults, laws, metrics, radios, sensors
+
+LAW, BODY, SENSOR, RADIO, FAULT = (tuple(each.RULES) for each in (laws, bodies, sensors, radios, faults))
 LAW_NUMBERS = ("preferred_speed", "interaction_range")
-PARAMETER = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "linked_within", "survey")
-MEASURES = (*PARAMETER, "fitness", "faults")
-SENSOR = ("measure", "error", "exact", "bounds")
-RADIO = ("missed", "missed_few", "receive", "late", "see", "carry", "lasts")
-FAULT = ("sense", "tell", "radio", "clock", "overrule", "motion", "leaves")
+MEASURES = (*metrics.METRIC, *metrics.METRIC_SET)
 COLUMNS = "MutableSequence[float]"
 
 # (module, name) behind the words that a rule file need not define itself
@@ -46,7 +44,7 @@ SPECIAL = {
     "faults": {"edges": "str"},
 }
 # of the record of parameters, by owner
-LETTERS = {"p": LAW, "q": MEASURES, "b": ("move", "limits", "endures"), "s": SENSOR, "k": RADIO, "f": FAULT}
+LETTERS = {"p": LAW, "q": MEASURES, "b": BODY, "s": SENSOR, "k": RADIO, "f": FAULT}
 STATE = f"tuple[{', '.join(['float'] * 6)}]"
 VECTOR = "tuple[float, float, float]"
 RESULTS = {
@@ -68,7 +66,7 @@ def kinds_of(functions: set[str]) -> dict[str, str]:
     if "decide" in functions:
         kinds |= {name: name for name in (*LAW, *LAW_NUMBERS, "workspace")}
     if "move" in functions:
-        kinds |= {"move": "move", "limits": "limits", "endures": "endures"}
+        kinds |= {name: name for name in BODY}
     if "sample" in functions or "fitness" in functions:
         kinds |= {name: name for name in (*MEASURES, "workspace", "total")}
     if "meet" in functions:

@@ -107,7 +107,7 @@ def law_of(found: Model, parameters: Mapping[str, Any], dimensions: int) -> Law:
     keys |= {"agents": AGENTS, "world.dimensions": str(dimensions), "wing.segments": "5", "start.separation": 0.0}
     keys |= {"world.arena": "none", "start.kind": "ball", "start.radius": length, "radio.range": 10.0 * length}
     scenario = make({"model": {}}, f"check of {found.name}", keys, given=Given(law=found))
-    speed = float(found.preferred_speed(p)) if found.preferred_speed else 0.0
+    speed = found.speed(p)
     speed = speed or min(float(getattr(scenario.body, "speed", getattr(scenario.body, "speed_max", 1.0))), 10.0)
     period = min(0.2, 0.05 * length / speed)
     dt = 0.2 * period

@@ -12,7 +12,7 @@ from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.units import OTHERS, rescaled
 from airflock.core.maths import FAR, TINY
 from airflock.core.topology import Topology
-from airflock.core.vocabulary import asks
+from airflock.core.vocabulary import answer
 from airflock.rules import law
 from airflock.scenarios.families import TOPOLOGY
 from airflock.scenarios.seeds import sound_seed
@@ -114,7 +114,7 @@ def _met(found: Topology, t: Any, others: Others) -> NDArray[np.float64]:
         "r2": np.where(others.heard, squares, FAR).tolist(), "hidden": others.hidden.tolist(),
         "fade": others.fade.tolist(), "heap": [FAR] * count, "weak": [FAR] * count,
     }  # fmt: skip
-    found.meet(*(given[name] for name in asks(found.meet, "meet", found.name)))
+    answer(found.meet, "meet", given, found.name)
     return np.array(met)
 
 

@@ -27,7 +27,6 @@ DIMENSIONS = {
     "": (0, 0), "1": (0, 0), "dB": (0, 0), "rad": (0, 0), "deg": (0, 0), "kg": (0, 0), "m": (1, 0), "cm": (1, 0),
     "km": (1, 0), "s": (0, 1), "Hz": (0, -1), "N": (1, -2), "Pa": (-1, -2), "J": (2, -2), "W": (2, -3),
 }  # fmt: skip
-COMMAND_UNITS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": "1"}
 
 
 def factor(unit: str, units: Units) -> float:

@@ -4,14 +4,12 @@ A `Model` and what one agent perceives go in, a command comes out. Rules are cal
 the order of the drivers: all neighbours, all surfaces, then the decision. In a plane every z is zero.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from airflock.core.contract import Model
 from airflock.core.maths import FAR, TINY, norm
-from airflock.core.vocabulary import Own, Percept, asks
-from airflock.errors import RuleError
+from airflock.core.vocabulary import Own, Percept, answer
 
 START = {"sum": 0.0, "min": FAR, "max": -FAR}  # what a reduction gives where nothing is reduced
 
@@ -155,9 +153,9 @@ def pair_percept(own: State, heard: Heard, index: int, group: float = -1.0) -> d
     }  # fmt: skip
 
 
-def reduced(record: type, how: Mapping[str, str], terms: Iterable[tuple[float, ...]]) -> Any:
+def reduced(record: type[Any], how: Mapping[str, str], terms: Iterable[tuple[float, ...]]) -> Any:
     """One record from many: each field summed, or its least or greatest value where `how` says so."""
-    fields: tuple[str, ...] = record._fields  # type: ignore[attr-defined]
+    fields: tuple[str, ...] = record._fields
     ways = [how.get(name, "sum") for name in fields]
     totals = [START[way] for way in ways]
     if not how:
@@ -174,20 +172,5 @@ def combined(how: str, total: float, value: float) -> float:
     return total + value if how == "sum" else (min(total, value) if how == "min" else max(total, value))
 
 
-def answer(rule: Callable[..., Any], kind: str, given: Mapping[str, Any], owner: str = "") -> Any:
-    """Call a rule with what it asks for by name."""
-    names = _asked(rule, kind, owner)
-    values = [given.get(name) for name in names]
-    for place, value in enumerate(values):
-        if value is None:
-            raise RuleError(f"{owner}.{kind} asks for {names[place]}, which {owner} does not provide".lstrip("."))
-    return rule(*values)
-
-
-@cache
-def _asked(rule: Callable[..., Any], kind: str, owner: str) -> tuple[str, ...]:
-    return asks(rule, kind, owner)
-
-
-def _zeros(record: type) -> Any:
-    return record(*([0.0] * len(record._fields)))  # type: ignore[attr-defined]
+def _zeros(record: type[Any]) -> Any:
+    return record(*([0.0] * len(record._fields)))

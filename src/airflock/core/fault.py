@@ -9,11 +9,12 @@ from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from typing import Any
 
 from airflock.core.contract import names_of
 from airflock.core.parameters import Parameters, choices, number_names
-from airflock.core.vocabulary import asks
+from airflock.core.vocabulary import answer, asks
 from airflock.errors import RuleError
 
 # rule → how many numbers it returns, and what they are
@@ -78,7 +79,7 @@ class Fault:
     @cached_property
     def record(self) -> type:
         """NamedTuple of its numbers, which its rules are handed as `f`."""
-        return namedtuple(self.name.title().replace("_", ""), self.fields)  # type: ignore[misc]
+        return namedtuple(self.name.title().replace("_", ""), self.fields)
 
     @property
     def onset(self) -> tuple[str, ...]:
@@ -86,6 +87,13 @@ class Fault:
         asked = {(kind, name) for kind, rule in self.rules.items() for name in asks(rule, kind, self.name)}
         asked -= {(kind, name) for kind in ASKED.values() for name in STATE}
         return tuple(sorted({name for _, name in asked if name.startswith("at_")}))
+
+    def gone_after(self, numbers: Any) -> float:
+        """Time from its beginning until the agent leaves the flight, s; inf for never. numbers : its `Parameters`."""
+        if self.leaves is None:
+            return inf
+        given = {"f": self.record(*(getattr(numbers, name) for name in self.fields))}
+        return float(answer(self.leaves, "leaves", given, self.name))
 
     def kept(self, asked: str) -> tuple[str, ...]:
         """What of the state that a rule disturbs it wants to know as it was last before the fault, such as "at_x".

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.core.agent import State, answer
+from airflock.core.agent import State
 from airflock.core.maths import FAR
 from airflock.core.radio import Radio
+from airflock.core.vocabulary import answer
 
 EARLY = 0.05  # s; how far in the future a neighbour's data may seem to be, by two clocks that differ
 

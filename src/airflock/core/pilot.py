@@ -7,7 +7,7 @@ from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from airflock.core.agent import Decision, Heard, State, answer, decide, first_memory
+from airflock.core.agent import Decision, Heard, State, decide, first_memory
 from airflock.core.contract import Body, Model
 from airflock.core.hearing import Hearing, Packet, carried, lasts
 from airflock.core.maths import norm
@@ -15,7 +15,7 @@ from airflock.core.senses import Senses, Vector, World
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import back, complete, could_be_near, counts, of_standing, stands_until
 from airflock.core.topology import Topology, met_of
-from airflock.core.vocabulary import Percept, asks
+from airflock.core.vocabulary import Percept, answer, asks
 from airflock.errors import RuleError
 
 
@@ -52,8 +52,7 @@ class Pilot:
     ):  # fmt: skip
         self.model, self.p, self.place, self.index, self.period = model, p, place, index, period
         self.hearing, self.flat, self.seed = hearing or Hearing(), flat, seed
-        speed = float(model.preferred_speed(p)) if model.preferred_speed is not None else 0.0
-        self.silence = complete(silence, speed) if silence is not None and silence.rule == "stop" else None
+        self.silence = complete(silence, model.speed(p)) if silence is not None and silence.rule == "stop" else None
         self._of_standing = of_standing(self.silence) if self.silence is not None else None
         self.body, self.b, self.wing, self.aero, self.told = body, b, wing, aero, told
         self.topology, self.t, self.groups = topology, t, groups

@@ -12,13 +12,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.contract import names_of
+from airflock.core.contract.own_records import beginnings_of, check_memory, parameters_with
 from airflock.core.parameters import Parameters, number_names, quantity
 from airflock.core.vocabulary import asks
+from airflock.core.vocabulary.radios import RULES
 from airflock.errors import RuleError
 
 S5 = "Vásárhelyi et al. 2018, Table S5"
 FEW = 3  # packets of each rate in a decision, up to which `missed_few` serves
-RULES = ("missed", "missed_few", "receive", "late", "see", "carry", "lasts")
 LINKS = ("fast", "slow")  # how `missed` asks how many packets the first and the second of RATES send in a decision
 
 
@@ -116,7 +117,7 @@ class Radio:
     @property
     def beginnings(self) -> tuple[float, ...]:
         """What each field of its Packet is at the start of a flight."""
-        return tuple(getattr(self.Packet, "_field_defaults", {}).values())
+        return beginnings_of(self.Packet)
 
     def asks(self, *names: str) -> bool:
         """Whether one of its rules asks for any of these names."""
@@ -166,11 +167,9 @@ def radio(namespace: Any, name: str = "") -> Radio:
     if set(rules) <= {"carry", "lasts", "missed_few"}:
         raise RuleError(f"radio {name} has only {' and '.join(rules)}; give missed, receive, late or see as well")
     packet = found.get("Packet")
-    if ("packet" in asked.get("receive", ())) is (packet is None):
-        raise RuleError(f"radio {name}: a rule receive that asks for packet and a NamedTuple Packet come together")
-    if packet is not None and set(getattr(packet, "_field_defaults", {})) != set(getattr(packet, "_fields", "-")):
-        raise RuleError(f"radio {name}: Packet is a NamedTuple whose fields all have a value for the start")
-    record, rates = _whole(found.get("Parameters"), name), tuple(found.get("RATES", ()))
+    check_memory(f"radio {name}", "receive", asked.get("receive", ()), packet, "Packet")
+    record = parameters_with(Packets, found.get("Parameters"), f"radio {name}")
+    rates = tuple(found.get("RATES", ()))
     unknown = [rate for rate in rates if rate not in number_names(record)]
     if unknown or len(rates) > len(LINKS):
         raise RuleError(f"radio {name}: RATES = {rates} are not at most two numbers of Parameters")
@@ -178,15 +177,3 @@ def radio(namespace: Any, name: str = "") -> Radio:
     if wanted:
         raise RuleError(f"radio {name}: missed asks for {sorted(wanted)[0]}, which RATES does not name")
     return Radio(name, record, Packet=packet, rates=rates, violates=dict(found.get("VIOLATES", {})), **rules)
-
-
-def _whole(record: Any, owner: str) -> type:
-    """A radio's own parameters, which hold what all radios have."""
-    if record is None:
-        return Packets
-    if not (isinstance(record, type) and issubclass(record, Parameters)):
-        raise RuleError(f"radio {owner}: Parameters is not a frozen dataclass derived from airflock.Parameters")
-    if set(number_names(Packets)) <= set(number_names(record)):
-        return record
-    made = type("Parameters", (record, Packets), {"__module__": record.__module__, "__doc__": record.__doc__})
-    return dataclass(frozen=True, kw_only=True)(made)

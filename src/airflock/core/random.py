@@ -8,15 +8,13 @@ device binds its own form of the same arithmetic (`airflock.engine.primitives`).
 
 import math
 
-# Every stream of the project. Numbers are never reused; a stream may draw 256 times per step. 4 and 5 were packets lost
-# and packets received on links, one call for each pair, until PACKET replaced them.
+# Every stream of the project; each may draw 256 times per step. Numbers are never reused: 4, 5 and 9 are taken.
 SENSOR = 1  # Langevin noise of own and of sent measurements
 OUTER = 2  # white outer noise on the acceleration
 START = 3  # where the agents start
 GUST = 6  # wind gusts, common to the flock
 MODEL = 7  # noise that a model asks for through percept.normal and percept.uniform
 SCENE = 8  # the scene of a flight, where each flight has its own
-SHOW = 9  # no longer drawn from: shows were flown in parts once, each with a seed of its own
 FAULT = 10  # when faults begin and whom they hit: step is the occurrence, agent the entry or the one who may be hit
 SPREAD = 11  # tolerances of manufacture: step is the number's place in its record
 PACKET = 12  # whether anything of what one agent sends another arrives: agent is the number of the pair, `pair_number`

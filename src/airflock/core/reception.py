@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from airflock.core import random
-from airflock.core.agent import answer
 from airflock.core.radio import LINKS, Radio, either, lost, packets
+from airflock.core.vocabulary import answer
 
 FIRST = {  # before anything is known
     **dict.fromkeys(("dx", "dy", "dz", "vx", "vy", "vz"), 0.0), "age": 1e9, "clear": 1.0, "talkers": 1.0,

@@ -4,8 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from airflock.core import random
-from airflock.core.agent import State, answer
+from airflock.core.agent import State
 from airflock.core.sensor import FIRST, Sensor
+from airflock.core.vocabulary import answer
 
 Words = Callable[[int, int], tuple[int, int, int, int]]
 

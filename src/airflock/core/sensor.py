@@ -6,12 +6,13 @@ are the declaration, as of every rule (`core.vocabulary`).
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, make_dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.contract import names_of
+from airflock.core.contract.own_records import beginnings_of, check_memory, parameters_with
 from airflock.core.parameters import Parameters, quantity
-from airflock.core.vocabulary import asks
+from airflock.core.vocabulary import answer, asks
 from airflock.errors import RuleError
 
 FIRST = 8  # draw of the stream SENSOR for g0 to g3; then g4 to g7, g8 to g11, u0 to u3. Before it: errors along axes
@@ -65,7 +66,7 @@ class Sensor:
     @property
     def beginnings(self) -> tuple[float, ...]:
         """What each field of its Memory is at the start of a flight."""
-        return tuple(getattr(self.Memory, "_field_defaults", {}).values())
+        return beginnings_of(self.Memory)
 
     def is_exact(self, s: Any) -> bool:
         """Whether it tells the truth with these numbers."""
@@ -73,9 +74,7 @@ class Sensor:
 
     def lacks(self, **given: Any) -> list[str]:
         """What this sensor cannot measure, by what `bounds` may ask for."""
-        if self.bounds is None:
-            return []
-        return self.bounds(**{name: given[name] for name in asks(self.bounds, "bounds", self.name)})
+        return [] if self.bounds is None else list(answer(self.bounds, "bounds", given, self.name))
 
 
 def sensor(namespace: Any, name: str = "") -> Sensor:
@@ -113,28 +112,12 @@ def sensor(namespace: Any, name: str = "") -> Sensor:
     if len(rules) != 1:
         raise RuleError(f"sensor {name} has {' and '.join(rules) or 'no rule'}; give measure, or error")
     memory = found.get("Memory")
-    given = asks(found[rules[0]], rules[0], name)
-    if ("memory" in given) is (memory is None):
-        raise RuleError(f"sensor {name}: a rule measure that asks for memory and a NamedTuple Memory come together")
-    if memory is not None and set(getattr(memory, "_field_defaults", {})) != set(getattr(memory, "_fields", "-")):
-        raise RuleError(f"sensor {name}: Memory is a NamedTuple whose fields all have a value for the start")
+    check_memory(f"sensor {name}", "measure", asks(found[rules[0]], rules[0], name), memory)
     for kind in ("exact", "bounds"):
         if found.get(kind) is not None:
             asks(found[kind], kind, name)
+    parameters = parameters_with(Sampled, found.get("Parameters"), f"sensor {name}")
     return Sensor(
-        name, _sampled(found.get("Parameters"), name), found.get("measure"), found.get("error"), memory,
+        name, parameters, found.get("measure"), found.get("error"), memory,
         found.get("exact"), found.get("bounds"), dict(found.get("VIOLATES", {})),
     )  # fmt: skip
-
-
-def _sampled(record: Any, owner: str) -> type:
-    """A sensor's own parameters with the period that all have."""
-    if record is None:
-        return Sampled
-    if not (isinstance(record, type) and issubclass(record, Parameters)):
-        raise RuleError(f"sensor {owner}: Parameters is not a frozen dataclass derived from airflock.Parameters")
-    if "period" in getattr(record, "__dataclass_fields__", {}):
-        return record
-    made = make_dataclass("Parameters", [], bases=(record, Sampled), frozen=True, kw_only=True)
-    made.__doc__, made.__module__ = record.__doc__, record.__module__
-    return made

@@ -8,7 +8,7 @@ from airflock.core.agent import Heard, State
 from airflock.core.contract import names_of
 from airflock.core.maths import FAR, TINY
 from airflock.core.parameters import Choice, Parameters, declarations
-from airflock.core.vocabulary import asks
+from airflock.core.vocabulary import answer, asks
 from airflock.errors import RuleError
 
 
@@ -103,5 +103,5 @@ def met_of(
         "dx": [d[0] for d in offsets], "dy": [d[1] for d in offsets], "dz": [d[2] for d in offsets],
         "heap": [FAR] * count, "weak": [FAR] * count,
     }  # fmt: skip
-    topology.meet(*(given[name] for name in asks(topology.meet, "meet", topology.name)))
+    answer(topology.meet, "meet", given, topology.name)
     return [h for h, taken in zip(found, met, strict=True) if taken > 0.5]

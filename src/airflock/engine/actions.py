@@ -5,6 +5,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from airflock.core.contract.declared import COMMANDS
 from airflock.engine.presence import join, leave
 from airflock.engine.readings import Readings
 from airflock.errors import FlightError
@@ -13,7 +14,6 @@ from airflock.scenarios.document import keyed
 from airflock.scenarios.events import Event, agent_number, are_several, vector, vectors
 from airflock.scenarios.places import spot_fault, start_in_box
 
-COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": ""}
 FARTHEST = 1e6  # m from the centre: the largest arena; beyond it single precision does not hold a step of motion
 FASTEST = 1e3  # m/s; our choice: faster than anything that these bodies are made for
 
@@ -64,7 +64,7 @@ class Actions(Readings):
         >>> flight.command(0, [3.0, 0.0]).commands[:, 0].tolist()
         [3.0, 0.0]
         """
-        numbers, unit = self._those(agent), COMMANDS.get(self.scenario.model.command, "")
+        numbers, unit = self._those(agent), COMMANDS[self.scenario.model.command]
         given = vectors("command", value, len(numbers), self.scenario.dimensions, unit)
         self.sense()
         self._course.put("c", numbers, given)

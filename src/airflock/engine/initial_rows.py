@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.plan import NEVER as NEVER
+from airflock.core.contract.own_records import beginnings_of
 from airflock.engine.plan import Plan
 
 
@@ -18,7 +18,7 @@ def memories(plan: Plan, m: int, real: Any) -> NDArray[Any]:
 
 def rows_of_metrics(plan: Plan) -> dict[tuple[str, Any], slice]:
     """Where what each metric remembers lies among what all of them do, by its name and record."""
-    counts = [len(defaults(metric.Memory)) for metric in plan.metrics]
+    counts = [len(beginnings_of(metric.Memory)) for metric in plan.metrics]
     rows = (slice(end - count, end) for end, count in zip(accumulate(counts), counts, strict=True))
     return {(metric.name, metric.Memory): own for metric, own in zip(plan.metrics, rows, strict=True)}
 
@@ -34,12 +34,7 @@ def first_memories(plan: Plan, laws: NDArray[Any], real: Any) -> NDArray[Any]:
 
 def beginning(record: Any, m: int, real: Any) -> NDArray[Any]:
     """The defaults of a Memory for each of m lanes: (field, lane)."""
-    return np.repeat(np.array(defaults(record) or (0.0,), real)[:, None], m, axis=1)
-
-
-def defaults(record: Any) -> tuple[float, ...]:
-    """What the fields of a Memory hold before an agent has flown; empty where nothing is remembered."""
-    return tuple(getattr(record, "_field_defaults", {}).values())
+    return np.repeat(np.array(beginnings_of(record) or (0.0,), real)[:, None], m, axis=1)
 
 
 def of_pairs(plan: Plan, receivers: int, senders: int, real: Any) -> NDArray[Any]:

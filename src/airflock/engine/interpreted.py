@@ -184,7 +184,7 @@ def _bound(build: Builder) -> dict[str, Any]:
         choices = {key: value for key, value in constants.items() if key not in fields} | as_properties(
             vectors_of(fields)
         )
-        found[name] = type(name, (namedtuple(name, fields),), choices)  # type: ignore[misc]
+        found[name] = type(name, (namedtuple(name, fields),), choices)
     return found
 
 

@@ -14,7 +14,8 @@ from airflock.core.hearing import carried, lasts
 from airflock.core.maths import norm
 from airflock.core.topology import met_of
 from airflock.core.view import View
-from airflock.engine.initial_rows import NEVER
+from airflock.core.vocabulary import answer
+from airflock.engine.plan import NEVER
 from airflock.engine.state import State
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.surroundings import Place
@@ -33,7 +34,7 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
     heard = tuple(_heard(scenario, state, agent, number, truth, said, seed, world))
     p = _parameters(scenario, state, agent)
     met = _met(scenario, state, own, heard)
-    near = one.answer(model.reach, "reach", {"p": p}, model.name) if model.reach else math.inf
+    near = answer(model.reach, "reach", {"p": p}, model.name) if model.reach else math.inf
     terms, alike = [], []
     for other, meets in zip(heard, met, strict=True):
         if model.neighbour is None:
@@ -43,7 +44,7 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
         far = not meets or given["r"] > near
         same = given | {"dvx": 0.0, "dvy": 0.0, "dvz": 0.0, "dv": norm(0.0, 0.0, 0.0)}
         same |= {f"n{name}": given[name] for name in ("hx", "hy", "hz")}
-        found = [one.answer(model.neighbour, "neighbour", case | {"p": p}, model.name) for case in (given, same)]
+        found = [answer(model.neighbour, "neighbour", case | {"p": p}, model.name) for case in (given, same)]
         none = type(found[0])(*(0.0 for _ in found[0]))
         terms.append(none if far else found[0])
         alike.append(none if far else found[1])
@@ -60,7 +61,7 @@ def _memory(state: State, model: Model, agent: int) -> Any:
     """What a law remembers of an agent."""
     if model.Memory is None:
         return None
-    fields = len(model.Memory._fields)  # type: ignore[attr-defined]
+    fields = len(model.Memory._fields)
     return model.Memory(*(float(x) for x in state.arrays["mem"][:fields, _slot(state, agent)]))
 
 

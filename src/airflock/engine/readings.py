@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.course import Course
-from airflock.engine.initial_rows import NEVER
+from airflock.engine.plan import NEVER
 from airflock.engine.snapshots import Window
 from airflock.engine.state import State
 from airflock.errors import FlightError

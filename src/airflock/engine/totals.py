@@ -30,7 +30,7 @@ def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
     }
     named: dict[str, float] = {}
     for metric in plan.metrics:
-        own = {name: over_time[name] for name in metric.Sample._fields}  # type: ignore[attr-defined]
+        own = {name: over_time[name] for name in metric.Sample._fields}
         named |= metric.total(own) if metric.total else own
     return named
 

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from airflock.core.agent import State, answer
+from airflock.core.agent import State
 from airflock.core.fault import Fault
+from airflock.core.vocabulary import answer
 from airflock.errors import ScenarioError
 from airflock.scenarios.onsets import onsets
 from airflock.scenarios.scenario import Scenario

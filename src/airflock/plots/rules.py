@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.core.contract import Model
+from airflock.core.contract.declared import COMMANDS
 from airflock.core.vocabulary import asks
 from airflock.errors import RuleError
 from airflock.plots import style
@@ -23,7 +24,6 @@ from airflock.stage.arrows import vectors, word_of
 
 POINTS = 400
 SHARES = (0.5, 1.0, 2.0)  # of the velocity difference, in the panel of alignment
-UNITS = {"velocity": "m/s", "acceleration": "m/s²", "heading": "1"}
 
 
 def rules(
@@ -56,7 +56,7 @@ def rules(
     reach = float(farthest if farthest is not None else _farthest(scenario))
     positive(difference=dv, speed=v, farthest=reach)
     r = np.linspace(reach / POINTS, reach, POINTS)
-    unit = UNITS[model.command]
+    unit = COMMANDS[model.command].replace("^2", "²")
     draws: list[tuple[str, Callable[[Axes], None]]] = []
     if model.neighbour is not None and (model.terms or len(vectors(model.Sums)) > 1):
         for stem in vectors(model.Sums):

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from airflock.core.contract.declared import COMMANDS
 from airflock.errors import RecordingError
 from airflock.recordings.differences import velocities
 
@@ -49,7 +50,7 @@ def dataset(
     if groups:
         coordinates["group"] = ("individual", np.array(groups, str))
     names = ("position", "velocity", "command")
-    units = {**UNITS, "command": {"velocity": "m/s", "acceleration": "m/s^2"}.get(command, "1")}
+    units = {**UNITS, "command": COMMANDS.get(command, "1")}
     variables: dict[str, Any] = {
         name: (DIMENSIONS, frames[:, c * dimensions : (c + 1) * dimensions, None, :], {"units": units[name]})
         for c, name in enumerate(names)

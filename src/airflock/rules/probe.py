@@ -12,11 +12,11 @@ from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.core.contract import Body, Model
 from airflock.core.fault import RULES, Fault
-from airflock.core.radio import RULES as RADIO_RULES
 from airflock.core.radio import Radio
 from airflock.core.sensor import COMPONENTS, Sensor
 from airflock.core.topology import Topology
-from airflock.core.vocabulary import PAIR, SURFACE, VOCABULARY, Own, Percept, asks
+from airflock.core.vocabulary import VOCABULARY, Own, Percept, asks, radios
+from airflock.core.vocabulary.laws import PAIR, SURFACE
 from airflock.errors import RuleError
 from airflock.rules import law
 from airflock.spelling import raised
@@ -37,16 +37,16 @@ def probe(model: Model, parameters: Any) -> None:
             law.check(rule)
             answer = _call(rule, kind, given, model.name)
             if kind != "reach":
-                record = model.Sums if kind == "neighbour" else model.Walls
+                record: Any = model.Sums if kind == "neighbour" else model.Walls
                 _same_length(rule, answer, record, model.name)
-                if getattr(answer, "_fields", None) != record._fields:  # type: ignore[union-attr]
-                    fields = ", ".join(record._fields)  # type: ignore[union-attr]
-                    told = f"{model.name}.{kind} must return {record.__name__}({fields}), not a plain tuple"  # type: ignore[union-attr]
+                if getattr(answer, "_fields", None) != record._fields:
+                    fields = ", ".join(record._fields)
+                    told = f"{model.name}.{kind} must return {record.__name__}({fields}), not a plain tuple"
                     raise RuleError(f"{_place(rule)}: {told}")
                 given["sums" if kind == "neighbour" else "walls"] = answer
     for word, record in (("sums", model.Sums), ("walls", model.Walls)):
         if word not in given and record is not None:
-            given[word] = record(*([0.0] * len(record._fields)))  # type: ignore[attr-defined]
+            given[word] = record(*([0.0] * len(record._fields)))
     if model.Memory is not None:
         given["memory"] = model.Memory()
     if model.flock is not None:
@@ -102,7 +102,7 @@ def probe_body(body: Body, chosen: tuple[tuple[str, str], ...]) -> None:
 @cache
 def probe_radio(radio: Radio) -> None:
     """The same for the rules of a radio."""
-    for kind in RADIO_RULES:
+    for kind in radios.RULES:
         rule = getattr(radio, kind)
         if rule is None:
             continue
@@ -134,7 +134,7 @@ def _shared(model: Model, given: dict[str, Any]) -> Any:
     assert model.flock is not None and model.workspace is not None and model.Shared is not None
     shapes = shapes_of(model.workspace, 3, given)
     work = type(shapes)(*[[[0.0] * columns for _ in range(rows)] for rows, columns in shapes])
-    fields = model.Shared._fields  # type: ignore[attr-defined]
+    fields = model.Shared._fields
     shared = model.Shared(*[[0.0] * 3 for _ in fields])
     level = dict.fromkeys(("z", "vx", "vy", "vz"), [0.1, 0.2, 0.3])
     places = {"x": [0.0, -2.0, -2.5], "y": [0.0, 2.0, -2.1], **level}

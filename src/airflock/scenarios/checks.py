@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from airflock.core.contract import Body, Metric, MetricSet, Model
+from airflock.core.contract.declared import CLOCKS
 from airflock.core.radio import Radio
 from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
-from airflock.core.vocabulary import CLOCKS, asks
+from airflock.core.vocabulary import answer
 from airflock.scenarios.geometry import largest_extension
 
 
@@ -17,11 +18,11 @@ def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None, st
     b, p, flight = parts["body"], parts.get("parameters"), parts["flight"]
     if b is None or flight is None or found is None or p is None:
         return []
-    speed = float(found.preferred_speed(p)) if found.preferred_speed is not None else 0.0
     begin, wing = parts["start"], parts["wing"]
     if begin is None or wing is None:
         return []
-    return carried.lacks(b=b, dt=flight.dt, speed=speed, start=math.inf if started else begin.speed, wing=wing)
+    start = math.inf if started else begin.speed
+    return carried.lacks(b=b, dt=flight.dt, speed=found.speed(p), start=start, wing=wing)
 
 
 def sensor_faults(found: Sensor, parts: Mapping[str, Any]) -> list[str]:
@@ -71,7 +72,7 @@ def metric_faults(measures: MetricSet, q: Any, world: Any) -> list[str]:
     if q is None or world is None or measures.faults is None:
         return []
     given = {"q": q, "largest": largest_extension(world), "edges": world.edges}
-    return measures.faults(**{name: given[name] for name in asks(measures.faults, "faults", measures.name)})
+    return list(answer(measures.faults, "faults", given, measures.name))
 
 
 def silence_faults(rule: str, flight: Any, found: Model | None) -> list[str]:

@@ -9,7 +9,6 @@ from typing import Any
 from airflock.core.fault import KEYS, Fault, fault
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import quantity
-from airflock.core.vocabulary import asks
 from airflock.errors import AirflockError
 from airflock.faults.registry import KINDS
 from airflock.scenarios import schema, units
@@ -189,10 +188,9 @@ def _when_faults(where: str, when: Timing, may: int) -> list[str]:
 def _end_faults(where: str, when: Timing, kind: Fault, numbers: Any) -> list[str]:
     """Why a fault cannot end."""
     faults = []
-    if kind.leaves is not None and (when.lasts is not None or (when.at is not None and when.until is not None)):
-        given = {"f": kind.record(*(getattr(numbers, name) for name in kind.fields))}
-        if kind.leaves(*(given[name] for name in asks(kind.leaves, "leaves", kind.name))) <= 0.0:
-            faults.append(
-                f"{where}: {kind.name} does not end, as an agent that drops out stays out; leave out until and lasts"
-            )
+    ends = when.lasts is not None or (when.at is not None and when.until is not None)
+    if ends and kind.gone_after(numbers) <= 0.0:
+        faults.append(
+            f"{where}: {kind.name} does not end, as an agent that drops out stays out; leave out until and lasts"
+        )
     return faults

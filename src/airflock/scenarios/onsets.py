@@ -2,16 +2,11 @@
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from airflock.core import random
-from airflock.core.fault import Fault
-from airflock.core.vocabulary import asks
 from airflock.scenarios.faulty import Entry
 from airflock.scenarios.scenario import Scenario
-
-if TYPE_CHECKING:
-    pass
 
 ENDLESS = 1e9  # s; how long a fault lasts that does not end
 HOUR = 3600.0  # s
@@ -77,7 +72,7 @@ def _of_entry(scenario: Scenario, entry: Entry, number: int, seed: int, world: i
         if lasts <= 0.0:
             continue
         step = round(at / dt)
-        gone = _leaves(kind, entry)
+        gone = kind.gone_after(entry.numbers)
         for agent in _hit(entry, number, occurrence, seed, world):
             yield Onset(step, kind.name, agent, lasts, numbers, entry=number, begin=step)
             if gone < lasts:
@@ -107,14 +102,6 @@ def _hit(entry: Entry, number: int, occurrence: int, seed: int, world: int) -> l
         return list(may)
     draw = {agent: random.words(seed, random.FAULT, world, occurrence, agent, 1 + number)[0] for agent in may}
     return sorted(sorted(may, key=lambda agent: (draw[agent], agent))[: entry.number])
-
-
-def _leaves(kind: Fault, entry: Entry) -> float:
-    """How long after its beginning a fault takes the agent out of the flight, s; inf for never."""
-    if kind.leaves is None:
-        return math.inf
-    given = {"f": kind.record(*(getattr(entry.numbers, name) for name in kind.fields))}
-    return float(kind.leaves(*(given[name] for name in asks(kind.leaves, "leaves", kind.name))))
 
 
 def told(due: tuple[Onset, ...], step: int, dt: float) -> list[dict[str, Any]]:

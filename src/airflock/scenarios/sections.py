@@ -5,7 +5,7 @@ handed and the columns of the row that a driver reads are all made from `ORDER`,
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from airflock.aero import descent, wing
 from airflock.body import dryden, motion, wind
@@ -84,7 +84,7 @@ class Section(NamedTuple):
     key: str
     record: type[Record] | None
     letter: str = ""
-    derived: type | None = None
+    derived: type[Any] | None = None
 
     @property
     def field(self) -> str:

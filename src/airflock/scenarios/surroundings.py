@@ -3,9 +3,10 @@
 import math
 from typing import Any
 
-from airflock.core.agent import State, answer
+from airflock.core.agent import State
 from airflock.core.contract import Model
 from airflock.core.maths import FAR
+from airflock.core.vocabulary import answer
 from airflock.scenarios.scenario import Scenario
 from airflock.scenes.tree import unbuilt
 from airflock.world import bvh, goals
@@ -112,7 +113,7 @@ class Course:
             far = max(math.dist(a, b) for a, b in zip(self.starts, self.points, strict=True))
             self.duration = 1.5 * far / self.given.speed if self.given.speed > 0.0 else 0.0
         pairs = zip(self.starts, self.points, strict=True)
-        self.own = [[goals.glide(a, b, time, self.duration) for a, b in zip(*pair, strict=True)] for pair in pairs]  # type: ignore[call-arg]
+        self.own = [[goals.glide(a, b, time, self.duration) for a, b in zip(*pair, strict=True)] for pair in pairs]
 
     def of(self, agent: int) -> tuple[float, float, float] | None:
         """Where the goal of an agent is, m; None without goals."""

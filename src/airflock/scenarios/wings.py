@@ -44,7 +44,7 @@ def faults(parts: Mapping[str, Any], found: Model | None, measures: MetricSet, s
     if q is None or wing is None:
         return []
     lines, metrics = [], measures.of(q)
-    if q.stop == "collision" and not any("n_coll" in m.Sample._fields for m in metrics):  # type: ignore[attr-defined]
+    if q.stop == "collision" and not any("n_coll" in m.Sample._fields for m in metrics):
         lines.append(f"metrics.stop = 'collision' needs collisions, which metrics.kind = {q.kind!r} does not count")
     if not flies_on_wings(found, metrics):
         return lines

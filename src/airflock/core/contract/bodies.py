@@ -5,9 +5,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from airflock.core.contract.declared import COMMANDS
 from airflock.core.contract.namespaces import names_of
+from airflock.core.contract.own_records import beginnings_of, check_memory
 from airflock.core.parameters import Parameters
-from airflock.core.vocabulary import COMMANDS, asks
+from airflock.core.vocabulary import answer, asks
 from airflock.errors import RuleError
 
 
@@ -41,19 +43,17 @@ class Body:
     @property
     def beginnings(self) -> tuple[float, ...]:
         """What each field of its Memory is at the start of a flight."""
-        return tuple(getattr(self.Memory, "_field_defaults", {}).values())
+        return beginnings_of(self.Memory)
 
     def lasts(self, **given: Any) -> float:
         """How long its battery lasts at least, s; 0 once it is empty."""
         if self.endures is None:
             return math.inf
-        return self.endures(**{name: given[name] for name in asks(self.endures, "endures", self.name)})
+        return float(answer(self.endures, "endures", given, self.name))
 
     def lacks(self, **given: Any) -> list[str]:
         """What this body cannot fly, by what `limits` may ask for."""
-        if self.limits is None:
-            return []
-        return self.limits(**{name: given[name] for name in asks(self.limits, "limits", self.name)})
+        return [] if self.limits is None else list(answer(self.limits, "limits", given, self.name))
 
 
 def body(namespace: Any, name: str = "") -> Body:
@@ -92,14 +92,11 @@ def body(namespace: Any, name: str = "") -> Body:
     for needed in ("ACCEPTS", "INTEGRATION", "move"):
         if needed not in found:
             raise RuleError(f"body {name} lacks {needed}")
-    asks(found["move"], "move", name)
+    asked = asks(found["move"], "move", name)
     if found["ACCEPTS"] not in COMMANDS or found["INTEGRATION"] not in ("old", "new"):
         raise RuleError(f"body {name}: ACCEPTS is one of {', '.join(COMMANDS)}; INTEGRATION is old or new")
     memory = found.get("Memory")
-    if ("memory" in asks(found["move"], "move", name)) is (memory is None):
-        raise RuleError(f"body {name}: a rule move that asks for memory and a NamedTuple Memory come together")
-    if memory is not None and set(getattr(memory, "_field_defaults", {})) != set(getattr(memory, "_fields", "-")):
-        raise RuleError(f"body {name}: Memory is a NamedTuple whose fields all have a value for the start")
+    check_memory(f"body {name}", "move", asked, memory)
     for optional in ("limits", "endures"):
         if found.get(optional) is not None:
             asks(found[optional], optional, name)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.contract.metrics import Metric
-from airflock.core.vocabulary import asks
+from airflock.core.vocabulary import answer, asks
 from airflock.errors import RuleError
 
 
@@ -42,7 +42,7 @@ class MetricSet:
         if self.faults is not None:
             asks(self.faults, "faults", self.name)
         names = [item.name for item in self.metrics]
-        values = [value for item in self.metrics for value in item.Sample._fields]  # type: ignore[attr-defined]
+        values = [value for item in self.metrics for value in item.Sample._fields]
         for which, found in (("metric", names), ("value", values)):
             twice = sorted({name for name in found if found.count(name) > 1})
             if twice:
@@ -57,7 +57,7 @@ class MetricSet:
         if self.fitness is None:
             return dict(values)
         given = {"values": values, "agents": agents, "duration": duration, "q": q}
-        return {**values, **self.fitness(**{name: given[name] for name in asks(self.fitness, "fitness", self.name)})}
+        return {**values, **answer(self.fitness, "fitness", given, self.name)}
 
     def numbers(self, q: Any) -> tuple[str, ...]:
         """Names of the order parameters that are one number, fitness last."""

@@ -4,8 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from airflock.core.contract.declared import CLOCKS, OVER_TIME, REDUCTIONS
 from airflock.core.contract.namespaces import names_of
-from airflock.core.vocabulary import CLOCKS, OVER_TIME, REDUCTIONS, asks
+from airflock.core.vocabulary import asks
+from airflock.core.vocabulary.metrics import METRIC
 from airflock.errors import RuleError
 
 ABSENCE = {  # by how instants combine, `vocabulary.OVER_TIME`
@@ -37,22 +39,22 @@ class Metric:
 
     name: str
     sample: Callable[..., Any]
-    Sample: type
+    Sample: type[Any]
     pair: Callable[..., Any] | None = None
-    Pair: type | None = None
+    Pair: type[Any] | None = None
     agent: Callable[..., Any] | None = None
-    Agent: type | None = None
+    Agent: type[Any] | None = None
     linked: Callable[..., Any] | None = None
     member: Callable[..., Any] | None = None
-    Member: type | None = None
+    Member: type[Any] | None = None
     cluster: Callable[..., Any] | None = None
-    Cluster: type | None = None
-    Memory: type | None = None
+    Cluster: type[Any] | None = None
+    Memory: type[Any] | None = None
     within: Callable[..., float] | None = None
     settled: Callable[..., bool] | None = None
     linked_within: Callable[..., float] | None = None
     survey: Callable[..., None] | None = None
-    Shared: type | None = None
+    Shared: type[Any] | None = None
     workspace: Callable[..., Any] | None = None
     reduce: Mapping[str, str] = field(default_factory=dict)
     over_time: Mapping[str, str] = field(default_factory=dict)
@@ -67,16 +69,13 @@ class Metric:
 
     def absence(self, name: str) -> str:
         """How one of its order parameters is taken while some agents are absent, for people to read."""
-        how = {self.over_time.get(field, "mean") for field in self.Sample._fields}  # type: ignore[attr-defined]
-        how = {self.over_time.get(name, "mean")} if name in self.Sample._fields else how  # type: ignore[attr-defined]
-        if name not in self.Sample._fields and "sum" in how:  # type: ignore[attr-defined]
+        how = {self.over_time.get(field, "mean") for field in self.Sample._fields}
+        how = {self.over_time.get(name, "mean")} if name in self.Sample._fields else how
+        if name not in self.Sample._fields and "sum" in how:
             return "mean over agents and instants, of those who are there"
         return ABSENCE[how.pop() if len(how) == 1 else "mean"]
 
 
-MEASURING = (
-    "pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "linked_within", "survey",
-)  # fmt: skip
 RULES_AND_RECORDS = (
     ("sample", "Sample"), ("pair", "Pair"), ("agent", "Agent"), ("member", "Member"), ("cluster", "Cluster"),
     ("cluster", "linked"), ("survey", "Shared"), ("survey", "workspace"),
@@ -125,7 +124,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
     for rule, record in RULES_AND_RECORDS:
         if rule in found and record not in found:
             raise RuleError(f"metric {name} has a rule {rule} but no {record}")
-    for kind in MEASURING:
+    for kind in METRIC:
         if kind in found:
             asks(found[kind], kind, name)
     fields = {f for record in ("Pair", "Agent", "Member", "Cluster") for f in getattr(found.get(record), "_fields", ())}

@@ -4,9 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from airflock.core.contract.declared import COMMANDS, REDUCTIONS
 from airflock.core.contract.namespaces import names_of
 from airflock.core.parameters import declarations
-from airflock.core.vocabulary import COMMANDS, REDUCTIONS, asks
+from airflock.core.vocabulary import asks
+from airflock.core.vocabulary.laws import RULES
 from airflock.errors import RuleError
 
 NEEDED = {  # what each law brings, and what it is
@@ -52,13 +54,13 @@ class Model:
     reach: Callable[..., float] | None = None
     sight: Callable[..., float] | None = None
     neighbour: Callable[..., Any] | None = None
-    Sums: type | None = None
+    Sums: type[Any] | None = None
     boundary: Callable[..., Any] | None = None
-    Walls: type | None = None
+    Walls: type[Any] | None = None
     wall_reach: Callable[..., float] | None = None
-    Memory: type | None = None
+    Memory: type[Any] | None = None
     flock: Callable[..., None] | None = None
-    Shared: type | None = None
+    Shared: type[Any] | None = None
     workspace: Callable[..., Any] | None = None
     reduce: Mapping[str, str] = field(default_factory=dict)
     usual: Mapping[str, float] = field(default_factory=dict)
@@ -74,6 +76,10 @@ class Model:
     def deciding(self) -> tuple[Callable[..., Any], ...]:
         """Rules whose commands add up."""
         return (self.decide,) if self.added is None else (self.decide, self.added.decide)
+
+    def speed(self, p: Any) -> float:
+        """Its preferred speed with these parameters, m/s; 0 where it has none."""
+        return 0.0 if self.preferred_speed is None else float(self.preferred_speed(p))
 
     def __hash__(self) -> int:
         return hash((self.name, self.decide, self.neighbour, self.boundary, self.flock))
@@ -120,7 +126,7 @@ def model(namespace: Any, name: str = "") -> Model:
     for rule, record in (("neighbour", "Sums"), ("boundary", "Walls"), ("flock", "Shared"), ("flock", "workspace")):
         if rule in found and record not in found:
             raise RuleError(f"model {name} has a rule {rule} but no {record} ({RECORDS[record]})")
-    for kind in ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide"):
+    for kind in RULES:
         if kind in found:
             asks(found[kind], kind, name)
     reduce = dict(found.get("REDUCE", {}))

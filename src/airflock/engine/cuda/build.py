@@ -135,7 +135,7 @@ class CudaBuilder(Builder):
         """Lines that one thread of the block runs."""
         return ["cuda.syncthreads()", *branch("tid == 0", lines), "cuda.syncthreads()"]
 
-    def clusters(self, metric: Metric) -> list[str]:  # type: ignore[override]
+    def clusters(self, metric: Metric) -> list[str]:
         """Clusters are found by all threads of a block together."""
         return clusters(self, metric)
 

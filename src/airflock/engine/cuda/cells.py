@@ -8,12 +8,12 @@ loss.
 
 from typing import Any
 
+from airflock.core.contract.own_records import beginnings_of
 from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.sorting import FOURS, PLAIN_FOURS, SORT
 from airflock.engine.cuda.start import heading_off, tried
 from airflock.engine.cuda.state import numbers
-from airflock.engine.initial_rows import defaults
 from airflock.engine.passes.build import branch, loop
 from airflock.engine.passes.driver import MADE
 from airflock.engine.plan import Plan
@@ -138,7 +138,7 @@ def _begin(build: CellBuilder) -> list[str]:
     body += [*loop(f"attempt in range({start.ATTEMPTS})", draw), *branch("row_w.speed > ZERO", turn)]
     put = ("s_x", "s_y", "s_z", "real(i if placed else -1 - i)", "vx", "vy", "vz", "ZERO")
     body += [f"near[i, {c}] = {value}" for c, value in enumerate(put)]
-    values = ["ZERO"] * 3 + [f"real({start})" for start in defaults(plan.model.Memory)]
+    values = ["ZERO"] * 3 + [f"real({start})" for start in beginnings_of(plan.model.Memory)]
     body += [f"rest[i, {c}] = {v}" for c, v in enumerate(values + ["ZERO"] * (rest_columns(plan) - len(values)))]
     return [*_common(build), *branch("slot < n", body)]
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.core.contract.own_records import beginnings_of
 from airflock.engine.cpu import Flown
 from airflock.engine.cuda.cells import COMMON, NEAR, crowd, rest_columns
 from airflock.engine.cuda.launch import configured
 from airflock.engine.cuda.memory import SHARE, unfit
-from airflock.engine.initial_rows import defaults
 from airflock.engine.measuring import measured
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.flock import owners
@@ -143,7 +143,7 @@ class Crowd:
         near[:, :dims], near[:, 4 : 4 + dims] = np.asarray(start)[:dims].T, np.asarray(start)[dims:].T
         near[:, 3] = np.arange(self.agents)
         rest = np.zeros((self.agents, self.driver.REST), near.dtype)
-        for c, value in enumerate(defaults(self.plan.model.Memory)):
+        for c, value in enumerate(beginnings_of(self.plan.model.Memory)):
             rest[:, 3 + c] = value
         self.near, self.rest = runtime().to_device(near), runtime().to_device(rest)
 

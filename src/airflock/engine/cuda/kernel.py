@@ -1,11 +1,11 @@
 """Kernel: a whole flight of one flock per block, as the order in which the stages run."""
 
+from airflock.core.contract.own_records import beginnings_of
 from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.cuda.individuals import begin_faults
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.start import agents, begin, own
 from airflock.engine.cuda.state import memory
-from airflock.engine.initial_rows import defaults
 from airflock.engine.passes.build import branch, columns, loop
 from airflock.engine.passes.driver import make
 from airflock.engine.plan import Plan
@@ -147,7 +147,7 @@ def _forget(build: CudaBuilder) -> list[str]:
     """Memories of the collision metrics back at their start values."""
     lines = []
     for metric, _, first, _ in measured(build.plan, "collision"):
-        for c, start in enumerate(defaults(metric.Memory)):
+        for c, start in enumerate(beginnings_of(metric.Memory)):
             own = f"kept{first + c}_i" if build.shape.registers else f"memory[{first + c}, i]"
             lines += agents(build, [f"{own} = real({start})"])
     return lines

@@ -2,9 +2,9 @@
 
 import re
 
+from airflock.core.contract.own_records import beginnings_of
 from airflock.engine.cuda.build import REDUCED, CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.start import tables
-from airflock.engine.initial_rows import defaults
 from airflock.engine.passes import flock
 from airflock.engine.passes.build import columns, loop
 from airflock.engine.plan import WHOLE, Plan
@@ -116,5 +116,5 @@ def _first_value(build: CudaBuilder, name: str) -> str:
     if kept[1] == "mem" and build.plan.laws:
         return f"all_mem[block, {kept[2]}, i]"
     records = [build.plan.model.Memory] if kept[1] == "mem" else [metric.Memory for metric in build.plan.metrics]
-    starts = [start for record in records for start in defaults(record)]
+    starts = [start for record in records for start in beginnings_of(record)]
     return f"real({starts[int(kept[2])]})"

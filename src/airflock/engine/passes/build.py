@@ -221,7 +221,5 @@ def branch(test: str, lines: Iterable[str]) -> list[str]:
 def columns(metrics: Iterable[Metric]) -> list[tuple[str, str, str]]:
     """Of every value that metrics sample: name, how it combines over time, and the clock that samples it."""
     return [
-        (name, metric.over_time.get(name, "mean"), metric.clock)
-        for metric in metrics
-        for name in metric.Sample._fields  # type: ignore[attr-defined]
+        (name, metric.over_time.get(name, "mean"), metric.clock) for metric in metrics for name in metric.Sample._fields
     ]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 
+from airflock.core.contract.declared import CLOCKS
 from airflock.engine import vectors
 from airflock.engine.passes import approach, decide, flock, measure, move, perceive, slots
 from airflock.engine.passes.build import Builder, columns
@@ -123,7 +124,7 @@ def _sampled(plan: Plan) -> dict[str, tuple[list[tuple[int, str]], int]]:
     values = list(enumerate(columns(plan.metrics)))
     return {
         f"measure_{clock}": ([(c, how) for c, (_, how, when) in values if when == clock], len(values) + number)
-        for number, clock in enumerate(measure.CLOCKS)
+        for number, clock in enumerate(CLOCKS)
     }
 
 

@@ -17,7 +17,6 @@ from airflock.engine.stages.near import SURE, pairs_by_cells
 from airflock.engine.stages.words import wants
 from airflock.rules.reading import fields_read
 
-CLOCKS = ("sample", "collision")
 AVERAGED = {"x": {"x", "y", "z"}, "v": {"vx", "vy", "vz"}, "h": {"hx", "hy", "hz"}}  # fields of a mean
 BY_CELLS = "n, row, whole, work, cells"  # what a search by cells is called with
 

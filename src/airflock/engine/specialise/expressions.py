@@ -83,7 +83,7 @@ class Expressions:
         if isinstance(value, (tuple, list)):
             return ast.Tuple([self.printed(part, node, scope) for part in value], LOAD)
         if isinstance(value, types.BuiltinFunctionType) or value in (range, abs, min, max, int):
-            return ast.Name(value.__name__, LOAD)  # type: ignore[union-attr]
+            return ast.Name(value.__name__, LOAD)
         if isinstance(value, types.FunctionType) and value in KEPT:
             return ast.Name(KEPT[value], LOAD)
         if isinstance(value, (types.FunctionType, type)):

@@ -161,7 +161,7 @@ def pairs(
     return least2
 
 
-def pairs_of(  # noqa: C901 - tests of the plan leave one way through
+def pairs_of(
     agents: tuple[int, ...], flock: Flock, numbers: Any, n: int, m: int,
     *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool,
 ) -> Any:  # fmt: skip
@@ -263,7 +263,7 @@ def measure(
     """
     x = flock.position
     mean = headings(flock, n, plan=plan, summed=summed)
-    if over is not None:  # noqa: SIM108 - a helper of several lines stands where it is assigned
+    if over is not None:
         least2 = over()
     else:
         least2 = pairs(flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest, abreast=abreast)

@@ -99,7 +99,7 @@ def neighbours(
     # distances, which carry none.
     range_ = least(k.range, LIMIT)
     range2 = range_ * range_ + TINY if plan.bits == 64 and not plan.perturbed else range_ * range_
-    if model.reach is not None and not plan.varies("p"):  # noqa: SIM108 - a helper of several lines stands alone
+    if model.reach is not None and not plan.varies("p"):
         near2 = squared_reach(numbers.p, plan=plan, model=model)
     else:
         near2 = LIMIT

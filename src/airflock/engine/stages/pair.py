@@ -130,7 +130,7 @@ def whether_open(
     *, plan: Plan,
 ) -> Any:  # fmt: skip
     """Whether nothing stands between two agents, 1 or 0, where it shades the radio."""
-    if plan.shades and at.drawn is not None:  # noqa: SIM108 - as above
+    if plan.shades and at.drawn is not None:
         open_way = unshaded(me.i, j, reach.radio, flock, w, whole, around, plan=plan)
     else:
         open_way = flock.clear[j] if plan.shades else ONE
