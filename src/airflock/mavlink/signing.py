@@ -27,12 +27,6 @@ def stamp_at(utc: int) -> int:
     return (utc - EPOCH) // 10
 
 
-def mission_key(fleet_secret: bytes, mission: int) -> bytes:
-    """Key of one mission, 32 bytes, from the secret of a fleet: HKDF with SHA-256 (RFC 5869), one block."""
-    extracted = hmac.new(b"airflock mission key", fleet_secret, hashlib.sha256).digest()
-    return hmac.new(extracted, mission.to_bytes(4, "little") + b"\x01", hashlib.sha256).digest()
-
-
 class Signer:
     """Packs and signs messages of one sender.
 
