@@ -10,7 +10,7 @@ import wary as wary_law
 from against_reference import compared
 from airflock.engine import driver_text, fly, plan_of
 from airflock.errors import ScenarioError
-from airflock.recordings.scores import scenario_of
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.scenarios.files import load
 from airflock.scenarios.laws import find_model
 from scenarios_drawn import Draw

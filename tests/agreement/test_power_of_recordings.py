@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from airflock.recordings.flown_scenario import aero_settings
 from airflock.recordings.layout import dataset
-from airflock.recordings.scores import aero_settings, measure
+from airflock.recordings.scores import measure
 from formations import FOOT, drags, vee, wing_of
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")

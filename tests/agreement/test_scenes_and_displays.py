@@ -11,8 +11,8 @@ from airflock.display.assignment import assign
 from airflock.display.show import ranks, recording_of, scenario_of
 from airflock.engine import plan_of
 from airflock.recordings.flights import simulate
+from airflock.recordings.flown_scenario import scenario_of as of_recording
 from airflock.recordings.layout import check
-from airflock.recordings.scores import scenario_of as of_recording
 from airflock.scenarios.files import load
 from inside import cpu, tables
 from reference.flight import fly_plainly

@@ -13,7 +13,7 @@ from shapely.geometry import Polygon
 import airflock
 from airflock.errors import ScenarioError
 from airflock.mavlink.coordinates import Site
-from airflock.recordings.scores import scenario_of
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.scenarios import geometry
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make

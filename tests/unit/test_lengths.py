@@ -7,8 +7,9 @@ import pytest
 import airflock
 from airflock.errors import RecordingError
 from airflock.metrics.registry import SETS
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.lengths import IN_BODIES, in_bodies
-from airflock.recordings.scores import measure, not_told, scenario_of
+from airflock.recordings.scores import measure, not_told
 from processes import called
 
 GIVEN = {

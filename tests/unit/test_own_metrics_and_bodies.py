@@ -12,7 +12,7 @@ from airflock.errors import AirflockError, RuleError, ScenarioError
 from airflock.metrics.registry import SETS, metric_set, reports
 from airflock.recordings.files import fly_again
 from airflock.recordings.flights import flown_document
-from airflock.recordings.scores import scenario_of
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.scenarios.files import load
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")

@@ -38,8 +38,9 @@ from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
 from airflock.plots.video import frame_count, video
 from airflock.recordings.files import save
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.layout import dataset
-from airflock.recordings.scores import courses, scenario_of
+from airflock.recordings.scores import courses
 from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.stage.arrows import vectors

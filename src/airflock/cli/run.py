@@ -160,8 +160,8 @@ def _tell_groups(what: Sequence[Any], files: Sequence[Path], changed: Scores, tr
     """Measure the groups of recordings, and print what was found."""
     from airflock.metrics.registry import reports
     from airflock.recordings.files import load_recording
+    from airflock.recordings.flown_scenario import scenario_of
     from airflock.recordings.groups import BETWEEN, group_scores
-    from airflock.recordings.scores import scenario_of
 
     runs = []
     for source, path in zip(what, files, strict=True):
@@ -199,7 +199,8 @@ def _measured(source: Any, path: Path, changed: Scores, trust: bool, aero: bool)
     from airflock.metrics.registry import reports
     from airflock.recordings.attributes import faults
     from airflock.recordings.files import load_recording
-    from airflock.recordings.scores import aero_settings, between_frames, measure, not_told, scenario_of
+    from airflock.recordings.flown_scenario import aero_settings, scenario_of
+    from airflock.recordings.scores import between_frames, measure, not_told
 
     recording = load_recording(source)
     settings = aero_settings(recording, changed) if aero else changed

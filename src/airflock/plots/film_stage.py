@@ -94,7 +94,7 @@ class Stage:
         self.darts.set_verts(list(_darts(x, y, x0, y0, self.dart)))
         self.darts.set_array(tempo)
         if self.solid is not None:
-            self.darts.set_alpha(np.where(self.solid.hides(where.T), BEHIND, 1.0).tolist())  # type: ignore[arg-type]
+            self.darts.set_alpha(np.where(self.solid.hides(where.T), BEHIND, 1.0).tolist())
         self.clock.set_text(f"{instant:7.1f} s")
         for artist in (self.tails, self.darts, self.clock):
             self.axes.draw_artist(artist)
@@ -160,7 +160,7 @@ class Stage:
         colors = style.SPEED(self.scale(paces.ravel()))
         age = (moments[1:] - instant) / self.tail
         colors[:, 3] = np.repeat(np.clip(0.6 * (1.0 + age), 0.02, 1.0), past.shape[2])
-        self.tails.set_color(colors[kept])  # type: ignore[arg-type]
+        self.tails.set_color(colors[kept])
 
 
 def _canvas(size: tuple[int, int]) -> Any:

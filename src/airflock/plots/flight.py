@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from airflock.errors import RecordingError
 from airflock.recordings import attributes
 from airflock.recordings.differences import velocities
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.layout import DIMENSIONS, check
-from airflock.recordings.scores import scenario_of
 from airflock.scenarios.geometry import ground_plan
 from airflock.scenarios.scenario import Scenario
 from airflock.world import arena

@@ -22,7 +22,7 @@ from airflock.plots.transfer import transfer
 from airflock.plots.wash import wash
 from airflock.recordings.files import load_recording
 from airflock.recordings.flights import simulate
-from airflock.recordings.scores import scenario_of
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant

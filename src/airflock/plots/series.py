@@ -13,7 +13,8 @@ from airflock.errors import AirflockError, RecordingError
 from airflock.plots import style
 from airflock.plots.flight import details_of, name_of, window
 from airflock.recordings.attributes import faults
-from airflock.recordings.scores import over_time, scenario_of
+from airflock.recordings.flown_scenario import scenario_of
+from airflock.recordings.scores import over_time
 
 CORR, VEL, LAP = r"$\phi^{\mathrm{corr}}$", r"$\phi^{\mathrm{vel}}/v^{\mathrm{flock}}$", r"$\phi^{\mathrm{LAP}}$"
 STEADY = 1e-4  # share of its value by which a steady value differs

@@ -82,7 +82,7 @@ def panels(
 
 def root(figure: Figure) -> Figure:
     """The whole figure that a picture is drawn in."""
-    return figure.get_figure(root=True)  # type: ignore[return-value]
+    return figure.get_figure(root=True)
 
 
 def dress(axes: Axes, x: str = "", y: str = "", *, grid: bool = True) -> None:
@@ -169,5 +169,5 @@ def colour_bar(
     bar = figure.colorbar(shown, ax=axes, shrink=shrink, aspect=32, pad=pad)
     bar.set_label(label, fontsize=TEXT, color=color)
     bar.ax.tick_params(labelsize=SMALL, labelcolor=color, color=color, length=2.5, width=0.6)
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
     return bar

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
 from airflock.recordings import images
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.layout import frames_of
-from airflock.recordings.scores import scenario_of
 
 BINS = 24
 LEVELS = {"q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95}

@@ -21,8 +21,8 @@ from airflock import atomic
 from airflock.errors import RecordingError
 from airflock.metrics.registry import numbers_of
 from airflock.recordings import attributes
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.layout import frames_of
-from airflock.recordings.scores import scenario_of
 from airflock.replays.layers import flown_layers, layers
 from airflock.replays.pack import pack
 from airflock.scenarios.events import Event, events_of

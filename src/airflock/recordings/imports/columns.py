@@ -199,4 +199,4 @@ def _copy(found: Layout, source: str, target: str) -> None:
 
 def _drop(found: Layout, target: str) -> None:
     for table in (found.trees, found.factors, found.labels):
-        table.pop(target, None)  # type: ignore[attr-defined]
+        table.pop(target, None)

@@ -60,7 +60,7 @@ def value(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
     """An expression with arrays in the place of names."""
     if isinstance(tree, ast.BinOp):
         with np.errstate(divide="ignore", invalid="ignore"):
-            return OPERATIONS[type(tree.op)](value(tree.left, columns), value(tree.right, columns))  # type: ignore[index]
+            return OPERATIONS[type(tree.op)](value(tree.left, columns), value(tree.right, columns))
     if isinstance(tree, ast.UnaryOp):
         inner = value(tree.operand, columns)
         return -inner if isinstance(tree.op, ast.USub) else inner

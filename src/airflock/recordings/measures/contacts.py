@@ -5,8 +5,8 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import ParameterError
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.measures.states import sound, states
-from airflock.recordings.scores import scenario_of
 from airflock.world.place import Place, Shapes
 
 

@@ -11,8 +11,8 @@ from airflock.numeric import is_number
 from airflock.recordings import images
 from airflock.recordings.attributes import scenario_document
 from airflock.recordings.differences import velocities
+from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.layout import check
-from airflock.recordings.scores import scenario_of
 
 Array = NDArray[Any]
 
