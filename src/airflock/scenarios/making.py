@@ -10,6 +10,7 @@ from airflock.scenarios import (
     checks,
     fault_keys,
     faulty,
+    filled_in,
     formats,
     geometry,
     group_keys,
@@ -28,7 +29,7 @@ from airflock.scenarios.document import TOP, components, keyed, merged, with_kin
 from airflock.scenarios.families import FAMILIES, METRICS, NOTHING, TOPOLOGY, Given
 from airflock.scenarios.gathering import Gathered, gathered
 from airflock.scenarios.ground import file_faults
-from airflock.scenarios.scenario import Scenario, start_separation
+from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.untrusted import is_file
 
@@ -176,7 +177,7 @@ def _faults_between(parts: Mapping[str, Any], flown: Gathered, started: bool) ->
     if world is not None:
         separation = parts["start"].separation if parts["start"] is not None else 0.0
         if separation is None and law is not None and parts.get("parameters") is not None:
-            separation = start_separation(law, parts["parameters"], begin, world)
+            separation = filled_in.separation(law, parts["parameters"], begin, world)
         count = int(flight.agents) if flight is not None else 1
         faults += geometry.faults(world, count, separation or 0.0, begin, started=started)
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:

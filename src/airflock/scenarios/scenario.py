@@ -15,11 +15,10 @@ from airflock.core.parameters import number_names
 from airflock.core.radio import Packets, Radio
 from airflock.core.sensor import Sensor
 from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import complete
 from airflock.core.topology import Topology
 from airflock.metrics import parameters as metric_parameters
+from airflock.scenarios import filled_in
 from airflock.scenarios.faulty import Entry
-from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.group_laws import Law, laws_of
 from airflock.scenarios.groups import Group, own_numbers, varied
 from airflock.scenarios.portrait import html, sentence
@@ -133,7 +132,7 @@ class Scenario:
         """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
         records = self.records
         found: dict[str, tuple[str, ...]] = {
-            each.letter: each.derived._fields if each.derived else number_names(records[each.key])  # type: ignore[attr-defined]
+            each.letter: each.derived._fields if each.derived else number_names(records[each.key])
             for each in ORDER
             if each.letter
         }
@@ -272,32 +271,13 @@ class Scenario:
         """Metric parameters with everything that was left to the scenario filled in."""
         return self._measured
 
+    @cached_property
+    def _measured(self) -> metric_parameters.Parameters:
+        return filled_in.metrics(self)
+
     def judged(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Order parameters of a flight with what the metric set makes of them: partial fitnesses and fitness."""
         return self.measures.judged(values, self.agents, self.flight.duration, self.measured_by())
-
-    @cached_property
-    def _measured(self) -> metric_parameters.Parameters:
-        given = {name: getattr(self.metrics, name) for name in self.metrics.__dataclass_fields__}
-        p, model = self.parameters, self.model
-        if given["v_flock"] is None and model.preferred_speed is not None:
-            given["v_flock"] = float(model.preferred_speed(p))
-        if given["v_flock"] is None:
-            given["v_flock"] = 1.0
-        if given["v_tol"] is None:
-            given["v_tol"] = 0.375 * given["v_flock"]
-        if given["r_comm"] is None:
-            given["r_comm"] = self.radio.range
-        if given["r_cluster"] is None:
-            known = model.interaction_range or model.reach
-            given["r_cluster"] = min(float(known(p)), 1e6) if known else min(self.radio.range, 1e6)
-        if given["collision_period"] is None:
-            given["collision_period"] = self.flight.dt
-        if given["max_e"] is None:
-            given["max_e"] = largest_extension(self.world) or None
-        if given["k"] is None:
-            given["k"] = given["max_e"]
-        return type(self.metrics)(**given)
 
     def silent_by(self) -> Silence:
         """The rule of silence with everything that was left to the scenario filled in."""
@@ -305,8 +285,7 @@ class Scenario:
 
     @cached_property
     def _silent(self) -> Silence:
-        speed = self.model.preferred_speed
-        return complete(self.silence, float(speed(self.parameters)) if speed is not None else 0.0, self.radio.delay)
+        return filled_in.silence(self)
 
     def separation(self) -> float:
         """Smallest distance of two agents at the start, m.
@@ -318,15 +297,4 @@ class Scenario:
         7.0
         """
         given = self.start.separation
-        return start_separation(self.model, self.parameters, self.start, self.world) if given is None else given
-
-
-def start_separation(model: Model, parameters: Any, begin: start.Parameters, world: arena.Parameters) -> float:
-    """Default of start.separation, m: 2 s of flight at the preferred speed, at least 3 m (authors' program).
-
-    In a ball, a box or a periodic world agents may start anywhere: 0.
-    """
-    if begin.kind != "arena" or world.edges == "periodic":
-        return 0.0
-    speed = float(model.preferred_speed(parameters)) if model.preferred_speed else 0.0
-    return max(3.0, 2.0 * speed)
+        return filled_in.separation(self.model, self.parameters, self.start, self.world) if given is None else given
