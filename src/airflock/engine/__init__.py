@@ -35,7 +35,7 @@ _WHERE = {
     "score_flight": "simulate",
     "score_flights": "simulate",
 }
-__all__ = [*_WHERE]  # noqa: PLE0604
+__all__ = [*_WHERE]
 
 if not TYPE_CHECKING:  # a type checker shall tell names that do not exist
 
