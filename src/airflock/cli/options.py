@@ -213,3 +213,15 @@ def searching(study: Any, quiet: bool) -> Iterator[tuple[Any, Callable[[bool], N
             bar.update(final, completed=done, rate=done / max(time.perf_counter() - begin, 1e-9))
 
         yield watch, note
+
+
+def place_on_earth(option: str, text: str, faults: list[str]) -> tuple[float, float, float]:
+    """Latitude and longitude (degrees) and altitude (m) from text; what is wrong is noted."""
+    try:
+        latitude, longitude, altitude = (float(part) for part in text.split(","))
+        if not math.isfinite(latitude + longitude + altitude):
+            raise ValueError
+    except ValueError:
+        faults.append(f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120")
+        return 0.0, 0.0, 0.0
+    return latitude, longitude, altitude
