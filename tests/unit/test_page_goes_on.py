@@ -20,7 +20,7 @@ PRESET = "vasarhelyi_2018/4ms"
 def player(monkeypatch):
     """An interpreted flight that has begun, and what is told of it."""
     plainly = lambda *given, **named: Flight(*given, **{**named, "device": "python"})  # noqa: E731
-    monkeypatch.setattr("airflock.studio.side.Flight", plainly)
+    monkeypatch.setattr("airflock.studio.origin.Flight", plainly)
     made = Player(FlightRequest(PRESET, {"agents": 5}, seed=3))
     made.faults = []
     made.fault = made.faults.append
@@ -110,7 +110,7 @@ def test_a_field_shows_what_flies_where_another_number_is_refused(player):
 
 def test_the_end_of_the_longest_flight_is_told(player, monkeypatch):
     assert not player.over and player.status == ""
-    monkeypatch.setattr("airflock.studio.side.LONGEST", 1.0)
+    monkeypatch.setattr("airflock.studio.origin.LONGEST", 1.0)
     player.reset()
     player.fly(100)
     then = player.flight.step

@@ -36,12 +36,13 @@ from airflock.studio.drawing import Flock, arrival
 from airflock.studio.flights import FlightRequest
 from airflock.studio.moments import Moments
 from airflock.studio.opening import Opening
+from airflock.studio.origin import Origin
 from airflock.studio.pace import Pace
 from airflock.studio.perceiving import Perceiving, _vectors
 from airflock.studio.player import Player
 from airflock.studio.score_tables import differences
 from airflock.studio.shading import Shading, together, ways
-from airflock.studio.side import Origin, Side, value_of
+from airflock.studio.side import Side, value_of
 from airflock.studio.trails import PIECE, Trails
 from airflock.studio.tuning import EXAMPLE, pair
 
@@ -63,7 +64,7 @@ def decide(own, p):
 def interpreted(monkeypatch):
     """Flights are interpreted: compiling them would add nothing to what is tested."""
     plainly = lambda *given, **named: Flight(*given, **{**named, "device": "python"})  # noqa: E731
-    monkeypatch.setattr("airflock.studio.side.Flight", plainly)
+    monkeypatch.setattr("airflock.studio.origin.Flight", plainly)
 
 
 @pytest.fixture

@@ -14,8 +14,9 @@ from airflock.errors import StudioError
 from airflock.recordings.files import save
 from airflock.replays import replay
 from airflock.scenarios.scenario import Scenario
+from airflock.studio.origin import Origin
 from airflock.studio.saving import flown_again, toml_of
-from airflock.studio.side import Origin, Side
+from airflock.studio.side import Side
 
 
 @dataclass(frozen=True)

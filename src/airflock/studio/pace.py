@@ -1,6 +1,5 @@
 """Pace: how many motion steps are due at each frame of a page."""
 
-FASTEST = 1000.0  # times real time; faster than this asks for as fast as it goes
 LATE = 0.25  # s of real time that are given up at most, rather than flown in one leap
 
 

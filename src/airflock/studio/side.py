@@ -4,78 +4,24 @@ import os
 import shlex
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.engine import Flight, Snapshot
-from airflock.errors import RecordingError, StudioError
-from airflock.recordings import attributes
-from airflock.recordings.files import load_recording
-from airflock.recordings.scores import scenario_of
+from airflock.errors import StudioError
 from airflock.scenarios.events import Event
 from airflock.scenarios.fault_keys import has_fault, is_fault_key, value_in_fault
-from airflock.scenarios.files import load
 from airflock.scenarios.group_keys import is_group_key, value_in_group
 from airflock.scenarios.scenario import Scenario
 from airflock.studio.controls import fields
+from airflock.studio.origin import Origin
 from airflock.threads import in_background
 
 BELOW, SPACED = -1e7, 1e4  # m; where agents that have left are shown: nowhere
-LONGEST = 1e6  # s; an open page has no end of its own
 MOST_AT_ONCE = 400  # agents; of more, one interpreted step holds a page up
-
-
-@dataclass(frozen=True)
-class Origin:
-    """Where flights come from.
-
-    where     : preset, scenario file or recording, which is flown again with its events
-    settings  : keys changed from outside
-    law       : a law that flies instead of the file's; trust : whether code that the file names may run
-    recording : what `where` holds, if it is a recording
-    """
-
-    where: str
-    settings: Mapping[str, Any]
-    law: Any = None
-    trust: bool = False
-    recording: xr.Dataset | None = None
-
-    @classmethod
-    def of(cls, where: str, settings: Mapping[str, Any] | None, law: Any = None, *, trust: bool = False) -> "Origin":
-        """An origin by its name; raises RecordingError for a recording that cannot be flown again."""
-        return cls(where, dict(settings or {}), law, trust, recorded(where) if where.lower().endswith(".nc") else None)
-
-    def scenario(self) -> Scenario:
-        """The scenario, with its own duration."""
-        if self.recording is not None:
-            return scenario_of(self.recording, dict(self.settings))
-        return load(self.where, dict(self.settings), self.law, trust=self.trust)
-
-    def flight(self, seed: int, device: str = "cpu") -> tuple[Scenario, Flight]:
-        """The scenario without an end, and an open flight of it; that of a recording is a compiled one."""
-        preset = endless(self.scenario())
-        if self.recording is None:
-            return preset, Flight(preset, seed, device=device)
-        same = not self.settings and seed == int(self.recording.attrs["airflock_seed"])
-        events = attributes.events(self.recording) if same else []
-        return preset, Flight(preset, seed, precision=int(self.recording.attrs["airflock_precision"]), events=events)
-
-    def beside(self, first: "Origin") -> str:
-        """What it is called beside another one: its name, or the keys that set it apart."""
-        if self.where != first.where:
-            return self.where
-        return ", ".join(f"{key} = {v}" for key, v in self.settings.items() if first.settings.get(key) != v)
-
-    @property
-    def document(self) -> dict[str, Any] | None:
-        """The scenario of a recording as a document; None of a preset or a file."""
-        return None if self.recording is None else attributes.scenario_document(self.recording)
 
 
 class Side:
@@ -276,21 +222,6 @@ class Side:
         if number < len(points):
             points[number][:dims] = [float(c) for c in place[:dims]]
             self.change({"goals.kind": "points", "goals.points": points})
-
-
-def recorded(where: str) -> xr.Dataset:
-    """A recording that can be flown again. Raises RecordingError for any other, and says what shows it."""
-    found = load_recording(where)
-    if "airflock_scenario" not in found.attrs or not int(found.attrs.get("random_start", 1)):
-        raise RecordingError(f"{where}: was not flown from a scenario and a seed; airflock replay {where} shows it")
-    return found
-
-
-def endless(scenario: Scenario) -> Scenario:
-    """The scenario with the longest duration that a flight can have."""
-    longest = min(LONGEST, 0.9 * 2**31 * scenario.flight.dt)
-    document = {**scenario.document, "duration": longest}
-    return replace(scenario, flight=replace(scenario.flight, duration=longest), document=document)
 
 
 def in_space(state: NDArray[Any], dimensions: int) -> tuple[NDArray[Any], NDArray[Any]]:
