@@ -16,8 +16,9 @@ from airflock.identify import body, hills, packets, periods, synthetic
 from airflock.identify import sensors as standing
 from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of_recording
+from airflock.identify.numbers import HARDER, UNITS, Number
 from airflock.identify.plan import flight_card
-from airflock.identify.run import HARDER, UNITS, Number, identify, read_heard
+from airflock.identify.run import identify, read_heard
 from airflock.radios import links
 from airflock.sensors import langevin
 from processes import called

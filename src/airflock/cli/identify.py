@@ -133,7 +133,7 @@ def _checked(result: Any, flights: int, quiet: bool) -> Any:
 def _table(result: Any) -> None:
     from rich.console import Console
 
-    from airflock.identify.run import NEVER
+    from airflock.identify.numbers import NEVER_TOLD
 
     console = Console()
     if result.settings():
@@ -145,7 +145,7 @@ def _table(result: Any) -> None:
         )
     for line in _reasons(result):
         console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
-    for key, reason in NEVER.items():
+    for key, reason in NEVER_TOLD.items():
         console.print(f"  {key}: {reason}", highlight=False, markup=False, soft_wrap=True)
 
 
@@ -163,7 +163,7 @@ def _numbers_table(result: Any) -> Any:
     from rich import box
     from rich.table import Table
 
-    from airflock.identify.run import UNITS
+    from airflock.identify.numbers import UNITS
 
     table = Table(
         title=f"{result.logs.drones} drones, like {result.like.name}", box=box.SIMPLE_HEAD, title_justify="left"

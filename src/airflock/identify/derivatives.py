@@ -12,3 +12,9 @@ def second_derivative(loss: Callable[[Any], float], z: NDArray[np.float64], i: i
     one, other = step * np.eye(len(z))[[i, j]]
     differences = loss(z + one + other) - loss(z + one - other) - loss(z - one + other) + loss(z - one - other)
     return differences / (4.0 * step * step)
+
+
+def curvature(loss: Callable[[Any], float], z: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """All second derivatives of a loss at z, (row, column)."""
+    n = len(z)
+    return np.array([[second_derivative(loss, z, i, j, step) for j in range(n)] for i in range(n)])

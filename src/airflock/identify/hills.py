@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from airflock.identify.derivatives import second_derivative
+from airflock.identify.derivatives import curvature
 
 LINKS = ("near", "far", "received_near", "received_far")
 ALIKE = 3.0  # of log-likelihood: half of a chi-square at 95 % and what the descent leaves open
@@ -182,8 +182,7 @@ def _logit(share: float, edge: float = 1e-5) -> float:
 
 def _spread(loss: Any, z: Any) -> Any:
     """Half of 95 % intervals by the curvature and the derivative of the numbers by what is fitted."""
-    step, size = 0.02, len(z)
-    curve = np.array([[second_derivative(loss, z, i, j, step) for j in range(size)] for i in range(size)])
-    unit = np.eye(size) * step
+    step = 0.02
+    unit = np.eye(len(z)) * step
     by = np.array([(np.array(unpacked(z + u)) - np.array(unpacked(z - u))) / (2 * step) for u in unit]).T
-    return 1.96 * np.sqrt(np.clip(np.diag(by @ np.linalg.pinv(curve) @ by.T), 0.0, None))
+    return 1.96 * np.sqrt(np.clip(np.diag(by @ np.linalg.pinv(curvature(loss, z, step)) @ by.T), 0.0, None))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from airflock.identify.derivatives import second_derivative
+from airflock.identify.derivatives import curvature
 from airflock.identify.logs import Logs
 
 NAMES = ("noise", "damping", "scale", "white")
@@ -140,6 +140,4 @@ def _series(ground: Logs, period: float) -> list[tuple[NDArray[np.float64], NDAr
 
 def _spread(loss: Any, z: NDArray[np.float64]) -> NDArray[np.float64]:
     """Standard errors of log parameters, by the curvature of the likelihood."""
-    n = len(z)
-    curve = np.array([[second_derivative(loss, z, i, j, 0.03) for j in range(n)] for i in range(n)])
-    return np.asarray(np.sqrt(np.clip(np.diag(np.linalg.pinv(curve)), 0.0, None)))
+    return np.asarray(np.sqrt(np.clip(np.diag(np.linalg.pinv(curvature(loss, z, 0.03))), 0.0, None)))

@@ -16,7 +16,7 @@ from airflock.evolve import tables
 from airflock.evolve.safe import told
 from airflock.evolve.space import declared
 from airflock.evolve.store import Store
-from airflock.identify.run import UNITS
+from airflock.identify.numbers import UNITS
 from airflock.plots.certificate import certificate
 from airflock.plots.convergence import convergence
 from airflock.scenarios.portrait import sentence
