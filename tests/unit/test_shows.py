@@ -50,10 +50,21 @@ def test_a_show_is_one_flight_and_its_recording_is_scored(interpreted, failure, 
 def test_one_driver_flies_a_whole_show(interpreted, seed):
     """It was compiled for those who stay, and once more when the first one fell."""
     points = points_of("A", 6, seed=0)
-    show = master.Master(scenario_of(6), ranks(6), points, seed, comes_and_goes=True)
+    show = master.Master(scenario_of(6), ranks(6), points, seed, failing=True)
     driver = show.flight._state.driver
     show.form(points, [(2, "fall", 0.3)])
     assert show.flight.present.sum() == 5 and show.flight._state.driver is driver
+
+
+def test_a_show_that_does_not_know_who_will_fail_is_the_same_flight(interpreted, monkeypatch, seed):
+    """By a driver of those who stay, and from the first failure on by one that knows who is there."""
+    shapes = [points_of(text, 6, seed=number) for number, text in enumerate("AO")]
+    told = fly_show(shapes, 6, 0.34, "both", seed)
+    known = master.Flight
+    monkeypatch.setattr(master, "Flight", lambda *given, **more: known(*given, **more | {"absence": False}))
+    untold = fly_show(shapes, 6, 0.34, "both", seed)
+    assert untold.flight.frames.tobytes() == told.flight.frames.tobytes() and repr(untold.formed) == repr(told.formed)
+    assert "faults" not in told.flight.scenario.document and not told.flight.scenario.faults
 
 
 def test_faults_of_the_scenario_fly_in_a_show(interpreted, seed):
@@ -94,7 +105,7 @@ def held_up(monkeypatch, length, seed, minded=True):
     """Figures of one drone before the flat side of one that hovers, where pull and push of its law balance."""
     start, towards = ranks(1), np.array([-0.7, 1.0, 0.0]) / np.hypot(0.7, 1.0)
     point = start + length * towards
-    flown = master.Master(scenario_of(1, {"model.p_wall": 4.0}), start, point, seed, comes_and_goes=False)
+    flown = master.Master(scenario_of(1, {"model.p_wall": 4.0}), start, point, seed, failing=False)
     flown.hulls.append(start[0] + (0.0, 1.35, 0.0))
     if not minded:
         monkeypatch.setattr(flown, "_mind", lambda: None)
@@ -114,7 +125,7 @@ def test_a_drone_that_is_held_up_behind_a_hovering_one_gets_there(interpreted, m
 def test_no_two_drones_have_the_same_point_while_some_are_sent_around(interpreted, seed):
     rng = np.random.default_rng(seed)
     points = ranks(9) + (0.0, 12.0, 3.0)
-    flown = master.Master(scenario_of(9), ranks(9), points, seed, comes_and_goes=False)
+    flown = master.Master(scenario_of(9), ranks(9), points, seed, failing=False)
     flown.hulls = [ranks(9)[4] + (0.0, 6.0, 1.0), points[4] + (0.0, -4.0, 0.0)]
     for _ in range(20):
         places = flown.flight.state[:3].T + rng.normal(0.0, 2.0, (9, 3))

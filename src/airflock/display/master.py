@@ -19,7 +19,6 @@ CHECK = 5.0  # s; how often the master looks once all should be there
 LOOK = 1.0  # s; how often it looks for drones that make no progress
 PATIENCE = 60.0  # s; how long it waits for a shape at most
 HALF = 0.35  # m; half side of the box that stands for a drone that hovers
-NEVER = 1e-30  # 1/h; how often drones drop out by themselves: more than never, so that one driver flies the whole show
 
 Frames = NDArray[np.float64]
 
@@ -52,10 +51,11 @@ class Master:
     target  : of each drone the number of its point, also of those that have failed
     way, left : where all set out and where to (drone, 3), m; when, and how long they are under way, s
     around  : by drone: where it flies first, for something stands in its way; tried : all such points of this shape
+    failing : whether some will fail: one driver then flies the whole show
     hulls   : places of those that hover; falling : position and velocity (6,) of those that fall
     """
 
-    def __init__(self, scenario: Scenario, ranks: Places, points: Places, seed: int, *, comes_and_goes: bool):
+    def __init__(self, scenario: Scenario, ranks: Places, points: Places, seed: int, *, failing: bool):
         self.scenario, self.period, self.points = scenario, scenario.metrics.period, points
         self.target = assign(ranks, points, np.zeros(len(points), bool))
         self.around: dict[int, Places] = {}
@@ -68,9 +68,7 @@ class Master:
         start = np.zeros((6, len(ranks)))
         start[:3] = ranks.T
         keys: dict[str, Any] = {"goals.points": self._aims(), "duration": PATIENCE}
-        if comes_and_goes:
-            keys["faults"] = [*scenario.document.get("faults", ()), {"kind": "fails", "per_hour": NEVER}]
-        self.flight = Flight(remade(scenario, keys), seed, precision=64, record=True, start=start)
+        self.flight = Flight(remade(scenario, keys), seed, precision=64, record=True, start=start, absence=failing)
         self.progress, self.looked = Progress(LOOK), 0.0
         self.way, self.left = (np.zeros((0, 3)), np.zeros((0, 3))), (0.0, 0.0)
         self._set_out()
@@ -145,7 +143,7 @@ class Master:
         for who in past:  # or who has failed on the way
             del self.around[who]
         since, lasts = self.flight.time - self.left[0], self.left[1]
-        held = np.flatnonzero(self.progress.look(places, glide(*self.way, since, lasts)))  # type: ignore[no-untyped-call]
+        held = np.flatnonzero(self.progress.look(places, glide(*self.way, since, lasts)))
         if len(held):
             self._send_out(held, places)
         elif past:
@@ -219,7 +217,7 @@ class Master:
         for body in self.falling:
             touching = np.zeros(places.shape[1], bool)
             for _ in range(10):  # a fall of 10 m/s takes 10 cm in a tenth of a frame
-                body = np.array(fall(body[0], body[1], body[2], body[3], body[4], body[5], 0.1 * self.period))  # type: ignore[no-untyped-call]
+                body = np.array(fall(body[0], body[1], body[2], body[3], body[4], body[5], 0.1 * self.period))
                 near = np.linalg.norm(places.T - body[:3], axis=1) < reach
                 self.struck += int((near & ~touching).sum())
                 touching = near

@@ -81,7 +81,7 @@ def fly_show(
     legs = np.array_split(doomed, len(shapes))
     kinds = {int(who): FAILURES[i % 2] if failure == "both" else failure for i, who in enumerate(doomed)}
     scenario = scenario_of(drones, settings)
-    show = Master(scenario, ranks(drones), shapes[0], seed, comes_and_goes=bool(len(doomed)))
+    show = Master(scenario, ranks(drones), shapes[0], seed, failing=bool(len(doomed)))
     ends = []
     for points, failures in zip(shapes, legs, strict=True):
         show.form(points, [(int(who), kinds[int(who)], float(rng.uniform())) for who in failures])

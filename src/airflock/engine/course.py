@@ -29,7 +29,7 @@ from airflock.threads import in_background
 class Course:
     """A flight as its drivers see it: steps flown one after another, whatever is asked of it between them.
 
-    scenario : in force now; seed, precision, record, device : of the whole flight
+    scenario : in force now; seed, precision, record, device, absence : of the whole flight
     start    : positions and velocities to start from, (component, agent), or None
     state    : of the driver in force; steps : how many the flight has
     step     : the next to be flown; sensed : whether its agents have perceived and decided already
@@ -37,10 +37,12 @@ class Course:
     events   : done so far; windows : scored so far
     """
 
-    def __init__(self, scenario: Scenario, seed: int, precision: int, record: bool, start: Any, device: str):
+    def __init__(
+        self, scenario: Scenario, seed: int, precision: int, record: bool, start: Any, device: str, absence: bool
+    ):  # fmt: skip
         self.scenario, self.seed, self.world = scenario, seed, 0
-        self.precision, self.record, self.device = precision, record, device
-        self.state = opened(scenario, seed, precision, record, start, device=device)
+        self.precision, self.record, self.device, self.absence = precision, record, device, absence
+        self.state = opened(scenario, seed, precision, record, start, device=device, absence=absence)
         self.origin = (scenario, seed, precision, None if start is None else np.array(start))
         self.steps, self.step, self.since, self.sensed = self.state.whole("steps"), 0, 0, False
         self.events: list[Event] = []

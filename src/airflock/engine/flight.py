@@ -32,6 +32,8 @@ class Flight(Actions):
     device    : cpu, or python: the same stages uncompiled, for debuggers, in double precision
     world     : which of 2^32 independent streams of random numbers of this seed
     events    : what is done to the flight on its way, as `events` of an earlier flight holds it
+    absence   : agents will leave or join: a driver that knows who is there flies from the start, in place of a second
+                one that takes over when somebody leaves; the same bits
 
     Raises ScenarioError and FlightError, one line per fault.
 
@@ -56,11 +58,12 @@ class Flight(Actions):
         world: int = 0,
         device: str = "cpu",
         events: Sequence[Event | Mapping[str, Any]] = (),
+        absence: bool = False,
     ):
         if device not in self.DEVICES:
             raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(self.DEVICES)}")
         seed = sound_seed(seed)
-        self._course = Course(loaded(scenario).in_flight(seed), seed, precision, record, start, device)
+        self._course = Course(loaded(scenario).in_flight(seed), seed, precision, record, start, device, absence)
         self._planned = events_of(events)
         if world:
             self._course.to_world(world)
@@ -317,4 +320,5 @@ class Flight(Actions):
             start=start,
             events=self.events,
             device=self.device,
+            absence=self._course.absence,
         )
