@@ -12,7 +12,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
 
 project, author, release = "Airflock", "The Airflock authors", __version__
-copyright = author  # noqa: A001 - the name that sphinx asks for
+copyright = author
 extensions = [
     "myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery",
     "docstrings", "mathml", "pages", "terms",

@@ -197,7 +197,7 @@ def renew(
     wanted = [row for row in rows if row.result in OPEN or (row.result != breaks.ALREADY and not only_open)]
     wanted = [row for row in wanted if not chosen or f"{row.paper}.{row.part}" in chosen]
     wanted.sort(key=lambda row: list(chosen).index(f"{row.paper}.{row.part}") if chosen else 0)
-    for found in in_parts(folder, lambda line: print(line, file=sys.stderr), wanted, threads):  # noqa: T201
+    for found in in_parts(folder, lambda line: print(line, file=sys.stderr), wanted, threads):
         rows = as_judged(replaced(rows, found), pages)
         tables.write(Row._fields, rows, path)
 

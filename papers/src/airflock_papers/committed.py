@@ -48,5 +48,5 @@ def renew(
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("folder", type=Path, help="where what is done is kept")
     asked = parser.parse_args()
-    rows = fly(asked.folder, lambda line: print(line, file=sys.stderr))  # noqa: T201
+    rows = fly(asked.folder, lambda line: print(line, file=sys.stderr))
     write(columns, rows, Path(str(resources.files("airflock_papers"))) / name)

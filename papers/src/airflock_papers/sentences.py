@@ -192,7 +192,7 @@ def without_row(every: Iterable[str], begins: Iterable[str]) -> list[str]:
 def main(arguments: Sequence[str]) -> int:
     """Check all lists; the folder of the texts is the first argument, that of papers/ the second."""
     if not arguments:
-        print("usage: python -m airflock_papers.sentences FOLDER_OF_TEXTS [PAPERS]", file=sys.stderr)  # noqa: T201
+        print("usage: python -m airflock_papers.sentences FOLDER_OF_TEXTS [PAPERS]", file=sys.stderr)
         return 2
     texts, papers = Path(arguments[0]), Path(arguments[1] if len(arguments) > 1 else "papers")
     count = 0
@@ -202,9 +202,9 @@ def main(arguments: Sequence[str]) -> int:
         found = faults(name, papers / name, text)
         count += len(found)
         told = "" if text else f" ({path} is not there: only rows and claims were checked)"
-        print(f"{name}: {len(rows(papers / name / 'sentences.csv'))} rows, {len(found)} faults{told}")  # noqa: T201
+        print(f"{name}: {len(rows(papers / name / 'sentences.csv'))} rows, {len(found)} faults{told}")
         for fault in found:
-            print(f"  {fault}")  # noqa: T201
+            print(f"  {fault}")
     return 1 if count else 0
 
 

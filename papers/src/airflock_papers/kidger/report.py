@@ -19,10 +19,6 @@ ABOUT = (
     "not available; here its sentences are judged by numbers. Lengths are in m (one unit is 1 m), 60 frames are a "
     "second. Separation is flown as the thesis prints it: the inverse vector itself, a metre being a metre per frame."
 )
-COST = (
-    "Processor time of one core, the least of five flights; decisions, motion and every order parameter at 60 frames "
-    "per second."
-)
 TUNING = (
     f"{DURATION:g} s, final set, in open air (the city without buildings) and in the city. {SEEDS} seeds for the "
     f"points that a sentence compares, {CURVE} for the others. n_coll counts how often two boids meet: boids that "
