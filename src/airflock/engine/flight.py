@@ -6,11 +6,9 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from airflock.core.view import View
 from airflock.engine import failure, notebook
 from airflock.engine.actions import Actions
 from airflock.engine.course import Course
-from airflock.engine.look import view
 from airflock.engine.snapshots import Snapshot
 from airflock.errors import FlightError
 from airflock.scenarios.events import Event, events_of
@@ -180,45 +178,6 @@ class Flight(Actions):
         if self.step == self._course.steps and not self._state.ended:
             self._advance(self._course.steps + 1)
         return self.scores()
-
-    def scores(self) -> dict[str, Any]:
-        """Order parameters and fitness of the window since the last change, up to now.
-
-        Examples
-        --------
-        >>> import airflock
-        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
-        >>> flight.advance(1.0).scores()["n_coll"]
-        0.0
-        """
-        return self.scenario.judged(self._state.values())
-
-    def look(self, agent: int) -> View:
-        """What an agent perceives, and the parts of its command.
-
-        Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
-
-        Raises FlightError for an agent that is not there, and RuleError for a rule that asks for what cannot be told
-        outside of the flight.
-
-        Examples
-        --------
-        >>> import airflock
-        >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
-        >>> view = flight.advance(1.0).look(3)
-        >>> view.agent, len(view.heard) == len(view.met)
-        (3, True)
-        """
-        self._course.take_over()
-        self._course.begin()
-        number = self._there(agent)
-        if not self.decides or self._course.sensed or self._state.plan.sequential:
-            return view(self.scenario, self._state, number, self.step, self.seed, self.world)
-        kept = self._state.buffer.copy()
-        self._state.advance(self.step, self.step + 1, 2)
-        found = view(self.scenario, self._state, number, self.step, self.seed, self.world)
-        self._state.buffer[:] = kept
-        return found
 
     def event(self, kind: str, /, **data: Any) -> "Flight":
         """Do what an event says: the method of the same name.
