@@ -29,11 +29,11 @@ def main():
     scenario = load(asked.folder / "tuned.toml")
     certificate = tomllib.loads((asked.folder / "certificate.toml").read_text())
     rows = score_flights([scenario] * asked.flights, range(FIRST, FIRST + asked.flights))
-    speed, touched, nearest = (np.array([row[key] for row in rows]) for key in ("phi_vel", "n_contacts", "r_min"))
+    speed, room, nearest = (np.array([row[key] for row in rows]) for key in ("phi_vel", "clearance", "r_min"))
     near = scenario.metrics.r_coll
     print("| what | in fresh flights |\n|---|---|")
     print(f"| phi_vel, mean and worst | {speed.mean():.2f} and {speed.min():.2f} m/s |")
-    print(f"| flights with a contact | {int((touched > 0).sum())} of {asked.flights:,} |")
+    print(f"| flights with a contact | {int((room < 0.0).sum())} of {asked.flights:,} |")
     print(f"| flights nearer than {near:g} m | {int((nearest < near).sum())} of {asked.flights:,} |")
     print(f"| smallest distance of all | {nearest.min():.2f} m |")
     print("\nIts certificate:", *certificate["statements"], sep="\n- ")
