@@ -41,6 +41,7 @@ WATCH = 0.1  # s between two looks at how the fleet is doing
 ENDED = "a process of the fleet ended with status {}"
 Begun = Generator[Rest, None, Life]
 Watching = Callable[[Callable[[], None]], Coroutine[Any, Any, None]]
+ABSENT = (math.nan,) * 15  # a row of a drone that has dropped out
 OURSELVES = 0  # place of the ether among the lives
 
 
@@ -74,7 +75,7 @@ class Flown:
         )
         count = len(plan.card.members)
         self._nodes, self._crafts = lives[1 : 1 + count], lives[1 + count :]
-        self.log = sorted((t - plan.clock[0], who, note) for life in self._nodes for t, who, note in life.notes)
+        self.log = sorted((t - plan.clock[0], who, note) for life in lives[1:] for t, who, note in life.notes)
 
     @property
     def lift(self) -> float:
@@ -85,9 +86,15 @@ class Flown:
         return min(len(life.rows) for life in self._crafts)
 
     def array(self) -> NDArray[np.float64]:
-        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them."""
+        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them.
+
+        Of drones that have dropped out nan, as in the recording of a simulation.
+        """
         frames = [
-            [(*craft.rows[k], *_at(node.rows, k, 0, (0.0,) * 9)) for craft, node in self._pairs()]
+            [
+                ABSENT if _gone(craft, k) else (*craft.rows[k], *_at(node.rows, k, 0, (0.0,) * 9))
+                for craft, node in self._pairs()
+            ]
             for k in range(self._frames())
         ]
         return np.array(frames, float)
@@ -95,7 +102,12 @@ class Flown:
     def ages(self) -> NDArray[np.float64]:
         """(time, receiver, sender): s since the state that a node has of another one held; nan: it has none."""
         never = [NEVER] * len(self.card.members)
-        stamps = np.array([[_at(n.rows, k, 1, never) for _, n in self._pairs()] for k in range(self._frames())])
+        stamps = np.array(
+            [
+                [never if _gone(craft, k) else _at(node.rows, k, 1, never) for craft, node in self._pairs()]
+                for k in range(self._frames())
+            ]
+        )
         times = self.card.period * np.arange(len(stamps))
         return np.where(stamps > 0.1 * NEVER, times[:, None, None] - stamps, np.nan)
 
@@ -116,14 +128,15 @@ def _at(rows: Sequence[Any], k: int, part: int, none: Any) -> Any:
     return rows[min(k, len(rows) - 1)][part] if rows else none
 
 
-def refused(scenario: Scenario, faults: Sequence[Fault]) -> list[str]:
+def _gone(craft: Life, k: int) -> bool:
+    """Whether a vehicle has dropped out by period k."""
+    return bool(math.isnan(craft.rows[k][0]))
+
+
+def refused(faults: Sequence[Fault]) -> list[str]:
     """What flies in lock-step only, one line each."""
-    refused = [
-        f"faults.kind = {kind.name!r}: faults of a scenario fly with --mode lockstep; give --faults FILE instead"
-        for kind in scenario.fault_kinds
-    ]
     gone = [f for f in faults if f.kind == "node" and f.end < 1e9]
-    return refused + ["fault node: on the real clock a node that died stays dead; leave out end"] * bool(gone)
+    return ["fault node: on the real clock a node that died stays dead; leave out end"] * bool(gone)
 
 
 def fly(
@@ -140,7 +153,7 @@ def fly(
 
     Raises ScenarioError for what flies in lock-step only, LinkError where a process ends before its time.
     """
-    wrong = refused(scenario, faults)
+    wrong = refused(faults)
     if wrong:
         raise ScenarioError(wrong)
     ports = Ports.opened(len(card.members), join)

@@ -21,6 +21,7 @@ from airflock.scenarios.scenario import Scenario
 
 KEY = hashlib.sha256(b"a fleet in software has no secret").digest()
 READY_TIME = 12.0  # s on the ground before a start is ordered
+DROPS_OUT = "drops out by a fault: node and motors are off"
 SINCE = 60_000_000  # µs; packets sent so long before a node began are accepted, for its clock may be wrong
 
 
