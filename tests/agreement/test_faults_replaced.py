@@ -15,7 +15,8 @@ SURE = {"radio.kind": "links", "radio.near": 500.0, "radio.received_near": 1.0} 
 QUIET = {"sensors.noise": 0.0, "body.noise": 0.0}
 OTHER = {  # numbers of the second one
     "motor": {"share": 0.9}, "gnss_offset": {"east": -8.0}, "gnss_drift": {"north": -4.0}, "gnss_spoofed": {"up": 1.0},
-    "radio_range": {"share": 1e-4}, "pretender": {"east": -9.0}, "clock": {"ahead": -2.0}, "battery": {"endurance": 9.0},
+    "radio_range": {"share": 1e-4}, "pretender": {"east": -9.0}, "clock": {"ahead": -2.0},
+    "battery": {"endurance": 9.0},
 }  # fmt: skip
 
 
@@ -132,7 +133,8 @@ def test_with_another_delay_faults_go_on(delay):
 
 
 def test_a_flight_that_is_cut_while_faults_are_on_their_way_has_the_same_bits():
-    faults = [pretends(0.4, 20.0), pretends(0.83, -20.0), {"kind": "clock", "at": 0.9}, {"kind": "gnss_frozen", "at": 1.0}]
+    faults = [pretends(0.4, 20.0), pretends(0.83, -20.0), {"kind": "clock", "at": 0.9}]
+    faults += [{"kind": "gnss_frozen", "at": 1.0}]
     scenario = load(PAPER, {**SMALL, "duration": 2.5, "radio.kind": "links", "faults": faults})
     whole = airflock.open(scenario, 3, device="python")
     scores = whole.finish()

@@ -307,6 +307,7 @@ def test_what_is_frozen_was_off_already_and_is_off_no_further(kinds):
 
 
 def test_a_clock_that_is_ahead_extrapolates_too_far():
+    """From 1 s on, the delay: what was sent before the flight was stamped by a clock that was right."""
     keys = {"radio.kind": "links", "radio.near": 500.0, "radio.received_near": 1.0, "radio.range": 1e4}
     keys |= {"sensors.noise": 0.0, "body.noise": 0.0}
     found = []
@@ -314,7 +315,7 @@ def test_a_clock_that_is_ahead_extrapolates_too_far():
         flight = airflock.open(
             load(PAPER, {**SMALL, **keys, **({"faults": faults} if faults else {})}), 1, device="python"
         )
-        flight.sense()
+        flight.advance(1.0).sense()
         found.append((flight.look(0).heard, flight.look(2).heard))
     ages = [[other.age for other in heard if other.who in (0, 2)] for pair in found for heard in pair]
     assert ages == [[pytest.approx(a)] for a in (1.0, 1.0, -0.5, 2.5)]

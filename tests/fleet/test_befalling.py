@@ -1,4 +1,4 @@
-"""Faults of a scenario befall a fleet as they befall a simulated flock: in lock-step, and each by its time on the clock.
+"""Faults of a scenario befall a fleet as they befall a simulated flock: in lock-step, and by the time of a real clock.
 
 In lock-step without noise a fleet is within 5 cm of the simulation, which the reference flies to 1e-9
 (`tests/agreement/test_faults_replaced.py`); what packets say is resolved to 0.04 mm.

@@ -53,9 +53,7 @@ def begins(scenario: Scenario, seed: int) -> dict[int, list[tuple[int, Any, floa
                 if entry.fault.leaves is not None:
                     gone = answer(entry.fault.leaves, "leaves", {"f": entry.numbers}, entry.fault.name)
                     if gone < lasts:
-                        found.append(
-                            Hit(step + round(gone / dt), number, occurrence, agent, True, entry, lasts, step)
-                        )
+                        found.append(Hit(step + round(gone / dt), number, occurrence, agent, True, entry, lasts, step))
     by_step: dict[int, list[tuple[int, Any, float, bool]]] = {}
     for hit_ in sorted(found, key=lambda one: one[:5]):
         if not (hit_.leaves and any(replaces(other, hit_) for other in found)):

@@ -48,7 +48,7 @@ def layout_of(
     kept: tuple[Any, ...],
 ) -> Layout:
     """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
-    m, dims = lanes(agents), plan.dimensions
+    m = lanes(agents)
     label = np.int32 if plan.bits == 32 else np.int64
     pairs = (agents, m) if plan.packets else (1, 1)
     values, sums = sums_of(plan)

@@ -1,8 +1,8 @@
 """Befalling: faults of the scenario as they befall the drones of a fleet, at the times of a simulation.
 
 A vehicle asks them what its navigation tells, what reaches its motors and how it moves; the ether, how far a drone is
-heard; and a node suffers them in `fleet.ailing`. Each asks by the time of the flight, so that on the real clock all of them
-let the same fault begin at the same time, each for itself.
+heard; and a node suffers them in `fleet.ailing`. Each asks by the time of the flight, so that on the real clock all of
+them let the same fault begin at the same time, each for itself.
 """
 
 import math

@@ -89,7 +89,7 @@ def mislead(
 
 
 def tune(lanes: Iterable[int], decision: int, flock: Flock, numbers: Any, whole: Any, *, plan: Plan) -> None:
-    """Find how far each agent is heard and hears at a decision, and how far its clock is ahead, and was when it sent."""
+    """Find how far each agent is heard and hears at a decision, and how far its clock is ahead, or was as it sent."""
     time = real(decision) * numbers.c.period
     if plan.suffers("radio"):
         reach = least(numbers.k.range, LIMIT)

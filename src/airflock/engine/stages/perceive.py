@@ -29,9 +29,9 @@ def snapshot(flock: Flock, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
             ring[slot, a + plan.dimensions, i] = (
                 flock.velocity[a][i] + flock.own_drift[a][i] if plan.senses and not plan.sees else flock.velocity[a][i]
             )
-    for c, kind, what in plan.sent_faults:
+    for c, name, what in plan.sent_faults:
         for i in range(m):
-            ring[slot, c, i] = flock.fault(kind, what)[i]
+            ring[slot, c, i] = flock.fault(name, what)[i]
 
 
 def chance(flock: Flock, whole: Any, decision: int, m: int, *, plan: Plan, drawn: Draw) -> None:
@@ -110,9 +110,9 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
             for i in range(m):
                 flock.heard_position[a][i] = flock.position[a][i]
                 flock.heard_velocity[a][i] = flock.velocity[a][i]
-    for c, kind, what in plan.sent_faults:
+    for c, name, what in plan.sent_faults:
         for i in range(m):
-            flock.as_sent.fault(kind, what)[i] = ring[slot, c, i]
+            flock.as_sent.fault(name, what)[i] = ring[slot, c, i]
     now = real(decision) * numbers.c.period
     then = now - real(whole.delay) * numbers.c.dt
     x, v, hx, hv = flock.measured_position, flock.measured_velocity, flock.heard_position, flock.heard_velocity
