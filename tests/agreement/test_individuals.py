@@ -1,6 +1,7 @@
 """Agents that differ, fail, leave and join: what a flight does about them, by truths that need no engine."""
 
 from concurrent.futures import Future
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -453,6 +454,20 @@ def two_of_three(vx):
 def test_a_kind_that_is_none_is_one_line(rules, said):
     with pytest.raises(RuleError, match=said):
         plan_of(load(PAPER, {"faults": [{"kind": "odd", "at": 1.0}]}, faults=airflock.fault(rules, "odd")))
+
+
+@pytest.mark.parametrize("name", ["onset", "at_x", "sent_lasts", "per_hour"])
+def test_numbers_of_a_kind_have_no_names_that_a_flight_keeps(name):
+    """A number called onset was overwritten by when the fault began, in flights alone."""
+    from airflock.core.parameters import Parameters, quantity
+
+    declared = {
+        "__annotations__": {name: float},
+        name: quantity(5.0, "m", low=0.0, high=9.0, meaning="x", source="ours"),
+    }
+    record = dataclass(frozen=True, kw_only=True)(type("Parameters", (Parameters,), declared))
+    with pytest.raises(RuleError, match=f"Parameters.{name}: "):
+        airflock.fault({"Parameters": record, "sense": Magnet.sense}, "odd")
 
 
 @pytest.mark.parametrize(

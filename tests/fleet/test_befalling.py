@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 
 from airflock.faults.registry import KINDS
-from airflock.fleet import compare, realtime
+from airflock.fleet import compare, realtime, starting
+from airflock.fleet import live as live_
 from airflock.fleet.ailing import Ailing
 from airflock.fleet.befalling import Faults
 from airflock.fleet.lockstep import Fleet
 from airflock.onboard.mission import Phase
 from airflock.recordings.flights import simulate
 from fleets import card, scenario
+from flocks import ISLANDS
 
 CROWD = {"world.side": 60.0, "start.separation": 6.0}
 LINKS = {"radio.kind": "links"}  # neighbours are carried forward by the age of their packets
@@ -160,6 +162,20 @@ def test_on_the_real_clock_packets_say_what_a_fault_tells():
         (datagram,) = node.say_status(zero + time)
         said.append(ailing.told(datagram, time) == datagram)
     assert said == [True, False, True]
+
+
+def test_on_the_real_clock_buildings_shade_the_radio(monkeypatch):
+    """The ether asks the map of the card between where two vehicles are; it took all ways for clear."""
+    asked = []
+    monkeypatch.setattr(starting, "clear", lambda card, here, there: bool(asked.append((here, there))))
+    monkeypatch.setattr(live_, "clear", starting.clear)
+    keys = {"radio.kind": "shadow", "radio.near": 5.0, "radio.far": 25.0, "world.obstacles": ISLANDS}
+    live((), duration=0.4, **keys)
+    assert asked and all(0.0 < math.dist(*pair) < 120.0 for pair in asked)
+    with_buildings = card(scenario(2, **keys))
+    monkeypatch.undo()
+    assert not starting.clear(with_buildings, (-30.0, -5.0, 20.0), (30.0, -5.0, 20.0)), "through an island"
+    assert starting.clear(with_buildings, (-30.0, -30.0, 20.0), (30.0, -30.0, 20.0)), "south of it"
 
 
 def test_no_kind_is_refused_on_any_clock():

@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Generator, MutableSequence, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 from airflock.core.agent import State
@@ -20,7 +21,7 @@ from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault, clock_error
 from airflock.fleet.individuals import records_of
-from airflock.fleet.starting import DROPS_OUT, KEY, SINCE, in_the_air, vehicle_of
+from airflock.fleet.starting import DROPS_OUT, KEY, SINCE, clear, in_the_air, vehicle_of
 from airflock.fleet.telemetry import MESSAGES
 from airflock.fleet.teller import Teller
 from airflock.onboard.card import Card
@@ -274,7 +275,10 @@ def ether_life(plan: Plan) -> Generator[Rest, None, Life]:
     flown, period = plan.scenario, card.safety.status_period
     befalls = Faults(flown, plan.seed)
     reach = befalls.reach if befalls else None
-    ether = Ether(flown.transceiver, flown.radio, card.members, plan.seed, period, plan.faults, reach, site=card.site)
+    ether = Ether(
+        flown.transceiver, flown.radio, card.members, plan.seed, period, plan.faults, reach, partial(clear, card),
+        card.site,
+    )  # fmt: skip
     station = ports.station.here
     radios = [port.here for port in ports.radios]
     who = {here: i for i, here in enumerate(radios)}

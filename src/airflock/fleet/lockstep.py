@@ -20,7 +20,7 @@ from airflock.fleet.dice import OuterNoise, SensorDice
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault, clock_error
 from airflock.fleet.individuals import records_of, sensors_of
-from airflock.fleet.starting import DROPS_OUT, KEY, SINCE, Station, in_the_air, lift_of, vehicle_of
+from airflock.fleet.starting import DROPS_OUT, KEY, SINCE, Station, clear, in_the_air, lift_of, vehicle_of
 from airflock.fleet.vehicle import SUFFERED
 from airflock.mavlink.coordinates import Geodetic
 from airflock.mavlink.orders import Do
@@ -74,7 +74,7 @@ class Fleet:
         ]
         reach = befalls.reach if befalls else None
         radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
-        self.ether = Ether(*radio, card.members, seed, period, faults, reach, self._clear, card.site)
+        self.ether = Ether(*radio, card.members, seed, period, faults, reach, partial(clear, card), card.site)
         words = SensorDice(seed, len(card.members))
         self._sensing = [
             Sensing(scenario.sensor, own, seed, i, flat=card.flat, words=partial(words, drone=i))
@@ -176,11 +176,6 @@ class Fleet:
     def gone(self) -> set[int]:
         """Places of the drones that have dropped out by a fault of the scenario."""
         return self._befalls.gone
-
-    def _clear(self, here: tuple[float, float, float], there: tuple[float, float, float]) -> bool:
-        """Whether nothing stands between two places of vehicles, m."""
-        a, b = (self.card.law_state(State(*place, 0.0, 0.0, 0.0)) for place in (here, there))
-        return not self.card.place.blocked(*a[:3], *b[:3])
 
     def _is_dead(self, who: int, now: float) -> bool:
         """Whether a fault keeps a node from hearing and saying anything."""

@@ -59,6 +59,12 @@ def lift_of(card: Card) -> float:
     return -card.law_state(State(*(0.0,) * 6)).z
 
 
+def clear(card: Card, here: tuple[float, float, float], there: tuple[float, float, float]) -> bool:
+    """Whether nothing stands between two places of vehicles, m."""
+    a, b = (card.law_state(State(*place, 0.0, 0.0, 0.0)) for place in (here, there))
+    return not card.place.blocked(*a[:3], *b[:3])
+
+
 def in_the_air(vehicle: Vehicle, card: Card, start: State) -> None:
     """Put a vehicle in the air, where it obeys its node as if it had for long."""
     vehicle.state = start._replace(z=start.z + (card.height if card.flat else lift_of(card)))
