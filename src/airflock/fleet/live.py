@@ -185,7 +185,8 @@ class Craft:
         body = records_of(scenario, len(card.members), plan.seed)[i][1]
         noise = OuterNoise(plan.seed, 1, not card.flat, first=i)
         self.vehicle = made = vehicle_of(scenario, card, i, body, noise, plan.utc(time.monotonic()))
-        self._befalls = made.faults = Faults(scenario, plan.seed, only=i)
+        self._befalls = Faults(scenario, plan.seed, only=i)
+        made.faults = self._befalls or None
         self.notes: list[tuple[float, int, str]] = []
         self._booted = time.monotonic() - WARM
         self._sensing = Sensing(scenario.sensor, scenario.sensors, plan.seed, i, flat=card.flat)
