@@ -62,7 +62,8 @@ class Vehicle:
         ours = ("MAV_SYS_ID",) if kind == "px4" else ("SYSID_THISMAV", "SYSID_MYGCS")
         self.parameters = PARAMETERS[kind] | dict.fromkeys(ours, system)
         self.target: Vector = (0.0, 0.0, 0.0)
-        self.followed: Vector = (0.0, 0.0, 0.0)  # what reached its motors last, m/s
+        self.followed = self._obeyed = STILL  # what reached its motors last, and what faults make of the command, m/s
+        self._asked: tuple[float, Vector] | None = None  # the command of which they were asked, and when it came, s
         self.target_at, self.first_at, self.climb_to = -1e9, -1e9, 0.0
         self.booted = 0.0  # s
         self.beat_at: float | None = None  # when the last heartbeat of its station came; None: none ever
@@ -305,8 +306,11 @@ class Vehicle:
         (x, y, z, vx, vy, vz), c = self.state, self.wish()
         falls = self.off or not self.motor
         command = (vx, vy, vz - 5.0) if falls else c
-        if self.faults is not None:
-            command = self.faults.overruled(self.place, now, command)
+        if self.faults is not None and not falls:
+            asked = self.target_at, c
+            if asked != self._asked:  # as in a simulation: once for each command
+                self._asked, self._obeyed = asked, self.faults.overruled(self.place, now, c)
+            command = self._obeyed
         self.followed = command
         eu, ev, ew = self.error[3:]
         measured = vx + eu, vy + ev, vz + ew
