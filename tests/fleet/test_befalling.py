@@ -42,6 +42,11 @@ BEFALLEN = {
     "drift replaced": ({}, hit("gnss_drift", {"at": 1.0}, {"at": 1.4, "east": -0.5})),
     "stuck replaced": ({}, hit("stuck", {"at": 1.5}, {"at": 2.9, "lasts": 1.0})),
     "deaf replaced": ({}, hit("radio_deaf", {"at": 0.5}, {"at": 1.1, "lasts": 1.5})),
+    "offset": ({}, hit("gnss_offset", {"at": 1.13, "east": 4.0})),
+    "spoofed": ({}, hit("gnss_spoofed", {"at": 1.13})),
+    "silent": ({}, hit("radio_silent", {"at": 0.5})),
+    "range": ({}, hit("radio_range", {"at": 0.5, "share": 0.2})),
+    "battery": ({}, hit("battery", {"at": 0.5, "endurance": 3.0, "share": 0.0}, {"at": 1.13, "endurance": 4.2})),
     "motor replaced": ({}, hit("motor", {"at": 0.5, "share": 0.0}, {"at": 1.3, "share": 0.5})),
 }
 
