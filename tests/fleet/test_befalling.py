@@ -9,15 +9,18 @@ import math
 import numpy as np
 import pytest
 
+from airflock.core.hearing import EARLY
+from airflock.errors import CardError
 from airflock.faults.registry import KINDS
 from airflock.fleet import compare, realtime, starting
 from airflock.fleet import live as live_
 from airflock.fleet.ailing import Ailing
 from airflock.fleet.befalling import Faults
 from airflock.fleet.lockstep import Fleet
+from airflock.onboard.card import card_of, hash_of
 from airflock.onboard.mission import Phase
 from airflock.recordings.flights import simulate
-from fleets import card, scenario
+from fleets import card, document, scenario
 from flocks import ISLANDS
 
 CROWD = {"world.side": 60.0, "start.separation": 6.0}
@@ -90,6 +93,20 @@ def test_a_vehicle_whose_motors_are_off_falls_whatever_its_autopilot_keeps_follo
     """A command that sticks held it up."""
     fleet = flown({}, hit("stuck", {"at": 0.5}) + hit("fails", {"at": 1.0}), duration=8.0)
     assert fleet.vehicles[1].state.z == 0.0 and fleet.vehicles[0].state.z > 5.0
+
+
+def test_real_drones_believe_stamps_and_simulated_ones_do_not_ask():
+    real, software = card(scenario(2)), compare.software_card(scenario(2))
+    assert (real.hearing.early, real.hearing.in_order, real.hearing.once) == (EARLY, True, False)
+    assert not {"once", "any_stamp"} & real.document["radio"].keys()
+    assert software.hearing.early > 1e9 and not software.hearing.in_order and software.hearing.once
+    assert not compare.software_card(scenario(2, **LINKS)).hearing.once, "the newest packet counts until the next comes"
+    assert compare.software_card(scenario(2), live=True).hearing == real.hearing
+    made = document(scenario(2))
+    for wrong in (1, "yes", None):
+        odd = {**made, "radio": {**made["radio"], "once": wrong}}
+        with pytest.raises(CardError, match=f"radio.once = {wrong!r}: give true or false"):
+            card_of({**odd, "hash": hash_of(odd)})
 
 
 def test_ages_are_told_by_both_clocks():
