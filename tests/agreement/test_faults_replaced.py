@@ -123,6 +123,12 @@ def test_who_joins_again_has_sent_nothing_false():
     np.testing.assert_allclose(x[5:], true[:-5], atol=1e-5)
 
 
+def test_who_joins_again_does_not_land_by_the_battery_of_before():
+    flown = flight([{"kind": "battery", "at": 1.0, "agents": [1, 2], "endurance": 2.0}]).advance(1.5)
+    flown.remove(2).advance(0.5).add(2, [0.0, 0.0]).advance(2.0)
+    assert flown.present.tolist() == [True, False, True, True, True]
+
+
 @pytest.mark.parametrize("delay", [0.2, 2.0])
 def test_with_another_delay_faults_go_on(delay):
     flown = flight([pretends(0.0, 20.0)]).advance(2.0).change({"radio.delay": delay})

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.drivers import device_of, driver_of, flying
-from airflock.engine.fault_columns import strike
+from airflock.engine.fault_columns import still_has, strike
 from airflock.engine.initial_rows import first_memories
 from airflock.engine.layout import aligned_zeros, layout_of
 from airflock.engine.passes import grid
@@ -127,7 +127,7 @@ class State:
             return  # said when the step is flown
         for onset in self.tables.due:
             if onset.step == step and onset.leaves:
-                leave(self, [onset.agent])
+                leave(self, [onset.agent] if still_has(self, onset) else [])
             elif onset.step == step:
                 strike(self, onset)
 
