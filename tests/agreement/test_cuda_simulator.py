@@ -17,6 +17,7 @@ HERE = Path(__file__).resolve().parents[1] / "gpu"
 CASES = (
     *covering.PLANS, "split", "torus", "table", "couzin", "vicsek", "groups", "together", "city", "herd", "stop",
     "display", "wings", "vee", "echelon", "weights", "jitter", "species", "in turn", "lonely", "leavers", "collided",
+    "replaced", "replaced, in tables",
     "herd leaves", "display fails", "wing fails", "in turn, fewer", "pair 51",  # laws that remember several numbers
 )  # fmt: skip
 

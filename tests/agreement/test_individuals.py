@@ -1,6 +1,7 @@
 """Agents that differ, fail, leave and join: what a flight does about them, by truths that need no engine."""
 
 from concurrent.futures import Future
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -307,6 +308,7 @@ def test_what_is_frozen_was_off_already_and_is_off_no_further(kinds):
 
 
 def test_a_clock_that_is_ahead_extrapolates_too_far():
+    """From 1 s on, the delay: what was sent before the flight was stamped by a clock that was right."""
     keys = {"radio.kind": "links", "radio.near": 500.0, "radio.received_near": 1.0, "radio.range": 1e4}
     keys |= {"sensors.noise": 0.0, "body.noise": 0.0}
     found = []
@@ -314,7 +316,7 @@ def test_a_clock_that_is_ahead_extrapolates_too_far():
         flight = airflock.open(
             load(PAPER, {**SMALL, **keys, **({"faults": faults} if faults else {})}), 1, device="python"
         )
-        flight.sense()
+        flight.advance(1.0).sense()
         found.append((flight.look(0).heard, flight.look(2).heard))
     ages = [[other.age for other in heard if other.who in (0, 2)] for pair in found for heard in pair]
     assert ages == [[pytest.approx(a)] for a in (1.0, 1.0, -0.5, 2.5)]
@@ -452,6 +454,20 @@ def two_of_three(vx):
 def test_a_kind_that_is_none_is_one_line(rules, said):
     with pytest.raises(RuleError, match=said):
         plan_of(load(PAPER, {"faults": [{"kind": "odd", "at": 1.0}]}, faults=airflock.fault(rules, "odd")))
+
+
+@pytest.mark.parametrize("name", ["onset", "at_x", "sent_lasts", "per_hour"])
+def test_numbers_of_a_kind_have_no_names_that_a_flight_keeps(name):
+    """A number called onset was overwritten by when the fault began, in flights alone."""
+    from airflock.core.parameters import Parameters, quantity
+
+    declared = {
+        "__annotations__": {name: float},
+        name: quantity(5.0, "m", low=0.0, high=9.0, meaning="x", source="ours"),
+    }
+    record = dataclass(frozen=True, kw_only=True)(type("Parameters", (Parameters,), declared))
+    with pytest.raises(RuleError, match=f"Parameters.{name}: "):
+        airflock.fault({"Parameters": record, "sense": Magnet.sense}, "odd")
 
 
 @pytest.mark.parametrize(

@@ -225,12 +225,6 @@ def test_laws_of_members_stand_on_the_card():
     assert made.groups == ()  # neither law asks for them
 
 
-def test_a_fault_that_no_fleet_flies_is_refused_with_what_to_do():
-    found = scenario(2, 1.0, faults=[{"kind": "clock", "at": 0.5}])
-    with pytest.raises(ScenarioError, match=r"faults.kind = 'clock': .*; give"):
-        compare.fly(found, compare.software_card(found), 0)
-
-
 def test_whoever_stays_flies_on_what_a_drone_sent_before_it_dropped_out():
     """As in a simulation from which it drops out later by the delay: until then its last packets are on their way."""
     crowd = {"world.side": 60.0, "start.separation": 6.0}

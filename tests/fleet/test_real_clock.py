@@ -127,7 +127,5 @@ def test_a_process_that_is_killed_ends_the_others_without_a_word_of_theirs(monke
 
 
 def test_what_flies_in_lock_step_only_is_refused():
-    found = scenario(2, 1.0, faults=[{"kind": "motor", "at": 0.5}])
-    assert "--mode lockstep" in realtime.refused(found, ())[0]
     with pytest.raises(ScenarioError, match="stays dead"):
         flown("tasks", faults=(Fault("node", (2,), 0.3, 0.5),))

@@ -14,11 +14,12 @@ from airflock.cli.main import app
 from airflock.core.agent import State
 from airflock.errors import AirflockError, CardError, StudioError
 from airflock.fleet import compare, realtime
+from airflock.fleet.befalling import Faults
 from airflock.fleet.faults import KINDS, Fault
 from airflock.fleet.lockstep import STARTED
 from airflock.fleet.observer import Observer
 from airflock.fleet.starting import KEY, Station, write_for_watching
-from airflock.fleet.teller import Teller
+from airflock.fleet.teller import OF_SCENARIO, Teller
 from airflock.mavlink import witness
 from airflock.mavlink.keys import write_key
 from airflock.mavlink.orders import Do
@@ -164,6 +165,21 @@ def test_a_fault_is_told_without_an_amount_that_nobody_knows(kind):
     for datagram in teller.report(f.now, STARTED + round(f.now * 1e6)):
         observer.take(datagram, f.now)
     assert f"<b>{kind}</b>, drone 2: " in faults_of(observer) and "amount" not in faults_of(observer)
+
+
+@pytest.mark.parametrize("kind", OF_SCENARIO)
+def test_a_fault_of_the_scenario_is_told_by_what_its_kind_does(kind):
+    """Three kinds are called as other faults of fleets are: these say that they are of the scenario."""
+    f, observer = watched()
+    befalls = Faults(scenario(3, faults=[{"kind": kind, "at": 0.2, "agents": [0, 2]}]), 0)
+    teller = Teller(f.card.members, [Fault("motor", (2,), 0.0, 5.0)])
+    for now in (0.0, 1.0):
+        befalls.until(now)
+        for datagram in teller.report(now, STARTED + round((f.now + now) * 1e6), befalls.holding(now)):
+            observer.take(datagram, f.now + now)
+    told = OF_SCENARIO[kind]
+    assert observer.faults == {"motor": {2}, told: {1, 3}} and told != "motor"
+    assert f"<b>{told}</b>, drones 1, 3: " in faults_of(observer) and not faults_of(observer).endswith(": </p>")
 
 
 def test_what_the_ether_tells_needs_the_key_and_its_own_system():

@@ -39,6 +39,14 @@ LAWS = [
     {"name": "b", "agents": 2, "model": {"p_rep": 0.3}, "body": {"tau": 0.5}},
 ]
 FAILS = [fault("fails", 0.1, [2]), fault("motor", 0.1, [0], share=0.5, lasts=0.3), fault("motor", 0.2, [0], share=0.2)]
+REPLACED = {  # within the delay, and one who then leaves
+    "radio.kind": "links", "radio.near": 30.0, "radio.far": 60.0, "radio.delay": 0.3, "faults": [
+        fault("pretender", 0.0, [0], east=5.0), fault("pretender", 0.2, [0], east=-5.0),
+        fault("pretender", 0.3, [0], east=3.0, lasts=0.2), fault("clock", 0.0, [1], ahead=0.2),
+        fault("clock", 0.3, [1, 2], ahead=-0.1), fault("gnss_drift", 0.1, [2], east=3.0),
+        fault("gnss_drift", 0.25, [2], north=9.0), fault("fails", 0.55, [1]),
+    ],
+}  # fmt: skip
 # of a plan of the covering set: keys anew, threads per agent, states in registers
 SMALL = {
     "paper": ({"metrics.r_coll": 9.0, "sensors.period": 0.15, "world.side": 60.0}, 1, True),
@@ -53,6 +61,8 @@ CASES = {
             *(fault("fails", 0.2 * (1 + k), [agent]) for k, agent in enumerate((1, 0, 2))),
         ],
     }, 2, True),
+    "replaced": ("vasarhelyi_2018", REPLACED, 2, True),
+    "replaced, in tables": ("vasarhelyi_2018", REPLACED, 1, False),
     "leavers": ("vasarhelyi_2018", {
         "agents": 6, "radio.loss": 0.4, "radio.delay": 0.2, "radio.kind": "shadow", "world.obstacles": ISLANDS,
         "silence.rule": "stop", "silence.patience": 0.1, "metrics.r_cluster": 12.0, "faults": [

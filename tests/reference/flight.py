@@ -52,7 +52,7 @@ class Agent:
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
     rays       : how many it cast at its last decision
     links      : by the number of another agent, what the radio keeps of what that one sends
-    faults     : by kind, the latest that has hit it; kept : of each kind what it may repeat
+    faults     : by kind, all that have hit it; kept : of each kind what it may repeat
     present    : whether it is there
     """
 
@@ -67,9 +67,18 @@ class Agent:
     sent: State = State(*ZERO, *ZERO)
     rays: float = 0.0
     links: dict[int, Link] = field(default_factory=dict)
-    faults: dict[str, Suffering] = field(default_factory=dict)
+    faults: dict[str, list[Suffering]] = field(default_factory=dict)
     kept: dict[tuple[str, str], State] = field(default_factory=dict)
     present: bool = True
+
+    def fault(self, kind: str, time: float) -> Suffering | None:
+        """The fault of a kind that had begun last at a time (s): of each kind a later one replaces an earlier one."""
+        begun = [suffering for suffering in self.faults.get(kind, ()) if suffering.begun(time)]
+        return begun[-1] if begun else None
+
+    def suffers(self, time: float) -> list[Suffering]:
+        """The last fault of each kind at a time, s."""
+        return [found for kind in self.faults if (found := self.fault(kind, time)) is not None]
 
 
 def fly_plainly(  # noqa: C901 - one loop that a reader can follow
@@ -175,7 +184,8 @@ def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any
         known = {f"at_{name}": value for name, value in agent.state._asdict().items()}
         known |= dict(zip(("at_cx", "at_cy", "at_cz"), agent.command, strict=True))
         dt = scenario.flight.dt
-        agent.faults[entry.fault.name] = Suffering(entry.fault, entry.numbers, step * dt, lasts, known, 0.5 * dt)
+        suffering = Suffering(entry.fault, entry.numbers, step * dt, lasts, known, 0.5 * dt)
+        agent.faults.setdefault(entry.fault.name, []).append(suffering)
         order = [kind.name for kind in scenario.fault_kinds]  # a later kind disturbs what an earlier one has left
         agent.faults = dict(sorted(agent.faults.items(), key=lambda item: order.index(item[0])))
     for number, agent in enumerate(flock if scenario.lands else ()):
@@ -242,7 +252,7 @@ def decisions(
         )  # fmt: skip
         agent.rays = float(pilot.senses.rays)
         x, y, z = made.command
-        for suffering in agent.faults.values():
+        for suffering in agent.suffers(time):
             stuck = suffering.asked("overrule", time, cx=x, cy=y, cz=z)
             x, y, z = (x, y, z) if stuck is None else stuck
         agent.command = (x, y, z if scenario.dimensions == 3 else 0.0)
@@ -310,15 +320,16 @@ def hear(
         into, out = radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]
         far = into if scenario.transceiver.see is not None else min(into, out)  # who is seen need not send
         carries = distance <= norm(far, 0.0, 0.0) and far >= 0.0
-        mine, theirs = ahead(flock[i], time), ahead(other, time)
+        mine, theirs = ahead(flock[i], time), ahead(other, time - late)
         if in_range:
             found.add(j)
         link = flock[i].links.setdefault(j, Link())
         if in_range and carries and arrives(scenario, seed, number, place, i, j, flock, link, time + mine):
             wait = lateness(scenario, seed, number, place, i, j, flock)
             if scenario.transceiver.see is not None:
-                seen = glimpsed(scenario, seed, number, place, i, j, flock, said, own_believed, time + mine - late)
-                link.way = time, seen, time - late + mine
+                then = time - late + ahead(flock[i], time - late)
+                seen = glimpsed(scenario, seed, number, place, i, j, flock, said, own_believed, then)
+                link.way = time, seen, then
             if link.way is None:  # one packet at a time is under way
                 link.way = time + wait, said[j], time - late + theirs
         if link.way is not None and link.way[0] <= time + 0.5 * scenario.flight.dt:
@@ -457,7 +468,7 @@ def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust
         body.name,
     )
     velocity, agent.remembered = (*moved[:2], moved[2] if three else 0.0), moved[3] if body.Memory else None
-    for suffering in agent.faults.values():
+    for suffering in agent.suffers(step * dt):
         told = {f"n{axis}": velocity[c] for c, axis in enumerate("xyz")} | {"dt": dt}
         velocity = suffering.asked("motion", step * dt, **{k: given[k] for k in MOVING}, **told) or velocity
     integration = choices(scenario.body).get("integration", body.integration)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from airflock.core import random
 from airflock.core.agent import State
@@ -24,9 +24,13 @@ class Suffering:
     known: dict[str, float]
     near: float  # s; half a step: times are whole steps, and a fault lasts for whole steps
 
+    def begun(self, time: float) -> bool:
+        """Whether it has begun by a time, s."""
+        return self.begin - self.near < time
+
     def asked(self, rule: str, time: float, **given: Any) -> Any:
         """What a rule of it answers, or None where it has none or does not last at that time (s)."""
-        now = self.begin - self.near <= time < self.begin + self.lasts - self.near
+        now = self.begun(time) and time < self.begin + self.lasts - self.near
         found = getattr(self.kind, rule)
         if found is None or not now:
             return None
@@ -36,7 +40,8 @@ class Suffering:
 
 def begins(scenario: Scenario, seed: int) -> dict[int, list[tuple[int, Any, float, bool]]]:
     """By step: agents that are hit, by which entry, for how long (s), and whether they leave by then."""
-    duration, dt, found = scenario.flight.duration, scenario.flight.dt, {}
+    duration, dt = scenario.flight.duration, scenario.flight.dt
+    found: list[Hit] = []
     for number, entry in enumerate(scenario.faults):
         for occurrence, at in enumerate(times(entry, number, seed, duration)):
             ends = min(entry.lasts, entry.until - at)
@@ -45,20 +50,36 @@ def begins(scenario: Scenario, seed: int) -> dict[int, list[tuple[int, Any, floa
                 continue
             step = round(at / dt)
             for agent in hit(entry, number, occurrence, seed):
-                found.setdefault(step, []).append((number, occurrence, agent, entry, lasts, False))
+                found.append(Hit(step, number, occurrence, agent, False, entry, lasts, step))
                 if entry.fault.leaves is not None:
                     gone = answer(entry.fault.leaves, "leaves", {"f": entry.numbers}, entry.fault.name)
                     if gone < lasts:
-                        found.setdefault(step + round(gone / dt), []).append(
-                            (number, occurrence, agent, entry, lasts, True)
-                        )
-    return {step: [(a, e, s, x) for _, _, a, e, s, x in sorted(hits, key=by_entry)] for step, hits in found.items()}
+                        found.append(Hit(step + round(gone / dt), number, occurrence, agent, True, entry, lasts, step))
+    by_step: dict[int, list[tuple[int, Any, float, bool]]] = {}
+    for hit_ in sorted(found, key=lambda one: one[:5]):
+        if not (hit_.leaves and any(replaces(other, hit_) for other in found)):
+            by_step.setdefault(hit_.step, []).append((hit_.agent, hit_.entry, hit_.lasts, hit_.leaves))
+    return by_step
 
 
-def by_entry(hit: Any) -> tuple[int, int, int, bool]:
-    """Place of a hit among those of its step."""
-    number, occurrence, agent, _, _, leaves = hit
-    return number, occurrence, agent, leaves
+class Hit(NamedTuple):
+    """An agent that is hit, or leaves, at a step: by which entry and occurrence, for how long (s), begun when."""
+
+    step: int
+    number: int
+    occurrence: int
+    agent: int
+    leaves: bool
+    entry: Any
+    lasts: float
+    begin: int
+
+
+def replaces(other: Hit, leaving: Hit) -> bool:
+    """Whether a fault has replaced one of its kind, before the agent left by it."""
+    same = other.agent == leaving.agent and other.entry.fault.name == leaving.entry.fault.name
+    later = (other.begin, other.number) > (leaving.begin, leaving.number) and other.begin < leaving.step
+    return same and later and not other.leaves
 
 
 def times(entry: Any, number: int, seed: int, duration: float) -> Iterator[float]:
@@ -122,7 +143,7 @@ def misled(
     flat = {} if dims == 3 else {"z": 0.0, "vz": 0.0}
     for rule, name in rules:
         for kind in kinds:
-            suffering, key = agent.faults.get(kind.name), (kind.name, name)
+            suffering, key = agent.fault(kind.name, time), (kind.name, name)
             given = {f"at_{each}": value for each, value in agent.kept.get(key, state)._asdict().items()}
             found = None if suffering is None else suffering.asked(rule, time, **state._asdict(), **given)
             agent.kept[key] = agent.kept.get(key, state) if found is not None else state
@@ -133,7 +154,7 @@ def misled(
 def radio_of(agent: Any, time: float, reach: float) -> tuple[float, float]:
     """How far an agent is heard and hears, m; negative where not at all."""
     out = into = reach
-    for suffering in agent.faults.values():
+    for suffering in agent.suffers(time):
         found = suffering.asked("radio", time, reach=reach)
         if found is not None:
             out, into = min(out, found[0]), min(into, found[1])
@@ -142,4 +163,4 @@ def radio_of(agent: Any, time: float, reach: float) -> tuple[float, float]:
 
 def ahead(agent: Any, time: float) -> float:
     """How far its clock is ahead, s."""
-    return sum(suffering.asked("clock", time) or 0.0 for suffering in agent.faults.values())
+    return sum(suffering.asked("clock", time) or 0.0 for suffering in agent.suffers(time))

@@ -195,11 +195,9 @@ def test_how_a_fleet_flies_is_checked_at_once(airflock, tmp_path):
     told = ("kind = 'los' is none of", "px4, ardupilot", "multirotor, quadrotor", "lockstep, tasks, processes")
     for line, part in zip(lines, told, strict=True):
         assert part in line
-    faulty = ["--set", 'faults=[{kind="motor", at=1.0}]']
-    code, _, lines = airflock("fleet", REAL, "--agents", 2, "--mode", "tasks", *faulty)
-    assert code == 2 and lines == [
-        "airflock: faults.kind = 'motor': faults of a scenario fly with --mode lockstep; give --faults FILE instead"
-    ]
+    (tmp_path / "wakes.toml").write_text('[[fault]]\nkind = "node"\nend = 5\n')
+    code, _, lines = airflock("fleet", REAL, "--agents", 2, "--mode", "tasks", "--faults", "wakes.toml")
+    assert code == 2 and lines == ["airflock: fault node: on the real clock a node that died stays dead; leave out end"]
 
 
 def test_a_fleet_on_the_real_clock_tells_what_it_cost(airflock):

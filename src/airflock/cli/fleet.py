@@ -82,7 +82,7 @@ def fleet(
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 300 --mode processes --card fleet.json,
     and beside it airflock watch fleet.json
     """
-    from airflock.fleet import compare, flying, individuals, realtime
+    from airflock.fleet import compare, flying, realtime
     from airflock.fleet.faults import read_faults
     from airflock.fleet.starting import READY_TIME
     from airflock.scenarios.files import load
@@ -97,9 +97,8 @@ def fleet(
         broken = read_faults(faults, tuple(range(1, loaded.agents + 1))) if faults else ()
     options.refuse(wrong + _option_faults(vehicle, body, mode, card_file, against))
     tables.say_notes(loaded.notes)
-    options.refuse(individuals.refused(loaded))
     live = mode != flying.LOCKSTEP
-    options.refuse(realtime.refused(loaded, broken) if live else [])
+    options.refuse(realtime.refused(broken) if live else [])
     if card_file is not None and loaded.varied and seeds > 1:
         options.refuse([f"--card {card_file}: with tolerances each seed has its own card; add --seeds 1"])
     how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "ground": ground, "join": join, "card_file": card_file}

@@ -146,6 +146,9 @@ def fault(namespace: Any, name: str = "") -> Fault:
     if taken:
         raise RuleError(f"fault {name}: Parameters.{taken[0]}: the name has a meaning of its own in [[faults]]")
     made = Fault(name, record, doc=str(found.get("__doc__") or ""), **rules)
+    kept = [key for key in number_names(record) if key == "onset" or key.startswith(("at_", *(f"{a}_" for a in ASKED)))]
+    if kept:
+        raise RuleError(f"fault {name}: Parameters.{kept[0]}: a flight keeps something else of that name; give another")
     if choices(record()):
         raise RuleError(f"fault {name}: Parameters holds a choice; make a kind of its own for each")
     return made

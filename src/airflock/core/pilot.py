@@ -102,6 +102,12 @@ class Pilot:
         """Number of an agent's group; -1 where it is in none."""
         return float(self.groups[who]) if 0 <= who < len(self.groups) else -1.0
 
+    def set_clock(self, ahead: float) -> None:
+        """The own clock has been set forward by so much, s: by it, all that was heard is older."""
+        self.stands_until -= ahead
+        for packet in self.packets.values():
+            packet.sent_at -= ahead
+
     def forget(self, who: int) -> None:
         """Drop what is known of a neighbour: it has told that it is on the ground, or has left the flock."""
         self.packets.pop(who, None)

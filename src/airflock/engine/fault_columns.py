@@ -31,6 +31,16 @@ def strike(state: "State", onset: Onset) -> None:
     _write(state, kind, slot, values)
 
 
+def still_has(state: "State", leaving: Onset) -> bool:
+    """Whether an agent still has the fault by which it is to leave: who has joined again since has none."""
+    slot = leaving.agent if state.slots is None else int(state.slots[leaving.agent])
+    work, rows = state.arrays["work"], state.driver.ROWS
+    onset, lasts = (rows.get(fault_row(leaving.kind, name)) for name in ("onset", "lasts"))
+    if onset is None or lasts is None:
+        return True  # of a kind that does nothing else it keeps nothing
+    return bool(work[lasts, slot] > 0.0 and work[onset, slot] == _began(state, leaving._replace(step=leaving.begin)))
+
+
 def renew(state: "State", due: Sequence[Onset]) -> None:
     """Go on with these faults: what has begun has their numbers and their end, and ends where it is none of them."""
     slots = range(state.agents) if state.slots is None else state.slots.tolist()

@@ -11,6 +11,7 @@ from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import BEGUN
+from airflock.engine.stages.state import fault_row
 from airflock.engine.state import State
 
 
@@ -100,16 +101,24 @@ def _under_way(old: State, new: State, step: int, lanes: NDArray[np.int64]) -> N
     """The ring of past states for the delay of the new plan, (slot, component, lane).
 
     Decision k hears slot k modulo the ring, the states of step k * decide_every - delay. With a shorter delay newer
-    states replace what was under way in time; with a longer one the last packet is heard again meanwhile.
+    states replace what was under way in time; with a longer one the last packet is heard again meanwhile. Beside states
+    lie the faults by which they were sent; where none are kept yet, those of now stand in.
     """
     past, every = old.arrays["past"][..., lanes], old.whole("decide_every")
     made = np.empty_like(new.arrays["past"])
+    motion, work = len(new.plan.motion), new.arrays["work"]
+    for c, kind, what in new.plan.sent_faults:
+        made[:, c] = work[new.driver.ROWS[fault_row(kind, what)]]
+    had = {(kind, what): c for c, kind, what in old.plan.sent_faults}
+    same = {c: had[kind, what] for c, kind, what in new.plan.sent_faults if (kind, what) in had}
     if not old.plan.late or every != new.whole("decide_every"):
-        made[:] = new.arrays["work"][[new.driver.ROWS[name] for name in new.plan.motion]]
+        made[:, :motion] = work[[new.driver.ROWS[name] for name in new.plan.motion]]
         return made
     coming, newest = -(-step // every), (step - 1 + old.whole("delay")) // every
     for k in range(coming, coming + len(made)):
-        made[k % len(made)] = past[max(0, min(k, newest)) % len(past)]
+        slot = past[max(0, min(k, newest)) % len(past)]
+        made[k % len(made), :motion] = slot[:motion]
+        made[k % len(made), list(same)] = slot[list(same.values())]
     return made
 
 

@@ -48,7 +48,7 @@ def layout_of(
     kept: tuple[Any, ...],
 ) -> Layout:
     """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
-    m, dims = lanes(agents), plan.dimensions
+    m = lanes(agents)
     label = np.int32 if plan.bits == 32 else np.int64
     pairs = (agents, m) if plan.packets else (1, 1)
     values, sums = sums_of(plan)
@@ -63,7 +63,7 @@ def layout_of(
         "held": ((HELD,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": (gusts, real),
         "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
         "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
-        "past": ((ring, 2 * dims, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),
+        "past": ((ring, plan.in_ring, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),
         "labels": ((2, m), label), "there": ((2,), np.float64),
     }  # fmt: skip
     shaped |= {name: (array.shape, array.dtype) for name, array in beginnings.items()}

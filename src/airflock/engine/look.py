@@ -107,7 +107,8 @@ def _heard(
     """Everybody in range whose packet agent i has and still believes: as the driver drew it, from the same counters."""
     k, plan, n = scenario.radio, state.plan, state.agents
     fades = plan.topology is not None and plan.topology.asks("fade")
-    clocks, reach, groups = _clocks(state), _reach(state, i), scenario.group_numbers
+    clocks, sent_clocks = _clocks(state, "clock"), _clocks(state, "sent_clock" if plan.late else "clock")
+    reach, groups = _reach(state, i), scenario.group_numbers
     late = clock(scenario)["delay"] * scenario.flight.dt
     now = number * state.whole("decide_every") * scenario.flight.dt
     for j in range(n):
@@ -133,7 +134,7 @@ def _heard(
         elif not plan.lossy or random.pair_uniform(seed, random.PACKET, world, number, i, j, n) >= radio.lost(
             distance, k
         ):
-            yield Heard(j, said[j], late + clocks[i] - clocks[j], fade, groups[j])
+            yield Heard(j, said[j], late + clocks[i] - sent_clocks[j], fade, groups[j])
 
 
 def _reach(state: State, i: int) -> list[float]:
@@ -144,9 +145,9 @@ def _reach(state: State, i: int) -> list[float]:
     return [min(found, float(into[i])) for found in out.tolist()]
 
 
-def _clocks(state: State) -> list[float]:
-    """How far the clock of each agent is ahead, s."""
-    return [float(ahead) for ahead in state.rows(["clock"])[0]] if state.plan.suffers("clock") else [0.0] * state.agents
+def _clocks(state: State, row: str) -> list[float]:
+    """How far the clock of each agent is ahead, or was when it sent what is heard now, s."""
+    return [float(ahead) for ahead in state.rows([row])[0]] if state.plan.suffers("clock") else [0.0] * state.agents
 
 
 def _beside(scenario: Scenario, own: Motion, other: Motion) -> Motion:

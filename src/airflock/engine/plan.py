@@ -121,6 +121,22 @@ class Plan(Facts):
         return self.noisy or self.delayed
 
     @property
+    def sent_faults(self) -> tuple[tuple[int, str, str], ...]:
+        """Columns of faults that lie in the ring beside the state that is sent: place, kind, and which of its numbers.
+
+        What is heard was sent a delay ago, by the faults and the clock of then, whatever has begun or ended since.
+        """
+        rules = ("clock",) if self.sees else ("sense", "tell", "clock")
+        kinds = self.suffers(*rules) if self.late else ()
+        found = [(kind.name, what) for kind in kinds for what in ("onset", "lasts", *kind.fields)]
+        return tuple((2 * self.dimensions + c, kind, what) for c, (kind, what) in enumerate(found))
+
+    @property
+    def in_ring(self) -> int:
+        """How many numbers of each agent a slot of the ring holds: its state, then columns of faults."""
+        return 2 * self.dimensions + len(self.sent_faults)
+
+    @property
     def told(self) -> bool:
         """Whether what others know of an agent is not the truth of this moment: it has rows of its own."""
         return self.late or self.sees or bool(self.suffers("sense", "tell"))

@@ -45,7 +45,8 @@ def join(state: "State", agent: int, position: list[float], velocity: list[float
     for name, (_, true) in kept_rows(state.plan).items():
         if name in rows:
             work[rows[name], before] = motion[true]
-    state.arrays["past"][:, :, before] = list(motion.values())
+    state.arrays["past"][:, :, before] = 0.0  # by no fault
+    state.arrays["past"][:, : len(motion), before] = list(motion.values())
     state.look_at_pairs()
 
 

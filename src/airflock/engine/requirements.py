@@ -44,10 +44,10 @@ def check(scenario: Scenario, plan: Plan) -> None:
 
 def bytes_of(scenario: Scenario, plan: Plan, agents: int) -> int:
     """Bytes that a flight of so many agents takes, about."""
-    times, real, width, states = clock(scenario), plan.bits // 8, lanes(agents), 2 * plan.dimensions
+    times, real, width = clock(scenario), plan.bits // 8, lanes(agents)
     kept = max(len(getattr(memory, "_fields", ())) for memory in plan.memories)
     kept += sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
-    past = times["ring"] * states if plan.late else 0
+    past = times["ring"] * plan.in_ring if plan.late else 0
     numbers = (ROWS + kept + past) * width + (agents * len(plan.of_pair) * width if plan.packets else 0)
     cells = 8 * CHUNKS * (CELLS * agents + SPARE) if plan.grid else 0
     return real * numbers + cells + _frames(scenario, plan, agents)

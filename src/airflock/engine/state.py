@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.drivers import device_of, driver_of, flying
-from airflock.engine.fault_columns import strike
+from airflock.engine.fault_columns import still_has, strike
 from airflock.engine.flight_memory import FlightMemory
 from airflock.engine.plan import Plan
 from airflock.engine.presence import leave
@@ -83,7 +83,7 @@ class State(FlightMemory):
             return  # said when the step is flown
         for onset in self.tables.due:
             if onset.step == step and onset.leaves:
-                leave(self, [onset.agent])
+                leave(self, [onset.agent] if still_has(self, onset) else [])
             elif onset.step == step:
                 strike(self, onset)
 

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from airflock.core.agent import State
-from airflock.fleet import realtime
 from airflock.fleet.faults import Fault
+from airflock.fleet.flown import Flown
 from airflock.fleet.lockstep import Fleet, start_states
 from airflock.fleet.prepare import card_document, limits_of
 from airflock.fleet.starting import READY_TIME
@@ -65,7 +65,7 @@ def first_states(scenario: Scenario, seed: int) -> list[State]:
     return start_states(np.concatenate(rows), dims)
 
 
-def recording(fleet: Fleet | realtime.Flown) -> xr.Dataset:
+def recording(fleet: Fleet | Flown) -> xr.Dataset:
     """The flight of a fleet in the simulator's layout, with what each node knew of itself."""
     scenario, dims = fleet.scenario, fleet.scenario.dimensions
     rows = fleet.array()
@@ -116,7 +116,7 @@ class Departure(NamedTuple):
 
 
 def departure(
-    fleet: Fleet | realtime.Flown, times: Sequence[float] = (2.0, 5.0, 10.0, 20.0, 30.0, 60.0), device: str = "cpu"
+    fleet: Fleet | Flown, times: Sequence[float] = (2.0, 5.0, 10.0, 20.0, 30.0, 60.0), device: str = "cpu"
 ) -> Departure:  # fmt: skip
     """How fast a fleet leaves the simulated flight of its seed, and the simulation itself after nudges.
 
@@ -187,7 +187,7 @@ def sampled(scenario: Scenario, period: float) -> Scenario:
     return replace(scenario, metrics=replace(scenario.metrics, period=period), document=document)
 
 
-def both(scenario: Scenario, fleet: Fleet | realtime.Flown) -> tuple[dict[str, Any], dict[str, Any]]:
+def both(scenario: Scenario, fleet: Fleet | Flown) -> tuple[dict[str, Any], dict[str, Any]]:
     """Order parameters of the simulated flight and of the fleet of one seed, measured alike from recordings."""
     simulated = simulate(scenario, fleet.seed, precision=64)
     return measure(simulated)[0], measure(recording(fleet))[0]

@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import ScenarioError, gathering
-from airflock.fleet import compare, individuals, realtime
+from airflock.fleet import compare, realtime
 from airflock.fleet.faults import Fault, read_faults
 from airflock.fleet.starting import write_for_watching
 from airflock.fleet.teller import WATCHED
@@ -175,8 +175,7 @@ def fleet(
         known = compare.sampled(found, found.sensors.period or found.flight.dt)
         if faults is not None:
             injected = read_faults(own_path(faults), tuple(range(1, known.agents + 1)))
-        mistakes += individuals.refused(known)
-        mistakes += realtime.refused(known, injected) if mode != LOCKSTEP else []
+        mistakes += realtime.refused(injected) if mode != LOCKSTEP else []
     if card is not None and known is not None and known.varied and len(numbers) > 1:
         mistakes.append(f"card = {card}: with tolerances each seed has its own card; give one seed")
     if mistakes or known is None:

@@ -6,18 +6,22 @@ every packet; where each vehicle is stands in memory that all share. The flight 
 vehicle, and all have hovered and heard each other for a while.
 """
 
+import math
 import time
 from collections.abc import Generator, MutableSequence, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 from airflock.core.agent import State
 from airflock.core.sensing import Sensing
+from airflock.fleet.ailing import Ailing
+from airflock.fleet.befalling import Faults
 from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault, clock_error
 from airflock.fleet.individuals import records_of
-from airflock.fleet.starting import KEY, SINCE, in_the_air, vehicle_of
+from airflock.fleet.starting import DROPS_OUT, KEY, SINCE, clear, in_the_air, vehicle_of
 from airflock.fleet.telemetry import MESSAGES
 from airflock.fleet.teller import Teller
 from airflock.onboard.card import Card
@@ -34,6 +38,7 @@ LOOK = 0.02  # s; least time between two looks of a vehicle at its ports
 HOP = 0.01  # s between two looks of the ether
 BEAT = 0.5  # s between two calls of a vehicle at a port where nobody has answered yet
 NEVER = -1e9
+ABSENT = (math.nan,) * 6  # a row of a vehicle that has dropped out
 
 
 class Ports(NamedTuple):
@@ -145,6 +150,8 @@ def node_life(plan: Plan, i: int) -> Generator[Rest, None, Life]:
     now = time.monotonic()
     utc = plan.utc(now) + clock_error(plan.faults, member)
     node = Node(card, member, KEY, now=now, utc=utc, since=utc - SINCE)
+    befalls = Faults(plan.scenario, plan.seed, only=i)
+    ailing = Ailing(node, befalls, i, card.site, lambda own: own - plan.clock[0])
     rows: list[Any] = []
     notes: list[tuple[float, int, str]] = []
     waits = plan.start is not None
@@ -152,6 +159,7 @@ def node_life(plan: Plan, i: int) -> Generator[Rest, None, Life]:
     def until() -> bool:
         nonlocal waits
         wire, now = node.wire, plan.now
+        befalls.until(now)
         if wire.state is not None and wire.armed is not None:
             plan.clock[2 + i] = 1.0
         if waits and wire.state is not None and wire.mode == card.autopilot.ours and wire.armed:
@@ -159,12 +167,12 @@ def node_life(plan: Plan, i: int) -> Generator[Rest, None, Life]:
         while now >= len(rows) * card.period:
             ages = [node.peers.all[m].at - plan.clock[0] if m != member else NEVER for m in card.members]
             rows.append(((*node.command, *(wire.state or (0.0,) * 6)), ages))
-        return plan.over or now >= dies
+        return plan.over or now >= dies or i in befalls.gone
 
     def tell(note: str) -> None:
         notes.append((time.monotonic(), member, note))
 
-    ticks = yield from live(node, [plan.ports.nodes[i], plan.ports.radios[i]], card.safety.tick, tell, until)
+    ticks = yield from live(ailing, [plan.ports.nodes[i], plan.ports.radios[i]], card.safety.tick, tell, until)
     return Life(rows, notes, ticks, node.phase, time.process_time() - began)
 
 
@@ -177,6 +185,9 @@ class Craft:
         body = records_of(scenario, len(card.members), plan.seed)[i][1]
         noise = OuterNoise(plan.seed, 1, not card.flat, first=i)
         self.vehicle = made = vehicle_of(scenario, card, i, body, noise, plan.utc(time.monotonic()))
+        self._befalls = Faults(scenario, plan.seed, only=i)
+        made.faults = self._befalls or None
+        self.notes: list[tuple[float, int, str]] = []
         self._booted = time.monotonic() - WARM
         self._sensing = Sensing(scenario.sensor, scenario.sensors, plan.seed, i, flat=card.flat)
         self._every = max(1, round(card.period / scenario.flight.dt))
@@ -231,12 +242,16 @@ class Craft:
         vehicle, plan, dt = self.vehicle, self.plan, self.plan.scenario.flight.dt
         while now >= self.steps * dt:
             at = self.steps * dt
+            self._befalls.strike(self.steps, lambda _: (vehicle.state, vehicle.followed))
+            if self._befalls.gone and not vehicle.off:
+                vehicle.off = True
+                self.notes.append((time.monotonic(), vehicle.system, DROPS_OUT))
             if self.steps == 0 and plan.start is not None:
                 vehicle.state = State(*vehicle.state[:3], *plan.start[self.place][3:])
             if self.steps % self._every == 0:
                 if plan.scenario.errs:
                     vehicle.error = self._sensing.measure(self.steps // self._every, vehicle.state, plan.card.period)
-                self.rows.append(tuple(vehicle.state))
+                self.rows.append(ABSENT if vehicle.off else tuple(vehicle.state))
             vehicle.suffer(plan.faults, at, dt)
             vehicle.step(at, dt)
             self.steps += 1
@@ -252,14 +267,19 @@ def craft_life(plan: Plan, i: int) -> Generator[Rest, None, Life]:
         craft.look()
         due = max(due + period, time.monotonic() - period)
         yield Rest(due)
-    return Life(craft.rows, [], Ticks(count, late, worst), Phase.DONE, time.process_time() - began)
+    return Life(craft.rows, craft.notes, Ticks(count, late, worst), Phase.DONE, time.process_time() - began)
 
 
 def ether_life(plan: Plan) -> Generator[Rest, None, Life]:
     """Life of the ether: packets of nodes reach those whom the radio lets them reach, orders reach all at once."""
     began, card, ports = time.process_time(), plan.card, plan.ports
     flown, period = plan.scenario, card.safety.status_period
-    ether = Ether(flown.transceiver, flown.radio, card.members, plan.seed, period, plan.faults, site=card.site)
+    befalls = Faults(flown, plan.seed)
+    reach = befalls.reach if befalls else None
+    ether = Ether(
+        flown.transceiver, flown.radio, card.members, plan.seed, period, plan.faults, reach, partial(clear, card),
+        card.site,
+    )  # fmt: skip
     station = ports.station.here
     radios = [port.here for port in ports.radios]
     who = {here: i for i, here in enumerate(radios)}
@@ -271,6 +291,7 @@ def ether_life(plan: Plan) -> Generator[Rest, None, Life]:
 
     while not plan.over:
         now, at = plan.now, plan.places
+        befalls.until(now)
         for data, sender in ports.ether.read_from():
             if sender in who:
                 ether.send(now, who[sender], data, at)
@@ -283,7 +304,7 @@ def ether_life(plan: Plan) -> Generator[Rest, None, Life]:
             ports.ether.send(data, radios[to])
             if teller is not None:
                 teller.arrived(to, data, now)
-        for data in () if teller is None else teller.report(now, plan.utc(time.monotonic())):
+        for data in () if teller is None else teller.report(now, plan.utc(time.monotonic()), befalls.holding(now)):
             watched(data)
         yield Rest(time.monotonic() + HOP)
     return Life([], [], Ticks(0, 0, 0.0), Phase.DONE, time.process_time() - began)

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from airflock.core.agent import State
 from airflock.core.sensing import Sensing
+from airflock.fleet.ailing import Ailing
+from airflock.fleet.befalling import Faults
 from airflock.fleet.dice import OuterNoise, SensorDice
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault, clock_error
-from airflock.fleet.individuals import Faults, records_of, sensors_of
-from airflock.fleet.rogue import retold
-from airflock.fleet.starting import KEY, SINCE, Station, in_the_air, lift_of, vehicle_of
+from airflock.fleet.individuals import records_of, sensors_of
+from airflock.fleet.starting import DROPS_OUT, KEY, SINCE, Station, clear, in_the_air, lift_of, vehicle_of
 from airflock.fleet.vehicle import SUFFERED
 from airflock.mavlink.coordinates import Geodetic
 from airflock.mavlink.orders import Do
@@ -65,6 +66,7 @@ class Fleet:
             Node(card, who, KEY, now=0.0, utc=STARTED + clock_error(self.faults, who), since=STARTED - SINCE)
             for who in card.members
         ]  # fmt: skip
+        self._ailing = [Ailing(node, befalls, i, card.site) for i, node in enumerate(self.nodes)]
         self._suffering = [
             (vehicle, own)
             for vehicle in self.vehicles
@@ -72,7 +74,7 @@ class Fleet:
         ]
         reach = befalls.reach if befalls else None
         radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
-        self.ether = Ether(*radio, card.members, seed, period, faults, reach, self._clear, card.site)
+        self.ether = Ether(*radio, card.members, seed, period, faults, reach, partial(clear, card), card.site)
         words = SensorDice(seed, len(card.members))
         self._sensing = [
             Sensing(scenario.sensor, own, seed, i, flat=card.flat, words=partial(words, drone=i))
@@ -97,7 +99,7 @@ class Fleet:
             for k in range(round(delay / period), 0, -1):
                 early.autopilot(vehicle.pack_state(), -k * period)
                 for datagram in early.say_status(-k * period):
-                    self.ether.send(-k * period, who, self._told(who, -k * period, datagram))
+                    self.ether.send(-k * period, who, self._ailing[who].told(datagram, -k * period))
 
     # ------------------------------------------------------------------------------------------------------ flight
 
@@ -128,7 +130,7 @@ class Fleet:
     def _step(self) -> None:
         now = self.now
         if self._befalls:
-            self._befalls.strike(self.steps, [v.state for v in self.vehicles], [v.target for v in self.vehicles])
+            self._befalls.strike(self.steps, lambda i: (self.vehicles[i].state, self.vehicles[i].followed))
             self._drop_out(now)
         if self.steps % self._tick == 0:
             self._exchange(now)
@@ -156,35 +158,24 @@ class Fleet:
         for i, (node, vehicle) in enumerate(zip(self.nodes, self.vehicles, strict=True)):
             if dead[i]:
                 continue
-            out = node.tick(now)
+            out = self._ailing[i].tick(now)
             self.log += [(now, node.member, note) for note in out.notes]
             for data in out.autopilot:
                 node.autopilot(vehicle.receive(data, now), now)
             for datagram in out.radios[0]:
-                self.ether.send(now, i, self._told(i, now, datagram), at)
+                self.ether.send(now, i, datagram, at)
 
     def _drop_out(self, now: float) -> None:
         """Let the drones come down that faults have just taken out of the flight."""
         for i in sorted(self._befalls.gone):
             if not self.vehicles[i].off:
                 self.vehicles[i].off = True
-                self.log.append((now, self.nodes[i].member, "drops out by a fault: node and motors are off"))
+                self.log.append((now, self.nodes[i].member, DROPS_OUT))
 
     @property
     def gone(self) -> set[int]:
         """Places of the drones that have dropped out by a fault of the scenario."""
         return self._befalls.gone
-
-    def _told(self, who: int, now: float, datagram: bytes) -> bytes:
-        """What a drone sends in place of a packet, by its faults."""
-        if not self._befalls.lies:
-            return datagram
-        return retold(datagram, self.card.site, partial(self._befalls.told, who, now))
-
-    def _clear(self, here: tuple[float, float, float], there: tuple[float, float, float]) -> bool:
-        """Whether nothing stands between two places of vehicles, m."""
-        a, b = (self.card.law_state(State(*place, 0.0, 0.0, 0.0)) for place in (here, there))
-        return not self.card.place.blocked(*a[:3], *b[:3])
 
     def _is_dead(self, who: int, now: float) -> bool:
         """Whether a fault keeps a node from hearing and saying anything."""

@@ -50,8 +50,8 @@ def card_document(
     low, high = arena.heights_of(scenario.world) if scenario.dimensions == 3 else (0.0, 0.0)
     height = max(HEIGHT, limits.base - low) if height is None else height
     top = limits.base + limits.layer * (len(members) - 1)
-    stands, period = scenario.stands(), scenario.sensors.period or scenario.flight.dt
-    held = not scenario.transceiver.keeps and as_simulated
+    stands = scenario.stands()
+    held = not scenario.transceiver.keeps
     silent = not as_simulated or scenario.silence.rule == "stop" if silent is None else silent
     silence = complete(scenario.silence, _speed(scenario), scenario.radio.delay, "stop" if silent else "fly_on")
     return {
@@ -72,7 +72,8 @@ def card_document(
         "radio": {
             "delay": scenario.radio.delay,
             "extrapolate": not as_simulated or scenario.transceiver.carry is forward,
-            "forget": scenario.radio.delay + 0.5 * period if held else 5.0,
+            "forget": 5.0,
+            **({"once": held, "any_stamp": True} if as_simulated else {}),
         },
         "silence": plain(silence),
         **({"topology": plain(scenario.topology)} if scenario.meets is not None else {}),
@@ -83,7 +84,7 @@ def card_document(
             "high": max(height + high, top) + SPARE,
         },
         "height": height,
-        "period": period,
+        "period": scenario.sensors.period or scenario.flight.dt,
         "seed": 0,
     }
 

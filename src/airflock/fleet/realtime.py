@@ -5,7 +5,6 @@ is no time-out: a process that ends before is named in one line, and ends the fl
 """
 
 import asyncio
-import hashlib
 import math
 import multiprocessing
 import os
@@ -14,20 +13,17 @@ import time
 from collections.abc import Callable, Coroutine, Generator, Sequence
 from functools import partial
 from multiprocessing.connection import wait
-from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from airflock.core.agent import State
 from airflock.errors import LinkError, ScenarioError
 from airflock.fleet.faults import Fault
-from airflock.fleet.live import NEVER, WARM, Life, Plan, Ports, craft_life, ether_life, node_life
-from airflock.fleet.starting import READY_TIME, Station, lift_of
+from airflock.fleet.flown import Flown, Load
+from airflock.fleet.live import WARM, Life, Plan, Ports, craft_life, ether_life, node_life
+from airflock.fleet.starting import READY_TIME, Station
 from airflock.mavlink import dialect
 from airflock.mavlink.orders import Do
 from airflock.onboard.card import Card
-from airflock.onboard.mission import Phase
 from airflock.onboard.resting import Rest, alone, take
 from airflock.scenarios.scenario import Scenario
 
@@ -44,86 +40,10 @@ Watching = Callable[[Callable[[], None]], Coroutine[Any, Any, None]]
 OURSELVES = 0  # place of the ether among the lives
 
 
-class Load(NamedTuple):
-    """What a fleet on the real clock cost, and how late it was.
-
-    cores : processor time of all per second; nodes, vehicles: of these (with the ether), where they are processes
-    ticks, late, worst : of all nodes: how many, how many late by more than half a period, by how much at most (s)
-    others : load of this computer (processes that want a processor, one minute) when the flight ended
-    """
-
-    cores: float
-    nodes: float | None
-    vehicles: float | None
-    ticks: int
-    late: int
-    worst: float
-    others: float
-
-
-class Flown:
-    """A fleet that has flown on the real clock; recorded like one in lock-step."""
-
-    def __init__(self, plan: Plan, lives: Sequence[Life], load: Load):
-        self.scenario, self.card, self.seed, self.faults, self.load = (
-            plan.scenario,
-            plan.card,
-            plan.seed,
-            plan.faults,
-            load,
-        )
-        count = len(plan.card.members)
-        self._nodes, self._crafts = lives[1 : 1 + count], lives[1 + count :]
-        self.log = sorted((t - plan.clock[0], who, note) for life in self._nodes for t, who, note in life.notes)
-
-    @property
-    def lift(self) -> float:
-        """Height (m) above the site at which the law counts zero."""
-        return lift_of(self.card)
-
-    def _frames(self) -> int:
-        return min(len(life.rows) for life in self._crafts)
-
-    def array(self) -> NDArray[np.float64]:
-        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them."""
-        frames = [
-            [(*craft.rows[k], *_at(node.rows, k, 0, (0.0,) * 9)) for craft, node in self._pairs()]
-            for k in range(self._frames())
-        ]
-        return np.array(frames, float)
-
-    def ages(self) -> NDArray[np.float64]:
-        """(time, receiver, sender): s since the state that a node has of another one held; nan: it has none."""
-        never = [NEVER] * len(self.card.members)
-        stamps = np.array([[_at(n.rows, k, 1, never) for _, n in self._pairs()] for k in range(self._frames())])
-        times = self.card.period * np.arange(len(stamps))
-        return np.where(stamps > 0.1 * NEVER, times[:, None, None] - stamps, np.nan)
-
-    def _pairs(self) -> Any:
-        return zip(self._crafts, self._nodes, strict=True)
-
-    def digest(self) -> str:
-        """SHA-256 of all that was flown."""
-        return hashlib.sha256(self.array().tobytes()).hexdigest()
-
-    def phases(self) -> list[Phase]:
-        """Phase in which every node ended."""
-        return [life.phase for life in self._nodes]
-
-
-def _at(rows: Sequence[Any], k: int, part: int, none: Any) -> Any:
-    """What a node said at period k; where it has died, what it said last."""
-    return rows[min(k, len(rows) - 1)][part] if rows else none
-
-
-def refused(scenario: Scenario, faults: Sequence[Fault]) -> list[str]:
+def refused(faults: Sequence[Fault]) -> list[str]:
     """What flies in lock-step only, one line each."""
-    refused = [
-        f"faults.kind = {kind.name!r}: faults of a scenario fly with --mode lockstep; give --faults FILE instead"
-        for kind in scenario.fault_kinds
-    ]
     gone = [f for f in faults if f.kind == "node" and f.end < 1e9]
-    return refused + ["fault node: on the real clock a node that died stays dead; leave out end"] * bool(gone)
+    return ["fault node: on the real clock a node that died stays dead; leave out end"] * bool(gone)
 
 
 def fly(
@@ -140,7 +60,7 @@ def fly(
 
     Raises ScenarioError for what flies in lock-step only, LinkError where a process ends before its time.
     """
-    wrong = refused(scenario, faults)
+    wrong = refused(faults)
     if wrong:
         raise ScenarioError(wrong)
     ports = Ports.opened(len(card.members), join)

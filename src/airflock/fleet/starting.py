@@ -21,6 +21,7 @@ from airflock.scenarios.scenario import Scenario
 
 KEY = hashlib.sha256(b"a fleet in software has no secret").digest()
 READY_TIME = 12.0  # s on the ground before a start is ordered
+DROPS_OUT = "drops out by a fault: node and motors are off"
 SINCE = 60_000_000  # µs; packets sent so long before a node began are accepted, for its clock may be wrong
 
 
@@ -56,6 +57,12 @@ def write_for_watching(path: Path, card: Card) -> None:
 def lift_of(card: Card) -> float:
     """Height (m) above the site at which the law counts zero."""
     return -card.law_state(State(*(0.0,) * 6)).z
+
+
+def clear(card: Card, here: tuple[float, float, float], there: tuple[float, float, float]) -> bool:
+    """Whether nothing stands between two places of vehicles, m."""
+    a, b = (card.law_state(State(*place, 0.0, 0.0, 0.0)) for place in (here, there))
+    return not card.place.blocked(*a[:3], *b[:3])
 
 
 def in_the_air(vehicle: Vehicle, card: Card, start: State) -> None:

@@ -1,7 +1,8 @@
 """Teller: what the ether tells who watches a fleet in software: whose packets arrive where, and which faults hold."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
+from airflock.faults.registry import KINDS as OURS
 from airflock.fleet.faults import KINDS, Fault
 from airflock.fleet.starting import KEY
 from airflock.mavlink import witness
@@ -11,7 +12,8 @@ WATCHED = ("127.0.0.1", 14600)  # where who watches hears a fleet in software
 PERIOD = 0.5  # s between two reports
 LATELY = 1.0  # s; a neighbour whose last packet arrived longer ago is not heard
 NEVER = -1e9
-NUMBERS = {kind: number for number, kind in enumerate(KINDS, start=witness.HEARS + 1)}
+OF_SCENARIO = {kind: f"{kind} of the scenario" if kind in KINDS else kind for kind in OURS}  # by kind how it is told
+NUMBERS = {kind: number for number, kind in enumerate((*KINDS, *OF_SCENARIO.values()), start=witness.HEARS + 1)}
 
 
 class Teller:
@@ -31,8 +33,13 @@ class Teller:
         if sender in self._at:
             self._at[self._members[to]][sender] = now
 
-    def report(self, now: float, utc: int) -> list[bytes]:
-        """Signed datagrams for who watches, where they are due; now: time of the flight, s; utc: µs of Unix time."""
+    def report(self, now: float, utc: int, befallen: Mapping[str, Collection[int]] | None = None) -> list[bytes]:
+        """Signed datagrams for who watches, where they are due.
+
+        now      : time of the flight, s; utc: µs of Unix time
+        befallen : kinds of fault of the scenario that hold, each with the places of whom they have befallen; a user's
+                   own has no number, and is not told
+        """
         if now < self._due:
             return []
         self._due = now + PERIOD
@@ -44,5 +51,8 @@ class Teller:
         for fault in self._faults:
             if fault.begin <= now < fault.end:
                 holding.setdefault(fault.kind, set()).update(fault.who or self._members)
+        for kind, places in (befallen or {}).items():
+            if kind in OF_SCENARIO:
+                holding[OF_SCENARIO[kind]] = {self._members[place] for place in places}
         told += [witness.message(NUMBERS[kind], 0, who) for kind, who in holding.items()]
         return [self._sign(each, utc) for each in told]

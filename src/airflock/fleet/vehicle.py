@@ -19,9 +19,9 @@ from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.errors import RuleError
 from airflock.fleet import telemetry
+from airflock.fleet.befalling import Faults
 from airflock.fleet.faults import Fault
 from airflock.fleet.holding import Holding
-from airflock.fleet.individuals import Faults
 from airflock.fleet.modes import HOLD, LAND, MODES, ON_LOSS, ON_SILENCE, OURS, PARAMETERS, PILOT, RTL, TAKEOFF
 from airflock.mavlink import dialect
 from airflock.mavlink.autopilots import AUTOPILOTS, px4_mode
@@ -62,6 +62,8 @@ class Vehicle:
         ours = ("MAV_SYS_ID",) if kind == "px4" else ("SYSID_THISMAV", "SYSID_MYGCS")
         self.parameters = PARAMETERS[kind] | dict.fromkeys(ours, system)
         self.target: Vector = (0.0, 0.0, 0.0)
+        self.followed = self._obeyed = STILL  # what reached its motors last, and what faults make of the command, m/s
+        self._asked: tuple[float, Vector] | None = None  # the command of which they were asked, and when it came, s
         self.target_at, self.first_at, self.climb_to = -1e9, -1e9, 0.0
         self.booted = 0.0  # s
         self.beat_at: float | None = None  # when the last heartbeat of its station came; None: none ever
@@ -304,8 +306,12 @@ class Vehicle:
         (x, y, z, vx, vy, vz), c = self.state, self.wish()
         falls = self.off or not self.motor
         command = (vx, vy, vz - 5.0) if falls else c
-        if self.faults is not None:
-            command = self.faults.overruled(self.place, now, command)
+        if self.faults is not None and not falls:
+            asked = self.target_at, c
+            if asked != self._asked:  # as in a simulation: once for each command
+                self._asked, self._obeyed = asked, self.faults.overruled(self.place, now, c)
+            command = self._obeyed
+        self.followed = command
         eu, ev, ew = self.error[3:]
         measured = vx + eu, vy + ev, vz + ew
         known = (vx, vy, vz, *measured, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)

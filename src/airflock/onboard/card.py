@@ -16,6 +16,7 @@ from airflock import atomic
 from airflock.core.agent import State
 from airflock.core.contract import Model
 from airflock.core.hearing import Hearing
+from airflock.core.maths import FAR
 from airflock.core.pilot import Pilot
 from airflock.core.silence import Parameters as Silence
 from airflock.errors import CardError, gathering
@@ -39,6 +40,7 @@ KEYS = (
     "world", "shapes", "radio", "silence", "safety", "fence", "height", "period", "seed", "hash",
 )  # fmt: skip
 OPTIONAL = ("topology", "groups")  # left out where a drone meets all whom it hears, where no law asks for groups
+HEARS = ("once", "any_stamp")  # of `radio`; left out on real drones: how a simulated agent hears (`core.hearing`)
 NUMBERS = {
     "mission": (1, 2**32 - 1), "expires": (1, 2**40), "height": (1.0, 1e4), "period": (0.01, 60.0), "seed": (0, 2**63),
 }  # fmt: skip
@@ -172,9 +174,12 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         faults,
     )
     fence = numbers_in(d["fence"], "fence", {"low": (0.0, 1e4), "high": (1.0, 1e4)}, faults, more=("corners",))
-    radio = numbers_in(
-        d["radio"], "radio", {"delay": (0.0, 30.0), "forget": (0.0, 600.0)}, faults, more=("extrapolate",)
-    )
+    heard = d["radio"]
+    odd = {key: heard[key] for key in HEARS if key in heard} if isinstance(heard, dict) else {}
+    faults += [f"radio.{key} = {value!r}: give true or false" for key, value in odd.items() if type(value) is not bool]
+    heard = {key: value for key, value in heard.items() if key not in odd} if isinstance(heard, dict) else heard
+    spans = {"delay": (0.0, 30.0), "forget": (0.0, 600.0)}
+    radio = numbers_in(heard, "radio", spans, faults, more=("extrapolate",))
     one = numbers_in({key: d[key] for key in NUMBERS}, "", NUMBERS, faults)
     members, groups, rows = d["members"], d.get("groups", []), d["shapes"]
     corners: Any = d["fence"].get("corners") if isinstance(d["fence"], dict) else None
@@ -204,11 +209,17 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         site=Site(site["latitude"], site["longitude"], site["altitude"]), members=tuple(members), operator=operator,
         autopilot=AUTOPILOTS[d["autopilot"]], model=law, parameters=parameters, body=body, body_parameters=numbers,
         own=own, groups=tuple(groups),
-        place=place, hearing=Hearing(bool(d["radio"]["extrapolate"]), radio["forget"]), delay=radio["delay"],
+        place=place, hearing=_hearing(bool(heard["extrapolate"]), radio["forget"], **odd), delay=radio["delay"],
         silence=silence, topology=topology, safety=safety, fence=Fence(corners),
         low=fence["low"], high=fence["high"], height=one["height"], flat=world.dimensions == "2",
         period=one["period"], seed=int(one["seed"]), hash=str(d["hash"]), document=d,
     )  # fmt: skip
+
+
+def _hearing(extrapolate: bool, forget: float, once: bool = False, any_stamp: bool = False) -> Hearing:
+    """What is done with neighbours' data; any_stamp: they count whatever time they say that they are of."""
+    stamps = {"early": FAR, "in_order": False} if any_stamp else {}
+    return Hearing(extrapolate, forget, once, **stamps)  # type: ignore[arg-type]
 
 
 def _member_faults(members: Any) -> list[str]:

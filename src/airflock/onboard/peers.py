@@ -80,6 +80,11 @@ class Peers:
                 return "jump"
         return ""
 
+    def set_clock(self, ahead: float) -> None:
+        """The own clock has been set forward by so much, s: by it, all states held earlier."""
+        for peer in self.all.values():
+            peer.at -= ahead
+
     def heard(self, now: float) -> int:
         """How many members are heard now."""
         return sum([now - peer.heard_at <= FRESH for peer in self.all.values()])

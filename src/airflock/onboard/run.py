@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple, NoReturn, TextIO
+from typing import NamedTuple, NoReturn, Protocol, TextIO
 
 from airflock import atomic
 from airflock.errors import AirflockError, CardError, LinkError, gathering
@@ -16,7 +16,7 @@ from airflock.mavlink.frames import Stream
 from airflock.mavlink.keys import read_key
 from airflock.onboard.card import Card, read_card
 from airflock.onboard.log import Logged, memory_text, read_memory
-from airflock.onboard.node import Node
+from airflock.onboard.node import Node, Out
 from airflock.onboard.ports import Port, Serial, open_port
 from airflock.onboard.resting import Hand, Rest, alone, take
 
@@ -172,6 +172,19 @@ def fly(
     tell(f"{ticks.total} ticks, {ticks.late} of them late by more than half a period, at most {ticks.worst:.3f} s")
 
 
+class Ticking(Protocol):
+    """A node, or what is used like one."""
+
+    def autopilot(self, data: bytes, now: float, /) -> None:
+        """Take bytes that came from the autopilot."""
+
+    def radio(self, datagram: bytes, now: float, /) -> None:
+        """Take a datagram that came by radio."""
+
+    def tick(self, now: float, /) -> Out:
+        """Let the node decide."""
+
+
 class Ticks(NamedTuple):
     """Ticks of a node on the real clock: how many, how many were late by more than half a period, the worst (s)."""
 
@@ -181,7 +194,7 @@ class Ticks(NamedTuple):
 
 
 def live(
-    node: Node | Logged, ports: Sequence[Port], period: float, tell: Callable[[str], None],
+    node: Ticking, ports: Sequence[Port], period: float, tell: Callable[[str], None],
     until: Callable[[], bool], save: Callable[[], None] = lambda: None,
 ) -> Generator[Rest, None, Ticks]:  # fmt: skip
     """Tick a node every `period` s on the real clock until `until` says so, and pass bytes.

@@ -38,7 +38,7 @@ def onsets(scenario: Scenario, seed: int, world: int = 0) -> tuple[Onset, ...]:
     found: list[Onset] = []
     for number, entry in enumerate(scenario.faults):
         found += _of_entry(scenario, entry, number, seed, world)
-    return tuple(sorted(found, key=lambda onset: onset.step))
+    return _in_order(found)
 
 
 def going_on(
@@ -55,7 +55,21 @@ def going_on(
     begun = [named.get(_which(o), o) for o in before if o.begin < now and (_which(o) in named or o.entry in lasting)]
     kept = {_which(onset)[:3] for onset in begun}
     gone = [o for o in after if o.begin < now <= o.step and _which(o)[:3] in kept and o not in begun]
-    return tuple(sorted([*begun, *gone, *(o for o in after if o.begin >= now)], key=lambda onset: onset.step))
+    return _in_order([*begun, *gone, *(o for o in after if o.begin >= now)])
+
+
+def _in_order(found: Sequence[Onset]) -> tuple[Onset, ...]:
+    """These in the order of their steps. Nobody leaves by a fault that another of its kind has replaced before."""
+    kept: list[Onset] = []
+    last: dict[tuple[str, int], Onset] = {}
+    for onset in sorted(found, key=lambda onset: onset.step):
+        other = last.get((onset.kind, onset.agent), onset)
+        if not onset.leaves:
+            last[onset.kind, onset.agent] = onset
+        elif other.step < onset.step and (other.step, other.entry) > (onset.begin, onset.entry):
+            continue
+        kept.append(onset)
+    return tuple(kept)
 
 
 def _which(onset: Onset) -> tuple[str, int, int, bool]:

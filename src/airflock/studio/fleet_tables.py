@@ -2,8 +2,10 @@
 
 import html
 
+from airflock.faults.registry import KINDS as OURS
 from airflock.fleet.faults import KINDS
 from airflock.fleet.observer import Observer
+from airflock.fleet.teller import OF_SCENARIO
 from airflock.onboard.peers import FRESH, Peer
 from airflock.studio.room import note
 
@@ -72,9 +74,14 @@ def about(observer: Observer, member: int, now: float) -> str:
 
 def faults_of(observer: Observer) -> str:
     """Faults that hold, with what they do."""
-    said = KINDS | SOME
+    said = KINDS | SOME | {told: _first(OURS[kind].doc) for kind, told in OF_SCENARIO.items()}
     lines = [f"<b>{kind}</b>, {observer.named(who)}: {said[kind]}" for kind, who in observer.faults.items()]
     return note("<br>".join(lines)) if lines else ""
+
+
+def _first(doc: str) -> str:
+    """What a kind of fault does, by the first sentence of its own words."""
+    return doc.partition(": ")[2].partition(".")[0]
 
 
 def notes_of(observer: Observer) -> str:

@@ -161,7 +161,8 @@ class CudaBuilder(Builder):
         more = ["group"] * plan.grouped + ["order"] * plan.absence
         first = 1 + max(c for table, c in found.values() if table == "truth")
         found |= {name: ("truth", first + c) for c, name in enumerate(more)}
-        tuned = ["reach_out", "reach_in"] * bool(plan.suffers("radio")) + ["clock"] * bool(plan.suffers("clock"))
+        clocks = ["clock", *["sent_clock"] * plan.late]
+        tuned = ["reach_out", "reach_in"] * bool(plan.suffers("radio")) + clocks * bool(plan.suffers("clock"))
         return found | {name: ("tuned", c) for c, name in enumerate(tuned)}
 
     def kind(self, letter: str, fields: tuple[str, ...]) -> str:

@@ -27,7 +27,7 @@ class Plain(NamedTuple):
 
 PLAIN = {
     "perceive": Plain(perceive.perceive, "k, slot, m, row, whole, work, ring, words", "k", draws=True),
-    "tune": Plain(faults.tune, "k_, m, row, work"),
+    "tune": Plain(faults.tune, "k_, m, row, whole, work"),
     "boundaries": Plain(surfaces.boundaries, "n, row, whole, work, faces, edges, spans, scene", own=True),
     "stop": Plain(silence.stop, "n, time, row, work, store", own=True),
     "overrule": Plain(faults.overrule, "n, time, row, work", own=True),

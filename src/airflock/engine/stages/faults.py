@@ -50,7 +50,11 @@ def about(i: int, kind: Fault, time: Any, flock: Flock, *, plan: Plan) -> Any:
     return {
         "since": most(time - flock.fault(kind.name, "onset")[i], ZERO),
         "f": kind.record(*[flock.fault(kind.name, name)[i] for name in kind.fields]),
-        **{name: flock.fault(kind.name, name)[i] if name[-1] in plan.axes else ZERO for name in kind.onset},
+        **{
+            name: flock.fault(kind.name, name)[i] if name[-1] in plan.axes else ZERO
+            for name in kind.onset
+            if not flock.then
+        },
     }
 
 
@@ -84,8 +88,8 @@ def mislead(
             velocity[a][i] = choose(on, t[a + 3], velocity[a][i])
 
 
-def tune(lanes: Iterable[int], decision: int, flock: Flock, numbers: Any, *, plan: Plan) -> None:
-    """Find how far each agent is heard and hears at a decision, and how far its clock is ahead."""
+def tune(lanes: Iterable[int], decision: int, flock: Flock, numbers: Any, whole: Any, *, plan: Plan) -> None:
+    """Find how far each agent is heard and hears at a decision, and how far its clock is ahead, or was as it sent."""
     time = real(decision) * numbers.c.period
     if plan.suffers("radio"):
         reach = least(numbers.k.range, LIMIT)
@@ -100,13 +104,21 @@ def tune(lanes: Iterable[int], decision: int, flock: Flock, numbers: Any, *, pla
             flock.reach_out[i] = choose(out < ZERO, -ONE, out * out)
             flock.reach_in[i] = choose(into < ZERO, -ONE, into * into)
     if plan.suffers("clock"):
-        for i in lanes:
-            ahead = ZERO
-            for kind in plan.suffers("clock"):
-                on = lasts(i, kind, time, flock, numbers)
-                t = ask(kind.clock, **about(i, kind, time, flock, plan=plan))
-                ahead = ahead + choose(on, t, ZERO)
-            flock.clock[i] = ahead
+        set_clocks(lanes, flock.clock, time, flock, numbers, plan=plan)
+        if plan.late:
+            then = time - real(whole.delay) * numbers.c.dt
+            set_clocks(lanes, flock.sent_clock, then, flock.as_sent, numbers, plan=plan)
+
+
+def set_clocks(lanes: Iterable[int], clock: Any, time: Any, flock: Flock, numbers: Any, *, plan: Plan) -> None:
+    """Fill a row with how far the clocks of agents are ahead at a time (s), by their faults."""
+    for i in lanes:
+        ahead = ZERO
+        for kind in plan.suffers("clock"):
+            on = lasts(i, kind, time, flock, numbers)
+            t = ask(kind.clock, **about(i, kind, time, flock, plan=plan))
+            ahead = ahead + choose(on, t, ZERO)
+        clock[i] = ahead
 
 
 def overrule(agents: Iterable[int], flock: Flock, numbers: Any, time: float, *, plan: Plan) -> None:

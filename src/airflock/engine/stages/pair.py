@@ -15,6 +15,7 @@ from airflock.engine.stages.receive import (
     hear,
     newest,
     on_record,
+    sending_clock,
     unheard,
     word_of,
 )  # fmt: skip
@@ -49,7 +50,7 @@ BOTH, HEAR, ADD = "both", "hear", "add"
 
 def heard_age(me: Hearer, j: int, at: Decision, flock: Flock, *, plan: Plan) -> Any:
     """How old the data of agent j are on arrival, as the clocks of both tell, s."""
-    return at.late + flock.clock[me.i] - flock.clock[j] if plan.suffers("clock") else at.late
+    return at.late + flock.clock[me.i] - sending_clock(j, flock, plan=plan) if plan.suffers("clock") else at.late
 
 
 def group_of(j: int, others: Others, *, plan: Plan) -> Any:

@@ -1,4 +1,4 @@
-"""Perceive: own state as measured, the others' as heard; the ring of past states behind the delay.
+"""Perceive: own state as measured, the others' as heard; the ring of past states, and faults, behind the delay.
 
 Of a sensor whose errors are added along each axis, those of what is measured and of what is sent are drawn apart. Any
 other measures once: what an agent sends is its state with the errors of its last measurement.
@@ -19,7 +19,7 @@ SENSOR = random.SENSOR
 
 
 def snapshot(flock: Flock, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
-    """Put the state that is sent into the slot of the ring from which it will be heard."""
+    """Put the state that is sent, and the faults by which, into the slot of the ring from which it will be heard."""
     for i in range(m):
         for a in range(plan.dimensions):
             ring[slot, a, i] = (
@@ -29,6 +29,9 @@ def snapshot(flock: Flock, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
             ring[slot, a + plan.dimensions, i] = (
                 flock.velocity[a][i] + flock.own_drift[a][i] if plan.senses and not plan.sees else flock.velocity[a][i]
             )
+    for c, name, what in plan.sent_faults:
+        for i in range(m):
+            ring[slot, c, i] = flock.fault(name, what)[i]
 
 
 def chance(flock: Flock, whole: Any, decision: int, m: int, *, plan: Plan, drawn: Draw) -> None:
@@ -107,12 +110,16 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
             for i in range(m):
                 flock.heard_position[a][i] = flock.position[a][i]
                 flock.heard_velocity[a][i] = flock.velocity[a][i]
+    for c, name, what in plan.sent_faults:
+        for i in range(m):
+            flock.as_sent.fault(name, what)[i] = ring[slot, c, i]
     now = real(decision) * numbers.c.period
     then = now - real(whole.delay) * numbers.c.dt
     x, v, hx, hv = flock.measured_position, flock.measured_velocity, flock.heard_position, flock.heard_velocity
+    as_sent = flock.as_sent if plan.late else flock
     for kind in plan.suffers("sense"):
         faults.mislead(range(m), kind, "believed", decision, now, x, v, flock, numbers, plan=plan)
         if not plan.sees:
-            faults.mislead(range(m), kind, "sent", decision, then, hx, hv, flock, numbers, plan=plan)
+            faults.mislead(range(m), kind, "sent", decision, then, hx, hv, as_sent, numbers, plan=plan)
     for kind in plan.suffers("tell") if not plan.sees else ():
-        faults.mislead(range(m), kind, "told", decision, then, hx, hv, flock, numbers, plan=plan)
+        faults.mislead(range(m), kind, "told", decision, then, hx, hv, as_sent, numbers, plan=plan)

@@ -67,9 +67,14 @@ def by_clock(time: Any, i: int, flock: Flock, *, plan: Plan) -> Any:
     return time + flock.clock[i] if plan.suffers("clock") else time
 
 
+def sending_clock(j: int, flock: Flock, *, plan: Plan) -> Any:
+    """How far the clock of agent j was ahead when it sent what comes in now, s."""
+    return flock.sent_clock[j] if plan.late else flock.clock[j]
+
+
 def sent_at(j: int, at: Decision, flock: Flock, *, plan: Plan) -> Any:
     """When what comes in at a decision was sent by agent j, by its own clock, s."""
-    return by_clock(at.time - at.late, j, flock, plan=plan)
+    return at.time - at.late + sending_clock(j, flock, plan=plan) if plan.suffers("clock") else at.time - at.late
 
 
 def sent(decision: int, rate: Any, numbers: Any) -> Any:

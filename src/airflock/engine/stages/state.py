@@ -62,6 +62,7 @@ class Flock:
     take       : the row of a name in the driver
     dimensions : 2 or 3
     number     : of agent i, by which random numbers and others know it
+    then       : of faults those numbers that held when what is heard now was sent
     """
 
     position: Axes = axes("")  # true state, m
@@ -79,6 +80,7 @@ class Flock:
     reach_out: Row = row("reach_out")  # square of how far it is heard, m²; negative: not at all
     reach_in: Row = row("reach_in")  # square of how far it hears
     clock: Row = row("clock")  # how far its clock is ahead, s
+    sent_clock: Row = row("sent_clock")  # the same when it sent what is heard now
     stopped: Row = row("stopped")  # whether it stopped for somebody whom it has lost, 1 or 0
     stop_position: Axes = axes("stop_")  # where, m
     stands_until: Row = row("stands_until")  # s
@@ -107,12 +109,17 @@ class Flock:
     outer: Columns = columns("g")  # normal numbers of the outer noise
     words: Columns = columns("u")  # random words
 
-    def __init__(self, take: Callable[[str], Row], dimensions: int, number: Row):
-        self.take, self.dimensions, self.number = take, dimensions, number
+    def __init__(self, take: Callable[[str], Row], dimensions: int, number: Row, then: bool = False):
+        self.take, self.dimensions, self.number, self.then = take, dimensions, number, then
+
+    @cached_property
+    def as_sent(self) -> "Flock":
+        """The same flock with the faults that it had when what is heard now was sent."""
+        return Flock(self.take, self.dimensions, self.number, then=True)
 
     def fault(self, kind: str, what: str) -> Row:
         """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
-        return self.take(fault_row(kind, what))
+        return self.take(fault_row(kind, f"sent_{what}" if self.then else what))
 
     def kept(self, kind: str, asked: str, what: str) -> Row:
         """Of a kind of fault: a component of the state that a rule disturbs, as it was last before the fault began."""
