@@ -17,6 +17,7 @@ from numba.core.imputils import RegistryLoader, builtin_registry
 from numba.core.typed_passes import NativeLowering, NativeParforLowering, NopythonRewrites, NopythonTypeInference
 from numba.core.untyped_passes import InlineClosureLikes
 
+from airflock.engine.array_values import as_values
 from airflock.engine.compile_shortcuts import sparing
 from airflock.engine.libraries import SPREAD, DriverLibrary, InlinedLibrary
 
@@ -126,7 +127,12 @@ class Remembering:
         return getattr(self._context, name)
 
     def resolve_function_type(self, function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
-        """Signature of a call. Only a function of the driver's own is asked each time: that has it compiled."""
+        """Signature of a call. Only a function of the driver's own is asked each time: that has it compiled.
+
+        It is compiled once for whole numbers, not once more for each that stands in the text of a caller.
+        """
+        if isinstance(function, types.Dispatcher):
+            given = tuple(types.unliteral(one) if isinstance(one, types.IntegerLiteral) else one for one in given)
         if named or isinstance(function, (types.Dispatcher, types.RecursiveCall)):
             return self._context.resolve_function_type(function, given, named)
         key = self._context, function, given
@@ -178,7 +184,7 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
         return [made]
 
     def _compile_core(self) -> Any:
-        with sparing(SPREAD):  # below Numba's lock: one thread at a time
+        with sparing(SPREAD, *as_values()):  # below Numba's lock: one thread at a time
             return super()._compile_core()
 
 

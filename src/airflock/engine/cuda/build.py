@@ -52,6 +52,7 @@ class CudaBuilder(Builder):
     """Takes the same calls as the builder of a CPU driver; `function` lowers what is a stage."""
 
     abreast = False
+    alone = False
     drops = False  # threads exchange their parts, which counts as being read
     apart = False
     ranges = False
