@@ -13,7 +13,13 @@ from numba import njit, prange
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import NumbaError
 
-from inside import CALLED, INNER, KNOWN, SPARED
+import airflock
+from airflock.engine import plan_of
+from inside import CALLED, INNER, KNOWN, SPARED, as_values, flight_driver
+
+as_tried = pytest.mark.skipif(
+    not KNOWN, reason="another version of Numba than those that were tried compiles as it likes"
+)
 
 OPTIONS = {"fastmath": True, "error_model": "numpy", "nogil": True, "forceinline": True, "_nrt": False}
 
@@ -47,7 +53,9 @@ def instructions(function):
     return [re.sub(r"\.L\w+", ".L", line) for line in lines]
 
 
-def test_machine_code_is_that_of_numba(monkeypatch):
+@pytest.fixture
+def whole_lines(monkeypatch):
+    """Vectors on the stack of Numba's own code lie as those of a driver do."""
     usual = JITCodeLibrary.add_ir_module
 
     def with_whole_lines(library, module):
@@ -57,11 +65,76 @@ def test_machine_code_is_that_of_numba(monkeypatch):
         usual(library, module)
 
     monkeypatch.setattr(JITCodeLibrary, "add_ir_module", with_whole_lines)
+
+
+def test_machine_code_is_that_of_numba(whole_lines):
     xs, ys = np.linspace(-2.0, 2.0, 101, dtype=np.float32), np.ones(101, np.float32)
     (_, ours), (_, theirs) = pair_of_functions(OPTIONS | INNER, OPTIONS | CALLED), pair_of_functions(OPTIONS, OPTIONS)
     found = [loop(xs.copy(), ys) for loop in (ours, theirs)]
     assert found[0] == found[1] != 0.0
     assert len(instructions(ours)) > 10
+    assert instructions(ours) == instructions(theirs)
+
+
+def test_a_function_is_compiled_once_for_all_whole_numbers_that_its_callers_write_out():
+    @njit(**OPTIONS | INNER)
+    def times(x, k):
+        return x * k
+
+    @njit(**OPTIONS | CALLED)
+    def of_all(n):
+        return times(n, 2) + times(n, 3) + times(n, n)
+
+    assert of_all(5) == 50
+    assert len(times.signatures) == 1
+
+
+def parts_of_arrays(options):
+    @njit(**options)
+    def mixed(table, row, found):
+        second = table[1]
+        found[0] = second[-1] + row[2] + table[0, 3] + table[-1][0]
+        cut = row[1:4]
+        found[1] = cut[1] + cut.shape[0] + cut.size + table.T[2][1] + table[:, 2][0]
+        cut[0] = 7.0
+        table[0][1:] = row[::2][0]
+        second[0] += row[-1]
+        found[2] = table.reshape(-1)[5] + second.nbytes + len(row[::-1]) + row[::-1][0] + table.strides[0]
+        for i in range(len(found) - 3):
+            found[3 + i] = second[i]
+        return 0
+
+    return mixed
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_parts_of_arrays_are_what_numpy_takes_of_them(order):
+    found = []
+    for mixed in (parts_of_arrays(OPTIONS | {"_nrt": True} | CALLED), parts_of_arrays(OPTIONS | CALLED).py_func):
+        table, row, out = np.array(np.arange(12.0).reshape(3, 4), order=order), np.arange(5.0) * 10.0, np.zeros(6)
+        mixed(table, row, out)
+        found.append((table, row, out))
+    for ours, theirs in zip(*found, strict=True):
+        assert (ours == theirs).all()
+
+
+def rows_of_a_table(options):
+    @njit(**options)
+    def loop(table, row):
+        x, y, z = table[0], table[1], table[2]
+        for i in range(x.shape[0]):
+            z[i] = row[0] * x[i] + row[1] * y[i]
+        return z[0]
+
+    return loop
+
+
+@as_tried
+def test_machine_code_for_rows_of_a_table_is_that_of_numba(whole_lines):
+    ours, theirs = rows_of_a_table(OPTIONS | CALLED), rows_of_a_table(OPTIONS)
+    for loop in (ours, theirs):
+        loop(np.ones((3, 40), np.float32), np.ones(2, np.float32))
+    assert len(instructions(ours)) > 20
     assert instructions(ours) == instructions(theirs)
 
 
@@ -117,7 +190,7 @@ def test_the_garbage_collector_is_left_as_it_was():
 
 
 def parts_of_numba():
-    return [vars(owner)[name] for owner, name, _ in SPARED]
+    return [vars(owner)[name] for owner, name, _ in (*SPARED, *as_values())]
 
 
 def test_numba_is_left_as_it_was():
@@ -146,11 +219,6 @@ def test_closures_lists_and_whole_arrays_are_compiled_where_there_are_any():
 
     xs = np.array([1.0, 4.0, 9.0])
     assert of_all(xs) == 14.0 * 2.0 + 6.0 + 14.0 * 2.0
-
-
-as_tried = pytest.mark.skipif(
-    not KNOWN, reason="another version of Numba than those that were tried compiles as it likes"
-)
 
 
 @as_tried
@@ -202,3 +270,12 @@ assert "scipy.linalg" in sys.modules
 """
     given = text.replace("{tests!r}", repr(str(Path(__file__).parents[1])))
     subprocess.run([sys.executable, "-c", given], check=True)
+
+
+def test_loops_of_noise_stand_in_a_driver_once():
+    driver = flight_driver(plan_of(airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})))
+    text = driver.TEXT
+    assert text.count("= random_philox(") == 1 and text.count(", u2, u3)\n") == 3  # itself, perceive, move
+    assert text.count("= normal_pair(") == 3 and text.count("normal(m, ") == 5  # itself, two of each; a start
+    assert text.count("= langevin_error(") == 1 and text.count("wander(m, ") == 5  # itself, four rows
+    assert text.count("    alone()\n") == 8

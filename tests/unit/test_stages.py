@@ -224,7 +224,7 @@ class World:
                     self.flock(work), self.numbers(), self.whole, self.around(), 0.7, n, n, *parts,
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
                     plan=self.plan, metrics=metrics, nearest=clock == "collision", over=None, abreast=True,
-                    summed="xvh",
+                    headed=measure.headed(metrics), summed="xvh",
                 )  # fmt: skip
             found.append((least, values, memory, work))
         return found

@@ -142,7 +142,7 @@ def main() -> None:
     if threading.current_thread() is threading.main_thread():  # only there are signals heard
         signal.signal(signal.SIGTERM, _stop)
         sys.unraisablehook = _again
-    atexit.register(gc.freeze)  # a compiler leaves millions of objects; to look for garbage among them takes Python 0.6 s
+    atexit.register(gc.freeze)  # a last look for garbage among what a compiler leaves takes 0.6 s
     warnings.showwarning = _note
     try:
         try:

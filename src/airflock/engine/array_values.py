@@ -20,7 +20,7 @@ class Record:
     _memory: Any = None
 
     def __init__(self, usual: Callable[..., Any], kind: types.Array, context: Any, builder: Any, value: Any):
-        """usual : what makes Numba's class of such records; it makes it anew each time, so only where it is needed."""
+        """By what makes Numba's class of such records, `usual`: anew each time, so only where it is needed."""
         vars(self).update(
             _usual=usual, _kind=kind, _context=context, _builder=builder, _value=value,
             _datamodel=context.data_model_manager[kind],

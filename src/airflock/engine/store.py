@@ -19,7 +19,8 @@ from airflock.machine import toolchain
 
 SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
 
-PASSES = ("compiler.py", "compile_shortcuts.py", "array_values.py", "libraries.py")  # what makes machine code of a driver's text
+# what makes machine code of a driver's text
+PASSES = ("compiler.py", "compile_shortcuts.py", "array_values.py", "libraries.py")
 
 _loading = Lock()
 

@@ -145,9 +145,7 @@ class Builder:
         """Whether a rule exists and asks for any of these names."""
         return rule is not None and bool(set(asks(rule, kind)) & set(names))
 
-    def function(
-        self, head: str, *bodies: Iterable[str] | str, parallel: bool = False, once: bool = False
-    ) -> None:
+    def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False, once: bool = False) -> None:
         """Add one compiled function of the driver; a parallel one spreads its prange over all cores.
 
         once : its machine code stands in the driver once, not wherever it is called, where a device has both forms

@@ -30,8 +30,8 @@ from airflock.engine.compiler import CALLED, INNER
 real = np.float{bits}
 integer = np.int{bits}
 COUNTED = True  # references to arrays; not where a driver makes no arrays of its own
-INLINE = dict(fastmath=True, error_model="numpy", _nrt=COUNTED, **INNER)
-JIT = INLINE | dict(nogil=True, forceinline=True)
+INLINE = dict(fastmath=True, error_model="numpy", forceinline=True, _nrt=COUNTED, **INNER)
+JIT = INLINE | dict(nogil=True)
 ONCE = JIT | dict(forceinline=False)
 """
 HEAD += DECLARED + "\n{primitives}\n"

@@ -17,7 +17,7 @@ RECEIVE = {  # whether each pair draws for itself: what stage draws
 
 
 def shared(build: Builder) -> measuring.Shared | None:
-    """Functions wander and err, whose rows are told to lie apart; None where their loops stand where they are needed."""
+    """Functions wander and err, whose rows are told to lie apart; None where their loops stand where needed."""
     plan = build.plan
     if not build.apart or plan.sequential or not plan.noisy or plan.senses:
         return None
