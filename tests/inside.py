@@ -50,7 +50,6 @@ NAMES = {
     "KNOWN": ("compile_shortcuts", "KNOWN"),
     "SPARED": ("compile_shortcuts", "SPARED"),
     "implementations": ("compile_shortcuts", "implementations"),
-    "as_values": ("array_values", "as_values"),
     "waiting_briefly": ("thread_waiting", "waiting_briefly"),
     "Flown": ("cpu", "Flown"),
     "SCRIPT": ("background_compile", "SCRIPT"),

@@ -179,8 +179,8 @@ ORDER = """
 @njit(cache=True, **JIT | CALLED)
 def order(a, b, i, j, found, counts):
     found[0] = min(a, b); found[1] = max(a, b); found[2] = min(a, i); found[3] = max(i, b)
-    found[4] = number_of(bits_of(a))
-    counts[0] = min(i, j); counts[1] = max(i, 3); counts[2] = min(i - j, integer(2)); counts[3] = bits_of(a)
+    found[4] = as_number(as_bits(a))
+    counts[0] = min(i, j); counts[1] = max(i, 3); counts[2] = min(i - j, integer(2)); counts[3] = as_bits(a)
     return 0
 """
 

@@ -17,7 +17,6 @@ from numba.core.imputils import RegistryLoader, builtin_registry
 from numba.core.typed_passes import NativeLowering, NativeParforLowering, NopythonRewrites, NopythonTypeInference
 from numba.core.untyped_passes import InlineClosureLikes
 
-from airflock.engine.array_values import as_values
 from airflock.engine.compile_shortcuts import sparing
 from airflock.engine.libraries import SPREAD, DriverLibrary, InlinedLibrary
 
@@ -184,7 +183,7 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
         return [made]
 
     def _compile_core(self) -> Any:
-        with sparing(SPREAD, *as_values()):  # below Numba's lock: one thread at a time
+        with sparing(SPREAD):  # below Numba's lock: one thread at a time
             return super()._compile_core()
 
 

@@ -50,28 +50,28 @@ def uniform(word):
 """
 )
 # Words of 32 bits in lanes of 64: one product has both halves. In lanes of 32, LLVM multiplies three times for them.
-# They are instructions, not functions, of which Numba would compile a dozen.
 WIDE = (
     MACHINE
     + """
-def _in_words(count, made):
-    def emit(context, builder, signature, arguments):
-        given = [builder.zext(cut(builder, each), WORD) for each in arguments]
-        return builder.zext(builder.trunc(made(builder, *given), HALF_WORD), WORD)
+@njit(**INLINE)
+def word(a):
+    return u64(u32(a))
 
-    def cut(builder, number):
-        return number if number.type == HALF_WORD else builder.trunc(number, HALF_WORD)
+@njit(**INLINE)
+def multiply_high(a, b):
+    return (word(a) * word(b)) >> u64(32)
 
-    if count == 1:
-        return intrinsic(lambda typing_context, a: (types.uint64(a), emit))
-    return intrinsic(lambda typing_context, a, b: (types.uint64(a, b), emit))
+@njit(**INLINE)
+def multiply_low(a, b):
+    return word(word(a) * word(b))
 
-WORD, HALF_WORD = ir.IntType(64), ir.IntType(32)
-word = _in_words(1, lambda builder, a: a)
-multiply_high = _in_words(2, lambda builder, a, b: builder.lshr(builder.mul(a, b), WORD(32)))
-multiply_low = _in_words(2, lambda builder, a, b: builder.mul(a, b))
-add32 = _in_words(2, lambda builder, a, b: builder.add(a, b))
-xor32 = _in_words(2, lambda builder, a, b: builder.xor(a, b))
+@njit(**INLINE)
+def add32(a, b):
+    return word(a + b)
+
+@njit(**INLINE)
+def xor32(a, b):
+    return a ^ b
 
 @njit(**INLINE)
 def uniform(word):
@@ -83,9 +83,9 @@ def uniform(word):
 LOG32 = """
 @njit(**INLINE)
 def log_uniform(u):
-    bits = bits_of(np.float32(u))
+    bits = as_bits(np.float32(u))
     e = np.int32(np.int32(bits - np.int32(0x3F3504F3)) >> np.int32(23))  # Numba would go on in 64 bits
-    m = number_of(np.int32(bits - np.int32(e << np.int32(23))))
+    m = as_number(np.int32(bits - np.int32(e << np.int32(23))))
     f = m - real(1.0)
     z = f * f
     p = real(7.0376836292e-2)
@@ -102,9 +102,9 @@ def log_uniform(u):
 LOG64 = """
 @njit(**INLINE)
 def log_uniform(u):
-    bits = bits_of(np.float64(u))
+    bits = as_bits(np.float64(u))
     e = (bits - 0x3FE6A09E667F3BCD) >> 52
-    m = number_of(np.int64(bits - (e << 52)))
+    m = as_number(np.int64(bits - (e << 52)))
     s = (m - 1.0) / (m + 1.0)
     z = s * s
     p = 1.0 / 23.0

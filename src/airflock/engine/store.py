@@ -19,8 +19,7 @@ from airflock.machine import toolchain
 
 SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
 
-# what makes machine code of a driver's text
-PASSES = ("compiler.py", "compile_shortcuts.py", "array_values.py", "libraries.py")
+PASSES = ("compiler.py", "compile_shortcuts.py", "libraries.py")  # what makes machine code of a driver's text
 
 _loading = Lock()
 

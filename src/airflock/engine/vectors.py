@@ -8,7 +8,7 @@ contiguous table to another one, plus a shift, as one vector. `wide_vectors` ask
 that calls it: LLVM takes 256 bits by default, for processors whose clock falls with wider ones. `apart` promises that
 the arguments of the function that calls it lie apart in memory: else LLVM compares the places of all rows before each
 loop, and gives up on a loop that writes many. `alone` keeps the function that calls it out of those that call that one.
-`min` and `max` are Numba's of two numbers, and `bits_of` and `number_of` its views of the bits of one, which Numba
+`min` and `max` are Numba's of two numbers, and `as_bits` and `as_number` its views of the bits of one, which Numba
 compiles for each kind of number as functions that Python could call.
 """
 
@@ -45,13 +45,13 @@ min = _first(operator.lt)
 max = _first(operator.gt)
 
 @intrinsic
-def bits_of(typing_context, a):
+def as_bits(typing_context, a):
     def emit(context, builder, signature, arguments):
         return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
     return (types.int32 if a.bitwidth == 32 else types.int64)(a), emit
 
 @intrinsic
-def number_of(typing_context, a):
+def as_number(typing_context, a):
     def emit(context, builder, signature, arguments):
         return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
     return (types.float32 if a.bitwidth == 32 else types.float64)(a), emit
