@@ -52,7 +52,6 @@ class CudaBuilder(Builder):
     """Takes the same calls as the builder of a CPU driver; `function` lowers what is a stage."""
 
     abreast = False
-    alone = False
     drops = False  # threads exchange their parts, which counts as being read
     apart = False
     ranges = False
@@ -117,7 +116,7 @@ class CudaBuilder(Builder):
         """One stage of a step."""
         self.function(f"{name}({arguments})", lines, body, f"return {answer}")
 
-    def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False) -> None:
+    def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False, once: bool = False) -> None:
         """Add a device function: a stage lowered to one thread, any other function as it is."""
         name = head.partition("(")[0]
         lines: list[str] = []

@@ -30,14 +30,12 @@ class Builder:
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
     drifts   : whether agents may be watched by how fast they are beside the drift of the flock
     trails   : whether rows of faults come last in the work table
-    alone    : whether a function can stand by itself, and is not made part of those that call it
     drops    : whether the compiler drops a sum over agents that nobody reads
     """
 
     clusters: Callable[[Metric], list[str]] | None = None
     slots = False
     abreast = True
-    alone = True
     drops = True
     apart = True
     ranges = True
@@ -148,16 +146,15 @@ class Builder:
     def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False, once: bool = False) -> None:
         """Add one compiled function of the driver; a parallel one spreads its prange over all cores.
 
-        once : its machine code stands in the driver once, not wherever it is called, where a device has both forms
+        once : its machine code stands in the driver once, not wherever it is called
         """
-        alone = once and self.alone
         lines: list[str] = []
         for body in bodies:
             lines += [body] if isinstance(body, str) else list(body)
         name, _, parameters = head.rstrip(")").partition("(")
         self.stages[name] = Function(name, tuple(parameters.split(", ")))
-        decorator = "@njit(parallel=True, **JIT)" if parallel else ONCE if alone else JIT
-        lines = ["alone()", *lines] if alone else lines
+        decorator = "@njit(parallel=True, **JIT)" if parallel else ONCE if once else JIT
+        lines = ["alone()", *lines] if once else lines
         lines = ["wide_vectors()", *lines] if vectors.bits() == 512 else lines
         self.functions.append(f"{decorator}\ndef {head}:\n" + indent("\n".join(lines), "    "))
 

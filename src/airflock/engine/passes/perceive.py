@@ -31,7 +31,7 @@ def shared(build: Builder) -> measuring.Shared | None:
 def snapshot(build: Builder) -> None:
     """Function snapshot: the true states into a slot of the ring."""
     made = specialise(build, measuring.snapshot)
-    build.function("snapshot(slot, m, work, ring)", ["apart()"] * build.alone, made.lines, once=True)
+    build.function("snapshot(slot, m, work, ring)", ["apart()"] * build.apart, made.lines, once=True)
 
 
 def meet(build: Builder) -> None:
