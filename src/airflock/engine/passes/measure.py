@@ -42,7 +42,7 @@ def measure(build: Builder, clock: str) -> None:
     clustered = {one.metric.name: clusters(build, one.metric, parts) for one in metrics}
     made = specialise(
         build, measuring.measure, metrics=metrics, nearest=clock == "collision", over=looked, abreast=build.abreast,
-        headed=headed(metrics), summed="xvh" if build.drops else averaged(metrics),
+        headed=headed(metrics) or not build.drops, summed="xvh" if build.drops else averaged(metrics),
         excursion=excursion(build) if outside else None,
         survey={one.metric.name: Call(f"survey_{one.metric.name}()") for one in metrics},
         clustered=clustered,
