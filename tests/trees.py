@@ -15,7 +15,7 @@ from airflock.rules.nodes import walk
 TURNS = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move", "overrule")
 STAGES = (
     *TURNS, *(f"{name}_of" for name in TURNS), "begin", "excursion", "tune", "meet", "aim_", "glide_", "appear_",
-    "measure_sample", "measure_collision", "nearest", "draw",
+    "measure_sample", "measure_collision", "nearest", "draw", "normal", "wander", "err", "keep",
     "near_sample", "near_collision", "clusters_correlation", "clusters_groups",
     "clusters_swarms", "advance", "measure_frames", "turns",
 )  # fmt: skip

@@ -87,14 +87,21 @@ def _work(
 
 
 def in_background(work: Callable[[], Any]) -> Future[Any]:
-    """Do some work in a thread of its own, which ends with the program."""
+    """Do some work in a thread of its own, which ends with the program.
+
+    It begins when the caller goes on: a thread that begins at once keeps the interpreter, and its caller waiting, for
+    5 ms.
+    """
     future: Future[Any] = Future()
+    asked = Event()
 
     def run() -> None:
+        asked.wait()
         try:
             future.set_result(work())
         except Exception as fault:  # raised again where the result is asked for
             future.set_exception(fault)
 
     Thread(target=run, daemon=True).start()
+    asked.set()
     return future

@@ -173,3 +173,25 @@ def test_streams_draws_worlds_seeds_agents_and_steps_are_independent(draws, seed
         worst = np.abs(correlation - np.eye(len(rows))).max()
         # 378 pairs: six standard errors are exceeded by chance once in a million runs
         assert worst < 6.0 / math.sqrt(N)
+
+
+ORDER = """
+@njit(cache=True, **JIT | CALLED)
+def order(a, b, i, j, found, counts):
+    found[0] = min(a, b); found[1] = max(a, b); found[2] = min(a, i); found[3] = max(i, b)
+    found[4] = as_number(as_bits(a))
+    counts[0] = min(i, j); counts[1] = max(i, 3); counts[2] = min(i - j, integer(2)); counts[3] = as_bits(a)
+    return 0
+"""
+
+
+@pytest.mark.parametrize("bits", [32, 64])
+def test_lesser_greater_and_bits_of_numbers_are_those_of_python(bits):
+    head = HEAD.format(label="order", bits=bits, primitives=primitives(bits))
+    driver = load_driver("\n\n".join([head, ORDER]) + "\n", "order")
+    real, whole = (np.float32, np.int32) if bits == 32 else (np.float64, np.int64)
+    for a, b, i, j in ((1.5, -2.5, 4, 7), (-2.5, 1.5, -4, -7), (0.0, 0.0, 3, 3), (1e30, -1e30, 2, -(2**31))):
+        found, counts = np.zeros(5, real), np.zeros(4, np.int64)
+        driver.order(real(a), real(b), i, j, found, counts)
+        assert found.tolist() == [real(x) for x in (min(a, b), max(a, b), min(a, i), max(i, b), a)]
+        assert counts.tolist() == [min(i, j), max(i, 3), min(i - j, 2), real(a).view(whole)]

@@ -117,7 +117,7 @@ CHANGES = (
     (pair, "if plan.periodic:", "if plan.delayed:", "quiet"),
     (surfaces, "flock.walls[c][i] += t[c]", "flock.walls[c][i] += t[0]", "polygon"),
     (move, "x[a][i] += v[a][i] * numbers.c.dt", "x[a][i] += v[a][i] * numbers.c.period", "quiet"),
-    (perceive, "flock.position[a][i] + flock.own_error", "flock.position[a][i] + flock.sent_error", "3-D"),
+    (perceive, "place[i] = x[i] + q[i]", "place[i] = x[i] + u[i]", "3-D"),
     (decide, "flock.command[a][i] = o[a]", "flock.command[a][i] = o[0]", "quiet"),
     (measure, "(integer(j) < nn)", "(integer(j) <= nn)", "quiet"),
     (clusters, "if done + size == n", "if size == n", "quiet"),

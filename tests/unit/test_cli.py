@@ -233,3 +233,16 @@ def test_a_time_that_is_none_is_one_line(time):
                     ["run", "vasarhelyi_2018/4ms", f"--duration={time}"]):  # fmt: skip
         done = called(*command)
         assert done.returncode == 2 and done.stderr.count("\n") == 1 and "write a time above 0" in done.stderr
+
+
+def test_the_command_ends_without_a_last_look_for_garbage():
+    text = """
+import atexit, gc, sys
+atexit.register(lambda: print(gc.get_freeze_count()))  # what is registered first is called last
+sys.argv = ["airflock", "presets"]
+from airflock.cli import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout.splitlines()[-1]) > 1000

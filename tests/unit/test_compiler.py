@@ -13,7 +13,13 @@ from numba import njit, prange
 from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import NumbaError
 
-from inside import CALLED, INNER, KNOWN, SPARED
+import airflock
+from airflock.engine import plan_of
+from inside import CALLED, INNER, KNOWN, SPARED, flight_driver
+
+as_tried = pytest.mark.skipif(
+    not KNOWN, reason="another version of Numba than those that were tried compiles as it likes"
+)
 
 OPTIONS = {"fastmath": True, "error_model": "numpy", "nogil": True, "forceinline": True, "_nrt": False}
 
@@ -47,7 +53,9 @@ def instructions(function):
     return [re.sub(r"\.L\w+", ".L", line) for line in lines]
 
 
-def test_machine_code_is_that_of_numba(monkeypatch):
+@pytest.fixture
+def whole_lines(monkeypatch):
+    """Vectors on the stack of Numba's own code lie as those of a driver do."""
     usual = JITCodeLibrary.add_ir_module
 
     def with_whole_lines(library, module):
@@ -57,12 +65,28 @@ def test_machine_code_is_that_of_numba(monkeypatch):
         usual(library, module)
 
     monkeypatch.setattr(JITCodeLibrary, "add_ir_module", with_whole_lines)
+
+
+def test_machine_code_is_that_of_numba(whole_lines):
     xs, ys = np.linspace(-2.0, 2.0, 101, dtype=np.float32), np.ones(101, np.float32)
     (_, ours), (_, theirs) = pair_of_functions(OPTIONS | INNER, OPTIONS | CALLED), pair_of_functions(OPTIONS, OPTIONS)
     found = [loop(xs.copy(), ys) for loop in (ours, theirs)]
     assert found[0] == found[1] != 0.0
     assert len(instructions(ours)) > 10
     assert instructions(ours) == instructions(theirs)
+
+
+def test_a_function_is_compiled_once_for_all_whole_numbers_that_its_callers_write_out():
+    @njit(**OPTIONS | INNER)
+    def times(x, k):
+        return x * k
+
+    @njit(**OPTIONS | CALLED)
+    def of_all(n):
+        return times(n, 2) + times(n, 3) + times(n, n)
+
+    assert of_all(5) == 50
+    assert len(times.signatures) == 1
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names a register of x86-64")
@@ -148,11 +172,6 @@ def test_closures_lists_and_whole_arrays_are_compiled_where_there_are_any():
     assert of_all(xs) == 14.0 * 2.0 + 6.0 + 14.0 * 2.0
 
 
-as_tried = pytest.mark.skipif(
-    not KNOWN, reason="another version of Numba than those that were tried compiles as it likes"
-)
-
-
 @as_tried
 def test_a_loop_over_threads_becomes_machine_code_where_it_is_called_alone(monkeypatch):
     made, usual = [], JITCodeLibrary._finalize_specific
@@ -202,3 +221,11 @@ assert "scipy.linalg" in sys.modules
 """
     given = text.replace("{tests!r}", repr(str(Path(__file__).parents[1])))
     subprocess.run([sys.executable, "-c", given], check=True)
+
+
+def test_loops_of_noise_stand_in_a_driver_once():
+    driver = flight_driver(plan_of(airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})))
+    text = driver.TEXT
+    assert text.count("= random_philox(") == 1 and text.count(" draw(m, ") == 3  # itself, perceive, move
+    assert text.count("normal_pair(u") == 0 and text.count(" normal(m, ") == 5  # itself, two of each
+    assert text.count("= langevin_error(") == 1 and text.count(" wander(m, ") == 5  # itself, four rows

@@ -112,7 +112,8 @@ class World:
         held = {name: getattr(words, name) for name in ("real", "integer", "least", "most", "choose")}
         held |= {name: float(getattr(words, name)) for name in ("ZERO", "HALF", "ONE", "TINY", "FAR", "LIMIT", "AWAY")}
         held |= {name: getattr(random, name) for name in random.PRIMITIVES}
-        held |= {"math": math, "np": np, "namedtuple": namedtuple, "JIT": {}, "wide_vectors": lambda: None}
+        held |= {"math": math, "np": np, "namedtuple": namedtuple, "JIT": {}, "ONCE": {}}
+        held |= {name: lambda: None for name in ("wide_vectors", "alone", "apart")}
         held |= {"apart": lambda: None, "u64": int}
         held["njit"] = lambda *_, **__: lambda function: function
         exec("\n\n".join([*self.build.source.blocks, *self.build.functions]), held)
@@ -224,7 +225,7 @@ class World:
                     self.flock(work), self.numbers(), self.whole, self.around(), 0.7, n, n, *parts,
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
                     plan=self.plan, metrics=metrics, nearest=clock == "collision", over=None, abreast=True,
-                    summed="xvh",
+                    headed=measure.headed(metrics), summed="xvh",
                 )  # fmt: skip
             found.append((least, values, memory, work))
         return found

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from airflock.threads import in_threads
+from airflock.threads import in_background, in_threads
 
 INTERRUPTED = """
 import faulthandler, random, signal, time
@@ -62,3 +62,15 @@ def test_a_fault_reaches_who_asks_and_no_further_job_begins(threads):
             found.append(result)
     assert found == [0, 1, 2, 3, 4]
     assert len(begun) < 400
+
+
+def test_work_in_the_background_begins_when_its_caller_goes_on():
+    done, usual = [], sys.getswitchinterval()
+    sys.setswitchinterval(10.0)  # s; a thread that has the interpreter keeps it
+    try:
+        work = in_background(lambda: done.append("work"))
+        done.append("caller")
+        work.result(60.0)
+    finally:
+        sys.setswitchinterval(usual)
+    assert done == ["caller", "work"]

@@ -10,10 +10,15 @@ import sys
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numba
-from numba.core import base, event, interpreter, ssa, types
+from llvmlite import binding
+from numba.core import base, codegen, config, event, interpreter, ssa, types
+from numba.core.imputils import RegistryLoader, builtin_registry
 from numba.core.postproc import PostProcessor
+from numba.core.typing import templates
+from numba.core.typing.context import BaseContext
 
 TRIED = (0, 62), (0, 68)  # first and last version of Numba of which this was tried, beside 0.65
 KNOWN = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
@@ -24,6 +29,8 @@ Spared = tuple[Any, str, Callable[..., Any]]  # whose, which of its functions, a
 _signatures: dict[Hashable, Any] = {}
 _sizes: dict[Hashable, int] = {}
 _places: dict[Callable[..., Any], bool] = {}
+_fresh: WeakKeyDictionary[Any, Hashable] = WeakKeyDictionary()
+_once: dict[Callable[..., Any], Any] = {}
 
 
 @contextmanager
@@ -160,6 +167,32 @@ def _without_exits(usual: Callable[..., Any], code: Any) -> Any:
     return usual(code) if held else code
 
 
+def registered() -> Hashable:
+    """What grows when Numba gets new implementations, of operators and functions, or of modules that hold some."""
+    lowered = sum(len(getattr(builtin_registry, kind)) for kind in RegistryLoader.registry_items)
+    typed = templates.builtin_registry
+    return len(sys.modules), lowered, len(typed.functions), len(typed.attributes), len(typed.globals)
+
+
+def _refreshed(usual: Callable[..., None], context: Any) -> None:
+    """Look for new implementations, where there are any since a context last looked."""
+    now = registered()
+    if _fresh.get(context) != now:
+        usual(context)
+        _fresh[context] = registered()
+
+
+def _unchanged(usual: Callable[..., None]) -> None:
+    """Nothing: what Numba reads of its environment and of a file, function by function, was read for the first one."""
+
+
+def _known(usual: Callable[..., Any], *given: Any) -> Any:
+    """What a question about this processor and this LLVM came to the first time."""
+    if usual not in _once:
+        _once[usual] = usual(*given)
+    return _once[usual]
+
+
 def _told(usual: Callable[..., None], kind: str, *given: Any, **named: Any) -> None:
     """An event; not each call of LLVM, where only the sums of their times are kept."""
     kept = all(type(listener) is event.TimingListener for listener in event._registered[kind])
@@ -171,6 +204,11 @@ SPARED: tuple[Spared, ...] = (
     (types.functions.BaseFunction, "get_call_type", call_type),
     (base.BaseContext, "get_abi_sizeof", _size),
     (base, "_has_loc", _takes_place),
+    (base.BaseContext, "refresh", _refreshed),
+    (BaseContext, "refresh", _refreshed),
+    (config, "reload_config", _unchanged),
+    (binding, "get_process_triple", _known),
+    (codegen.CPUCodegen, "_check_llvm_bugs", _known),
     (PostProcessor, "run", processed),
     (interpreter, "peep_hole_delete_with_exit", _without_exits),
     (ssa, "_run_block_rewrite", rewritten),

@@ -126,7 +126,12 @@ class Remembering:
         return getattr(self._context, name)
 
     def resolve_function_type(self, function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
-        """Signature of a call. Only a function of the driver's own is asked each time: that has it compiled."""
+        """Signature of a call. Only a function of the driver's own is asked each time: that has it compiled.
+
+        It is compiled once for whole numbers, not once more for each that stands in the text of a caller.
+        """
+        if isinstance(function, types.Dispatcher):
+            given = tuple(types.unliteral(one) if isinstance(one, types.IntegerLiteral) else one for one in given)
         if named or isinstance(function, (types.Dispatcher, types.RecursiveCall)):
             return self._context.resolve_function_type(function, given, named)
         key = self._context, function, given

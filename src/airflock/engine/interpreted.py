@@ -45,13 +45,13 @@ class Table:
         self.dtype = array.dtype
         self.elements: Any = _numbers(array)
         self.array = array
-        self.rows: dict[int, Any] = {}
+        self.rows: dict[int | tuple[int, ...], Any] = {}
 
     def __len__(self) -> int:
         return self.shape[0]
 
     def __getitem__(self, at: Any) -> Any:
-        if isinstance(at, tuple):
+        if isinstance(at, tuple) and len(at) == len(self.array.shape):
             return self.elements[at]
         if at not in self.rows:
             self.rows[at] = opened(self.array[at])
@@ -91,6 +91,7 @@ def _uncompiled(*function: Callable[..., Any], **_: Any) -> Any:
 PLAIN: Mapping[str, Any] = {
     "njit": _uncompiled,
     "JIT": {},
+    "ONCE": {},
     "prange": range,
     "math": math,
     "np": np,
@@ -103,6 +104,7 @@ PLAIN: Mapping[str, Any] = {
     "choose": words.choose,
     "wide_vectors": lambda: None,
     "apart": lambda: None,
+    "alone": lambda: None,
     "copy_block": words.copy_block,
     **{name: getattr(random, name) for name in random.PRIMITIVES},
 }

@@ -83,9 +83,9 @@ def uniform(word):
 LOG32 = """
 @njit(**INLINE)
 def log_uniform(u):
-    bits = np.float32(u).view(np.int32)
+    bits = as_bits(np.float32(u))
     e = np.int32(np.int32(bits - np.int32(0x3F3504F3)) >> np.int32(23))  # Numba would go on in 64 bits
-    m = np.int32(bits - np.int32(e << np.int32(23))).view(np.float32)
+    m = as_number(np.int32(bits - np.int32(e << np.int32(23))))
     f = m - real(1.0)
     z = f * f
     p = real(7.0376836292e-2)
@@ -102,9 +102,9 @@ def log_uniform(u):
 LOG64 = """
 @njit(**INLINE)
 def log_uniform(u):
-    bits = np.float64(u).view(np.int64)
+    bits = as_bits(np.float64(u))
     e = (bits - 0x3FE6A09E667F3BCD) >> 52
-    m = np.int64(bits - (e << 52)).view(np.float64)
+    m = as_number(np.int64(bits - (e << 52)))
     s = (m - 1.0) / (m + 1.0)
     z = s * s
     p = 1.0 / 23.0

@@ -7,7 +7,9 @@ ends are then no reductions any more (9 times on the same loop). `copy_block` co
 contiguous table to another one, plus a shift, as one vector. `wide_vectors` asks for 512-bit vectors in the function
 that calls it: LLVM takes 256 bits by default, for processors whose clock falls with wider ones. `apart` promises that
 the arguments of the function that calls it lie apart in memory: else LLVM compares the places of all rows before each
-loop, and gives up on a loop that writes many.
+loop, and gives up on a loop that writes many. `alone` keeps the function that calls it out of those that call that one.
+`min` and `max` are Numba's of two numbers, and `as_bits` and `as_number` its views of the bits of one, which Numba
+compiles for each kind of number as functions that Python could call.
 """
 
 from functools import cache
@@ -28,6 +30,32 @@ def _extreme(instruction, comparison):
 least = _extreme("llvm.minnum", "<")
 most = _extreme("llvm.maxnum", ">")
 
+def _first(comparison):
+    @intrinsic
+    def first(typing_context, a, b):
+        kind = typing_context.unify_types(a, b)
+        def emit(context, builder, signature, arguments):
+            x, y = [context.cast(builder, x, was, kind) for x, was in zip(arguments, signature.args)]
+            before = context.get_function(comparison, types.boolean(kind, kind))
+            return builder.select(before(builder, (y, x)), y, x)
+        return kind(a, b), emit
+    return first
+
+min = _first(operator.lt)
+max = _first(operator.gt)
+
+@intrinsic
+def as_bits(typing_context, a):
+    def emit(context, builder, signature, arguments):
+        return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
+    return (types.int32 if a.bitwidth == 32 else types.int64)(a), emit
+
+@intrinsic
+def as_number(typing_context, a):
+    def emit(context, builder, signature, arguments):
+        return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
+    return (types.float32 if a.bitwidth == 32 else types.float64)(a), emit
+
 @intrinsic
 def choose(typing_context, test, a, b):
     def emit(context, builder, signature, arguments):
@@ -38,6 +66,13 @@ def choose(typing_context, test, a, b):
 def wide_vectors(typing_context):
     def emit(context, builder, signature, arguments):
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')  # llvmlite knows names without values only
+        return context.get_dummy_value()
+    return types.void(), emit
+
+@intrinsic
+def alone(typing_context):
+    def emit(context, builder, signature, arguments):
+        builder.function.attributes.add("noinline")
         return context.get_dummy_value()
     return types.void(), emit
 

@@ -116,7 +116,7 @@ class CudaBuilder(Builder):
         """One stage of a step."""
         self.function(f"{name}({arguments})", lines, body, f"return {answer}")
 
-    def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False) -> None:
+    def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False, once: bool = False) -> None:
         """Add a device function: a stage lowered to one thread, any other function as it is."""
         name = head.partition("(")[0]
         lines: list[str] = []

@@ -27,4 +27,4 @@ def nearest(build: Builder) -> None:
     """Function nearest: the least distance of a pair, where it is looked for alone."""
     if foretold(build):
         made = specialise(build, approach.nearest)
-        build.function("nearest(n, m, row, whole, work)", made.lines, f"return {made.answer}")
+        build.function("nearest(n, m, row, whole, work)", made.lines, f"return {made.answer}", once=True)

@@ -16,6 +16,7 @@ from airflock.engine.stages.state import FAULT, SCENE
 from airflock.rules.generate import Source, law_mark
 
 JIT = "@njit(**JIT)"
+ONCE = "@njit(**ONCE)"
 
 
 class Builder:
@@ -142,14 +143,18 @@ class Builder:
         """Whether a rule exists and asks for any of these names."""
         return rule is not None and bool(set(asks(rule, kind)) & set(names))
 
-    def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False) -> None:
-        """Add one compiled function of the driver; a parallel one spreads its prange over all cores."""
+    def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False, once: bool = False) -> None:
+        """Add one compiled function of the driver; a parallel one spreads its prange over all cores.
+
+        once : its machine code stands in the driver once, not wherever it is called
+        """
         lines: list[str] = []
         for body in bodies:
             lines += [body] if isinstance(body, str) else list(body)
         name, _, parameters = head.rstrip(")").partition("(")
         self.stages[name] = Function(name, tuple(parameters.split(", ")))
-        decorator = "@njit(parallel=True, **JIT)" if parallel else JIT
+        decorator = "@njit(parallel=True, **JIT)" if parallel else ONCE if once else JIT
+        lines = ["alone()", *lines] if once else lines
         lines = ["wide_vectors()", *lines] if vectors.bits() == 512 else lines
         self.functions.append(f"{decorator}\ndef {head}:\n" + indent("\n".join(lines), "    "))
 

@@ -41,7 +41,7 @@ def measure(build: Builder, clock: str) -> None:
     clustered = {one.metric.name: clusters(build, one.metric, parts) for one in metrics}
     made = specialise(
         build, measuring.measure, metrics=metrics, nearest=clock == "collision", over=looked, abreast=build.abreast,
-        summed="xvh" if build.drops else averaged(metrics),
+        headed=headed(metrics) or not build.drops, summed="xvh" if build.drops else averaged(metrics),
         excursion=excursion(build) if outside else None,
         survey={one.metric.name: Call(f"survey_{one.metric.name}()") for one in metrics},
         clustered=clustered,
@@ -51,6 +51,16 @@ def measure(build: Builder, clock: str) -> None:
         lines = in_place(lines, name, part)
     cells = near or any(linked(build, one.metric) for one in metrics)
     build.function(f"measure_{clock}({arguments(build, cells)})", lines, f"return {made.answer}")
+
+
+def headed(metrics: tuple[Measured, ...]) -> bool:
+    """Whether any of these metrics asks for speeds, headings or means of the flock."""
+    asked = ("speed", "hx", "hy", "hz", "mean")
+    return any(
+        metric.survey is not None or metric.cluster is not None
+        or any(wants(rule, *asked) for rule in (metric.pair, metric.agent, metric.member, metric.sample))
+        for metric, *_ in metrics
+    )  # fmt: skip
 
 
 def averaged(metrics: tuple[Measured, ...]) -> str:

@@ -16,10 +16,22 @@ RECEIVE = {  # whether each pair draws for itself: what stage draws
 }
 
 
+def shared(build: Builder) -> measuring.Shared | None:
+    """Functions wander and err, whose rows are told to lie apart; None where their loops stand where needed."""
+    plan = build.plan
+    if not build.apart or plan.sequential or not plan.noisy or plan.senses:
+        return None
+    made = specialise(build, measuring.wander)
+    build.function("wander(m, q, u, g, row, work)", ["apart()", *made.lines], once=True)
+    made = specialise(build, measuring.err)
+    build.function("err(m, place, rate, x, v, q, u)", ["apart()", *made.lines], once=True)
+    return measuring.Shared(build.stages["wander"], build.stages["err"])
+
+
 def snapshot(build: Builder) -> None:
     """Function snapshot: the true states into a slot of the ring."""
     made = specialise(build, measuring.snapshot)
-    build.function("snapshot(slot, m, work, ring)", made.lines)
+    build.function("snapshot(slot, m, work, ring)", ["apart()"] * build.apart, made.lines, once=True)
 
 
 def meet(build: Builder) -> None:

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from airflock.engine.passes.build import Builder
 from airflock.engine.passes.noise import draw
+from airflock.engine.passes.perceive import shared
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import argument
 from airflock.engine.stages import faults, perceive, scene, silence, surfaces
@@ -40,7 +41,7 @@ PLAIN = {
 def plain(build: Builder, name: str) -> None:
     """The function of one of these stages; of a stage that asks a law, that for the law of the builder."""
     one = PLAIN[name]
-    known = {"drawn": draw(build) if build.plan.noisy else None} if one.draws else {}
+    known = {"drawn": draw(build) if build.plan.noisy else None, "shared": shared(build)} if one.draws else {}
     made = specialise(build, one.stage, decision=argument(one.decision), **known)
     if one.own:
         build.stage(f"{name}{build.mark}", one.arguments, made.once, made.body, made.answer)

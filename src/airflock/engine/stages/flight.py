@@ -40,21 +40,24 @@ def forget(metrics: tuple[Measured, ...], memory: Any, n: int) -> None:
                 memory[one.row + c, i] = float(start)
 
 
-def record(
-    step: int, first: int, flock: Flock, frames: Any, whole: Any, n: int, *, plan: Plan, slots: bool
-) -> None:  # fmt: skip
-    """Keep positions, velocities and commands as a frame, where there are any: frames[frame, component, agent].
+def keep(frame: int, flock: Flock, frames: Any, n: int, *, plan: Plan, slots: bool) -> None:
+    """Keep positions, velocities and commands as a frame: frames[frame, component, agent]."""
+    for i in range(n):
+        for part, row in enumerate((flock.position, flock.velocity, flock.command)):
+            for a in range(plan.dimensions):
+                c = part * plan.dimensions + a
+                frames[frame, c, place(flock.number[i]) if slots else i] = row[a][i]
+
+
+def record(step: int, first: int, frames: Any, whole: Any, *, stages: Stages) -> None:
+    """Keep a frame, where there are any.
 
     The first frame is that of the first sample at or after the step `first`. Whether a flight is recorded is asked of
     its frames, not of its plan: the same driver then flies it with and without a recording.
     """
     if frames.shape[0] > 0:
         frame = step // whole.sample_every - (first + whole.sample_every - 1) // whole.sample_every
-        for i in range(n):
-            for part, row in enumerate((flock.position, flock.velocity, flock.command)):
-                for a in range(plan.dimensions):
-                    c = part * plan.dimensions + a
-                    frames[frame, c, place(flock.number[i]) if slots else i] = row[a][i]
+        ask(stages["keep"], frame=frame)
 
 
 def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
@@ -171,7 +174,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
         if step % whole.sample_every == 0:
             for name in order["sample"]:
                 take(name, time, values, sums, stages=stages, sampled=sampled)
-            record(step, first, flock, frames, whole, n, plan=plan, slots=slots)
+            record(step, first, frames, whole, stages=stages)
         if step < whole.steps:
             if plan.struck and (step == first or step % whole.decide_every == 0):  # between, nobody changes places
                 hurt_first, hurt_end = ask(stages["struck"], time=time)

@@ -248,7 +248,7 @@ def measure(
     excursion: Callable[..., Any], survey: Mapping[str, Callable[[], None]],
     clustered: Mapping[str, Callable[..., Any]],
     *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool, over: Callable[[], Any] | None,
-    abreast: bool, summed: str,
+    abreast: bool, headed: bool, summed: str,
 ) -> Any:  # fmt: skip
     """Write what metrics sample at one instant into `values`; returns the least distance of a pair, m.
 
@@ -258,12 +258,16 @@ def measure(
     clustered      : finds its clusters
     nearest        : whether the least distance is asked for
     abreast        : whether two agents may go through the others of a pair rule together
+    headed         : whether speeds, headings or means of the flock are asked for
     summed         : of what the flock's mean is taken: position x, velocity v, heading h
     over           : what goes through pairs by cells; None: all pairs
     """
     x = flock.position
-    mean = headings(flock, n, plan=plan, summed=summed)
-    if over is not None:
+    if headed:  # noqa: SIM108 - a helper of several lines stands where it is assigned
+        mean = headings(flock, n, plan=plan, summed=summed)
+    else:
+        mean = ()
+    if over is not None:  # noqa: SIM108 - a helper of several lines stands where it is assigned
         least2 = over()
     else:
         least2 = pairs(flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest, abreast=abreast)

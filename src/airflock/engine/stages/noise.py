@@ -1,7 +1,7 @@
 """Noise: normal numbers for all agents, of the sensors and of the outer noise of the body."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from airflock.core import random
 from airflock.engine.plan import Plan
@@ -11,7 +11,14 @@ from airflock.engine.stages.words import ask
 OUTER = random.OUTER
 
 
-Draw = Callable[..., Any] | None  # `draw` as a function of the driver; None: its loop stands where it is asked for
+class Drawn(NamedTuple):
+    """`draw` and `normal` as functions of the driver, each once, whoever asks."""
+
+    words: Callable[..., Any]
+    normal: Callable[..., Any]
+
+
+Draw = Drawn | None  # None: their loops stand where they are asked for
 
 
 def draw(
@@ -41,9 +48,15 @@ def fill(u: Columns, flock: Flock, whole: Any, step: Any, stream: int, m: int, d
             )
     else:
         ask(
-            drawn, n=whole.agents, m=m, order=flock.number, step=step, stream=stream, world=whole.world,
+            drawn.words, n=whole.agents, m=m, order=flock.number, step=step, stream=stream, world=whole.world,
             seed_low=whole.seed_low, seed_high=whole.seed_high, u0=u[0], u1=u[1], u2=u[2], u3=u[3],
         )  # fmt: skip
+
+
+def normal(m: int, a: Row, b: Row, g: Row, h: Row) -> None:
+    """Two normal numbers per agent of two random words each."""
+    for i in range(m):
+        g[i], h[i] = random.normal_pair(a[i], b[i])
 
 
 def normals(flock: Flock, rows: Columns, whole: Any, step: Any, stream: int, m: int, first: int, drawn: Draw) -> None:
@@ -51,8 +64,10 @@ def normals(flock: Flock, rows: Columns, whole: Any, step: Any, stream: int, m: 
     u = flock.words
     fill(u, flock, whole, step, stream, m, drawn)
     for c in (0, 2):
-        for i in range(m):
-            rows[first + c][i], rows[first + c + 1][i] = random.normal_pair(u[c][i], u[c + 1][i])
+        if drawn is None:
+            normal(m, u[c], u[c + 1], rows[first + c], rows[first + c + 1])
+        else:
+            ask(drawn.normal, m=m, a=u[c], b=u[c + 1], g=rows[first + c], h=rows[first + c + 1])
 
 
 def uniforms(flock: Flock, rows: Columns, whole: Any, step: Any, stream: int, m: int, drawn: Draw) -> None:

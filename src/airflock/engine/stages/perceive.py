@@ -4,18 +4,41 @@ Of a sensor whose errors are added along each axis, those of what is measured an
 other measures once: what an agent sends is its state with the errors of its last measurement.
 """
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 from airflock.core import random
 from airflock.core.sensor import FIRST
 from airflock.engine.plan import Plan
 from airflock.engine.stages import faults
 from airflock.engine.stages.noise import Draw, normals, uniforms
-from airflock.engine.stages.state import Flock, column_of, numbers_of
+from airflock.engine.stages.state import Flock, Row, column_of, numbers_of
 from airflock.engine.stages.words import X, Y, Z, ask, fields, real, wants
 
 SENSOR = random.SENSOR
+
+
+class Shared(NamedTuple):
+    """`wander` and `err` as functions of the driver, each once for all rows."""
+
+    wander: Callable[..., Any]
+    err: Callable[..., Any]
+
+
+def wander(m: int, q: Row, u: Row, g: Row, flock: Flock, numbers: Any, *, plan: Plan) -> None:
+    """Errors along one axis after one more measurement: of the position, and of the velocity."""
+    for i in range(m):
+        q[i], u[i] = ask(
+            plan.sensor.error, dx=q[i], dv=u[i], g=g[i], period=numbers.c.period,
+            s=numbers_of(i, "s", flock, numbers, plan=plan),
+        )  # fmt: skip
+
+
+def err(m: int, place: Row, rate: Row, x: Row, v: Row, q: Row, u: Row) -> None:
+    """Positions and velocities along one axis with their errors."""
+    for i in range(m):
+        place[i] = x[i] + q[i]
+        rate[i] = v[i] + u[i]
 
 
 def snapshot(flock: Flock, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
@@ -68,7 +91,7 @@ def measure(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan
 
 def perceive(  # noqa: C901 - tests of the plan leave one way through
     flock: Flock, numbers: Any, whole: Any, decision: int, slot: int, m: int, ring: Any, *, plan: Plan,
-    drawn: Draw = None,
+    drawn: Draw = None, shared: Shared | None = None,
 ) -> None:  # fmt: skip
     """Advance the errors of what is measured and of what is sent, then measure and hear, with the faults of both."""
     axes, dims = range(plan.dimensions), plan.dimensions
@@ -81,15 +104,21 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
         for draw, kinds in enumerate(errors[: dims - 1]):
             normals(flock, flock.errors, whole, decision, SENSOR + 256 * draw, m, 0, drawn)
             for g, ((error, drift), a) in enumerate(kinds):
-                for i in range(m):
-                    error[a][i], drift[a][i] = ask(
-                        plan.sensor.error, dx=error[a][i], dv=drift[a][i], g=flock.errors[g][i],
-                        period=numbers.c.period, s=numbers_of(i, "s", flock, numbers, plan=plan),
-                    )  # fmt: skip
+                if shared is None:
+                    wander(m, error[a], drift[a], flock.errors[g], flock, numbers, plan=plan)
+                else:
+                    ask(shared.wander, q=error[a], u=drift[a], g=flock.errors[g])
         for a in axes:
-            for i in range(m):
-                flock.measured_position[a][i] = flock.position[a][i] + flock.own_error[a][i]
-                flock.measured_velocity[a][i] = flock.velocity[a][i] + flock.own_drift[a][i]
+            if shared is None:
+                err(
+                    m, flock.measured_position[a], flock.measured_velocity[a], flock.position[a], flock.velocity[a],
+                    flock.own_error[a], flock.own_drift[a],
+                )  # fmt: skip
+            else:
+                ask(
+                    shared.err, place=flock.measured_position[a], rate=flock.measured_velocity[a],
+                    x=flock.position[a], v=flock.velocity[a], q=flock.own_error[a], u=flock.own_drift[a],
+                )  # fmt: skip
     elif plan.believes:
         for a in axes:
             for i in range(m):
@@ -97,9 +126,15 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
                 flock.measured_velocity[a][i] = flock.velocity[a][i]
     if plan.noisy and not plan.senses and not plan.sees:
         for a in axes:
-            for i in range(m):
-                flock.heard_position[a][i] = ring[slot, a, i] + flock.sent_error[a][i]
-                flock.heard_velocity[a][i] = ring[slot, a + dims, i] + flock.sent_drift[a][i]
+            if shared is not None:
+                ask(
+                    shared.err, place=flock.heard_position[a], rate=flock.heard_velocity[a], x=ring[slot, a],
+                    v=ring[slot, a + dims], q=flock.sent_error[a], u=flock.sent_drift[a],
+                )  # fmt: skip
+            else:
+                for i in range(m):
+                    flock.heard_position[a][i] = ring[slot, a, i] + flock.sent_error[a][i]
+                    flock.heard_velocity[a][i] = ring[slot, a + dims, i] + flock.sent_drift[a][i]
     elif plan.late:
         for a in axes:
             for i in range(m):
