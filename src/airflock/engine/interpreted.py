@@ -37,27 +37,29 @@ Set breakpoints at will; changes have no effect. Rules are functions of their ow
 '''
 
 
-class Table:
-    """A table of a driver that hands out plain numbers: row by row, or element by element. It writes through."""
+class Table(dict[int, Any]):
+    """A table of a driver that hands out plain numbers: row by row, or element by element. It writes through.
+
+    As a dictionary of the rows that were asked for: whatever a stage reads, it reads its rows first.
+    """
 
     def __init__(self, array: NDArray[Any]):
         self.shape: tuple[int, ...] = array.shape
         self.dtype = array.dtype
         self.elements: Any = _numbers(array)
         self.array = array
-        self.rows: dict[int, Any] = {}
 
     def __len__(self) -> int:
         return self.shape[0]
 
-    def __getitem__(self, at: Any) -> Any:
+    def __missing__(self, at: Any) -> Any:
         if isinstance(at, tuple):
             return self.elements[at]
-        if at not in self.rows:
-            self.rows[at] = opened(self.array[at])
-        return self.rows[at]
+        row = opened(self.array[at])
+        super().__setitem__(at, row)
+        return row
 
-    def __setitem__(self, at: tuple[int, ...], value: float) -> None:
+    def __setitem__(self, at: Any, value: float) -> None:
         self.elements[at] = value
 
     def __iter__(self) -> Iterator[Any]:

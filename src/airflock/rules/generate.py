@@ -93,7 +93,7 @@ class Source:
         if isinstance(item, type):
             self.blocks.append(f"{name} = namedtuple({name!r}, {list(getattr(item, '_fields', ()))!r})")
         else:
-            self.blocks.append(self._function(item, name, chosen))
+            self.blocks.append(self._function(random_streams.COMPILED.get(item, item), name, chosen))
         return name
 
     def names(self) -> set[str]:
@@ -130,7 +130,7 @@ class Source:
             argument.annotation = None
         if isinstance(node.body[0], ast.Expr) and isinstance(node.body[0].value, ast.Constant):
             node.body.pop(0)
-        rewritten = ast.fix_missing_locations(_Rewrite(rule, self, chosen).visit(node))
+        rewritten = _Rewrite(rule, self, chosen).visit(node)
         _end_at_return(rewritten)
         # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
         # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
