@@ -1,5 +1,6 @@
 """Recordings: layout, scores of flights and logs, and what is refused."""
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -8,10 +9,12 @@ import pytest
 import xarray as xr
 
 import airflock
+from airflock.engine import driver_text
 from airflock.errors import AirflockError, RecordingError
 from airflock.recordings.attributes import name_of
 from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.scores import measure, over_time
+from inside import drivers
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 
@@ -183,3 +186,15 @@ def test_where_nothing_stands_no_instant_has_a_clearance(circling):
     assert over_time(circling)["clearance"].isna().all()
     walled = over_time(circling, {"world.arena": "circle", "world.radius": 100.0})
     assert walled["clearance"].tolist() == pytest.approx([80.0] * len(walled))
+
+
+def test_the_text_by_which_recordings_were_flown_is_written_once(monkeypatch):
+    """It takes a tenth of a second, and most recordings of a study or a test are of one plan."""
+    found, written = airflock.load("vicsek_1995/ordered", {"agents": 3, "duration": 0.5}), []
+    write = drivers.flight
+    monkeypatch.setattr(drivers, "flight", lambda plan: written.append(plan) or write(plan))
+    drivers.flight_text.cache_clear()
+    flown = [airflock.simulate(found, seed=seed, device="python") for seed in range(3)]
+    text = driver_text(found, precision=flown[0].attrs["airflock_precision"])
+    assert {each.attrs["airflock_sources"] for each in flown} == {hashlib.sha256(text.encode()).hexdigest()}
+    assert len(written) == 1

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,10 +14,16 @@ from airflock.engine.store import load_driver
 from airflock.errors import RuleError
 
 
+@lru_cache(maxsize=256)
+def flight_text(plan: Plan) -> str:
+    """Text of the driver that flies a plan; each recording says by which it was flown."""
+    return flight(plan)
+
+
 @cache
 def flight_driver(plan: Plan) -> ModuleType:
     """Compiled driver of a plan."""
-    return load_driver(flight(plan), plan.model.name)
+    return load_driver(flight_text(plan), plan.model.name)
 
 
 def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
