@@ -193,7 +193,7 @@ def test_the_text_by_which_recordings_were_flown_is_written_once(monkeypatch):
     found, written = airflock.load("vicsek_1995/ordered", {"agents": 3, "duration": 0.5}), []
     write = drivers.flight
     monkeypatch.setattr(drivers, "flight", lambda plan: written.append(plan) or write(plan))
-    drivers.flight_text.cache_clear()
+    drivers._text.cache_clear()
     flown = [airflock.simulate(found, seed=seed, device="python") for seed in range(3)]
     text = driver_text(found, precision=flown[0].attrs["airflock_precision"])
     assert {each.attrs["airflock_sources"] for each in flown} == {hashlib.sha256(text.encode()).hexdigest()}

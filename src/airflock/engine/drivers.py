@@ -14,9 +14,13 @@ from airflock.engine.store import load_driver
 from airflock.errors import RuleError
 
 
-@lru_cache(maxsize=256)
 def flight_text(plan: Plan) -> str:
-    """Text of the driver that flies a plan; each recording says by which it was flown."""
+    """Text of the driver that flies a plan, the same whether samples are kept; each recording says by which."""
+    return _text(plan.built(record=False) if plan.record else plan)
+
+
+@lru_cache(maxsize=256)
+def _text(plan: Plan) -> str:
     return flight(plan)
 
 

@@ -110,13 +110,17 @@ PLAIN: Mapping[str, Any] = {
 }
 
 
-@cache
 def flight_driver(plan: Plan, exact: bool = False) -> ModuleType:
-    """Interpreted driver of a plan.
+    """Interpreted driver of a plan, the same whether samples are kept.
 
     exact : run every line of the text; else rules are not asked about neighbours that do not count (out of range, lost,
         the agent itself), which a compiled driver asks about and then drops what they say
     """
+    return _flight_driver(plan.built(record=False) if plan.record else plan, exact)
+
+
+@cache
+def _flight_driver(plan: Plan, exact: bool) -> ModuleType:
     return _driver(drivers.stages(_plainly(plan), lenient=True), plan.model.name, exact)
 
 
