@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import counted, searching
 from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import SCENARIOS
 
@@ -85,7 +86,7 @@ def harden(
     else:
         from airflock.evolve.harden import MOST, harden
 
-        with options.progress(f"{scenario}: flights", MOST * seeds * len(optima), quiet=as_json) as done:
+        with counted(f"{scenario}: flights", MOST * seeds * len(optima), quiet=as_json) as done:
             steps = harden(optima, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
     for each, place in zip(optima, places, strict=True):
         write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")
@@ -121,7 +122,7 @@ def _evolved_again(
     settings = cautious(optimum, *factors)
     study = stricter(optimum, _space(where, optimum), settings, {"generations": generations})
     folder = out.parent / f"{out.stem}_study"
-    with options.searching(study, quiet=quiet) as (watch, note):
+    with searching(study, quiet=quiet) as (watch, note):
         return evolved_again(optimum, study, settings, folder, numbers, threads, watch, note)
 
 
