@@ -313,12 +313,15 @@ def test_what_makes_no_sense_is_one_line(scenario, call, said):
 # ---------------------------------------------------------------------------------------------------------- looking
 
 
-@pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "vasarhelyi_2018/real_gnss"])
-def test_what_an_agent_perceives_makes_up_its_command(name):
+@pytest.mark.parametrize(
+    ("name", "device"),
+    [("vasarhelyi_2018/4ms", "cpu"), ("vasarhelyi_2018/real_gnss", "python")],  # its sensor, compiled: covering.PLANS
+)
+def test_what_an_agent_perceives_makes_up_its_command(name, device):
     from airflock.core.agent import answer
 
     scenario = load(name, {"agents": 12, "duration": 20.0, "radio.range": 200.0})
-    flight = airflock.open(scenario, 3, precision=64).advance(5.0)
+    flight = airflock.open(scenario, 3, precision=64, device=device).advance(5.0)
     before = whole(flight)
     views = [flight.look(agent) for agent in range(12)]
     assert whole(flight) == before
