@@ -236,7 +236,7 @@ def test_a_change_to_the_same_numbers_changes_no_bit(scenario):
 
 @pytest.mark.parametrize(("delay", "device"), [(0.0, "python"), (0.4, "cpu"), (1.0, "cpu"), (1.7, "cpu")])
 def test_after_a_change_of_the_delay_states_of_so_long_ago_are_heard(delay, device):
-    """Without a delay it is another driver that goes on, handed over as compiled ones are in `test_going_back_flies_the_same_again`."""
+    """Without a delay another driver goes on; compiled, one hands over in `test_going_back_flies_the_same_again`."""
     quiet = load("vasarhelyi_2018/4ms", {"agents": 10, "sensors.noise": 0.0, "radio.range": 1e4})
     flight, past = airflock.open(quiet, 1, device=device), {}
     for step in range(0, 1000, 20):
