@@ -18,6 +18,7 @@ MODULES = {
     "passes_build": "passes.build",
     "passes_decide": "passes.decide",
     "passes_driver": "passes.driver",
+    "passes_measure": "passes.measure",
     "passes_perceive": "passes.perceive",
     "simulate": "simulate",
     "specialise_values": "specialise.values",

@@ -234,10 +234,11 @@ def test_a_change_to_the_same_numbers_changes_no_bit(scenario):
     assert np.array_equal(straight.state, changed.state)
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.4, 1.0, 1.7])
-def test_after_a_change_of_the_delay_states_of_so_long_ago_are_heard(scenario, delay):
+@pytest.mark.parametrize(("delay", "device"), [(0.0, "python"), (0.4, "cpu"), (1.0, "cpu"), (1.7, "cpu")])
+def test_after_a_change_of_the_delay_states_of_so_long_ago_are_heard(delay, device):
+    """Without a delay another driver goes on; compiled, one hands over in `test_going_back_flies_the_same_again`."""
     quiet = load("vasarhelyi_2018/4ms", {"agents": 10, "sensors.noise": 0.0, "radio.range": 1e4})
-    flight, past = airflock.open(quiet, 1), {}
+    flight, past = airflock.open(quiet, 1, device=device), {}
     for step in range(0, 1000, 20):
         past[step] = flight.state
         if step == 500:
@@ -313,12 +314,15 @@ def test_what_makes_no_sense_is_one_line(scenario, call, said):
 # ---------------------------------------------------------------------------------------------------------- looking
 
 
-@pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "vasarhelyi_2018/real_gnss"])
-def test_what_an_agent_perceives_makes_up_its_command(name):
+@pytest.mark.parametrize(
+    ("name", "device"),
+    [("vasarhelyi_2018/4ms", "cpu"), ("vasarhelyi_2018/real_gnss", "python")],  # its sensor, compiled: covering.PLANS
+)
+def test_what_an_agent_perceives_makes_up_its_command(name, device):
     from airflock.core.vocabulary import answer
 
     scenario = load(name, {"agents": 12, "duration": 20.0, "radio.range": 200.0})
-    flight = airflock.open(scenario, 3, precision=64).advance(5.0)
+    flight = airflock.open(scenario, 3, precision=64, device=device).advance(5.0)
     before = whole(flight)
     views = [flight.look(agent) for agent in range(12)]
     assert whole(flight) == before

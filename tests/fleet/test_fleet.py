@@ -79,6 +79,7 @@ def test_ten_drones_are_within_a_centimetre_after_five_seconds(seed):
     assert apart.fleet[0] < 0.01 < apart.nudged[0], apart
 
 
+@pytest.mark.usefixtures("scored_plainly")
 def test_the_recording_of_a_fleet_is_measured_like_any_other(tmp_path):
     from airflock.recordings.files import load_recording, save
 
@@ -611,7 +612,8 @@ def test_a_full_disk_does_not_bring_a_drone_down(tmp_path):
     assert "ticks" in said[-1] and len(log.getvalue()) <= 2000
 
 
-def test_a_fleet_in_python_is_that_of_the_command(tmp_path):
+@pytest.mark.usefixtures("scored_plainly")
+def test_a_fleet_in_python_is_that_of_the_command(monkeypatch):
     import json
 
     from typer.testing import CliRunner
@@ -620,6 +622,8 @@ def test_a_fleet_in_python_is_that_of_the_command(tmp_path):
     from airflock.cli.main import app
     from airflock.errors import ScenarioError
 
+    # the simulator beside both flies interpreted: tests above have it compiled
+    monkeypatch.setattr(compare, "simulate", lambda *given, **named: simulate(*given, **named | {"device": "python"}))
     small = {"agents": 3, "duration": 2.0}
     found = airflock.fleet("vasarhelyi_2018/real_4ms", seeds=[4, 5], settings=small, beside=True)
     words = "vasarhelyi_2018/real_4ms --agents 3 --duration 2 --seeds 2 --first-seed 4 --against simulator --json"

@@ -118,3 +118,38 @@ def test_what_no_driver_can_hold_is_one_line(rule, said):
     with pytest.raises(RuleError) as found:
         Source("", {"p": {"form": "square"}}).name(rule)
     assert said in str(found.value) and "\n" not in str(found.value)
+
+
+STEP = 2.0
+
+
+def stepped(x):
+    return x + STEP
+
+
+def twice(x, p):
+    return stepped(stepped(x)) if p.form == "on" else x
+
+
+def text_of(form):
+    """All that a driver holds of the rule."""
+    source = Source("", {"p": {"form": form}})
+    source.name(twice)
+    return "\n".join(source.blocks)
+
+
+def test_a_text_written_before_is_that_of_now(monkeypatch):
+    """What it depended on is asked again: choices, what names stand for, and what comes along."""
+    first = text_of("on")
+    assert "def test_generate_stepped" in first and "2.0" in first
+    assert text_of("off") != first == text_of("on")
+    monkeypatch.setitem(globals(), "STEP", 3.0)
+    assert "3.0" in text_of("on") and "2.0" not in text_of("on")
+    monkeypatch.setitem(globals(), "stepped", other_step)
+    assert "def test_generate_other_step" in text_of("on") and "stepped" not in text_of("on")
+    monkeypatch.undo()
+    assert text_of("on") == first
+
+
+def other_step(x):
+    return 4.0 * x

@@ -1,5 +1,6 @@
 """Recordings: layout, scores of flights and logs, and what is refused."""
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -8,10 +9,12 @@ import pytest
 import xarray as xr
 
 import airflock
+from airflock.engine import driver_text, plan_of
 from airflock.errors import AirflockError, RecordingError
 from airflock.recordings.attributes import name_of
 from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.scores import measure, over_time
+from inside import drivers, measuring, passes_driver, tables
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 
@@ -183,3 +186,25 @@ def test_where_nothing_stands_no_instant_has_a_clearance(circling):
     assert over_time(circling)["clearance"].isna().all()
     walled = over_time(circling, {"world.arena": "circle", "world.radius": 100.0})
     assert walled["clearance"].tolist() == pytest.approx([80.0] * len(walled))
+
+
+def test_the_text_by_which_recordings_were_flown_is_written_once(monkeypatch):
+    """It takes a tenth of a second, and most recordings of a study or a test are of one plan."""
+    found, written = airflock.load("vicsek_1995/ordered", {"agents": 3, "duration": 0.5}), []
+    write = drivers.flight
+    monkeypatch.setattr(drivers, "flight", lambda plan: written.append(plan) or write(plan))
+    drivers._text.cache_clear()
+    flown = [airflock.simulate(found, seed=seed, device="python") for seed in range(3)]
+    text = driver_text(found, precision=flown[0].attrs["airflock_precision"])
+    assert {each.attrs["airflock_sources"] for each in flown} == {hashlib.sha256(text.encode()).hexdigest()}
+    assert len(written) == 1
+
+
+def test_one_driver_measures_flights_of_several_laws():
+    """To compile it takes seconds, and of a law it would tell only where the numbers of the arena stand in a row."""
+    texts, keys = set(), {"agents": 5, "metrics.kind": "vasarhelyi", "world.dimensions": "2", "world.arena": "square"}
+    for law in ("vasarhelyi_2018/4ms", "viragh_2014/4ms", "couzin_2002/torus"):
+        found = airflock.load(law, keys | {"world.side": 100.0})
+        plan = plan_of(found, precision=64)
+        texts.add(passes_driver.replay(measuring.shared(plan, tables(found, plan, 0))[0]))
+    assert len(texts) == 1

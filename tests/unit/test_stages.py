@@ -17,6 +17,7 @@ from flocks import ISLANDS, NOTCHED, scenario
 from inside import WHOLE, Flock, Itself, Surroundings, clusters_of, stages, tables
 from inside import passes_decide as decide
 from inside import passes_driver as driver
+from inside import passes_measure as measure
 from inside import passes_perceive as perceive
 from inside import stages_approach as approach
 from inside import stages_decide as deciding

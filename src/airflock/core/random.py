@@ -21,6 +21,7 @@ PACKET = 12  # whether anything of what one agent sends another arrives: agent i
 FADE = 16  # strength of the signal between one pair, the same both ways
 AIR = 17  # what a radio's own rules ask for: agent is the number of the pair, receiver * agents + sender
 
+# A device binds these, and compiles of each function in COMPILED the form that calls them.
 PRIMITIVES = ("word", "multiply_high", "multiply_low", "add32", "xor32", "uniform", "normal_pair")
 
 MASK = 0xFFFFFFFF
@@ -54,6 +55,16 @@ def xor32(a, b):
 
 def philox(c0, c1, c2, c3, k0, k1):
     """Four random words of 32 bits from a counter of four words and a key of two."""
+    c0, c1, c2, c3, k0, k1 = c0 & MASK, c1 & MASK, c2 & MASK, c3 & MASK, k0 & MASK, k1 & MASK
+    for _ in range(10):
+        a, b = 0xD2511F53 * c0, 0xCD9E8D57 * c2
+        c0, c1, c2, c3 = (b >> 32) ^ c1 ^ k0, b & MASK, (a >> 32) ^ c3 ^ k1, a & MASK
+        k0, k1 = (k0 + 0x9E3779B9) & MASK, (k1 + 0xBB67AE85) & MASK
+    return c0, c1, c2, c3
+
+
+def philox_of_words(c0, c1, c2, c3, k0, k1):
+    """The same by the primitives of a device, whose words have other operators: what a driver holds of `philox`."""
     c0, c1, c2, c3, k0, k1 = word(c0), word(c1), word(c2), word(c3), word(k0), word(k1)
     for _ in range(10):
         h0 = multiply_high(0xD2511F53, c0)
@@ -67,6 +78,9 @@ def philox(c0, c1, c2, c3, k0, k1):
         k0 = add32(k0, 0x9E3779B9)
         k1 = add32(k1, 0xBB67AE85)
     return c0, c1, c2, c3
+
+
+COMPILED = {philox: philox_of_words}
 
 
 def draw(c0, c1, c2, c3, k0, k1):

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,10 +14,20 @@ from airflock.engine.store import load_driver
 from airflock.errors import RuleError
 
 
+def flight_text(plan: Plan) -> str:
+    """Text of the driver that flies a plan, the same whether samples are kept; each recording says by which."""
+    return _text(plan.built(record=False) if plan.record else plan)
+
+
+@lru_cache(maxsize=256)
+def _text(plan: Plan) -> str:
+    return flight(plan)
+
+
 @cache
 def flight_driver(plan: Plan) -> ModuleType:
     """Compiled driver of a plan."""
-    return load_driver(flight(plan), plan.model.name)
+    return load_driver(flight_text(plan), plan.model.name)
 
 
 def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:

@@ -37,27 +37,29 @@ Set breakpoints at will; changes have no effect. Rules are functions of their ow
 '''
 
 
-class Table:
-    """A table of a driver that hands out plain numbers: row by row, or element by element. It writes through."""
+class Table(dict[int, Any]):
+    """A table of a driver that hands out plain numbers: row by row, or element by element. It writes through.
+
+    As a dictionary of the rows that were asked for: whatever a stage reads, it reads its rows first.
+    """
 
     def __init__(self, array: NDArray[Any]):
         self.shape: tuple[int, ...] = array.shape
         self.dtype = array.dtype
         self.elements: Any = _numbers(array)
         self.array = array
-        self.rows: dict[int | tuple[int, ...], Any] = {}
 
     def __len__(self) -> int:
         return self.shape[0]
 
-    def __getitem__(self, at: Any) -> Any:
+    def __missing__(self, at: Any) -> Any:
         if isinstance(at, tuple) and len(at) == len(self.array.shape):
             return self.elements[at]
-        if at not in self.rows:
-            self.rows[at] = opened(self.array[at])
-        return self.rows[at]
+        row = opened(self.array[at])
+        super().__setitem__(at, row)
+        return row
 
-    def __setitem__(self, at: tuple[int, ...], value: float) -> None:
+    def __setitem__(self, at: Any, value: float) -> None:
         self.elements[at] = value
 
     def __iter__(self) -> Iterator[Any]:
@@ -110,13 +112,17 @@ PLAIN: Mapping[str, Any] = {
 }
 
 
-@cache
 def flight_driver(plan: Plan, exact: bool = False) -> ModuleType:
-    """Interpreted driver of a plan.
+    """Interpreted driver of a plan, the same whether samples are kept.
 
     exact : run every line of the text; else rules are not asked about neighbours that do not count (out of range, lost,
         the agent itself), which a compiled driver asks about and then drops what they say
     """
+    return _flight_driver(plan.built(record=False) if plan.record else plan, exact)
+
+
+@cache
+def _flight_driver(plan: Plan, exact: bool) -> ModuleType:
     return _driver(drivers.stages(_plainly(plan), lenient=True), plan.model.name, exact)
 
 

@@ -1,5 +1,6 @@
 """Measuring: order parameters of frames that are known, flown or recorded, by the very stages of a flight."""
 
+from dataclasses import replace
 from functools import cache
 from types import ModuleType
 from typing import Any
@@ -17,6 +18,8 @@ from airflock.engine.state import State
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables, tables
 from airflock.scenarios.scenario import Scenario
+
+READ = ("q", "w")  # letters of the numbers of order parameters, and of the arena
 
 
 @cache
@@ -58,6 +61,7 @@ def measured(
     present: NDArray[np.bool_] | None = None,
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
     """The same from the numbers of a world; the values of every instant as (time, value)."""
+    plan, tables = shared(plan, tables)
     driver = interpreted.replay_driver(plan) if device == "python" else replay_driver(plan)
     real = tables.row.dtype
     state = State(plan, tables, driver)
@@ -90,6 +94,18 @@ def measured(
             remembered[:, there], before[:, there] = own["memory"][:, lanes], own["work"][looked, lanes]
         known = present[first] if len(there) >= min(2, frames.shape[2]) else np.zeros_like(known)
     return state.values(), series
+
+
+def shared(plan: Plan, tables: Tables) -> tuple[Plan, Tables]:
+    """The same with what order parameters read first among the numbers: then one driver measures flights of all laws.
+
+    Of a law it would tell only how many numbers stand before those of the arena.
+    """
+    found = dict(plan.numbers)
+    order = sorted(found, key=lambda letter: (letter not in READ, letter))
+    places = [place for letter in order for place in range(plan.spans[letter].start, plan.spans[letter].stop)]
+    numbers = tuple((letter, found[letter]) for letter in order)
+    return replace(plan, numbers=numbers), replace(tables, row=np.ascontiguousarray(tables.row[places]))
 
 
 def _runs(present: NDArray[np.bool_]) -> list[tuple[int, int]]:

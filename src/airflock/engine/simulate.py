@@ -8,8 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from airflock.engine import cpu, devices, failure, requirements
-from airflock.engine.drivers import flight_driver, is_loaded
-from airflock.engine.passes.driver import flight as flight_text
+from airflock.engine.drivers import flight_driver, flight_text, is_loaded
 from airflock.engine.plan import Plan
 from airflock.engine.planning import plan_of
 from airflock.engine.state import State

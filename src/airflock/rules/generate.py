@@ -18,7 +18,8 @@ from typing import Any
 from airflock.core import random as random_streams
 from airflock.errors import RuleError
 from airflock.rules import law
-from airflock.rules.integers import free, tree_of
+from airflock.rules.copies import Notes, copies_of
+from airflock.rules.integers import tree_of
 from airflock.rules.nodes import walk
 from airflock.rules.unrolled import Unrolled
 from airflock.spelling import as_name
@@ -56,6 +57,7 @@ class Source:
         self.blocks: list[str] = []
         self.rows: dict[str, tuple[str, ...]] = {}
         self._names: dict[Any, str] = {}
+        self._taken: set[str] = set()
         self._originals: dict[str, Any] = {}
         self._apart = False
 
@@ -84,21 +86,22 @@ class Source:
         said = [text for text in chosen.values() if text.isidentifier()]
         name = base = as_name("_".join([module, item.__name__, *said]))
         count = 1
-        while name in self._names.values():
+        while name in self._taken:
             count += 1
             name = f"{base}{count}"
         self._names[key] = name
+        self._taken.add(name)
         if not chosen:
             self._originals[name] = item
         if isinstance(item, type):
             self.blocks.append(f"{name} = namedtuple({name!r}, {list(getattr(item, '_fields', ()))!r})")
         else:
-            self.blocks.append(self._function(item, name, chosen))
+            self.blocks.append(self._function(random_streams.COMPILED.get(item, item), name, chosen))
         return name
 
     def names(self) -> set[str]:
         """Names in the driver of all that has come so far."""
-        return set(self._names.values())
+        return self._taken
 
     def originals(self) -> dict[str, Any]:
         """What was copied, by its name in the driver: plain functions and NamedTuple classes of their authors."""
@@ -113,14 +116,25 @@ class Source:
 
     def record(self, name: str, fields: tuple[str, ...]) -> str:
         """A record of numbers under a name of its own (the columns of a parameter row)."""
-        if name not in self._names.values():
+        if name not in self._taken:
             self._names[name] = name
+            self._taken.add(name)
             self.rows[name] = fields
             self.blocks.append(f"{name} = namedtuple({name!r}, {list(fields)!r})")
         return name
 
     def _function(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str]) -> str:
         law.check(rule)
+        notes = Notes(rule, self)
+        known = copies_of(rule, name, *chosen.items(), self.decorator, self.law, self.lenient, self._apart)
+        for asked, text in known:
+            if notes.hold(asked):
+                return text
+        text = self._copied(rule, name, chosen, notes)
+        known.append((notes.asked, text))
+        return text
+
+    def _copied(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str], notes: Notes) -> str:
         node = tree_of(rule)
         node.name = name
         node.returns = None
@@ -130,7 +144,7 @@ class Source:
             argument.annotation = None
         if isinstance(node.body[0], ast.Expr) and isinstance(node.body[0].value, ast.Constant):
             node.body.pop(0)
-        rewritten = ast.fix_missing_locations(_Rewrite(rule, self, chosen).visit(node))
+        rewritten = _Rewrite(rule, self, chosen, notes).visit(node)
         _end_at_return(rewritten)
         # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
         # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
@@ -155,12 +169,18 @@ def _depth(node: ast.AST) -> int:
 class _Rewrite(Unrolled):
     """Bind the free names of one rule and cast its literals; arguments that are chosen become constants."""
 
-    def __init__(self, rule: Callable[..., Any], source: Source, chosen: Mapping[str, str]):
+    def __init__(self, rule: Callable[..., Any], source: Source, chosen: Mapping[str, str], notes: Notes):
         self.rule = rule
         self.source = source
         self.chosen = chosen
+        self.notes = notes
         self.local = set(rule.__code__.co_varnames) - set(chosen)
         super().__init__(rule, source.vectors)
+
+    def size(self, node: ast.AST) -> int:
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            return self.notes.size(node.value.id, node.attr)
+        return 0
 
     def _real(self, node: ast.expr) -> ast.expr:
         return ast.Call(ast.Name("real", ast.Load()), [node], [])
@@ -172,9 +192,8 @@ class _Rewrite(Unrolled):
         if isinstance(node.value, ast.Name):
             if node.value.id == "math" and isinstance(getattr(math, node.attr, None), float):
                 return self._real(ast.Constant(getattr(math, node.attr)))
-            chosen = self.source.constants.get(node.value.id, {})
-            if node.attr in chosen:
-                value = chosen[node.attr]
+            value = self.notes.choice(node.value.id, node.attr)
+            if value is not None:
                 return ast.Constant(value) if isinstance(value, str) else self._real(ast.Constant(value))
             if self.size(node):
                 return ast.Tuple([self.visit(part) for part in self.components(node)], ast.Load())
@@ -230,7 +249,7 @@ class _Rewrite(Unrolled):
 
     def _hand_on(self, node: ast.Call) -> None:
         """Name all arguments of a call; a plain function that is handed a choice is called by its text for this one."""
-        called = free(node.func.id, self.rule) if isinstance(node.func, ast.Name) else None
+        called = self.notes.free(node.func.id) if isinstance(node.func, ast.Name) else None
         if isinstance(called, types.FunctionType) and not node.keywords:  # a driver knows no defaults
             usual = called.__defaults__ or ()
             missing = called.__code__.co_argcount - len(node.args)
@@ -239,7 +258,7 @@ class _Rewrite(Unrolled):
         if isinstance(called, types.FunctionType) and any(text is not None for text in texts):
             names = called.__code__.co_varnames
             chosen = {name: text for name, text in zip(names, texts, strict=False) if text is not None}
-            node.func = ast.Name(self.source.name(called, chosen), ast.Load())
+            node.func = ast.Name(self.notes.name(called, chosen), ast.Load())
             node.args = [argument for argument, text in zip(node.args, texts, strict=True) if text is None]
 
     def _text(self, node: ast.expr) -> str | None:
@@ -250,7 +269,7 @@ class _Rewrite(Unrolled):
         elif isinstance(node, ast.Name):
             value = self.chosen.get(node.id)
         elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            value = self.source.constants.get(node.value.id, {}).get(node.attr)
+            value = self.notes.choice(node.value.id, node.attr)
         return value if isinstance(value, str) else None
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
@@ -275,7 +294,7 @@ class _Rewrite(Unrolled):
             return ast.Constant(self.chosen[node.id])
         if node.id in GIVEN or node.id in self.source.names() or node.id.startswith("percept_"):
             return node
-        value = free(node.id, self.rule)
+        value = self.notes.free(node.id)
         if isinstance(value, bool):
             return ast.Constant(value)
         if isinstance(value, float):
@@ -283,7 +302,7 @@ class _Rewrite(Unrolled):
         if isinstance(value, int):
             return ast.Constant(value)
         if isinstance(value, types.FunctionType) or (isinstance(value, type) and issubclass(value, tuple)):
-            return ast.Name(self.source.name(value), node.ctx)
+            return ast.Name(self.notes.name(value, NOTHING), node.ctx)
         if isinstance(value, types.ModuleType) or (self.source.lenient and hasattr(builtins, node.id)):
             return node
         why = "it does not compile; the device python flies it" if hasattr(builtins, node.id) else "it is not defined"

@@ -4,6 +4,7 @@ import ast
 import inspect
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 from airflock.errors import RuleError
@@ -53,8 +54,13 @@ def faults(rule: Callable[..., Any]) -> list[str]:
     return found
 
 
+@lru_cache(maxsize=4096)
+def _told(rule: Callable[..., Any]) -> tuple[str, ...]:
+    return tuple(faults(rule))
+
+
 def check(rule: Callable[..., Any]) -> None:
-    """Raise a RuleError that lists every fault of a rule; do nothing if it has none."""
-    found = faults(rule)
+    """Raise a RuleError that lists every fault of a rule; do nothing if it has none. Each is looked for once."""
+    found = _told(rule)
     if found:
         raise RuleError("\n".join(found))

@@ -156,7 +156,7 @@ def shares(statements: list[ast.stmt], marked: Any, name: str) -> bool:
     """
     if not isinstance(marked, ast.Name) or MARK.sub("", marked.id) != MARK.sub("", name):
         return False
-    rest = [s for s in statements if ast.unparse(s) != f"{marked.id} = {name}"]
+    rest = [s for s in statements if not _copies(s, marked.id, name)]
     return all(item.id != name for s in rest for item in walk(s) if isinstance(item, ast.Name))
 
 
@@ -166,4 +166,12 @@ def renamed(statements: list[ast.stmt], old: str, new: str) -> list[ast.stmt]:
         for item in walk(statement):
             if isinstance(item, ast.Name) and item.id == old:
                 item.id = new
-    return [statement for statement in statements if ast.unparse(statement) != f"{new} = {new}"]
+    return [statement for statement in statements if not _copies(statement, new, new)]
+
+
+def _copies(statement: ast.stmt, to: str, name: str) -> bool:
+    """Whether a statement gives one name the value of another, and does nothing else."""
+    if not isinstance(statement, ast.Assign) or len(statement.targets) > 1:
+        return False
+    names = [node.id for node in (*statement.targets, statement.value) if isinstance(node, ast.Name)]
+    return names == [to, name]

@@ -53,10 +53,10 @@ class Expressions:
 
     def value(self, node: ast.expr, scope: Scope) -> Any:
         """A known Python object, or syntax of the driver."""
-        method = getattr(self, f"_{type(node).__name__}", None)
+        method = BY_TYPE.get(type(node))
         if method is None:
             raise scope.fault(node, f"{type(node).__name__} is not specialised")
-        return method(node, scope)
+        return method(self, node, scope)
 
     def expr(self, node: ast.expr, scope: Scope) -> ast.expr:
         """Syntax of the driver for an expression."""
@@ -298,6 +298,11 @@ class Expressions:
                 return value.store(at)
             return ast.Subscript(self.printed(value, node, scope), self.printed(at, node, scope), STORE)
         raise scope.fault(node, f"{ast.unparse(node)} cannot be assigned to")
+
+
+BY_TYPE: dict[type, Callable[..., Any]] = {
+    getattr(ast, name[1:]): method for name, method in vars(Expressions).items() if name[0] == "_" and name[1].isupper()
+}
 
 
 def _record(value: object) -> bool:

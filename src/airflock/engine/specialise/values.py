@@ -5,7 +5,7 @@ import linecache
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 from airflock.engine.stages.words import NOTHING, ZERO
@@ -112,7 +112,7 @@ class Text:
     names: dict[str, Any]
     where: str
 
-    @property
+    @cached_property
     def body(self) -> list[ast.stmt]:
         """Its statements, without a docstring."""
         return self.node.body[1:] if ast.get_docstring(self.node) is not None else self.node.body
