@@ -25,7 +25,8 @@ import airflock
 from airflock import __version__, atomic
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.folder import STUDY
-from airflock.evolve.harden import COST, SAFETY, SLACK, harden
+from airflock.evolve.harden import COST, harden
+from airflock.evolve.held import SAFETY, SLACK
 from airflock.evolve.intervals import interval
 from airflock.evolve.steps import Table, flown
 from airflock.scenarios.making import make

@@ -95,7 +95,7 @@ def done(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tuning, "rate_of", lambda *_: 300.0)
         patch.setattr("airflock.evolve.run.draw", lambda *_: None)  # the study's own pictures
-        patch.setattr("airflock.certify.environment.usual_keys", lambda _: ("radio.delay", "agents"))  # one driver
+        patch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay", "agents"))  # one driver
         return tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"]), folder
 
 
@@ -148,7 +148,7 @@ def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch
     found, folder = done
     monkeypatch.setattr(tuning, "rate_of", lambda *_: pytest.fail("the plan is kept"))
     monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.certify.environment.usual_keys", lambda _: ("radio.delay", "agents"))
+    monkeypatch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay", "agents"))
     with pytest.raises(StudyError, match="holds a tuning already; continue it with --resume"):
         tune(make(MINE, "mine"), folder)
     with pytest.raises(StudyError, match="holds the tuning of another scenario"):
@@ -185,7 +185,7 @@ def logs(tmp_path_factory):
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
     monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.certify.environment.usual_keys", lambda _: ("radio.delay",))
+    monkeypatch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay",))
     how = {"like": make(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
     found = tune([logs], tmp_path / "a", **how)
     tau = load(tmp_path / "a" / "identified.toml").body.tau

@@ -55,6 +55,7 @@ class Measured:
     contacts : share of flights in which somebody left the arena or entered an obstacle; nan where nobody looked
     clearance : mean over seeds of the smallest distance to walls and obstacles, m; nan where nobody looked
     kept     : whether the step stays; verdict: why, or why not
+    margins  : of margins that were asked for, those that were flown here: name → value up to which what held holds
     """
 
     name: str
@@ -70,6 +71,7 @@ class Measured:
     clearance: float = math.nan
     kept: bool = True
     verdict: str = ""
+    margins: Mapping[str, float] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """The step as plain values."""
@@ -87,6 +89,7 @@ class Measured:
             "clearance": self.clearance,
             "kept": self.kept,
             "verdict": self.verdict,
+            "margins": dict(self.margins),
         }
 
 

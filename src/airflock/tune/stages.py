@@ -1,9 +1,11 @@
 """Stages of a tuning: search, hardening, certificate; each is continued where it was left."""
 
+import itertools
 import json
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from airflock import atomic
 from airflock.certify.campaign import FOLDER
@@ -54,16 +56,17 @@ def search(
 
 
 def hardening(
-    folder: Path, plan: Plan, limits: Sequence[str], threads: int | None, trust: bool
+    folder: Path, plan: Plan, limits: Sequence[str], margins: Sequence[str], threads: int | None, trust: bool
 ) -> tuple[Scenario, list[Measured], str]:
     """The scenario after hardening, its steps, and why there are none."""
     if (folder / STEPS).is_file():
         steps, why = read_steps(folder / STEPS)
         return load(folder / TUNED, trust=trust), steps, why
     best = load(folder / STUDY / BEST, trust=trust)
-    steps, why = [], ""
+    steps, why, count = [], "", itertools.count()
     try:
-        steps = harden(best, range(plan.seeds), limit=limits, threads=threads)
+        how: dict[str, Any] = {"threads": threads, "done": lambda: next(count)}
+        steps = harden(best, range(plan.seeds), limit=limits, margin=margins, **how)
         write(folder / TUNED, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune.")
     except ScenarioError as fault:
         why = fault.faults[0]
@@ -71,7 +74,8 @@ def hardening(
         if law.suffix == ".py" and law.is_file():
             atomic.write(folder / law.name, law.read_bytes())
         write(folder / TUNED, document(best), "Evolved by airflock tune; not hardened.")
-    atomic.write(folder / STEPS, json.dumps({"why": why, "steps": [step.as_dict() for step in steps]}))
+    told = {"why": why, "flights": next(count), "steps": [step.as_dict() for step in steps]}
+    atomic.write(folder / STEPS, json.dumps(told))
     return load(folder / TUNED, trust=trust), steps, why
 
 
@@ -85,7 +89,7 @@ def certificate(
     note: Note | None,
 ) -> Certificate:
     """The certificate of the tuned set, saved in the folder."""
-    from airflock.certify.environment import usual_keys
+    from airflock.evolve.environment import usual_keys
 
     campaign = campaign_of(tuned, limits, confidence)
     path = folder / "certificate_flights"
