@@ -1,10 +1,10 @@
 """Do cheaper flights rank candidates as whole ones do? python benchmarks/fidelity.py STUDY
 
 STUDY is the folder of a study of one scenario in a square. Candidates from early and from late generations of its
-search fly TRUTH whole flights each, whose mean counts as the truth, and FLIGHTS of each cheaper kind: with longer motion
-steps, shorter, or with half of the agents in half of the area. The table has, for each kind: processor time of a flight,
-Kendall's tau between the truth and single flights (mean of FLIGHTS of them), and between the truth and their means.
-Whole flights on other seeds than the truth's are the row to compare with.
+search fly TRUTH whole flights each, whose mean counts as the truth, and FLIGHTS of each cheaper kind: with longer
+motion steps, shorter, or with half of the agents in half of the area. The table has, for each kind: processor time of a
+flight, Kendall's tau between the truth and single flights (mean of FLIGHTS of them), and between the truth and their
+means. Whole flights on other seeds than the truth's are the row to compare with.
 """
 
 import argparse

@@ -21,7 +21,7 @@ from airflock.evolve.held import Constraints
 from airflock.evolve.margins import read_margins
 from airflock.evolve.objective_table import read_limits
 from airflock.evolve.space import declared
-from airflock.evolve.steps import RECIPE, ROOM, Measured, Step, recipe, together
+from airflock.evolve.steps import APART, RECIPE, ROOM, Measured, Step, recipe, together
 from airflock.evolve.trial import Trial
 from airflock.scenarios import formats
 from airflock.scenarios.files import loaded
@@ -59,7 +59,7 @@ def harden(
         Seeds of the flights of each step; the result is judged on three times as many seeds after the largest of them.
     steps : sequence of Step
         What is tried, one after another; earlier braking is added where agents touch walls or obstacles, and comes
-        first where that is what is short.
+        first where that is what is short; larger distances are added where a margin is to be widened.
     cost : float
         Fitness, 0 to 1, that may be given up in all; a step towards limits that are not kept yet may cost more.
     limit : str or sequence of str
@@ -102,11 +102,12 @@ def harden(
     faults += wrong
     if faults:
         raise ScenarioError(faults)
+    steps = [*steps, *(APART if margins else ())]
     trial = Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, Constraints(held, cost), margins, threads, done)
     found = [trial.first]
     hit = float((together(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()
-    order = [*steps, *ROOM] if touched else list(steps)
+    order = [*steps, *(ROOM if touched else ())]
     at_walls = trial.first.contacts > hit or trial.first.parts.get("f_wall", 1.0) < trial.first.parts.get("f_coll", 1.0)
     if at_walls or trial.short_at_walls():
         order.sort(key=lambda step: not step.earlier)
