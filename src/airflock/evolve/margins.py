@@ -22,7 +22,7 @@ FAULTS = "faults"  # stands for all kinds of fault
 USUAL = "vasarhelyi_2018/faulty"  # how long faults last that a scenario does not have
 HOURLY = 1.0  # faults of one kind in an hour of the flock: the first rate of those that a scenario does not have
 NEVER = 1e-9  # rate, 1/h, of faults that a driver has and no flight sees
-UNITS = {"per_hour": "1/h", "number": "agents"}  # of numbers of faults
+UNITS = {"per_hour": "an hour", "number": "agents"}  # of numbers of faults
 
 
 @dataclass(frozen=True)

@@ -39,13 +39,14 @@ class Reach:
 
     @property
     def far(self) -> str:
-        """How far it reaches: up or down to which value."""
-        return f"{'up' if self.margin.first.way > 0 else 'down'} to {self.margin.told(self.holds)}"
+        """How far it reaches, in words."""
+        least = "" if self.ends else " at least"
+        return f"{'up' if self.margin.first.way > 0 else 'down'} to {self.margin.told(self.holds)}{least}"
 
     @property
     def told(self) -> str:
         """How far it reaches and what ends it, in words."""
-        end = f", not at {self.margin.told(self.breaks)}: {self.why}" if self.ends else " at least"
+        end = f", not at {self.margin.told(self.breaks)}: {self.why}" if self.ends else ""
         return f"{self.margin.name}: what held holds {self.far}{end}"
 
 

@@ -47,12 +47,19 @@ class Trial:
                 raise ScenarioError([f"{scenario.name}: does not fly, so it cannot be hardened{why_zero(rows)}"])
         self.margins = shortest(margins, lambda worse: self._harm(worse, optimum[1], self.seeds, self.optimum))
         self.along = self.margins[0] if self.margins and self.margins[0].ends else None
-        said = "; ".join(each.told for each in self.margins)
         self.first = replace(
             against(together(self.optimum), together(self.optimum), *optimum),
-            verdict=f"short is {said}" if self.along else said,
+            verdict=self._margins_told(),
             margins={each.margin.name: each.value for each in self.margins},
         )
+
+    def _margins_told(self) -> str:
+        """Which margin of the optimum is short, and how far the others reach; empty where none was asked for."""
+        if not self.margins:
+            return ""
+        short = f"short is {self.margins[0].told}" if self.along else f"nothing is short; {self.margins[0].told}"
+        others = ", ".join(f"{each.margin.name} {each.far}" for each in self.margins[1:])
+        return f"{short}; farther reach {others}" if others else short
 
     def touches(self) -> bool:
         """Whether what was kept so far touches walls or obstacles in some flight, or more often than a limit allows.
@@ -95,10 +102,18 @@ class Trial:
             if kept:
                 self.kept.append((named, parameters))
                 self.table = table
-                self.along = now if now is not None and now.ends else None
+                self.along = None if now is None else self._short_now(now, parameters)
             if not refused:
                 break
         return found
+
+    def _short_now(self, now: Reach, parameters: Mapping[str, float]) -> Reach | None:
+        """The margin that is short with what is kept now: this one, or another that did not reach so far before."""
+        others = [
+            each for each in self.margins if each.margin is not now.margin and each.ends and each.holds < now.holds
+        ]
+        found = [now, *(self._reach(each, parameters, self.seeds, self.optimum) for each in others)]
+        return min((each for each in found if each.ends), key=lambda each: each.holds, default=None)
 
     def _gained(self, table: Sequence[Table], now: Reach | None) -> str:
         """Whether a step that breaks nothing is kept, in words; now : how far the short margin reaches with it."""
@@ -191,7 +206,7 @@ class Trial:
     ) -> str:
         """What that held for the optimum no longer holds where scenarios are worse, in words; empty if all does."""
         try:
-            return self.constraints.broken(worse, before, self._fly(parameters, seeds, worse))
+            return self.constraints.broken(worse, before, self._fly(parameters, seeds, worse), surely=True)
         except AirflockError as fault:  # no room for so many agents, for instance
             return f"cannot be flown: {str(fault).splitlines()[0]}"
 

@@ -135,7 +135,7 @@ def tune(
         if result.dead:
             raise StudyError(f"{mine.name}: {result.dead}")
         _say(note, STAGES[1])
-        tuned, steps, why = hardening(folder, plan, searched, margins, threads, trust)
+        tuned, steps, why = hardening(folder, plan, searched, threads, trust, margins)
         _say(note, STAGES[2])
         shown = certificate(folder, tuned, limits, sure, plan, threads, note)
         found = Tuned(

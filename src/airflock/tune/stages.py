@@ -56,7 +56,7 @@ def search(
 
 
 def hardening(
-    folder: Path, plan: Plan, limits: Sequence[str], margins: Sequence[str], threads: int | None, trust: bool
+    folder: Path, plan: Plan, limits: Sequence[str], threads: int | None, trust: bool, margins: Sequence[str] = ()
 ) -> tuple[Scenario, list[Measured], str]:
     """The scenario after hardening, its steps, and why there are none."""
     if (folder / STEPS).is_file():
