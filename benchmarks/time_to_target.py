@@ -44,7 +44,7 @@ SEARCHES: dict[str, dict[str, Any]] = {
     "fast": dict(FAST),
     "fast, warm from 4 m/s": {**FAST, "generations": 40, "start": "scenario"},
     "full study": {},
-    "fast, dt 0.1 s": dict(FAST),
+    "fast, growing flights": {**FAST, "flights": "growing", "generations": 80},
     "fast, lq-CMA-ES": {**FAST, "generations": LQ_PARTS},
 }  # fmt: skip
 FIRST, PAIRS, MOST = 3_000_000_000, 400, 1000  # seeds of the judge, unlike those of any study
@@ -60,8 +60,6 @@ def study_of(what, seed):
         keys = load_study(NAME).space.keys
         settings |= {key: getattr(known, key.removeprefix("model.")) for key in keys}
         settings["model.v_shill"] = max(settings["model.v_shill"], 6.0)
-    if "dt 0.1" in what:
-        settings["dt"] = 0.1
     return load_study(NAME, settings=settings, search={**SEARCHES[what], "seed": seed})
 
 
