@@ -4,7 +4,7 @@ python benchmarks/splitting.py FOLDER FLIGHTS LIMIT [LIMIT ...]      # continues
 
 FLIGHTS is the folder of flights of `airflock certify --flights 40000 --out x.toml` (x_flights), LIMIT a smallest
 distance in m. Ten repetitions begin with a tenth of these flights each, as `airflock certify --flights 4000 --split`
-does with its own: five runs of 100 flights a level, refused where they disagree with the flights that they began with.
+does with its own: five runs of 200 flights a level, refused where they disagree with the flights that they began with.
 The number is then set beside intervals of Clopper and Pearson (95 %): of these flights, of the first 10,000, of all.
 """
 

@@ -90,14 +90,30 @@ def test_a_limit_that_the_budget_cannot_show_is_told_beforehand_with_a_budget_th
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
+def seen():
+    """What the tuning of `done` told while it went on."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory, seen):
     """A tuning of a few seconds; and how many flights a second were assumed."""
     folder = tmp_path_factory.mktemp("tuned") / "out"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tuning, "rate_of", lambda *_: 300.0)
         patch.setattr("airflock.evolve.run.draw", lambda *_: None)  # the study's own pictures
         patch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay", "agents"))  # one driver
-        return tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"]), folder
+        return tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"], watch=seen.append), folder
+
+
+def test_it_tells_its_stages_in_their_order_and_their_flights(done, seen):
+    assert list(dict.fromkeys(each.stage for each in seen)) == ["search", "hardening", "certificate", "report"]
+    for stage in ("search", "hardening"):
+        flights = [(each.done, each.total) for each in seen if each.stage == stage and each.total]
+        assert flights == sorted(flights) and 0 < flights[-1][0] <= flights[-1][1]
+    certified = [each.done for each in seen if each.told.endswith("events")]
+    assert certified[-1] == len(done[0].certificate.rows)
+    assert {each.told for each in seen} >= {"tolerance of radio.delay", "tolerance of agents"}
 
 
 def test_the_folder_holds_what_to_fly_what_was_shown_and_a_report(done):

@@ -20,7 +20,7 @@ from airflock.scenarios.events import Event
 from airflock.scenarios.scenario import Scenario
 
 REPETITIONS = 5
-SIZE = 100  # flights of a level
+SIZE = 200  # flights of a level
 FEWEST = 2000  # flights from which repetitions start, each from its share of them
 START = 100  # flights with which a repetition goes on: the nearest ones of its share
 BACK = 4.0  # s, mean time before the first crossing from which noise is drawn anew

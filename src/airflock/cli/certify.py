@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import counted, line
 from airflock.errors import gathering
 from airflock.suffixes import PICTURES, SCENARIOS
 
@@ -186,38 +187,22 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
 
 
 @contextmanager
-def counting(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
-    """A line that moves: flights, those up to the coming look, events so far, flights per second."""
-    import sys
-
-    if quiet or not sys.stderr.isatty():
-        yield None, None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    shape = (
-        TextColumn("{task.description}"), BarColumn(bar_width=20), MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]:.1f} flights/s"), TimeElapsedColumn(),
-    )  # fmt: skip
-    with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
-        task = bar.add_task("counting", total=None, rate=0.0)
+def counting(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[str], None]]]:
+    """Progress of counting: flights up to the coming look, events so far, flights per second; then what else begins."""
+    with line(quiet) as told:
 
         def watch(p: Any) -> None:
             events = ", ".join(str(count) for count in p.events)
-            bar.update(task, completed=p.done, total=p.total, rate=p.rate, description=f"counting: {events} events")
+            told.update(f"counting, {events} events, {p.rate:.1f} flights/s", p.done, p.total)
 
-        def note(text: str) -> None:
-            bar.update(task, description=text, total=None)
-
-        yield watch, note
+        yield watch, told.update
 
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
     """Check a certificate; status 1 where it does not hold."""
     from airflock.certify.check import check
 
-    with options.progress(f"{path}: flights again", 0, quiet=as_json) as done:
+    with counted(f"{path}: flights again", 0, quiet=as_json) as done:
         result = check(path, threads=threads, trust=trust, done=done)
     if as_json:
         tables.emit_json({"same": result.same, **vars(result)})

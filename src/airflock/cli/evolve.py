@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import searching
 
 
 def evolve(
@@ -121,7 +122,7 @@ def evolve(
     )
     begin = time.perf_counter()
     executor = executor_for(study, scheduler, threads, timeout)
-    with options.searching(study, quiet or as_json) as (watch, note):
+    with searching(study, quiet or as_json) as (watch, note):
         result = run(study, out, executor, watch, note, sensitivity=sensitivity)
     if as_json:
         tables.emit_json({**result.document(), "folder": str(out), "seconds": time.perf_counter() - begin})

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import counted
 from airflock.errors import gathering
 from airflock.spelling import meant
 from airflock.suffixes import RECORDINGS
@@ -105,7 +106,7 @@ def fleet(
     how["silent"] = True if silence is None and not against else silence
     series = flying.Fleets(loaded, vehicle)
     ticks = seeds * int(loaded.flight.duration + (READY_TIME if ground else 0.0))
-    with options.progress(f"{loaded.name}: fleet", ticks, quiet=as_json) as done, _imports_kept():
+    with counted(f"{loaded.name}: fleet", ticks, quiet=as_json) as done, _imports_kept():
         numbers = range(first_seed, first_seed + seeds)
         for flown in flying.in_turn(loaded, numbers, faults=broken, done=done, say=tables.say, **how):
             series.add(flown, beside=against is not None, follows=not ground and not live)

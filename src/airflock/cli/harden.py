@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import counted, searching
 from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import SCENARIOS
 
@@ -90,7 +91,7 @@ def harden(
         from airflock.evolve.harden import harden, rounds
 
         most = rounds(len(margin or ())) * seeds * len(optima)
-        with options.progress(f"{scenario}: flights", most, quiet=as_json) as done:
+        with counted(f"{scenario}: flights", most, quiet=as_json) as done:
             how: Any = {"limit": limit or (), "margin": margin or (), "threads": threads, "done": done}
             steps = harden(optima, numbers, cost=cost, **how)
     for each, place in zip(optima, places, strict=True):
@@ -127,7 +128,7 @@ def _evolved_again(
     settings = cautious(optimum, *factors)
     study = stricter(optimum, _space(where, optimum), settings, {"generations": generations})
     folder = out.parent / f"{out.stem}_study"
-    with options.searching(study, quiet=quiet) as (watch, note):
+    with searching(study, quiet=quiet) as (watch, note):
         return evolved_again(optimum, study, settings, folder, numbers, threads, watch, note)
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import imports, options, tables
+from airflock.cli.progress import counted
 from airflock.errors import AirflockError, gathering
 from airflock.suffixes import PICTURES, SCENARIOS
 
@@ -126,7 +127,7 @@ def _checked(result: Any, flights: int, quiet: bool) -> Any:
 
     if not flights or not result.settings():
         return None
-    with options.progress("check: flights", flights, quiet=quiet) as done:
+    with counted("check: flights", flights, quiet=quiet) as done:
         return posterior(result.scenario(), result.logs, flights, done, comparable=result.comparable)
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import counted
 from airflock.errors import RecordingError, gathering
 from airflock.suffixes import RECORDINGS
 
@@ -130,7 +131,7 @@ def reading(files: int, quiet: bool) -> Any:
 
     @contextmanager
     def shown() -> Any:
-        with options.progress("reading", 100 * files, quiet=quiet) as step:
+        with counted("reading", 100 * files, quiet=quiet) as step:
             state = {"file": 0, "share": 0.0, "told": 0}
 
             def done(share: float) -> None:

@@ -1,6 +1,6 @@
 """Verb infer: which flocking law explains these tracks?"""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import line
 from airflock.errors import AirflockError, gathering
 from airflock.suffixes import PICTURES, SCENARIOS
 
@@ -88,21 +89,15 @@ def infer(
 
 
 @contextmanager
-def _telling(quiet: bool) -> Iterator[Any]:
-    """A line on the terminal that says what is under way."""
-    import sys
-
-    if quiet or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status("reading") as status:
+def _telling(quiet: bool) -> Iterator[Callable[[str], None]]:
+    """Progress: which law is fitted, and how many steps that took so far."""
+    with line(quiet) as told:
+        told.update("reading")
         steps: dict[str, int] = {}
 
         def show_step(name: str) -> None:
             steps[name] = steps.get(name, 0) + 1
-            status.update(f"{name}: step {steps[name]}")
+            told.update(f"{name}, step {steps[name]}")
 
         yield show_step
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import counted
 from airflock.suffixes import PAGES, PICTURES, VIDEOS
 
 
@@ -117,7 +118,7 @@ def video(
         check_chart(chart, courses(scenario) if chart else [], scenario.name)
         recording = flight_of(scenario, seed)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
-    with named(what), options.progress("pictures", frame_count(recording, **choice)) as done:
+    with named(what), counted("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, space=space, chart=chart, **choice)
     tables.say(f"saved {out}")
 

@@ -2,8 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -160,65 +159,3 @@ def compile_first(scenario: Any, precision: int, device: str) -> None:
         from airflock.engine import compile_for
 
         compile_for(scenario, precision=precision)
-
-
-@contextmanager
-def progress(label: str, total: int, quiet: bool = False) -> Iterator[Callable[[], None]]:
-    """A bar on the terminal while long work runs; yields a function to call after each part."""
-    import sys
-
-    if quiet or not sys.stderr.isatty():
-        yield lambda: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    shape = (TextColumn(label), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*shape, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=total)
-        yield lambda: bar.advance(task)
-
-
-@contextmanager
-def searching(study: Any, quiet: bool) -> Iterator[tuple[Any, Callable[[bool], None] | None]]:
-    """A line that moves: generation, best, mean, flights per second, time left; then the finalists."""
-    import sys
-    import time
-
-    if quiet or not sys.stderr.isatty():
-        yield None, None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    from airflock.evolve.race import ROUNDS
-    from airflock.evolve.search import total_flights
-
-    finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
-    finals += round(sum(share * seeds for share, seeds in ROUNDS) * study.whole("pool"))
-    shape = (
-        TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.percentage:>3.0f} %"),
-        TextColumn("{task.fields[rate]:.1f} flights/s"), TimeRemainingColumn(),
-    )  # fmt: skip
-    begin = time.perf_counter()
-    with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
-        searching = bar.add_task("generation 1", total=total_flights(study), rate=0.0)
-        final: Any = None
-
-        def watch(p: Any) -> None:
-            rate = p.fresh / max(time.perf_counter() - begin, 1e-9)
-            told = "" if p.best is None else f" · best {p.best:.4f}"
-            told += "" if p.mean is None else f" · mean {p.mean:.4f}"
-            where = f"run {p.run + 1}, " if study.whole("restarts") else ""
-            text = f"{where}generation {p.generation + 1}/{study.whole('generations')}{told}"
-            bar.update(searching, completed=p.done, description=text, rate=rate)
-
-        def note(_: bool) -> None:
-            nonlocal final, begin
-            if final is None:
-                begin = time.perf_counter()
-                final = bar.add_task("finalists on fresh seeds", total=finals, rate=0.0)
-            done = bar.tasks[-1].completed + 1
-            bar.update(final, completed=done, rate=done / max(time.perf_counter() - begin, 1e-9))
-
-        yield watch, note

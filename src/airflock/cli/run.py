@@ -7,6 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import counted
 from airflock.errors import gathering
 from airflock.suffixes import PICTURES, RECORDINGS, TABLES
 
@@ -53,7 +54,7 @@ def run(
         options.tell_time(flights, threads, device)
         options.compile_first(found, precision, device)
     chosen: dict[str, Any] = {"scheduler": scheduler, "threads": threads, "precision": precision, "device": device}
-    with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:
+    with counted(f"{found.name}: flights", seeds, quiet=as_json) as done:
         rows = scores(flights, numbers, **chosen, done=done)
     _tell(found, numbers, rows, changed, as_json)
     if save or plot:  # after the scores, which a full disk does not take away

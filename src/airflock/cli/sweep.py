@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import counted
 from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import PICTURES, TABLES
 
@@ -67,7 +68,7 @@ def sweep(
     if scheduler is None:
         options.tell_time([found for found in scenarios for _ in numbers], threads, device)
         options.compile_first(scenarios[0], precision, device)
-    with options.progress(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
+    with counted(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
         chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
         tidy = flown(points, scenarios, numbers, **chosen, say=tables.say, scheduler=scheduler)
     _keep(tidy, keys, show, scenarios[0], table, plot)

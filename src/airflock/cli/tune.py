@@ -1,13 +1,12 @@
 """Verb tune: from a scenario of one's own to a set that is evolved, hardened and certified."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from airflock.cli import options, tables
+from airflock.cli.progress import line
 from airflock.errors import gathering
 
 
@@ -90,55 +89,22 @@ def tune(
     if like is not None:
         how |= {"like": base, "heard": heard}
     shown: list[str] = []
-    with _stages(as_json) as (watch, note):
+    with line(as_json) as told:
 
-        def tell(text: str) -> None:
+        def watch(p: Any) -> None:
+            told.update(p.stage + (f", {p.told}" if p.told else ""), p.done, p.total)
+
+        def note(text: str) -> None:
             shown.append(text)
-            if note is not None:
-                note(text)
+            told.say(text)
 
-        tuning = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=tell, **how)
+        tuning = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
     if as_json:
         tables.emit_json(tuning.document())
     else:
         _print(tuning, shown)
     if not tuning.shown:
         raise typer.Exit(1)
-
-
-@contextmanager
-def _stages(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
-    """A line that moves: the stage, and how far the search is; above it, what stays to be read."""
-    import sys
-
-    from airflock.tune.run import STAGES
-
-    if quiet:
-        yield None, None
-        return
-    if not sys.stderr.isatty():
-        yield None, lambda text: None if text in STAGES else typer.echo(text, err=True)
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    shape = (TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
-    with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
-        task = bar.add_task("first flights", total=None)
-
-        def watch(p: Any) -> None:
-            best = "" if p.best is None else f", best {p.best:.4f}"
-            bar.update(
-                task, completed=p.done, total=p.total, description=f"search: generation {p.generation + 1}{best}"
-            )
-
-        def note(text: str) -> None:
-            if text in STAGES:
-                bar.update(task, description=text, total=None)
-            else:
-                bar.console.print(text, highlight=False, markup=False, soft_wrap=True)
-
-        yield watch, note
 
 
 def _print(tuning: Any, shown: list[str]) -> None:

@@ -4,12 +4,16 @@ A search compares candidates that flew twice, and an event that it must avoid ha
 two flights do tell is how far from the limit they ended: by the reliability index of Cornell (1969), the mean distance
 from the limit in standard deviations. A normal variate lies beyond it with the probability of the event.
 
-From ENOUGH flights on a candidate has a mean and a standard deviation of its own, and what was counted counts, too: the
-smaller index is the estimate. Of fewer flights, means are shrunk towards the mean of all candidates as far as chance
-explains their differences (James & Stein 1961), and so are standard deviations, from that of the LIKE nearest to that
-of all. Else those that were lucky would win. The deviation is that below the mean (Markowitz 1959): wide distances are
-no danger. A score that repeats itself, such as a count or an excursion that is mostly zero, has no distance from its
-limit: events are counted.
+From ENOUGH flights on a candidate has a tail of its own. The flights that came nearest, a tenth of all, show how fast
+distances become rarer: as an exponential tail does, the one between tails that end and tails that are heavy (Pickands
+1975). A normal tail falls faster, so that it looks more dangerous than it is, by 2 at three standard deviations. What
+was counted counts, too: the smaller index is the estimate.
+
+Of fewer flights, means are shrunk towards the mean of all candidates as far as chance explains their differences (James
+& Stein 1961), and so are standard deviations, from that of the LIKE nearest to that of all. Else those that were lucky
+would win. The deviation is that below the mean (Markowitz 1959): wide distances are no danger. A score that repeats
+itself in more than a tenth of all flights, such as a count or an excursion that is mostly zero, has no distance from
+its limit: events are counted.
 """
 
 import math
@@ -23,6 +27,8 @@ from scipy.stats import norm
 from airflock.limits.limit import Limit
 
 ENOUGH = 30  # flights of one candidate
+NEAREST, FEWEST = 0.1, 10  # share of its flights that show how its tail falls, and at least so many
+REPEATED = 0.1  # share of flights; distances in single precision meet by chance, some of ten thousand
 LIKE = 8  # candidates that share a deviation as far as they differ: wide flocks' distances vary more than narrow ones'
 LEAST = 0.1  # share of a difference that is left where chance explains all: so the order of candidates stays
 Row = Mapping[str, Any] | None  # scores of a flight; None: it failed
@@ -37,7 +43,7 @@ def indices(limit: Limit, flights: Sequence[Sequence[Row]]) -> NDArray[np.float6
     rooms = [np.array([_room(limit, row) for row in rows]) for rows in flights]
     every = np.concatenate(rooms)
     known = every[np.isfinite(every)]
-    if len(known) < 2 or len(np.unique(known)) < len(known):
+    if len(known) < 2 or len(np.unique(known)) < (1.0 - REPEATED) * len(known):
         return np.array([_of_share(events, len(room)) for events, room in zip(counted, rooms, strict=True)])
     found = np.array([_of_share(events, len(room)) for events, room in zip(counted, rooms, strict=True)])
     sound = [bool(np.isfinite(room).all()) for room in rooms]
@@ -46,7 +52,7 @@ def indices(limit: Limit, flights: Sequence[Sequence[Row]]) -> NDArray[np.float6
         found[few] = _together([rooms[i] for i in few])
     for i, room in enumerate(rooms):
         if sound[i] and len(room) >= ENOUGH:
-            found[i] = min(found[i], _together([room])[0])
+            found[i] = min(found[i], _of_tail(room))
     return found
 
 
@@ -64,6 +70,15 @@ def index_of(probability: float) -> float:
 def _of_share(events: int, flights: int) -> float:
     """Index of a share of flights; infinite where nothing happened, finite where it always did."""
     return index_of(min(events, flights - 0.5) / flights) if events else math.inf
+
+
+def _of_tail(room: NDArray[np.float64]) -> float:
+    """Index of one candidate, from how far its nearest flights are from the limit; infinite where that cannot tell."""
+    nearest = np.sort(room)[: max(FEWEST, round(NEAREST * len(room))) + 1]
+    begin, excess = nearest[-1], float((nearest[-1] - nearest[:-1]).mean())
+    if begin <= 0.0 or excess == 0.0:
+        return math.inf
+    return index_of((len(nearest) - 1) / len(room) * math.exp(-begin / excess))
 
 
 def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:

@@ -14,7 +14,6 @@ from airflock.evolve.bounds import usual_space
 from airflock.evolve.margins import read_margins
 from airflock.evolve.run import Interrupted
 from airflock.evolve.safe import flights_that_count
-from airflock.evolve.search import Watch
 from airflock.metrics.registry import numbers_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
@@ -23,11 +22,9 @@ from airflock.tune.folder import keep_plan, kept_plan
 from airflock.tune.logs import TOLD, FromLogs, Paths, identified
 from airflock.tune.plan import CONFIDENCE, plan_of
 from airflock.tune.result import Tuned
-from airflock.tune.stages import Note, certificate, hardening, rate_of, search
+from airflock.tune.stages import Note, Stage, Watch, certificate, hardening, rate_of, search
 from airflock.tune.start import has_walls, start_of
 from airflock.untrusted import own_path
-
-STAGES = "search", "hardening", "certificate", "report"
 
 
 def tune(
@@ -80,8 +77,8 @@ def tune(
     threads : int, optional
         Flights side by side; by default one per core.
     watch, note : callable, optional
-        Told of flights of the search; told which of STAGES begins, and before them in a line of each limit that the
-        budget leaves too little time to show.
+        Told as each stage begins and of its flights (`airflock.tune.stages.Stage`); told in a line, before they begin,
+        of each limit that the budget leaves too little time to show.
     trust : bool
         Whether code that files name may run.
 
@@ -127,22 +124,21 @@ def tune(
         logs.save(folder)
     short = infeasible(asked, plan)
     for line in short:
-        _say(note, line)
+        if note is not None:
+            note(line)
     notes = [*notes, *usual_space(start)[1], *short]
+    watch = watch or (lambda stage: None)
     try:
-        _say(note, STAGES[0])
         result = search(folder, start, plan, searched, threads, watch)
         if result.dead:
             raise StudyError(f"{mine.name}: {result.dead}")
-        _say(note, STAGES[1])
-        tuned, steps, why = hardening(folder, plan, searched, threads, trust, margins)
-        _say(note, STAGES[2])
-        shown = certificate(folder, tuned, limits, sure, plan, threads, note)
+        tuned, steps, why = hardening(folder, plan, searched, threads, trust, watch, margins)
+        shown = certificate(folder, tuned, limits, sure, plan, threads, watch)
         found = Tuned(
             folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
             {} if logs is None else logs.told,
         )  # fmt: skip
-        _say(note, STAGES[3])
+        watch(Stage("report"))
         from airflock.tune.report import save
 
         save(found)
@@ -186,8 +182,3 @@ def usual_limits(scenario: Scenario) -> list[str]:
         )
     contacts = ["clearance<0 at 0.01/h"] if has_walls(scenario) else []
     return [f"r_min<{scenario.metrics.r_coll:g} at 0.01/h", *contacts]
-
-
-def _say(note: Note | None, text: str) -> None:
-    if note:
-        note(text)

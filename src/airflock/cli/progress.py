@@ -1,0 +1,172 @@
+"""Progress of long work: a line that moves on a terminal; in a log, a plain line every now and then."""
+
+import itertools
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Lock
+from typing import Any, Protocol
+
+from airflock.cli import tables
+
+FIRST, EVERY = 10.0, 30.0  # s: before the first line of a log, and at least between two
+SHARE = 0.1  # of the time so far that passes at least between two lines: a day gives some seventy
+
+
+class Line(Protocol):
+    """What is under way, told again whenever it changes."""
+
+    def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
+        """What is under way, how much of it is done, and how much there is (None: nobody knows)."""
+
+    def say(self, text: str) -> None:
+        """Print a line that stays."""
+
+
+@contextmanager
+def line(quiet: bool = False) -> Iterator[Line]:
+    """The line for where standard error goes: none if quiet, a bar on a terminal, or lines for a log."""
+    if quiet:
+        yield Silent()
+    elif sys.stderr.isatty():
+        with _bar() as bar:
+            yield bar
+    else:
+        yield Log()
+
+
+class Silent:
+    """Nothing is told of progress, nor what would stay above it."""
+
+    def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
+        """Tell nothing."""
+
+    def say(self, text: str) -> None:
+        """Print nothing."""
+
+
+class Log:
+    """Plain lines for a file or the log of a cluster, each with what is done, how fast, and how long it will take."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        self._clock, self._lock = clock, Lock()
+        self._began = clock()
+        self._next = self._began + FIRST
+        self._pace = Pace(clock)
+
+    def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
+        """Print a line if the last one is long enough ago."""
+        with self._lock:
+            self._pace.update(done, total)
+            now = self._clock()
+            if now < self._next:
+                return
+            self._next = now + max(EVERY, SHARE * (now - self._began))
+            counted = f": {done:,.0f} of {total:,.0f} ({done / total:.0%})" if total else ""
+            left = self._pace.left
+            ends = "" if left is None else f", {spoken(left)} left"
+            self.say(f"{text}{counted}{ends}")
+
+    def say(self, text: str) -> None:
+        """Print a line that stays."""
+        tables.say(text)
+
+
+class Pace:
+    """How fast work goes: `left` is the time (s) that it will still take, None where nobody knows.
+
+    What was done before it was first looked at, by a run that was cut off, took no time. Less done than before
+    means that other work begins.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        self._clock = clock
+        self._first, self._last, self._since = 0.0, math.inf, clock()
+        self.left: float | None = None
+
+    def update(self, done: float, total: float | None) -> None:
+        """Take what is done, of how much."""
+        now = self._clock()
+        if done < self._last:
+            self._first, self._since = done, now
+        self._last = done
+        gained = done - self._first
+        self.left = None if not total or gained <= 0.0 else (total - done) * (now - self._since) / gained
+
+
+def spoken(seconds: float) -> str:
+    """A time as one says it: 40 s, 12 min, 3.5 h."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
+
+
+@contextmanager
+def _bar() -> Iterator[Line]:
+    """A line that moves: what is under way, a bar, its share, and the time that is left."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    shape = (
+        TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TaskProgressColumn(),
+        TextColumn("{task.fields[left]}"), TimeElapsedColumn(),
+    )  # fmt: skip
+    pace = Pace()
+    with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as drawn:
+        task: Any = None
+
+        class Bar:
+            def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
+                nonlocal task
+                pace.update(done, total)
+                left = "" if pace.left is None else f"{spoken(pace.left)} left"
+                if task is None:
+                    task = drawn.add_task(text, total=total, left=left)
+                drawn.update(task, description=text, completed=done, total=total, left=left)
+
+            def say(self, text: str) -> None:
+                drawn.console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+        yield Bar()
+
+
+@contextmanager
+def counted(label: str, total: int, quiet: bool = False) -> Iterator[Callable[[], None]]:
+    """Progress of so many equal parts; yields a function to call after each."""
+    with line(quiet) as told:
+        lock, done = Lock(), 0
+
+        def one() -> None:
+            nonlocal done
+            with lock:
+                done += 1
+                told.update(label, done, total)
+
+        told.update(label, 0, total)
+        yield one
+
+
+@contextmanager
+def searching(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[bool], None]]]:
+    """Progress of a search: generation, best, mean, flights per second; then of the finalists."""
+    from airflock.evolve.race import ROUNDS
+
+    finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
+    finals += round(sum(share * seeds for share, seeds in ROUNDS) * study.whole("pool"))
+    began, flown = time.perf_counter(), itertools.count(1)
+    with line(quiet) as told:
+
+        def watch(p: Any) -> None:
+            rate = p.fresh / max(time.perf_counter() - began, 1e-9)
+            found = "" if p.best is None else f", best {p.best:.4f}"
+            found += "" if p.mean is None else f", mean {p.mean:.4f}"
+            where = f"run {p.run + 1}, " if study.whole("restarts") else ""
+            text = f"{where}generation {p.generation + 1}/{study.whole('generations')}{found}, {rate:.1f} flights/s"
+            told.update(text, p.done, p.total)
+
+        def note(_: bool) -> None:
+            told.update("finalists on fresh seeds", min(next(flown), finals), finals)
+
+        yield watch, note
