@@ -90,7 +90,7 @@ def harden(
     else:
         from airflock.evolve.harden import harden, rounds
 
-        most = rounds(len(margin or ())) * seeds * len(optima)
+        most = rounds(margin or ()) * seeds * len(optima)
         with counted(f"{scenario}: flights", most, quiet=as_json) as done:
             how: Any = {"limit": limit or (), "margin": margin or (), "threads": threads, "done": done}
             steps = harden(optima, numbers, cost=cost, **how)

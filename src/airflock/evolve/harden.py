@@ -18,7 +18,7 @@ from typing import Any
 from airflock.errors import ScenarioError
 from airflock.evolve.folder import plain
 from airflock.evolve.held import Constraints
-from airflock.evolve.margins import read_margins
+from airflock.evolve.margins import FAULTS, read_margins
 from airflock.evolve.objective_table import read_limits
 from airflock.evolve.space import declared
 from airflock.evolve.steps import APART, RECIPE, ROOM, Measured, Step, recipe, together
@@ -29,12 +29,12 @@ from airflock.scenarios.scenario import Scenario
 
 COST = 0.05  # of fitness, at most
 MOST = 22  # rounds of flights, with all whole and half steps, the fresh seeds and measures beside the law
-ALONG = 40, 3  # rounds more with margins: along the short one, and for each that was asked for
+ALONG, EACH, KINDS = 40, 3, 30  # rounds more along a margin, for each that was asked for, and for all kinds of fault
 
 
-def rounds(margins: int) -> int:
-    """Rounds of flights of hardening with so many margins, about."""
-    return MOST + (ALONG[0] + ALONG[1] * margins if margins else 0)
+def rounds(margins: Sequence[str]) -> int:
+    """Rounds of flights of hardening with these margins, about."""
+    return MOST + (ALONG + EACH * len(margins) + KINDS * (FAULTS in margins) if margins else 0)
 
 
 def harden(

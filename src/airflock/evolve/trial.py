@@ -163,7 +163,7 @@ class Trial:
 
     def _others_end(self, factor: float, before: Sequence[Table]) -> bool:
         """Whether a margin that was longer now ends before the shortest did, on fresh seeds."""
-        for other in self.margins[1:]:
+        for other in self.margins[1:] if factor > 1.0 else ():
             worse = other.margin.worse(factor)
             now, was = self.kept[-1][1], self.kept[0][1]
             if self._harm(worse, now, self.fresh[0], before) and not self._harm(worse, was, self.fresh[0], before):

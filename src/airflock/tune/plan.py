@@ -1,11 +1,12 @@
 """Plan: how a budget of time is shared between searching, hardening and certifying; written once, then kept."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from airflock import __version__
 from airflock.errors import StudyError
-from airflock.evolve.harden import ALONG
+from airflock.evolve.harden import MOST, rounds
 
 SEARCH, HARDEN, CERTIFY = 0.45, 0.15, 0.4  # shares of the budget
 TRIED = 15  # rounds of flights that hardening is planned with; all whole and half steps and fresh seeds would be 19
@@ -40,11 +41,13 @@ class Plan:
         return {"airflock": __version__, **asdict(self)}
 
 
-def plan_of(budget: float, rate: float, *, warm: bool = False, telling: int = USUAL, margins: int = 0) -> Plan:
+def plan_of(
+    budget: float, rate: float, *, warm: bool = False, telling: int = USUAL, margins: Sequence[str] = ()
+) -> Plan:
     """A plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
 
     telling : flights that tell whether the rarest limit is kept: at most so many for each finalist and each step
-    margins : how many are to be widened
+    margins : what hardening is to widen, as `airflock.harden` takes it
     StudyError where nothing sensible fits into it.
     """
     flights = budget * SEARCH * rate
@@ -54,7 +57,7 @@ def plan_of(budget: float, rate: float, *, warm: bool = False, telling: int = US
     pool = int(min(max(finals / 16.0, 2 * top), 100))
     spent = 8 * pool + (top + AVERAGES + 2) * final_seeds
     generations = int((flights - spent) / (POPULATION * FLIGHTS))
-    tried = TRIED + (ALONG[0] + ALONG[1] * margins if margins else 0)
+    tried = TRIED + rounds(margins) - MOST
     seeds = int(min(budget * HARDEN * rate / tried, max(telling, 2 * USUAL)))
     if generations < LEAST or seeds < 10:
         flown = max((LEAST * POPULATION * FLIGHTS + spent) / SEARCH, 10 * tried / HARDEN)

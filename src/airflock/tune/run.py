@@ -116,7 +116,7 @@ def tune(
         raise ScenarioError(faults)
     telling = flights_that_count([each for each in asked.limits if each.rate is not None], start)
     if plan is None:
-        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling, margins=len(margins))
+        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling, margins=margins)
         plan = replace(made, limits=limits, confidence=sure, margins=margins)
         keep_plan(folder, start, plan)
     searched = [each.text for each in asked.limits if each.rate is not None]

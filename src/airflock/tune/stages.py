@@ -97,7 +97,7 @@ def hardening(
 
     def done() -> None:
         count = next(flown)
-        watch(Stage("hardening", "", count, max(count, rounds(len(margins)) * plan.seeds)))
+        watch(Stage("hardening", "", count, max(count, rounds(margins) * plan.seeds)))
 
     try:
         steps = harden(best, range(plan.seeds), limit=limits, margin=margins, threads=threads, done=done)
