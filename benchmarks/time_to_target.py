@@ -20,9 +20,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from surrogate import LqCMAES
 
 from airflock import __version__, atomic
 from airflock.engine import score_flight, score_flights
+from airflock.evolve import search
 from airflock.evolve.folder import open_folder
 from airflock.evolve.intervals import interval
 from airflock.evolve.optimisers import optimiser
@@ -35,12 +37,15 @@ from airflock.evolve.study import load_study
 from airflock.scenarios.files import load
 
 NAME, FULL, COARSE = "vasarhelyi_2018/6ms", "vasarhelyi_2018/evolved_6ms", {"dt": 0.05, "metrics.period": 1.0}
+LQ_PARTS = 576  # parts of generations, which lq-CMA-ES asks for one by one: eight of each that flies as a whole
 SEARCHES: dict[str, dict[str, Any]] = {
     "population 100": {"population": 100, "generations": 43, "pool": 40, "top": 8, "final_seeds": 100},
     "population 50": {**FAST, "generations": 96, "late_seeds": 0},
     "fast": dict(FAST),
     "fast, warm from 4 m/s": {**FAST, "generations": 40, "start": "scenario"},
     "full study": {},
+    "fast, growing flights": {**FAST, "flights": "growing", "generations": 80},
+    "fast, lq-CMA-ES": {**FAST, "generations": LQ_PARTS},
 }  # fmt: skip
 FIRST, PAIRS, MOST = 3_000_000_000, 400, 1000  # seeds of the judge, unlike those of any study
 STEP, CURVE, CURVE_FIRST = 500, 100, 3_100_000_000  # flights between points of a curve; flights and seeds of a point
@@ -58,6 +63,11 @@ def study_of(what, seed):
     return load_study(NAME, settings=settings, search={**SEARCHES[what], "seed": seed})
 
 
+def lq_optimiser(algorithm, dimension, objectives, population, seed, *, spread, start):
+    """As `optimiser`, but lq-CMA-ES."""
+    return LqCMAES(dimension, population, seed, spread, start)
+
+
 def flown(folder, whole, where=""):
     """Cost of a study, or of a part of it, in whole flights."""
     with Store(folder, write=False) as store:
@@ -73,6 +83,7 @@ def searched(what, seed, folder):
     shutil.rmtree(folder, ignore_errors=True)  # of one that was cut off: its processor time is not known
     study = study_of(what, seed)
     executor = executor_for(study, threads=1)
+    search.optimiser = lq_optimiser if "lq" in what else optimiser
     score_flight(study.scenario, 0)
     open_folder(folder, study, resume=False)
     begin = time.process_time()

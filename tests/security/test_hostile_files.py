@@ -169,7 +169,7 @@ WAYS = {
     "watch against": (command("watch", "vasarhelyi_2018/4ms", "--against", "evil.toml", "--port", "0"), ""),
     "tune": (command("tune", "evil.toml", "--out", "tuned"), ""),
     "tune logs": (command("tune", "log.csv", "--like", "evil.toml", "--out", "tuned"), ""),
-    "folder of a tuning": (python('hardened(Path("tuning"), None, (), None, False)'), CONSENT),
+    "folder of a tuning": (python('hardened(Path("tuning"), None, (), None, False, print)'), CONSENT),
     "identify": (command("identify", "log.csv", "--like", "evil.toml"), ""),
     "infer": (command("infer", "log.csv", "--models", "evil.toml"), ""),
     "card of a scenario": (command("fly", "prepare", "evil.toml", "--site", "47,19,0", "--members", "1-3"), ""),

@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 from airflock.certify.campaign import FOLDER, Campaign
 from airflock.certify.certificate import NOT_SAID, digest, sealed
 from airflock.certify.check import check
-from airflock.certify.environment import sound_keys, usual_keys
 from airflock.certify.flyer import Flyer
 from airflock.certify.run import certify, run
 from airflock.certify.seeds import COUNT, identity, seed
@@ -20,6 +19,7 @@ from airflock.certify.tolerance import Screen, batch_of
 from airflock.cli.main import app
 from airflock.engine import score_flights
 from airflock.errors import AirflockError, ScenarioError, StudyError
+from airflock.evolve.environment import sound_keys, usual_keys
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted
 from airflock.evolve.space import with_parameters

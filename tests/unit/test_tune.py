@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 import tomllib
+from html import escape
 from types import SimpleNamespace
 
 import numpy as np
@@ -101,7 +102,7 @@ def done(tmp_path_factory, seen):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tuning, "rate_of", lambda *_: 300.0)
         patch.setattr("airflock.evolve.run.draw", lambda *_: None)  # the study's own pictures
-        patch.setattr("airflock.certify.environment.usual_keys", lambda _: ("radio.delay", "agents"))  # one driver
+        patch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay", "agents"))  # one driver
         return tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"], watch=seen.append), folder
 
 
@@ -164,7 +165,7 @@ def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch
     found, folder = done
     monkeypatch.setattr(tuning, "rate_of", lambda *_: pytest.fail("the plan is kept"))
     monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.certify.environment.usual_keys", lambda _: ("radio.delay", "agents"))
+    monkeypatch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay", "agents"))
     with pytest.raises(StudyError, match="holds a tuning already; continue it with --resume"):
         tune(make(MINE, "mine"), folder)
     with pytest.raises(StudyError, match="holds the tuning of another scenario"):
@@ -198,10 +199,38 @@ def logs(tmp_path_factory):
     return path
 
 
+def test_a_margin_is_widened_told_in_the_report_and_goes_on_without_being_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
+    monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
+    monkeypatch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay",))
+    how = {"warm": True, "budget": 16.0, "limit": ["r_min<0.1 at 10%"]}
+    with pytest.raises(ScenarioError, match="margin: radio.dely is not a number of the environment; did you mean"):
+        tune(make(MINE, "mine"), tmp_path / "a", margin="radio.dely", **how)
+    assert not (tmp_path / "a").exists()
+    found = tune(make(MINE, "mine"), tmp_path / "a", margin="radio.delay", **how)
+    told = json.loads((tmp_path / "a" / "hardening.json").read_text())
+    assert found.steps[0].margins["radio.delay"] >= 0.4 and "radio.delay: what held holds" in found.steps[-1].verdict
+    page = (tmp_path / "a" / "report.html").read_text()
+    assert escape(found.steps[0].verdict) in page and f"<td>{told['flights']:,}</td>" in page
+    monkeypatch.setattr("airflock.tune.stages.harden", lambda *_, **__: pytest.fail("hardened already"))
+    again = tune(make(MINE, "mine"), tmp_path / "a", resume=True, **how)
+    assert again.steps == found.steps
+    (tmp_path / "a" / "hardening.json").unlink()
+    asked = {}
+
+    def hardened(*_, margin, **__):
+        asked.update(margin=margin)
+        return list(found.steps)
+
+    monkeypatch.setattr("airflock.tune.stages.harden", hardened)
+    tune(make(MINE, "mine"), tmp_path / "a", resume=True, **how)
+    assert asked == {"margin": ["radio.delay"]}
+
+
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
     monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.certify.environment.usual_keys", lambda _: ("radio.delay",))
+    monkeypatch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay",))
     how = {"like": make(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
     found = tune([logs], tmp_path / "a", **how)
     tau = load(tmp_path / "a" / "identified.toml").body.tau

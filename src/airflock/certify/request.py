@@ -51,7 +51,7 @@ def asked(campaign: Campaign, tolerance: bool | Sequence[str], split: bool = Fal
         refuse(campaign)
     if not tolerance:
         return ()
-    from airflock.certify.environment import sound_keys, usual_keys
+    from airflock.evolve.environment import sound_keys, usual_keys
 
     return usual_keys(campaign.scenario) if tolerance is True else sound_keys(campaign.scenario, list(tolerance))
 

@@ -15,10 +15,10 @@ from typing import Any
 
 from airflock.certify.campaign import Campaign, intervals
 from airflock.certify.counting import Count
-from airflock.certify.environment import FROM_ZERO, environment, worse
 from airflock.certify.flyer import Flyer
 from airflock.certify.seeds import TOLERANCE, seed
 from airflock.core.parameters import Quantity
+from airflock.evolve.environment import FROM_ZERO, environment, worse
 from airflock.evolve.store import Batch
 from airflock.executors import Flight
 from airflock.limits.bounds import Look, look, needed, schedule, share

@@ -45,6 +45,7 @@ def harden(
             help="A limit that no step may break, such as 'r_min<3 at 0.01/h', as in certify; repeatable.",
         ),
     ] = None,
+    margin: options.Margin = None,
     changes: options.Set = None,
     trust: options.Trust = False,
     duration: options.Duration = None,
@@ -53,10 +54,11 @@ def harden(
 ) -> None:
     """Make an optimum safer: try the steps of Table S4, and keep those that help, cost little and break nothing.
 
-    A step towards a limit that is not kept yet may cost more. With a study of several scenarios, a step must keep what
-    held in each; further files end in _2 and so on. Exit status 1 if no step was kept.
+    A step towards a limit that is not kept yet may cost more. With --margin, steps must not shorten the margin that is
+    short, and those that widen it are kept. With a study of several scenarios, a step must keep what held in each;
+    further files end in _2 and so on. Exit status 1 if no step was kept.
 
-    Example: airflock harden study --out flyable.toml
+    Example: airflock harden study --out flyable.toml --margin radio.delay --margin faults
     """
     from airflock.evolve.folder import write
     from airflock.evolve.harden import document
@@ -77,6 +79,8 @@ def harden(
         faults.append(f"{scenario}: is a study of {len(optima)} scenarios; --r-coll and --delay take one")
     if again and limit:
         faults.append("--limit is for the recipe; leave it out with --r-coll and --delay")
+    if again and margin:
+        faults.append("--margin is for the recipe; leave it out with --r-coll and --delay")
     options.refuse(faults)
     tables.say_notes(note for each in optima for note in each.notes)
     numbers = range(first_seed, first_seed + seeds)
@@ -84,10 +88,12 @@ def harden(
         stricter = (r_coll or 1.0, delay or 1.0)
         steps = _evolved_again(scenario, optima[0], stricter, generations, out, numbers, threads, as_json)
     else:
-        from airflock.evolve.harden import MOST, harden
+        from airflock.evolve.harden import harden, rounds
 
-        with counted(f"{scenario}: flights", MOST * seeds * len(optima), quiet=as_json) as done:
-            steps = harden(optima, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
+        most = rounds(margin or ()) * seeds * len(optima)
+        with counted(f"{scenario}: flights", most, quiet=as_json) as done:
+            how: Any = {"limit": limit or (), "margin": margin or (), "threads": threads, "done": done}
+            steps = harden(optima, numbers, cost=cost, **how)
     for each, place in zip(optima, places, strict=True):
         write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")
     if as_json:
@@ -162,6 +168,8 @@ def _print(name: str, steps: list[Any], seeds: int) -> None:
         )
     console = Console()
     console.print(table)
+    if steps[0].verdict:
+        console.print(f"margins: {steps[0].verdict}", highlight=False, markup=False, soft_wrap=True)
     for step in steps[1:]:
         (cost, least, most), (gain, low, high) = step.cost, step.gain
         told = f"cost {cost:.3g} ({least:.3g} to {most:.3g}), gain {gain:.3g} m ({low:.3g} to {high:.3g}), 95 %"

@@ -29,6 +29,7 @@ def tune(
             show_default="collisions and contacts with walls at 0.01/h each",
         ),
     ] = None,
+    margin: options.Margin = None,
     confidence: Annotated[
         float | None, typer.Option(help="Confidence of the certificate.", show_default="0.95")
     ] = None,
@@ -84,6 +85,7 @@ def tune(
     options.compile_first(base, 32, "cpu")
     what: Any = base if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
+    how["margin"] = margin or ()
     if like is not None:
         how |= {"like": base, "heard": heard}
     shown: list[str] = []

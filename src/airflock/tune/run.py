@@ -11,6 +11,7 @@ from typing import Any
 from airflock.certify.request import campaign_of
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.bounds import usual_space
+from airflock.evolve.margins import read_margins
 from airflock.evolve.run import Interrupted
 from airflock.evolve.safe import flights_that_count
 from airflock.metrics.registry import numbers_of
@@ -32,6 +33,7 @@ def tune(
     *,
     budget: float = 1200.0,
     limit: Sequence[str] = (),
+    margin: str | Sequence[str] = (),
     confidence: float | None = None,
     like: Scenario | str | os.PathLike[str] | None = None,
     heard: str | os.PathLike[str] | None = None,
@@ -58,6 +60,8 @@ def tune(
         What is to be shown, as `airflock.certify` takes it; by default that collisions (`metrics.r_coll`) are rarer
         than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
         that look as if they kept these limits before all others.
+    margin : str or sequence of str
+        Margins that hardening is to widen as well, as `airflock.harden` takes them.
     confidence : float, optional
         Confidence of the certificate, a share in [0.5, 1); by default 0.95.
     like : Scenario, str or path, optional
@@ -67,7 +71,7 @@ def tune(
     warm : bool
         Search from the start's own numbers on, which its speed scales, instead of the middle of all ranges.
     resume : bool
-        Continue the work in the folder; limits and confidence that are not given are as in the first call.
+        Continue the work in the folder; limits, margins and confidence that are not given are as in the first call.
     settings : mapping, optional
         Keys of the scenario to change.
     threads : int, optional
@@ -107,10 +111,13 @@ def tune(
     limits = list(limit) or (plan.limits if plan else []) or usual_limits(start)
     sure = (plan.confidence if plan else CONFIDENCE) if confidence is None else confidence
     asked = campaign_of(start, limits, sure)  # refused before anything flies
+    margins = [margin] if isinstance(margin, str) else list(margin) or (plan.margins if plan else [])
+    if faults := read_margins(margins, [start])[1]:
+        raise ScenarioError(faults)
     telling = flights_that_count([each for each in asked.limits if each.rate is not None], start)
     if plan is None:
-        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling)
-        plan = replace(made, limits=limits, confidence=sure)
+        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling, margins=margins)
+        plan = replace(made, limits=limits, confidence=sure, margins=margins)
         keep_plan(folder, start, plan)
     searched = [each.text for each in asked.limits if each.rate is not None]
     if logs is not None and not (folder / TOLD).is_file():
@@ -125,7 +132,7 @@ def tune(
         result = search(folder, start, plan, searched, threads, watch)
         if result.dead:
             raise StudyError(f"{mine.name}: {result.dead}")
-        tuned, steps, why = hardening(folder, plan, searched, threads, trust, watch)
+        tuned, steps, why = hardening(folder, plan, searched, threads, trust, watch, margins)
         shown = certificate(folder, tuned, limits, sure, plan, threads, watch)
         found = Tuned(
             folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,

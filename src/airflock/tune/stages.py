@@ -16,8 +16,8 @@ from airflock.certify.request import campaign_of
 from airflock.certify.run import run as certified
 from airflock.errors import ScenarioError
 from airflock.evolve.folder import open_folder, write
-from airflock.evolve.harden import MOST, harden
 from airflock.evolve.harden import document as hardened_document
+from airflock.evolve.harden import harden, rounds
 from airflock.evolve.result import BEST, Result
 from airflock.evolve.run import executor_for as searching
 from airflock.evolve.run import run as evolved
@@ -78,7 +78,13 @@ def search(
 
 
 def hardening(
-    folder: Path, plan: Plan, limits: Sequence[str], threads: int | None, trust: bool, watch: Watch
+    folder: Path,
+    plan: Plan,
+    limits: Sequence[str],
+    threads: int | None,
+    trust: bool,
+    watch: Watch,
+    margins: Sequence[str] = (),
 ) -> tuple[Scenario, list[Measured], str]:
     """The scenario after hardening, its steps, and why there are none."""
     if (folder / STEPS).is_file():
@@ -90,10 +96,11 @@ def hardening(
     watch(Stage("hardening"))
 
     def done() -> None:
-        watch(Stage("hardening", "", next(flown), MOST * plan.seeds))
+        count = next(flown)
+        watch(Stage("hardening", "", count, max(count, rounds(margins) * plan.seeds)))
 
     try:
-        steps = harden(best, range(plan.seeds), limit=limits, threads=threads, done=done)
+        steps = harden(best, range(plan.seeds), limit=limits, margin=margins, threads=threads, done=done)
         write(folder / TUNED, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune.")
     except ScenarioError as fault:
         why = fault.faults[0]
@@ -101,7 +108,8 @@ def hardening(
         if law.suffix == ".py" and law.is_file():
             atomic.write(folder / law.name, law.read_bytes())
         write(folder / TUNED, document(best), "Evolved by airflock tune; not hardened.")
-    atomic.write(folder / STEPS, json.dumps({"why": why, "steps": [step.as_dict() for step in steps]}))
+    told = {"why": why, "flights": next(flown) - 1, "steps": [step.as_dict() for step in steps]}
+    atomic.write(folder / STEPS, json.dumps(told))
     return load(folder / TUNED, trust=trust), steps, why
 
 
@@ -124,7 +132,7 @@ def certificate(
     def follows(text: str) -> None:
         watch(Stage("certificate", text))
 
-    from airflock.certify.environment import usual_keys
+    from airflock.evolve.environment import usual_keys
 
     campaign = campaign_of(tuned, limits, confidence)
     path = folder / "certificate_flights"
