@@ -183,7 +183,7 @@ def test_on_the_real_clock_packets_say_what_a_fault_tells():
     fleet.advance(0.4)
     node = fleet.nodes[1]
     faults = Faults(found, 1, only=1)
-    ailing = Ailing(node, faults, 1, made.site, lambda own: own - zero)
+    ailing = Ailing(lambda: node, faults, 1, made.site, lambda own: own - zero)
     said = []
     for time in (0.5, 1.5, 2.5):
         faults.until(time)

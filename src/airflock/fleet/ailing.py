@@ -13,28 +13,35 @@ class Ailing:
 
     It sends what they tell, and its clock is as far ahead as they say; all else is left to the node.
 
-    place : of the drone among the members; time : of the flight (s) at a time of the node's own clock
+    node  : gives the node; asked each time, so that it may be exchanged for one that keeps a log
+    place : of the drone among the members
+    time  : of the flight (s) at a time of the node's own clock
     """
 
     def __init__(
-        self, node: Node, faults: Faults, place: int, site: Site, time: Callable[[float], float] = lambda now: now
+        self,
+        node: Callable[[], Node],
+        faults: Faults,
+        place: int,
+        site: Site,
+        time: Callable[[float], float] = lambda now: now,
     ):
         self._node, self._faults, self._place, self._site, self._time = node, faults, place, site, time
         self._ahead = 0
 
     def autopilot(self, data: bytes, now: float) -> None:
         """Take bytes that came from the autopilot."""
-        self._node.autopilot(data, now)
+        self._node().autopilot(data, now)
 
     def radio(self, datagram: bytes, now: float) -> None:
         """Take a datagram that came by radio."""
-        self._node.radio(datagram, now)
+        self._node().radio(datagram, now)
 
     def tick(self, now: float) -> Out:
         """Let the node decide."""
         at = self._time(now)
         self.set_clock(at)
-        out = self._node.tick(now)
+        out = self._node().tick(now)
         radios = tuple([self.told(datagram, at) for datagram in sent] for sent in out.radios)
         return out._replace(radios=radios)
 
@@ -42,7 +49,7 @@ class Ailing:
         """Set the node's clock as its faults say at a time of the flight, s."""
         ahead = round(1e6 * self._faults.ahead(self._place, time))
         if ahead != self._ahead:
-            self._node.set_clock(ahead - self._ahead)
+            self._node().set_clock(ahead - self._ahead)
             self._ahead = ahead
 
     def told(self, datagram: bytes, time: float) -> bytes:

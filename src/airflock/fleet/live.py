@@ -151,7 +151,7 @@ def node_life(plan: Plan, i: int) -> Generator[Rest, None, Life]:
     utc = plan.utc(now) + clock_error(plan.faults, member)
     node = Node(card, member, KEY, now=now, utc=utc, since=utc - SINCE)
     befalls = Faults(plan.scenario, plan.seed, only=i)
-    ailing = Ailing(node, befalls, i, card.site, lambda own: own - plan.clock[0])
+    ailing = Ailing(lambda: node, befalls, i, card.site, lambda own: own - plan.clock[0])
     rows: list[Any] = []
     notes: list[tuple[float, int, str]] = []
     waits = plan.start is not None

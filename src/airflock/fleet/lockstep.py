@@ -66,7 +66,9 @@ class Fleet:
             Node(card, who, KEY, now=0.0, utc=STARTED + clock_error(self.faults, who), since=STARTED - SINCE)
             for who in card.members
         ]  # fmt: skip
-        self._ailing = [Ailing(node, befalls, i, card.site) for i, node in enumerate(self.nodes)]
+        self._ailing = [
+            Ailing(partial(self.nodes.__getitem__, i), befalls, i, card.site) for i in range(len(self.nodes))
+        ]
         self._suffering = [
             (vehicle, own)
             for vehicle in self.vehicles
