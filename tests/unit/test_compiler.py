@@ -89,6 +89,24 @@ def test_a_function_is_compiled_once_for_all_whole_numbers_that_its_callers_writ
     assert len(times.signatures) == 1
 
 
+def test_a_function_that_adds_up_an_array_knows_the_length_that_its_caller_writes_out():
+    """LLVM adds up otherwise if it knows how long a loop is: lifting lines keep their bits."""
+
+    @njit(**OPTIONS | INNER)
+    def total(x, n):
+        found = np.float32(0.0)
+        for i in range(n):
+            found += x[i]
+        return found
+
+    @njit(**OPTIONS | CALLED)
+    def of_both(x, n):
+        return total(x, 20) + total(x, n)
+
+    assert of_both(np.ones(30, np.float32), 30) == 50.0
+    assert len(total.signatures) == 2
+
+
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names a register of x86-64")
 @pytest.mark.parametrize("spread", [False, True], ids=["one thread", "all cores"])
 def test_vectors_on_the_stack_lie_whole_in_lines_of_the_cache(spread):

@@ -114,6 +114,16 @@ class ArrayRewrites(NopythonRewrites):  # type: ignore[misc]
         return (texts or arrays) and super().run_pass(state)
 
 
+def _stands_once(function: types.Dispatcher) -> bool:
+    """Whether a function is not made part of those that call it."""
+    return function.dispatcher.targetoptions.get("forceinline") is False
+
+
+def _holds_array(kind: types.Type) -> bool:
+    """Whether a type is that of an array, or of a record of some."""
+    return isinstance(kind, types.Array) or (isinstance(kind, types.BaseTuple) and any(map(_holds_array, kind)))
+
+
 class Remembering:
     """A typing context that remembers which form of an operator or a function of Numba's takes which types."""
 
@@ -128,9 +138,11 @@ class Remembering:
     def resolve_function_type(self, function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
         """Signature of a call. Only a function of the driver's own is asked each time: that has it compiled.
 
-        It is compiled once for whole numbers, not once more for each that stands in the text of a caller.
+        It is compiled once for whole numbers, not once more for each that stands in the text of a caller. Not so what
+        goes along arrays, such as those of a wing's 20 stations: LLVM adds up otherwise if it knows how long a loop is.
+        Functions that stand once in a driver are there for all lengths.
         """
-        if isinstance(function, types.Dispatcher):
+        if isinstance(function, types.Dispatcher) and (_stands_once(function) or not any(map(_holds_array, given))):
             given = tuple(types.unliteral(one) if isinstance(one, types.IntegerLiteral) else one for one in given)
         if named or isinstance(function, (types.Dispatcher, types.RecursiveCall)):
             return self._context.resolve_function_type(function, given, named)
