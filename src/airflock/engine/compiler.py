@@ -114,14 +114,15 @@ class ArrayRewrites(NopythonRewrites):  # type: ignore[misc]
         return (texts or arrays) and super().run_pass(state)
 
 
-def _stands_once(function: types.Dispatcher) -> bool:
+def _stands_once(function: Any) -> bool:
     """Whether a function is not made part of those that call it."""
     return function.dispatcher.targetoptions.get("forceinline") is False
 
 
-def _holds_array(kind: types.Type) -> bool:
+def _holds_array(kind: Any) -> bool:
     """Whether a type is that of an array, or of a record of some."""
-    return isinstance(kind, types.Array) or (isinstance(kind, types.BaseTuple) and any(map(_holds_array, kind)))
+    parts: Any = kind if isinstance(kind, types.BaseTuple) else ()
+    return isinstance(kind, types.Array) or any(_holds_array(part) for part in parts)
 
 
 class Remembering:
@@ -142,7 +143,8 @@ class Remembering:
         goes along arrays, such as those of a wing's 20 stations: LLVM adds up otherwise if it knows how long a loop is.
         Functions that stand once in a driver are there for all lengths.
         """
-        if isinstance(function, types.Dispatcher) and (_stands_once(function) or not any(map(_holds_array, given))):
+        own = isinstance(function, types.Dispatcher)
+        if own and (_stands_once(function) or not any(_holds_array(one) for one in given)):
             given = tuple(types.unliteral(one) if isinstance(one, types.IntegerLiteral) else one for one in given)
         if named or isinstance(function, (types.Dispatcher, types.RecursiveCall)):
             return self._context.resolve_function_type(function, given, named)
