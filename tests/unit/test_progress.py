@@ -43,7 +43,7 @@ def test_lines_are_rarer_the_longer_work_takes(capsys):
 def test_a_line_says_how_much_is_done_and_what_is_left(capsys):
     _, lines = told(capsys, range(41), total=2000)  # a flight each second
     assert lines == ["flying: 10 of 2,000 (0%), 33 min left", "flying: 40 of 2,000 (2%), 33 min left"]
-    assert told(capsys, range(12))[1] == ["flying"]  # nobody knows how much there is
+    assert told(capsys, range(12))[1] == ["flying: 10"]  # nobody knows how much there is
 
 
 @given(st.floats(0.1, 10.0), st.integers(0, 500), st.integers(1, 400))

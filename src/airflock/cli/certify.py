@@ -202,7 +202,7 @@ def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
     """Check a certificate; status 1 where it does not hold."""
     from airflock.certify.check import check
 
-    with counted(f"{path}: flights again", 0, quiet=as_json) as done:
+    with counted(f"{path}: flights again", quiet=as_json) as done:
         result = check(path, threads=threads, trust=trust, done=done)
     if as_json:
         tables.emit_json({"same": result.same, **vars(result)})

@@ -64,10 +64,11 @@ class Log:
             if now < self._next:
                 return
             self._next = now + max(EVERY, SHARE * (now - self._began))
-            counted = f": {done:,.0f} of {total:,.0f} ({done / total:.0%})" if total else ""
+            amount = f": {done:,.0f}" if done else ""
+            amount = f": {done:,.0f} of {total:,.0f} ({done / total:.0%})" if total else amount
             left = self._pace.left
             ends = "" if left is None else f", {spoken(left)} left"
-            self.say(f"{text}{counted}{ends}")
+            self.say(f"{text}{amount}{ends}")
 
     def say(self, text: str) -> None:
         """Print a line that stays."""
@@ -133,8 +134,8 @@ def _bar() -> Iterator[Line]:
 
 
 @contextmanager
-def counted(label: str, total: int, quiet: bool = False) -> Iterator[Callable[[], None]]:
-    """Progress of so many equal parts; yields a function to call after each."""
+def counted(label: str, total: int | None = None, quiet: bool = False) -> Iterator[Callable[[], None]]:
+    """Progress of so many equal parts (None: nobody knows); yields a function to call after each."""
     with line(quiet) as told:
         lock, done = Lock(), 0
 

@@ -96,9 +96,9 @@ class Trial:
             if short is not None and now is not None:
                 measured = replace(measured, margins={now.margin.name: now.value})
                 refused = f"{now.told}; before {short.far}" if now.holds < short.holds else ""
-            verdict = f"undone: {refused}" if refused else self._gained(table, now)
-            kept = verdict.startswith("kept")
-            found.append(replace(measured, kept=kept, verdict=verdict))
+            kept, said = (False, refused) if refused else self._gained(table, now)
+            head = "kept" if kept else "undone"
+            found.append(replace(measured, kept=kept, verdict=f"{head}: {said}" if said else head))
             if kept:
                 self.kept.append((named, parameters))
                 self.table = table
@@ -115,16 +115,16 @@ class Trial:
         found = [now, *(self._reach(each, parameters, self.seeds, self.optimum) for each in others)]
         return min((each for each in found if each.ends), key=lambda each: each.holds, default=None)
 
-    def _gained(self, table: Sequence[Table], now: Reach | None) -> str:
-        """Whether a step that breaks nothing is kept, in words; now : how far the short margin reaches with it."""
+    def _gained(self, table: Sequence[Table], now: Reach | None) -> tuple[bool, str]:
+        """Whether a step that breaks nothing is kept, and why; now : how far the short margin reaches with it."""
         if now is not None and self.along is not None and now.holds > self.along.holds:
-            return f"kept: {now.told}; before {self.along.far}"
+            return True, f"{now.told}; before {self.along.far}"
         nearer = self.constraints.short(self.scenarios, table) < self.constraints.short(self.scenarios, self.table)
         if nearer or gains(together(self.table), together(table)):
-            return "kept" if now is None else f"kept: {now.margin.name} {now.far} as before"
+            return True, "" if now is None else f"{now.margin.name} {now.far} as before"
         if now is None:
-            return "undone: gains no distance and no room at walls"
-        return f"undone: gains no distance, no room at walls and no {now.margin.name}"
+            return False, "gains no distance and no room at walls"
+        return False, f"gains no distance, no room at walls and no {now.margin.name}"
 
     def on_fresh_seeds(self) -> Measured:
         """What was kept, on seeds that chose nothing; the last step is undone until everything that held holds.

@@ -39,7 +39,8 @@ class Faults:
         due = onsets(scenario, seed) if self._kinds else ()
         self._due = [onset for onset in due if only is None or onset.agent == only]
         self.gone: set[int] = set()
-        self._dt, self._cases = scenario.flight.dt, {}  # type: ignore[var-annotated]
+        self._dt = scenario.flight.dt
+        self._cases: dict[tuple[int, str], Case] = {}
         self._last: dict[tuple[int, str, str], State] = {}  # what a rule was last given before its fault
         self._reach = min(scenario.radio.range, 1e8)
 

@@ -36,13 +36,8 @@ class Flown:
     """A fleet that has flown on the real clock; recorded like one in lock-step."""
 
     def __init__(self, plan: Plan, lives: Sequence[Life], load: Load):
-        self.scenario, self.card, self.seed, self.faults, self.load = (
-            plan.scenario,
-            plan.card,
-            plan.seed,
-            plan.faults,
-            load,
-        )
+        self.scenario, self.card, self.seed, self.faults = plan.scenario, plan.card, plan.seed, plan.faults
+        self.load = load
         count = len(plan.card.members)
         self._nodes, self._crafts = lives[1 : 1 + count], lives[1 + count :]
         self.log = sorted((t - plan.clock[0], who, note) for life in lives[1:] for t, who, note in life.notes)

@@ -1,5 +1,13 @@
 """What the rules of a body may ask for."""
 
+STATE = {
+    "x": "position, east, m",
+    "y": "position, north, m",
+    "z": "position, up, m",
+    "vx": "velocity, east, m/s",
+    "vy": "velocity, north, m/s",
+    "vz": "velocity, up, m/s",
+}
 COMMAND = {
     "cx": "command, east; m/s or m/s² as the model's COMMAND says",
     "cy": "command, north; m/s or m/s² as the model's COMMAND says",

@@ -1,15 +1,7 @@
 """What the rules of a kind of fault may ask for."""
 
-from airflock.core.vocabulary.bodies import COMMAND, MOTION
+from airflock.core.vocabulary.bodies import COMMAND, MOTION, STATE
 
-STATE = {
-    "x": "position, east, m",
-    "y": "position, north, m",
-    "z": "position, up, m",
-    "vx": "velocity, east, m/s",
-    "vy": "velocity, north, m/s",
-    "vz": "velocity, up, m/s",
-}
 ONSET = {
     "since": "time since the fault began, s",
     **{f"at_{name}": f"true {text}, when the fault began" for name, text in STATE.items()},

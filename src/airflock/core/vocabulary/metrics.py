@@ -1,14 +1,10 @@
 """What the rules of an order parameter, and of a set of them, may ask for."""
 
+from airflock.core.vocabulary.bodies import STATE
 from airflock.core.vocabulary.laws import FLOCK, PAIR
 
 MEASURED = {
-    "x": "position, east, m",
-    "y": "position, north, m",
-    "z": "position, up, m",
-    "vx": "velocity, east, m/s",
-    "vy": "velocity, north, m/s",
-    "vz": "velocity, up, m/s",
+    **STATE,
     "speed": "length of the velocity, m/s",
     "hx": "heading (unit vector; zero at rest), east",
     "hy": "heading (unit vector; zero at rest), north",
