@@ -2,7 +2,8 @@
 
 Names: diagonal (fig4.diagonal), shill (model.shill_terms.6ms), collisions (minimum.f_collision), fitness
 (controller.fitness), ranges (s1.range), nearest (fig3.minimum), algorithm_a (fig1.a), turns (limits.turns), against
-(limits.delay, limits.noise). One line a set of flights; the figures stand as reasons in the pages' statements.
+(limits.delay, limits.noise), crowd (pressure.free). One line a set of flights; the figures stand as reasons in the
+pages' statements.
 """
 
 import sys
@@ -21,7 +22,8 @@ from airflock_papers.breaks import in_words
 from airflock_papers.dimock_2003.controller import STARTS
 from airflock_papers.dimock_2003.flights import Birds, Task
 from airflock_papers.dimock_2003.units import BEST, FT_LBF
-from airflock_papers.vasarhelyi_2018 import fig1, outdoor, real
+from airflock_papers.flights import with_changes
+from airflock_papers.vasarhelyi_2018 import fig1, outdoor, pressure, real
 from airflock_papers.vasarhelyi_2018.limits import IN_TURNS, QUARTER, turn_rate
 from airflock_papers.vasarhelyi_2018.published import optimum
 from airflock_papers.vasarhelyi_2018.tuning import SETTLED, SPEEDS
@@ -73,6 +75,7 @@ OF_A: tuple[dict[str, float], ...] = (
     {"body.a_max": 20.0},
     *({"radio.delay": t} for t in (0.7, 0.5, 0.3)),
 )
+CROWD: tuple[dict[str, Any], ...] = ({}, {"model.c_frict": 0.2}, {"model.p_rep": "times 2"}, {"radio.delay": 0.2})
 LAGS = (-4.0, -2.0, 0.0, 1.0, 2.0, 3.0, 4.0)  # s, from a turn to the order that is looked at
 READINGS: tuple[dict[str, Any], ...] = (
     {},
@@ -229,6 +232,16 @@ def against(seeds: int = 40, first: int = 0) -> None:
             tell(f"{v} m/s, {name}", f"mean {x.mean():.4f} ± {x.std():.4f}, median {x.median():.4f}")
 
 
+def crowd(seeds: int = 6, first: int = 7000) -> None:
+    """Collisions a flight among obstacles, and in how many flights there is one, by number of drones."""
+    for agents in pressure.FLIGHTS:
+        for keys in CROWD:
+            scenario = with_changes(pressure.scene(agents, obstacles=True), keys)
+            x = airflock.score(scenario, range(first, first + seeds))["n_coll"]
+            told = f"{x.mean():.2f} collisions a flight, in {(x > 0).sum()} of {seeds} flights"
+            tell(f"{agents} drones, {in_words(keys) or 'as the page'}", told)
+
+
 def fitness(seeds: int = 1) -> None:
     """Power of the published gains, ft lbf/s, over the 28 starts, by reading; no seed changes anything.
 
@@ -258,7 +271,8 @@ def tell(name: str, found: str) -> None:
 
 
 CAUSES: dict[str, Callable[..., None]] = {
-    each.__name__: each for each in (diagonal, shill, collisions, fitness, ranges, nearest, algorithm_a, turns, against)
+    each.__name__: each
+    for each in (diagonal, shill, collisions, fitness, ranges, nearest, algorithm_a, turns, against, crowd)
 }
 
 if __name__ == "__main__":

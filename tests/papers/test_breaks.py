@@ -198,8 +198,7 @@ def test_red_as_they_are_are_the_sentences_that_their_page_does_not_count_as_rep
     pages = campaign.verdicts(ROOT)
     for row in campaign.committed():
         if row.paper == name:
-            red = pages.get((name, row.id)) == "not reproduced"
-            assert red if row.result == breaks.ALREADY else not (red and row.result in campaign.OPEN), row
+            assert (row.result == breaks.ALREADY) == (pages.get((name, row.id)) == "not reproduced"), row
 
 
 def _holds(claim: Claim) -> bool:
@@ -214,80 +213,3 @@ def test_the_committed_changes_are_those_of_the_statements() -> None:
         keys = {s.id: (breaks.part_of(s), breaks.in_words(s.breaks)) for s in statements if s.breaks}
         words = {s.id: (breaks.part_of(s), s.fails_if) for s in statements if s.kind == "paper" and s.bound}
         assert told == words | keys
-
-
-ROWS = [
-    campaign.Row("kidger", "first", "first.a", "x = 1", breaks.RED, "0.5", "nan"),
-    campaign.Row("kidger", "last", "last.a", "x = 1", campaign.UNMADE),
-    campaign.Row("kidger", "last", "last.b", "x = 2", breaks.ALREADY),
-]
-
-
-def broken(flown: list, result: str = breaks.RED):
-    """A flight of changes that is cut off at the second part, once."""
-
-    def fly(paper, *, only, seeds, threads, progress, ids):
-        flown.append((only, seeds, sorted(ids)))
-        progress("flights", 1, 2)
-        if only == "last" and len(flown) == 2:
-            raise KeyboardInterrupt
-        return [breaks.Break(f"{only}.a", only, "x = 1", result, 0.5, float("nan"))]
-
-    return fly
-
-
-def test_a_campaign_goes_on_where_it_was_cut_off_and_leaves_out_what_is_red_as_it_is(tmp_path, monkeypatch) -> None:
-    flown: list = []
-    monkeypatch.setattr(campaign, "committed", lambda: ROWS)
-    monkeypatch.setattr(campaign, "SEEDS", {("kidger", "last"): 7})
-    monkeypatch.setattr(breaks, "fly", broken(flown))
-    with pytest.raises(KeyboardInterrupt):
-        campaign.fly(tmp_path, print)
-    rows = campaign.fly(tmp_path, print)
-    assert flown == [("first", None, ["first.a"]), ("last", 7, ["last.a"]), ("last", 7, ["last.a"])]
-    assert rows == [ROWS[0], ROWS[1]._replace(result=breaks.RED, ours="0.5", changed="nan"), ROWS[2]]
-    kept = tmp_path / "kidger.first.breaks.json"
-    assert campaign._kept(kept, json.loads(kept.read_text())["texts"], {"first.a"}) == ROWS[:1]
-    assert campaign._kept(kept, json.loads(kept.read_text())["texts"], {"first.a", "first.b"}) is None
-    assert campaign._kept(kept, "others", {"first.a"}) is None
-
-
-def test_what_a_campaign_found_is_committed_part_by_part_beside_the_rows_that_stay(tmp_path, monkeypatch) -> None:
-    table, flown = tmp_path / "breaks.csv", []
-    monkeypatch.setattr(campaign, "committed", lambda: ROWS)
-    monkeypatch.setattr(campaign, "as_stated", lambda rows, statements: rows)
-    monkeypatch.setattr(campaign, "verdicts", lambda papers: {("kidger", "last.b"): "not reproduced"})
-    monkeypatch.setattr(breaks, "fly", broken(flown))
-    with pytest.raises(AirflockError, match=r"kidger\.lost: no such part; known: kidger\.first, kidger\.last"):
-        campaign.renew(tmp_path, tmp_path, table, ["kidger.lost"], True)
-    with pytest.raises(KeyboardInterrupt):
-        campaign.renew(tmp_path, tmp_path, table, ["kidger.first", "kidger.last"])
-    assert table.read_text().splitlines()[1:] == [",".join(row) for row in ROWS]
-    campaign.renew(tmp_path, tmp_path, table, only_open=True)
-    assert [part for part, *_ in flown] == ["first", "last", "last"]
-    assert table.read_text().splitlines()[2] == f"kidger,last,last.a,x = 1,{breaks.RED},0.5,nan"
-
-
-def test_a_sentence_that_its_page_does_not_count_as_reproduced_has_nothing_to_break() -> None:
-    pages = {("kidger", "last.a"): "not reproduced", ("kidger", "last.b"): "reproduced"}
-    judged = campaign.as_judged(ROWS, pages)
-    assert [row.result for row in judged] == [breaks.RED, breaks.ALREADY, campaign.UNMADE]
-
-
-def test_a_row_is_of_the_change_that_its_statement_names_now() -> None:
-    stated = [statement(name, "ours == 0", {"x": value}) for name, value in (("a", 1), ("b", 2), ("c", 3))]
-    before = [campaign.Row("kidger", "part", f"part.{n}", "x = 1", breaks.RED, "0", "9") for n in "ab"]
-    after = campaign.as_stated(before, {"kidger": stated})
-    assert after == [
-        before[0],
-        campaign.Row("kidger", "part", "part.b", "x = 2", campaign.UNMADE),
-        campaign.Row("kidger", "part", "part.c", "x = 3", campaign.UNMADE),
-    ]
-
-
-def test_what_got_worse_is_told() -> None:
-    rows = ROWS[:1]
-    lost = [rows[0]._replace(result=breaks.UNSHOWN), rows[0]._replace(id="other", result=breaks.GREEN)]
-    assert campaign.worse(rows, rows) == []
-    assert campaign.worse(rows, lost) == lost
-    assert campaign.worse(lost, lost) == lost[1:]  # what was never seen red cannot get worse, what still holds is told

@@ -150,6 +150,11 @@ def test_a_renewed_page_keeps_what_was_measured_and_judges_it_by_the_statements_
         "by seed",
         "ours > 0.95",
     )
+    flown = replace(found, note="")
+    assert renewed(statements, old, [flown], "command") == old  # the same number keeps what was said of it
+    other = replace(flown, value=statistics.mean([0.7, 0.8, 0.8]))
+    assert renewed(statements, old, [other], "command")[0].note == ""
+    assert renewed(statements, old, [replace(found, note="now")], "command")[0].note == "now"
     elsewhere = {name: replace(statement, at="generation 10, elsewhere")}
     lost = renewed(elsewhere, old, [], "command")[0]
     assert lost.ours is None and lost.command == "command" and lost.verdict == "not flown yet"

@@ -4,6 +4,9 @@ A part that is done is kept in a folder with a hash of all texts that decide a f
 off goes on where it stopped. In a clone, `python -m airflock_papers.campaign FOLDER` flies everything and commits what
 it finds after each part; with `--open` only claims that nobody has seen red so far, with names of parts
 (`kidger.tuning`) only these. `airflock paper all --breaks` compares.
+
+Each row names the kind of processor that flew it, since another kind flies other flights of the same seeds. Whether a
+claim holds beforehand may then be another by chance. That its change breaks it must be seen on every kind.
 """
 
 import argparse
@@ -16,6 +19,7 @@ from typing import NamedTuple
 
 from airflock import atomic
 from airflock.errors import AirflockError
+from airflock.machine import kind
 from airflock.untrusted import TextError, json_object, read_text
 from airflock_papers import PAPERS, breaks
 from airflock_papers import committed as tables
@@ -47,7 +51,10 @@ Key = tuple[str, str]  # paper and claim, or paper and part
 
 
 class Row(NamedTuple):
-    """What came of the change of one claim: as of `breaks.Break`, numbers to four digits."""
+    """What came of the change of one claim: as of `breaks.Break`, numbers to four digits.
+
+    processor : its kind, on which the change was flown; empty where that was not kept, or nothing was flown
+    """
 
     paper: str
     part: str
@@ -56,6 +63,18 @@ class Row(NamedTuple):
     result: str
     ours: str = ""
     changed: str = ""
+    processor: str = ""
+
+
+class Worse(NamedTuple):
+    """A claim that its change does not break, or no longer does, as it is now.
+
+    elsewhere : the kind of processor on which it was seen red, if it is another and the claim does not hold beforehand
+                with the few flights of this one: not judged
+    """
+
+    row: Row
+    elsewhere: str = ""
 
 
 def parts(rows: Iterable[Row]) -> list[Key]:
@@ -79,18 +98,21 @@ def in_parts(
 ) -> Iterable[list[Row]]:
     """What came of the changes of some rows, part by part, as soon as one is flown."""
     folder.mkdir(parents=True, exist_ok=True)
+    now = f"{texts()} on {kind()}"
     todo = parts(wanted)
     for number, (name, part) in enumerate(todo, 1):
         path = folder / f"{name}.{part}.breaks.json"
         ids = {row.id for row in wanted if (row.paper, row.part) == (name, part)}
-        rows = _kept(path, texts(), ids)
+        rows = _kept(path, now, ids)
         if rows is None:
             tell = teller(folder / "log.txt", say, f"{number}/{len(todo)} {name} {part}")
             flown = breaks.fly(
                 find(name), only=part, seeds=SEEDS.get((name, part)), threads=threads, progress=tell, ids=ids
             )
-            rows = [Row(name, part, b.id, b.change, b.result, f"{b.ours:.4g}", f"{b.changed:.4g}") for b in flown]
-            atomic.write(path, json.dumps({"texts": texts(), "rows": rows}))
+            rows = [
+                Row(name, part, b.id, b.change, b.result, f"{b.ours:.4g}", f"{b.changed:.4g}", kind()) for b in flown
+            ]
+            atomic.write(path, json.dumps({"texts": now, "rows": rows}))
         yield rows
 
 
@@ -144,9 +166,9 @@ def as_judged(rows: Iterable[Row], verdicts: Mapping[Key, str]) -> list[Row]:
     found = []
     for row in rows:
         red = verdicts.get((row.paper, row.id)) == fails
-        if red and row.result in OPEN:
+        if red:  # also one that few flights had seen turn red
             row = row._replace(result=breaks.ALREADY)
-        elif row.result == breaks.ALREADY and not red:
+        elif row.result == breaks.ALREADY:
             row = row._replace(result=UNMADE)
         found.append(row)
     return found
@@ -162,13 +184,21 @@ def verdicts(papers: Path) -> dict[Key, str]:
     }
 
 
-def worse(before: Iterable[Row], after: Iterable[Row]) -> list[Row]:
-    """Claims that their change does not break, or no longer does, as they are now."""
-    red = {(row.paper, row.id) for row in before if row.result == breaks.RED}
-    return [
-        row for row in after
-        if row.result == breaks.GREEN or ((row.paper, row.id) in red and row.result != breaks.RED)
-    ]  # fmt: skip
+def worse(before: Iterable[Row], after: Iterable[Row]) -> list[Worse]:
+    """Claims that their change does not break, or no longer does, as they are now.
+
+    One that still holds under its change is a fault on every kind of processor. One that does not hold beforehand is
+    none where it was seen red on another kind; what is not known to be another is judged.
+    """
+    red = {(row.paper, row.id): row.processor for row in before if row.result == breaks.RED}
+    found = []
+    for row in after:
+        seen = red.get((row.paper, row.id))
+        if row.result == breaks.GREEN:
+            found.append(Worse(row))
+        elif seen is not None and row.result != breaks.RED:
+            found.append(Worse(row, seen if row.processor not in ("", seen) else ""))
+    return found
 
 
 def renew(

@@ -36,13 +36,14 @@ def renewed(
     """Claims of a page in the order of the statements: those that were measured, and those of before, judged again.
 
     new : statements that stand on no page yet and come to this one
+    A number that came out the same keeps what was said of it, such as a working range, if nothing else is said now.
     """
     kept = {claim.id: claim for claim in old}
     fresh = {claim.id: claim for claim in judge(statements, found)}
     claims = []
     for name, statement in statements.items():
         if name in fresh:
-            claims.append(fresh[name])
+            claims.append(_noted(fresh[name], kept.get(name)))
         elif name in kept:
             same = (kept[name].quantity, kept[name].at) == (statement.quantity, statement.at)
             if same and kept[name].ours is not None:
@@ -54,6 +55,13 @@ def renewed(
         elif name in new:
             claims += unflown({name: statement}, [], command) if statement.quantity else [Claim(**asdict(statement))]
     return claims
+
+
+def _noted(claim: Claim, before: Claim | None) -> Claim:
+    """A claim with the note of before, if it has none and its number, as it is written, is the same."""
+    if before is None or claim.note or records.number(claim.ours, 6) != records.number(before.ours, 6):
+        return claim
+    return replace(claim, note=before.note)
 
 
 def words(text: str, title: str) -> str:
