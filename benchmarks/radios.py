@@ -3,8 +3,8 @@
     python benchmarks/radios.py                   against 4870486, the commit before the radio went into the pair loop
     python benchmarks/radios.py TREE --rounds 10  against a commit, a tag or a checkout
 
-Processor time of flights of 600 s on one thread, the least of all rounds. Each set is a new pair of processes: where
-code and arrays lie in memory decides a few percent. A motor fails in few flights if it does so once an hour, so the last
+Processor time of flights of 600 s on one thread, the least of all rounds. A set is a new pair of processes: where
+code and arrays lie in memory decides a few percent. A motor fails in few flights if it does so once an hour: the last
 row is the mean over SEEDS of the least time of each, against the same flights without. Status 1 where a ratio exceeds
 its bound.
 """
