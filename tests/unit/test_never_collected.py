@@ -28,6 +28,14 @@ def told(text):
     return done.stdout.split()
 
 
+def test_a_compiler_leaves_no_garbage_behind():
+    text = """
+flight = airflock.open('vicsek_1995/ordered', precision=64).compile()
+print(sum(1 for found in [gc.collect()] if found > 1000))
+"""
+    assert told(text) == ["0"]
+
+
 def test_a_full_collection_looks_at_a_tenth_of_what_the_compiler_brings():
     opened = "airflock.open('vicsek_1995/ordered'); print(len(gc.get_objects()), gc.get_freeze_count(), gc.isenabled())"
     seen, kept, collecting = told(opened)
@@ -53,6 +61,11 @@ def test_who_collects_by_himself_goes_on_doing_so():
 
 def test_who_has_imported_the_compiler_before_keeps_his_objects_under_the_collector():
     assert told("import numba; airflock.open('vicsek_1995/ordered'); print(gc.get_freeze_count())") == ["0"]
+
+
+def test_a_program_with_many_objects_of_its_own_keeps_them_under_the_collector():
+    opened = "mine = [[k] for k in range(100_000)]; airflock.open('vicsek_1995/ordered'); print(gc.get_freeze_count())"
+    assert told(opened) == ["0"]
 
 
 def test_an_import_that_fails_leaves_the_collector_as_it_was():
