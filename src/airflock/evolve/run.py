@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from airflock import atomic
+from airflock.asked import Asked
 from airflock.errors import StudyError
 from airflock.evolve.fitness import Objective, Own
 from airflock.evolve.folder import open_folder, sweep, versions
@@ -20,7 +21,7 @@ from airflock.evolve.sensitivity import METHODS
 from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
-from airflock.evolve.study import Study, load_study, make_study, with_limits
+from airflock.evolve.study import Study, load_study, make_study
 from airflock.evolve.winner import conclude
 from airflock.executors import Executor, Score
 from airflock.executors.cluster import Cluster, fly_on_their_cpu
@@ -127,14 +128,16 @@ def evolve(
     True
     """
     folder = own_path(out)
-    study, _ = asked_for(
-        what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust, fast=fast,
-        folder=folder if resume else None,
+    asked = Asked()
+    found = asked.read(
+        asked_for, what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust,
+        fast=fast, folder=folder if resume else None,
     )  # fmt: skip
-    if sensitivity and sensitivity not in METHODS:
-        raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
-    check_timeout(timeout)
-    study = on_device(study, device, scheduler)
+    asked.read(sound_method, sensitivity)
+    asked.read(sound_timeout, timeout)
+    asked.read(sound_device, device, scheduler)
+    asked.refuse()
+    study = on_device(found[0], device)
     open_folder(folder, study, resume=resume)
     executor = executor_for(study, scheduler, threads, timeout)
     return run(study, folder, executor, watch, sensitivity=sensitivity)
@@ -189,7 +192,8 @@ def study_of(
             said = ", ".join(beside)
             raise StudyError(f"{said}: a Study object sets this itself; give a preset, a file or a Scenario")
         return what
-    by_hand, search_keys = search_keys or {}, fast_keys(search_keys or {}, limits=bool(limit)) if fast else search_keys
+    search_keys = fast_keys(search_keys or {}, limits=bool(limit)) if fast else search_keys
+    limits = [limit] if isinstance(limit, str) else list(limit)
     given = {"space": space, "objective": objective, "over_scenarios": over_scenarios}
     tables = {key: value for key, value in given.items() if value is not None}
     if isinstance(what, Scenario) or (isinstance(what, Sequence) and not isinstance(what, str)):
@@ -198,16 +202,15 @@ def study_of(
         if not scenarios:
             raise StudyError("evolve is given an empty list of scenarios")
         where = ", ".join(scenario.name for scenario in scenarios)
-        study = make_study(tables, where, search=search_keys, scenario=scenarios, trust=trust)
+        study = make_study(tables, where, search=search_keys, scenario=scenarios, limits=limits, trust=trust)
     else:
-        study = load_study(what, settings=settings, search=search_keys, tables=tables, trust=trust)
+        study = load_study(what, settings=settings, search=search_keys, tables=tables, limits=limits, trust=trust)
     if fitness is not None:
         code = getattr(fitness, "__code__", None)
         text = _text_of(code) if code is not None else ""
         name = getattr(fitness, "__name__", "fitness")
         study = replace(study, objectives=(Objective(name, own=fitness, text=text),))
-    limits = [limit] if isinstance(limit, str) else list(limit)
-    return with_limits(study, limits, seeds="seeds" in by_hand) if limits else study
+    return study
 
 
 def _text_of(code: Any) -> str:
@@ -228,19 +231,30 @@ def score_of(study: Study, place: int = 0) -> Score:
     return score
 
 
-def check_timeout(timeout: float | None) -> None:
+def sound_method(sensitivity: str) -> None:
+    """Refuse a method of finding sensitivities that nobody knows."""
+    if sensitivity and sensitivity not in METHODS:
+        raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
+
+
+def sound_timeout(timeout: float | None) -> None:
     """Refuse a time limit in which no flight could fly."""
     if timeout is not None and not timeout > 0.0:
         raise StudyError(f"timeout = {timeout:g} s must be above 0")
 
 
-def on_device(study: Study, device: str, scheduler: str | None = None) -> Study:
+def sound_device(device: str, scheduler: str | None = None) -> None:
+    """Refuse a device on which no study flies, and another one than their cpu for a scheduler's workers."""
+    fly_on_their_cpu(scheduler, device)
+    if device not in ("cpu", "cuda", "auto"):
+        raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
+
+
+def on_device(study: Study, device: str) -> Study:
     """The study for a device: cpu, cuda, or what auto picks for a generation of it. A missing one is one line."""
+    sound_device(device)
     if device == "cpu":
         return study
-    fly_on_their_cpu(scheduler, device)
-    if device not in ("cuda", "auto"):
-        raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
     from airflock.engine import picked
 
     generation = [study.scenario] * study.population(0) * study.whole("seeds")
