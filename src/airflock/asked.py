@@ -21,6 +21,11 @@ def or_else(part: T, stand_in: T) -> T:
     return stand_in if part is WRONG else part
 
 
+def if_right(needed: Any, part: T) -> T:
+    """A part that was judged with a stand-in for another one (`or_else`); wrong where that one is."""
+    return WRONG if needed is WRONG else part  # type: ignore[no-any-return]
+
+
 class Asked:
     """What is asked for, part by part; a part is left out where one that it is made of is wrong, and only there.
 

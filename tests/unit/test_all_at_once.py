@@ -27,6 +27,7 @@ ASKED = [
         "--seeds 0", "--over radio.range", "--show fitnes", "--table lost.nc", "--precision 16", "--device tpu",
     ]),
     (f"run {SET}", ["--seeds 0", "--set model.p_rep=-1", "--save lost.csv", "--precision 16", "--device tpu"]),
+    ("run unknown", ["--agents x", "--duration soon", "--plot lost.nc"]),
     (f"run {SET}", ["--agents x", "--duration soon", "--set model", "--first-seed -1", "--plot lost.nc"]),
     (f"fleet {SET} --agents 3 --duration 1", [
         "--seeds 0", "--vehicle naza", "--mode task", "--body quad", "--join 1", "--save lost.csv", "--card lost.txt",
@@ -109,3 +110,15 @@ def test_a_single_fault_stays_the_error_that_it_was():
     with pytest.raises(CardError) as fault:
         asked.refuse()
     assert fault.value is only
+
+
+def test_a_name_that_is_none_is_told_beside_changes_that_are_none():
+    for verb in (
+        "run",
+        "certify --limit 'r_min<3 at 1%'",
+        "tune --out new",
+        "evolve --out new",
+        "harden --out new.toml",
+    ):
+        lines = refused(f"{verb} vasarhelyi_2018/4m --set p_rep --duration soon")
+        assert [line.split(":")[0] for line in lines] == ["--set p_rep", "--duration soon", "vasarhelyi_2018/4m"], lines

@@ -27,20 +27,32 @@ from airflock.scenarios.files import load
         ("import x.csv --out y.nc", "import: --out: unknown option; did you mean --save?"),
         ("evolve x --output y", "evolve: --output: unknown option; did you mean --out?"),
         ("run x --zzz", "run: --zzz: unknown option; airflock run --help lists them"),
-        ("run x --seeds 0", "run: --seeds 0 lies outside [1, 1000000]"),
-        ("run x --seeds=-3", "run: --seeds -3 lies outside [1, 1000000]"),
-        ("run x --seeds abc", "run: --seeds abc is not a number; give [1, 1000000]"),
-        ("run x --seeds 1.5", "run: --seeds 1.5 is not a whole number; give [1, 1000000]"),
-        ("run x --first-seed -1", "run: --first-seed -1 lies outside [0, inf]"),
-        ("run x --duration soon", "--duration soon: write a time above 0 such as 90s, 10min or 2h"),
-        ("run x --seeds 0 --seeds 5 --threads 0", "run: --threads 0 lies outside [1, inf]"),
+        ("run vasarhelyi_2018/real_4ms --seeds 0", "run: --seeds 0 lies outside [1, 1000000]"),
+        ("run vasarhelyi_2018/real_4ms --seeds=-3", "run: --seeds -3 lies outside [1, 1000000]"),
+        ("run vasarhelyi_2018/real_4ms --seeds abc", "run: --seeds abc is not a number; give [1, 1000000]"),
+        ("run vasarhelyi_2018/real_4ms --seeds 1.5", "run: --seeds 1.5 is not a whole number; give [1, 1000000]"),
+        ("run vasarhelyi_2018/real_4ms --first-seed -1", "run: --first-seed -1 lies outside [0, inf]"),
+        (
+            "run vasarhelyi_2018/real_4ms --duration soon",
+            "--duration soon: write a time above 0 such as 90s, 10min or 2h",
+        ),
+        ("run vasarhelyi_2018/real_4ms --seeds 0 --seeds 5 --threads 0", "run: --threads 0 lies outside [1, inf]"),
         ("run x --seeds", "--seeds needs a value"),
         ("presets --for-speed nan", "presets: --for-speed nan is not a finite number; give [0.1, 100]"),
-        ("harden x --out y.toml --cost nan", "harden: --cost nan is not a finite number; give [0, inf]"),
+        (
+            "harden vasarhelyi_2018/real_4ms --out y.toml --cost nan",
+            "harden: --cost nan is not a finite number; give [0, inf]",
+        ),
         ("display AIR --spacing=nan", "display: --spacing nan is not a finite number; give [2.5, 100]"),
         ("replay x --rate NaN", "replay: --rate nan is not a finite number; give [0.1, 100]"),
-        ("fly prepare x --site 0,0,0 --members 1 --margin 1e999", "fly prepare: --margin inf is not a finite number"),
-        ("fly prepare x --site 0,0,0 --members 1 --fast-bits nan", "fly prepare: --fast-bits nan is not a finite"),
+        (
+            "fly prepare vasarhelyi_2018/real_4ms --site 0,0,0 --members 1 --margin 1e999",
+            "fly prepare: --margin inf is not a finite number",
+        ),
+        (
+            "fly prepare vasarhelyi_2018/real_4ms --site 0,0,0 --members 1 --fast-bits nan",
+            "fly prepare: --fast-bits nan is not a finite",
+        ),
         ("fly order m.json start --radio udp:1 --in nan", "fly order: --in nan is not a finite number; give [0, 60]"),
         ("run", "run: PRESET|FILE is missing; for instance: airflock run vasarhelyi_2018/4ms --seeds 20"),
         ("run a b c", "run: unexpected b c; it takes PRESET|FILE and options; for instance: airflock run"),
@@ -50,7 +62,7 @@ from airflock.scenarios.files import load
             "presets: unexpected vicsek_1995/ordered; it takes PRESET and options; for instance: airflock presets v",
         ),
         ("run x --seed 3", "run: --seed: unknown option; did you mean --first-seed (of one flight), or --seeds"),
-        ("run x --agents -3", "--agents -3 lies outside [1, 1e+07]"),
+        ("run vasarhelyi_2018/real_4ms --agents -3", "--agents -3 lies outside [1, 1e+07]"),
         ("watch x --agents 0", "--agents 0 lies outside [1, 1e+07]"),
         ("run x --trust=yes", "--trust takes no value; write it alone"),
         ("evolve x --budget 10s", "evolve: --budget: unknown option; airflock evolve --help lists them"),
@@ -65,6 +77,7 @@ from airflock.scenarios.files import load
     ],
 )
 def test_what_typer_refuses_is_told_in_one_line(words, line, monkeypatch, capsys):
+    words = words.replace("REAL", "vasarhelyi_2018/real_4ms")
     monkeypatch.setattr("sys.argv", ["/anywhere/airflock", *words.split()])
     with pytest.raises(SystemExit) as ended:
         main()

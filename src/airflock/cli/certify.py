@@ -114,11 +114,10 @@ def certify(
     from airflock.certify.branches import sound_split
     from airflock.certify.maps import sound_axes
     from airflock.cli.sweep import axis
-    from airflock.scenarios.files import load
 
     asked.read(options.writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
     seconds = asked.read(options.time_of, budget)
-    loaded = asked.read(load, scenario, options.changed(asked, changes, agents, duration), law, trust=trust)
+    loaded = options.loaded(asked, scenario, options.changed(asked, changes, agents, duration), law, trust=trust)
     asked.read(request.sound_confidence, confidence)
     asked.read(request.sound_flights, flights)
     asked.read(request.sound_flyer, precision, device)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import WRONG
+from airflock.asked import WRONG, or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import searching
 
@@ -115,7 +115,7 @@ def evolve(
     found = asked.read(
         asked_for,
         scenario,
-        options.changed(asked, changes, agents, duration),
+        or_else(options.changed(asked, changes, agents, duration), {}),
         search_keys={key: value for key, value in given.items() if value is not None and value is not WRONG},
         limit=limit or (),
         trust=trust,

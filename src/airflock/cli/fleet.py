@@ -87,14 +87,13 @@ def fleet(
     """
     from airflock.fleet import compare, flying
     from airflock.fleet.starting import READY_TIME
-    from airflock.scenarios.files import load
 
     asked, live = options.asked(ctx), mode != flying.LOCKSTEP
     asked.read(options.writable, (save, RECORDINGS), (card_file, (".json",)))
     settings = options.changed(asked, changes, agents, duration)
     if body in flying.BODIES:
         settings = asked.read(lambda given: given | {"body.kind": body}, settings)
-    loaded = asked.read(load, scenario, settings, trust=trust)
+    loaded = options.loaded(asked, scenario, settings, trust=trust)
     loaded = asked.read(lambda found: compare.sampled(found, found.sensors.period or found.flight.dt), loaded)
     numbers = asked.read(options.seeds_of, first_seed, seeds)
     members = asked.read(lambda found: tuple(range(1, found.agents + 1)), loaded)

@@ -56,14 +56,13 @@ def prepare(
     from airflock.fleet.prepare import MARGIN, card_document, left_off
     from airflock.mavlink.orders import new_keys
     from airflock.onboard.card import card_of, hash_of
-    from airflock.scenarios.files import load
 
     asked = options.asked(ctx)
     where, systems = asked.read(options.place_on_earth, "--site", site), asked.read(_members, members)
     asked.read(options.writable, (out, (".json",)))
     files = Files(out, out.with_suffix(".key"), out.with_suffix(".operator"))
     asked.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
-    loaded = asked.read(load, scenario, asked.read(options.settings, changes), trust=trust)
+    loaded = options.loaded(asked, scenario, asked.read(options.settings, changes), trust=trust)
     safety = _limits(limits, loaded, asked)
     private, public = new_keys()
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import or_else
+from airflock.asked import if_right, or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import counted, searching
 from airflock.errors import ScenarioError
@@ -67,7 +67,8 @@ def harden(
     from airflock.evolve.harden import asked_for, document
 
     asked = options.asked(ctx)
-    optima = asked.read(_optima, scenario, asked.read(options.settings, changes, None, duration), trust)
+    settings = asked.read(options.settings, changes, None, duration)
+    optima = if_right(settings, asked.read(_optima, scenario, or_else(settings, {}), trust))
     places = asked.read(_places, out, len(or_else(optima, [])), scenario)
     again = r_coll is not None or delay is not None
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import WRONG, Asked, or_else
+from airflock.asked import Asked, if_right, or_else
 from airflock.cli.verb import FAULTS
 from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import suffix_fault
@@ -170,8 +170,14 @@ def compile_first(scenario: Any, precision: int, device: str) -> None:
 
 def changed(asked: Asked, changes: list[str] | None, agents: int | None, duration: str | None) -> dict[str, Any]:
     """What `settings` makes of these options, the others being judged where the number of agents is none."""
-    made = asked.read(settings, changes, or_else(agents, None), duration)
-    return agents if agents is WRONG else made  # type: ignore[return-value]
+    return if_right(agents, asked.read(settings, changes, or_else(agents, None), duration))
+
+
+def loaded(asked: Asked, name: str, changed: Mapping[str, Any], law: str | None = None, *, trust: bool) -> Any:
+    """The scenario of a name with what is changed; the name and its file are judged where a change is none."""
+    from airflock.scenarios.files import load
+
+    return if_right(changed, asked.read(load, name, or_else(changed, {}), law, trust=trust))
 
 
 def seeds_of(first: int, count: int) -> list[int]:

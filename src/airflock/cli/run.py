@@ -37,12 +37,11 @@ def run(
     """
     from airflock.engine import picked
     from airflock.executors.scores import scores
-    from airflock.scenarios.files import load
 
     asked = options.asked(ctx)
     asked.read(options.writable, (save, RECORDINGS), (plot, PICTURES))
     changed = options.changed(asked, changes, agents, duration)
-    found = asked.read(load, scenario, changed, law, trust=trust)
+    found = options.loaded(asked, scenario, changed, law, trust=trust)
     numbers = asked.read(options.seeds_of, first_seed, seeds)
     asked.read(options.sound_flying, device, precision, scheduler)
     asked.refuse()

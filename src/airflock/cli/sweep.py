@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import WRONG, Asked
+from airflock.asked import WRONG, Asked, if_right, or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
 from airflock.errors import ScenarioError
@@ -61,7 +61,7 @@ def sweep(
     fixed = options.changed(asked, changes, agents, duration)
     axes = _axes(over, plot, asked)
     points = asked.read(grid, axes)
-    scenarios = asked.read(scenarios_at, scenario, points, fixed, law, trust=trust)
+    scenarios = if_right(fixed, asked.read(scenarios_at, scenario, points, or_else(fixed, {}), law, trust=trust))
     name = asked.read(shown, show, scenarios)
     numbers = asked.read(options.seeds_of, first_seed, seeds)
     asked.read(options.sound_flying, device, precision, scheduler)

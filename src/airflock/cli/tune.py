@@ -67,7 +67,6 @@ def tune(
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
     from airflock.certify.request import sound_confidence
-    from airflock.scenarios.files import load
     from airflock.tune.folder import kept_plan
     from airflock.tune.request import request_of
     from airflock.tune.run import tune
@@ -75,7 +74,7 @@ def tune(
     asked = options.asked(ctx)
     seconds = asked.read(options.time_of, budget)
     settings = options.changed(asked, changes, agents, duration)
-    base = asked.read(load, asked.read(_named, scenario, like, heard), settings, trust=trust)
+    base = options.loaded(asked, asked.read(_named, scenario, like, heard), settings, trust=trust)
     start = asked.read(_as_it_will_fly, base, like)
     plan = asked.read(kept_plan, out, start, resume) if like is None else None  # with logs, of what they will tell
     if confidence is not None:
