@@ -77,7 +77,6 @@ from airflock.scenarios.files import load
     ],
 )
 def test_what_typer_refuses_is_told_in_one_line(words, line, monkeypatch, capsys):
-    words = words.replace("REAL", "vasarhelyi_2018/real_4ms")
     monkeypatch.setattr("sys.argv", ["/anywhere/airflock", *words.split()])
     with pytest.raises(SystemExit) as ended:
         main()
