@@ -18,7 +18,7 @@ from typing import Any
 from airflock.core import random as random_streams
 from airflock.errors import RuleError
 from airflock.rules import law
-from airflock.rules.copies import Notes, copies_of
+from airflock.rules.copies import Copies, Notes
 from airflock.rules.integers import tree_of
 from airflock.rules.nodes import walk
 from airflock.rules.unrolled import Unrolled
@@ -29,6 +29,7 @@ ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True, **INNER)'
 GIVEN = law.ALLOWED_CALLS | {law.TAKEN, *law.RESERVED.values()}  # what every driver has
 NOTHING: Mapping[str, str] = {}
 NONE: Mapping[str, Mapping[str, int]] = {}
+COPIES = Copies()  # of this process
 INLINED = '@njit(inline="always", **JIT)'
 
 
@@ -126,12 +127,11 @@ class Source:
     def _function(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str]) -> str:
         law.check(rule)
         notes = Notes(rule, self)
-        known = copies_of(rule, name, *chosen.items(), self.decorator, self.law, self.lenient, self._apart)
-        for asked, text in known:
-            if notes.hold(asked):
-                return text
-        text = self._copied(rule, name, chosen, notes)
-        known.append((notes.asked, text))
+        of = rule, name, *chosen.items(), self.decorator, self.law, self.lenient, self._apart
+        text = COPIES.text(of, notes)
+        if text is None:
+            text = self._copied(rule, name, chosen, notes)
+            COPIES.keep(of, notes, text)
         return text
 
     def _copied(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str], notes: Notes) -> str:
