@@ -17,7 +17,8 @@ import toys
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.batched import Batched
 from airflock.evolve.folder import open_folder
-from airflock.evolve.run import Interrupted, asked_for, run, score_of, sound_device, study_of
+from airflock.evolve.request import asked_for, sound_device, study_of
+from airflock.evolve.run import Interrupted, run, score_of
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import FILE, Batch, Store
 from airflock.evolve.study import differences, load_study, shipped

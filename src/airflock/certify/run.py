@@ -16,7 +16,7 @@ from airflock.certify.flyer import Flyer
 from airflock.certify.hazard import Hazard, hazard
 from airflock.certify.maps import bounds_over, sound_axes
 from airflock.certify.request import campaign_of, sound_budget, sound_workers, tolerance_keys
-from airflock.evolve.folder import open_folder, sweep, versions, write
+from airflock.evolve.folder import open_folder, remove_unfinished, versions, write
 from airflock.evolve.run import Interrupted
 from airflock.evolve.store import Store
 from airflock.executors import Executor
@@ -166,7 +166,7 @@ def run(
 
     with Store(folder) as store:
         store.begin(versions())
-        sweep(folder)
+        remove_unfinished(folder)
         write(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
         flyer = Flyer(campaign, store, executor, note=note)
         try:

@@ -89,15 +89,8 @@ def evolve(
     Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
     """
     from airflock.evolve.folder import open_folder
-    from airflock.evolve.run import (
-        asked_for,
-        executor_for,
-        on_device,
-        run,
-        sound_device,
-        sound_method,
-        sound_timeout,
-    )  # fmt: skip
+    from airflock.evolve.request import asked_for, sound_device, sound_method, sound_timeout
+    from airflock.evolve.run import executor_for, on_device, run
 
     asked = options.asked(ctx)
     given = {
