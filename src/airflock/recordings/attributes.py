@@ -20,6 +20,7 @@ from airflock.untrusted import from_outside, json_object
 
 FORMAT = 2
 FORMAT_KEY, CHECKSUM, LAW = "airflock_format", "airflock_checksum", "airflock_law"
+FRAME, EAST_NORTH_UP = "airflock_frame", "east-north-up"  # of tracks whose axes are known to be those of the ground
 EVENTS, FAULTS = "airflock_events", "airflock_faults"
 
 
@@ -56,6 +57,12 @@ def name_of(recording: xr.Dataset) -> str:
     first = files[0].rpartition("/")[2].rpartition(".")[0] or files[0]
     more = f" and {len(files) - 1} more" if len(files) > 1 else ""
     return str(recording.attrs.get("airflock_name") or f"{bounded(first, 60) or 'recording'}{more}")
+
+
+def axes_of(recording: xr.Dataset) -> tuple[str, str, str]:
+    """What to call the axes: east, north, up of flights and of tracks on the ground; else x, y, z, as of a tank."""
+    known = recording.attrs.get("airflock_scenario") or recording.attrs.get(FRAME) == EAST_NORTH_UP
+    return ("east", "north", "up") if known else ("x", "y", "z")
 
 
 def measured_by(recording: xr.Dataset) -> dict[str, Any]:
