@@ -25,6 +25,6 @@ def scrape(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any])
         if isinstance(value, Figure) and id(value) not in seen:
             seen.add(id(value))
             path = next(block_vars["image_path_iterator"])
-            value.savefig(path, dpi=min(WIDTH / value.get_figwidth(), 200.0))
+            value.savefig(path, dpi=min(WIDTH / value.get_figwidth(), 200.0), bbox_inches="tight", pad_inches=0.08)
             names.append(path)
     return figure_rst(names, gallery_conf["src_dir"])

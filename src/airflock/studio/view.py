@@ -97,14 +97,14 @@ class View:
         for client in self.server.get_clients().values():
             self._welcome(client)
 
-    def _point(self, camera: Any) -> None:
-        for name, value in self._aim.items():  # the position first: it takes look_at along
+    def _point(self, camera: Any, aspect: float = 1.0) -> None:
+        for name, value in drawn_back(self._aim, aspect).items():  # the position first: it takes look_at along
             setattr(camera, name, value)
 
     def _welcome(self, client: Any) -> None:
         """Point the camera of one page; until the page has answered, what it says of its camera is old."""
         self._met[client.client_id] = time.monotonic()
-        self._point(client.camera)
+        self._point(client.camera, client.camera.aspect)
 
     def ground(self, name: str, span: float, height: float, centre: NDArray[Any]) -> None:
         """A grid of 20 by 20 squares."""
@@ -270,3 +270,15 @@ def _round(length: float) -> float:
     """1, 2 or 5 times a power of ten near a length, m."""
     power = 10.0 ** np.floor(np.log10(max(length, 1e-9)))
     return float(min((1.0, 2.0, 5.0, 10.0), key=lambda digit: abs(digit * power - length)) * power)
+
+
+def drawn_back(aim: Mapping[str, Any], aspect: float) -> dict[str, Any]:
+    """An aim of a camera for a page of an aspect, width by height: one that is higher than wide sees as far sideways.
+
+    The field of view is that of the height, so the camera of a telephone draws back until the width shows as much.
+    """
+    if not aim or not 0.0 < aspect < 1.0:
+        return dict(aim)
+    target = np.asarray(aim["look_at"])
+    place = target + (np.asarray(aim["position"]) - target) / aspect
+    return {**aim, "position": tuple(place), "near": aim["near"] / aspect, "far": aim["far"] / aspect}
