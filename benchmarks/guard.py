@@ -43,7 +43,7 @@ ROWS = {
 
 
 def child() -> None:
-    """Fly what standard input names, and answer with seconds; one line each."""
+    """Fly what standard input names (preset, settings, seed or none), and answer with seconds; one line each."""
     from airflock.engine.cpu import fly
     from airflock.engine.simulate import plan_of
     from airflock.engine.tables import tables
@@ -52,7 +52,7 @@ def child() -> None:
 
     ready = {}
     for line in sys.stdin:
-        preset, settings = json.loads(line)
+        preset, settings, *seed = json.loads(line)
         key = line
         if key not in ready:
             if preset not in presets():
@@ -63,7 +63,7 @@ def child() -> None:
             except ScenarioError:
                 scenario = load(preset, {key: value for key, value in settings.items() if "." not in key})
             plan = plan_of(scenario)
-            ready[key] = plan, tables(scenario, plan, 1)
+            ready[key] = plan, tables(scenario, plan, *(seed or [1]))
             fly(*ready[key])  # compiled, and loaded into the caches
         begun = time.process_time()
         fly(*ready[key])
@@ -82,7 +82,7 @@ class Version:
             command, env=paths, cwd=tree, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
 
-    def seconds(self, row: tuple[str, dict]) -> float:
+    def seconds(self, row: tuple[str, dict] | tuple[str, dict, int]) -> float:
         """Processor time of one flight, s."""
         self.process.stdin.write(json.dumps(row) + "\n")
         self.process.stdin.flush()

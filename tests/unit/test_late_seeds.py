@@ -79,22 +79,22 @@ def test_windows_are_means_of_equal_parts_of_the_last_half():
     assert windowed(means, 0) == [] and len(windowed(means[:3], 5)) == 2
 
 
-def test_the_best_finalists_fly_again_and_the_winner_is_the_best_of_all_their_flights(tmp_path):
+def test_the_better_half_of_the_finalists_flies_on_and_the_winner_is_the_best_of_all_flights_of_the_best(tmp_path):
     study = toys.study(windows=2, averages=1, again=2, final_seeds=5)
     open_folder(tmp_path / "a", study, resume=False)
     result = run(study, tmp_path / "a", InProcess(lambda p, seed: toys.bowl(p, seed, noise=0.3), 1))
     with Store(tmp_path / "a", write=False) as store:
-        first, again = (store.flown(Batch(stage, 0, 0)) for stage in ("final", "again"))
+        rounds = [store.flown(Batch(*batch)) for batch in (("final", 0, 0), ("final", 0, 1), ("again", 0, 0))]
         seeds = {seed for (seed,) in store.rows("SELECT seed FROM flight WHERE stage IN ('final', 'again', 'score')")}
     assert list(result.finalists["origin"]) == ["mean"] * 4 + ["top"] * 3
-    means = np.array([np.mean([first[i, j]["fitness"] for j in range(5)]) for i in range(7)])
-    best = np.argsort(-means, kind="stable")[:2]
-    both = [np.mean([*(first[i, j]["fitness"] for j in range(5)), *(again[k, j]["fitness"] for j in range(10))])
-            for k, i in enumerate(best)]  # fmt: skip
-    assert result.finalists["fitness"].to_numpy()[best] == pytest.approx(both) and len(seeds) == 5 + 10 + 5
-    rest = np.delete(result.finalists["fitness"].to_numpy(), best)
-    assert rest == pytest.approx(np.delete(means, best))
-    assert result.parameters["model.p_rep"] == result.finalists["model.p_rep"][best[np.argmax(both)]]
+    flights, alive = {k: [] for k in range(7)}, list(range(7))
+    for flown, count, left in zip(rounds, (1, 4, 10), (4, 2, 1), strict=True):  # a third of 5 is 1; then all the others
+        assert {place for place, _ in flown} == set(range(len(alive)))
+        for place, k in enumerate(alive):
+            flights[k] += [flown[place, j]["fitness"] for j in range(count)]
+        alive = sorted(alive, key=lambda k: -np.mean(flights[k]))[:left]
+    assert result.finalists["fitness"].to_numpy() == pytest.approx([np.mean(flights[k]) for k in range(7)])
+    assert result.parameters["model.p_rep"] == result.finalists["model.p_rep"][alive[0]] and len(seeds) == 5 + 10 + 5
 
 
 def test_a_search_that_is_cut_off_among_its_late_flights_ends_the_same(tmp_path):
@@ -134,7 +134,9 @@ def test_the_fast_search_takes_a_third_of_the_flights_and_goes_with_limits():
     def cost(study):
         q, top = study.search, study.search.top
         race = 4 * q.pool + 16 * max(q.top, round(0.25 * q.pool))
-        final = q.final_seeds * (2 + q.averages + q.windows + top + 2 * q.again)
+        finalists = 1 + q.averages + q.windows + top
+        on = (finalists / 3 + 2 / 3 * ((finalists + 1) // 2)) if q.again else finalists
+        final = q.final_seeds * (on + 2 * q.again + 1)
         return total_flights(study) + race + final
 
     assert 0.3 < cost(fast) / cost(usual) < 1 / 3

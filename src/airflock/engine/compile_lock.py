@@ -3,6 +3,7 @@
 The lock is one of the system's on a file beside the driver: it ends with the process that holds it, however that ends.
 """
 
+import gc
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -41,7 +42,10 @@ def one_at_a_time(compile_: Callable[[Any], Any], folder: Path) -> Callable[[Any
         if any(folder.glob("*.nbi")):
             return under_lock(signature)
         with alone(folder):
-            return under_lock(signature)  # which loads what another process has compiled meanwhile
+            found = under_lock(signature)  # which loads what another process has compiled meanwhile
+        if gc.isenabled():
+            gc.collect()  # what a compiler leaves: whoever flies would have to wait for it soon
+        return found
 
     return locked
 

@@ -20,6 +20,8 @@ from numba.core.postproc import PostProcessor
 from numba.core.typing import templates
 from numba.core.typing.context import BaseContext
 
+from airflock.engine.never_collected import never_collected
+
 TRIED = (0, 62), (0, 68)  # first and last version of Numba of which this was tried, beside 0.65
 KNOWN = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
 SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
@@ -57,16 +59,17 @@ def implementations() -> None:
     """
     if not KNOWN or "numba.np.arraymath" in sys.modules:
         return
-    from numba.np import linalg
+    with never_collected():
+        from numba.np import linalg
 
-    usual = linalg.ensure_blas
-    linalg.ensure_blas = _there
-    try:
-        from numba.np import arraymath
+        usual = linalg.ensure_blas
+        linalg.ensure_blas = _there
+        try:
+            from numba.np import arraymath
 
-        arraymath.ensure_blas = usual  # type: ignore[attr-defined]  # Numba has no types, here and below
-    finally:
-        linalg.ensure_blas = usual
+            arraymath.ensure_blas = usual  # type: ignore[attr-defined]  # Numba has no types, here and below
+        finally:
+            linalg.ensure_blas = usual
 
 
 def _there() -> None:

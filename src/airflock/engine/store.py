@@ -15,6 +15,7 @@ from types import ModuleType
 
 from airflock import atomic
 from airflock.cache import DRIVERS, cache_folder, shrink, spare
+from airflock.engine.never_collected import never_collected
 from airflock.machine import toolchain
 
 SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
@@ -33,10 +34,19 @@ def compiled_by() -> str:
 
 def load_driver(text: str, label: str) -> ModuleType:
     """Import a driver from its text; compiled code of an earlier process is reused."""
+    _import_compiler()
     digest = hashlib.sha256(f"{compiled_by()}\n{text}".encode()).hexdigest()[:20]
     name = f"airflock_driver_{label}_{digest}"
     with _loading:  # a thread must not get a module that another one is still executing
         return sys.modules[name] if name in sys.modules else _import(name, digest, text, label)
+
+
+def _import_compiler() -> None:
+    """Import what drivers import, if nobody has imported Numba yet."""
+    with _loading:
+        if "numba" not in sys.modules:
+            with never_collected():
+                from airflock.engine import checksums, compiler  # noqa: F401
 
 
 def _import(name: str, digest: str, text: str, label: str) -> ModuleType:

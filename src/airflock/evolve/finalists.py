@@ -15,7 +15,7 @@ from airflock.evolve.safe import excess_of, safe_first
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
 
-FINAL, AGAIN = Batch("final", 0, 0), Batch("again", 0, 0)
+FINAL, HALF, AGAIN = Batch("final", 0, 0), Batch("final", 0, 1), Batch("again", 0, 0)
 EXCESS = "excess"  # column: how far a candidate is from keeping all limits
 
 
@@ -49,29 +49,42 @@ def fly_finalists(evaluator: Evaluator, points: NDArray[np.float64]) -> tuple[Se
     """Fitness of each finalist on the same fresh seeds, by objective, and the index of the best."""
     study = evaluator.study
     fresh = [study.seed(1, j) for j in range(study.whole("final_seeds"))]
-    rows = evaluator.evaluate(FINAL, points, seeds=[fresh] * len(points))
     if study.whole("again"):
-        return flown_again(evaluator, points, rows)
+        return flown_in_rounds(evaluator, points, fresh)
+    rows = evaluator.evaluate(FINAL, points, seeds=[fresh] * len(points))
     return rows, _winner(study, rows, excess_of(study, evaluator.store, FINAL) if study.limits else None)
 
 
-def flown_again(
-    evaluator: Evaluator, points: NDArray[np.float64], rows: Sequence[Sequence[float | None]]
+def flown_in_rounds(
+    evaluator: Evaluator, points: NDArray[np.float64], fresh: Sequence[int]
 ) -> tuple[list[list[float | None]], int]:
-    """Let the best finalists fly twice as many further seeds.
+    """Let all finalists fly a third of the fresh seeds, the better half the others, the best twice as many again.
 
-    Returns the fitness of all finalists, of these over all their flights, and the index of the best of these.
+    Returns the fitness of all finalists, of each over all its flights, and the index of the best of the last round.
     """
-    study = evaluator.study
-    sign, n = (1.0 if study.objectives[0].maximise else -1.0), study.whole("final_seeds")
-    sound = [k for k, row in enumerate(rows) if row[0] is not None]
-    best = sorted(sound, key=lambda k: -sign * float(rows[k][0] or 0.0))[: study.whole("again")]
-    further = [study.seed(1, n + j) for j in range(2 * n)]
-    found = evaluator.evaluate(AGAIN, points[best], seeds=[further] * len(best))
-    both = [list(row) for row in rows]
-    for k, (value,) in zip(best, found, strict=True):
-        both[k] = [None if value is None else (float(rows[k][0] or 0.0) + 2.0 * value) / 3.0]
-    return both, best[_winner(study, [both[k] for k in best])] if best else _winner(study, rows)
+    study, first, again = evaluator.study, max(1, len(fresh) // 3), evaluator.study.whole("again")
+    further = [study.seed(1, len(fresh) + j) for j in range(2 * len(fresh))]
+    half = max(again, (len(points) + 1) // 2)
+    rows = [row[0] for row in evaluator.evaluate(FINAL, points, seeds=[fresh[:first]] * len(points))]
+    alive, flown = list(range(len(points))), first
+    for batch, most, seeds in ((HALF, half, fresh[first:]), (AGAIN, again, further)):
+        alive = _best(study, rows, alive, most)
+        if not alive:
+            break
+        found = evaluator.evaluate(batch, points[alive], seeds=[seeds] * len(alive))
+        for k, (value,) in zip(alive, found, strict=True):
+            before = float(rows[k] or 0.0)
+            rows[k] = None if value is None else (flown * before + len(seeds) * value) / (flown + len(seeds))
+        flown += len(seeds)
+    both = [[value] for value in rows]
+    return both, alive[_winner(study, [both[k] for k in alive])] if alive else _winner(study, both)
+
+
+def _best(study: Study, values: Sequence[float | None], among: Sequence[int], most: int) -> list[int]:
+    """Indices of the best that have not failed, the best first."""
+    sign = -1.0 if study.objectives[0].maximise else 1.0
+    sound = [k for k in among if values[k] is not None]
+    return sorted(sound, key=lambda k: sign * float(values[k] or 0.0))[:most]
 
 
 def finalist_table(

@@ -140,7 +140,7 @@ class Search(Record):
         low=0,
         high=1e4,
         source="our choice; docs/decisions/0121",
-        meaning="best finalists that fly twice as many further fresh seeds before the winner is chosen; 0: none",
+        meaning="best finalists that fly twice as many fresh seeds; the worse half stops early; 0: none",
     )
 
 
