@@ -14,13 +14,12 @@ import xarray as xr
 
 from airflock.errors import RecordingError, bounded
 from airflock.faults.registry import KINDS
-from airflock.recordings.layout import check_dataset
+from airflock.recordings.layout import EAST_NORTH_UP, FRAME, check_dataset
 from airflock.scenarios.laws import MODELS
 from airflock.untrusted import from_outside, json_object
 
 FORMAT = 2
 FORMAT_KEY, CHECKSUM, LAW = "airflock_format", "airflock_checksum", "airflock_law"
-FRAME, EAST_NORTH_UP = "airflock_frame", "east-north-up"  # of tracks whose axes are known to be those of the ground
 EVENTS, FAULTS = "airflock_events", "airflock_faults"
 
 

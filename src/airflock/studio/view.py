@@ -21,6 +21,8 @@ TRAILS = 40  # nodes, rewritten in turn: a trail is so many frames long
 NARROW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
 WIDE = 0.8
 SETTLING = 2.0  # s; a page that was just opened or pointed elsewhere is not led yet
+BREADTH = 1.2  # width by height from which on a page shows a field beside its panel
+TURNED = 0.02  # by which width by height differs when a telephone is turned, and not when a bar slides away
 FEW = 32  # segments of a kind of lines at first
 STILL = (1.0, 0.0, 0.0, 0.0)
 
@@ -58,7 +60,9 @@ class View:
         self._moving: list[Any] = []
         self._aim: dict[str, Any] = {}
         self._met: dict[int, float] = {}
+        self._narrow: dict[int, float] = {}  # by page: width by height, at most BREADTH
         self.server.on_client_connect(self._welcome)
+        self.server.on_client_connect(lambda client: client.camera.on_update(lambda _: self._sized(client)) and None)
         self._turn = 0
 
     @property
@@ -97,14 +101,21 @@ class View:
         for client in self.server.get_clients().values():
             self._welcome(client)
 
-    def _point(self, camera: Any, aspect: float = 1.0) -> None:
+    def _sized(self, client: Any) -> None:
+        """Point the camera of a page anew that has become narrow, or no longer is: it tells its size as it looks."""
+        narrow = min(client.camera.aspect, BREADTH)
+        if abs(narrow - self._narrow.get(client.client_id, BREADTH)) > TURNED:
+            self._narrow[client.client_id] = narrow
+            self._welcome(client)
+
+    def _point(self, camera: Any, aspect: float = BREADTH) -> None:
         for name, value in drawn_back(self._aim, aspect).items():  # the position first: it takes look_at along
             setattr(camera, name, value)
 
     def _welcome(self, client: Any) -> None:
         """Point the camera of one page; until the page has answered, what it says of its camera is old."""
         self._met[client.client_id] = time.monotonic()
-        self._point(client.camera, client.camera.aspect)
+        self._point(client.camera, self._narrow.get(client.client_id, BREADTH))
 
     def ground(self, name: str, span: float, height: float, centre: NDArray[Any]) -> None:
         """A grid of 20 by 20 squares."""
@@ -273,12 +284,13 @@ def _round(length: float) -> float:
 
 
 def drawn_back(aim: Mapping[str, Any], aspect: float) -> dict[str, Any]:
-    """An aim of a camera for a page of an aspect, width by height: one that is higher than wide sees as far sideways.
+    """An aim of a camera for a page of an aspect, width by height: a narrow one sees as far sideways as others do.
 
     The field of view is that of the height, so the camera of a telephone draws back until the width shows as much.
     """
-    if not aim or not 0.0 < aspect < 1.0:
+    if not aim or not 0.0 < aspect < BREADTH:
         return dict(aim)
+    closer = aspect / BREADTH
     target = np.asarray(aim["look_at"])
-    place = target + (np.asarray(aim["position"]) - target) / aspect
-    return {**aim, "position": tuple(place), "near": aim["near"] / aspect, "far": aim["far"] / aspect}
+    place = target + (np.asarray(aim["position"]) - target) / closer
+    return {**aim, "position": tuple(place), "near": aim["near"] / closer, "far": aim["far"] / closer}

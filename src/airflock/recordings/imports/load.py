@@ -11,7 +11,6 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import RecordingError
-from airflock.recordings.attributes import EAST_NORTH_UP, FRAME
 from airflock.recordings.imports import (
     absent,
     arrays,
@@ -34,6 +33,7 @@ from airflock.recordings.imports.track import (
     Track,
     nothing,
 )
+from airflock.recordings.layout import EAST_NORTH_UP, FRAME
 from airflock.untrusted import own_path
 
 
