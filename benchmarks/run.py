@@ -28,7 +28,7 @@ from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import cores
 
-PRESET = "vasarhelyi_2018/4ms"
+PRESET, LINKS = "vasarhelyi_2018/4ms", "vasarhelyi_2018/real_gnss"
 SEEDS = (1, 2, 3)  # flights of one round on one thread
 COMPARED = ("phi_vel", "phi_corr", "r_min_mean", "phi_lap_abs", "polarisation", "n_coll")
 
@@ -76,6 +76,7 @@ def pairs(scenario: Scenario, folder: Path, bits: int, many: int, trial: Path | 
     seldom = load(PRESET, {"duration": scenario.flight.duration, "metrics.collision_period": 0.2})
     c, c64 = (Reference(scenario, folder, bits=real, vector_bits=bits) for real in (32, 64))
     c_seldom = Reference(seldom, folder, vector_bits=bits)
+    links = load(LINKS, {"duration": scenario.flight.duration})
 
     def flown(found: Scenario, precision: int = 32) -> Callable[[], object]:
         return lambda: [score_flight(found, seed, precision=precision) for seed in SEEDS]
@@ -89,6 +90,10 @@ def pairs(scenario: Scenario, folder: Path, bits: int, many: int, trial: Path | 
         Pair("float32, collisions every 0.01 s", flown(scenario), written(c), 1.15, one),
         Pair("the same, C looks at all pairs", flown(scenario), written(c, skip=False), 1.25, one),
         Pair("float64, collisions every 0.01 s", flown(scenario, 64), written(c64), None, one),
+        Pair(
+            "two lossy links, 30 drones, float32", flown(links), written(Reference(links, folder, vector_bits=bits)),
+            1.15, one,
+        ),
         Pair(
             f"all {cores()} cores, float32, {many} flights",
             lambda: score_flights([scenario] * many, list(range(1, many + 1))),
@@ -113,12 +118,14 @@ def pairs(scenario: Scenario, folder: Path, bits: int, many: int, trial: Path | 
 def agreement(scenario: Scenario, folder: Path, bits: int, seeds: int) -> dict[str, object]:
     """How far C and airflock are apart: the same seeds over the first seconds, and means over many seeds."""
     found: dict[str, object] = {}
-    for precision, seconds, margin in ((64, 10.0, 1e-9), (32, 4.0, 2e-3)):
-        short = load(PRESET, {"duration": seconds})
+    tried = (PRESET, 64, 10.0, 1e-9), (PRESET, 32, 4.0, 2e-3), (LINKS, 64, 10.0, 1e-9)
+    for preset, precision, seconds, margin in tried:
+        short = load(preset, {"duration": seconds})
         frames, _ = Reference(short, folder, bits=precision, vector_bits=bits).frames(1)
         flown = fly(short, 1, precision=precision, record=True)
-        apart = float(np.abs(frames - flown.frames[:, :4]).max())
-        found[f"float{precision}, first {seconds:g} s"] = {"apart": apart, "margin": margin, "holds": apart <= margin}
+        apart, what = float(np.abs(frames - flown.frames[:, :4]).max()), "" if preset == PRESET else "two lossy links, "
+        name = f"{what}float{precision}, first {seconds:g} s"
+        found[name] = {"apart": apart, "margin": margin, "holds": apart <= margin}
     ours = score_flights([scenario] * seeds, list(range(1, seeds + 1)))
     theirs = Reference(scenario, folder, vector_bits=bits).evaluate_many(1, seeds)
     for name in COMPARED:
