@@ -61,8 +61,7 @@ class View:
         self._aim: dict[str, Any] = {}
         self._met: dict[int, float] = {}
         self._narrow: dict[int, float] = {}  # by page: width by height, at most BREADTH
-        self.server.on_client_connect(self._welcome)
-        self.server.on_client_connect(lambda client: client.camera.on_update(lambda _: self._sized(client)) and None)
+        self.server.on_client_connect(self._meet)
         self._turn = 0
 
     @property
@@ -100,6 +99,11 @@ class View:
         self._point(self.server.initial_camera)
         for client in self.server.get_clients().values():
             self._welcome(client)
+
+    def _meet(self, client: Any) -> None:
+        """Point the camera of a page that opens, and listen to what it tells of its size."""
+        self._welcome(client)
+        client.camera.on_update(lambda _: self._sized(client))
 
     def _sized(self, client: Any) -> None:
         """Point the camera of a page anew that has become narrow, or no longer is: it tells its size as it looks."""
