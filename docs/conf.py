@@ -63,5 +63,5 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
     "image_scrapers": ("figures",),
     "reset_modules": (),
-    "ignore_repr_types": r"matplotlib\.|'list'",  # what axes return is no output of an example
+    "ignore_repr_types": r"matplotlib\.|airflock\.plots|'list'",  # what axes return is no output of an example
 }

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import toys
 from airflock import atomic
-from airflock.evolve.folder import STUDY, open_folder, sweep, versions
+from airflock.evolve.folder import STUDY, open_folder, remove_unfinished, versions
 from airflock.evolve.search import search
 from airflock.evolve.store import FILE, Store
 from airflock.evolve.winner import conclude
@@ -44,7 +44,7 @@ def evolve(folder):
     executor = InProcess(toys.slow_bowl, 2)
     with Store(folder) as store:
         store.begin(RUN)
-        sweep(folder)
+        remove_unfinished(folder)
         conclude(study, store, executor, search(study, store, executor), folder)
     executor.close()
 

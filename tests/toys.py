@@ -17,11 +17,13 @@ SPACE = {
 }
 
 
-def study(tables=None, scenario=None, **search):
+def study(tables=None, scenario=None, limits=(), **search):
     """A study of three parameters; `search` are keys of the table [search]."""
     usual = {"population": 8, "generations": 6, "top": 3, "pool": 0, "final_seeds": 4}
     scenario = scenario or load("vasarhelyi_2018/6ms")
-    return make_study({"space": SPACE, **(tables or {})}, "toy", search=usual | search, scenario=scenario)
+    return make_study(
+        {"space": SPACE, **(tables or {})}, "toy", search=usual | search, scenario=scenario, limits=limits
+    )
 
 
 def bowl(parameters, seed, noise=0.01):

@@ -1,10 +1,9 @@
-"""Pictures of an executed example: every Matplotlib figure that it has bound to a name, alone or in a list, drawn
-without pyplot.
-"""
+"""Pictures of an executed example: every Matplotlib figure that it has bound to a name, alone or in a list."""
 
 from collections.abc import Callable
 from typing import Any
 
+import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from sphinx_gallery.scrapers import figure_rst
 
@@ -25,6 +24,7 @@ def scrape(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any])
         if isinstance(value, Figure) and id(value) not in seen:
             seen.add(id(value))
             path = next(block_vars["image_path_iterator"])
-            value.savefig(path, dpi=min(WIDTH / value.get_figwidth(), 200.0))
+            value.savefig(path, dpi=min(WIDTH / value.get_figwidth(), 200.0), bbox_inches="tight", pad_inches=0.08)
             names.append(path)
+    plt.close("all")  # pyplot keeps those of all examples otherwise, and warns
     return figure_rst(names, gallery_conf["src_dir"])

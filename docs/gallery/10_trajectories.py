@@ -10,3 +10,4 @@ import airflock
 
 recording = airflock.simulate("vasarhelyi_2018/4ms", seed=1)
 figure = airflock.plots.trajectories(recording)
+figure

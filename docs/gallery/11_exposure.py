@@ -9,3 +9,4 @@ import airflock
 
 recording = airflock.simulate("vasarhelyi_2018/8ms", seed=3)
 figure = airflock.plots.exposure(recording)
+figure

@@ -9,3 +9,4 @@ import airflock
 
 scenario = airflock.load("vasarhelyi_2018/4ms", {"duration": "2 min"})
 figure = airflock.plots.series(airflock.simulate(scenario, seed=2))
+figure

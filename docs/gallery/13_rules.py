@@ -8,3 +8,4 @@ The rules of a model, drawn from the functions that fly: repulsion, alignment, a
 import airflock
 
 figure = airflock.plots.rules(airflock.load("vasarhelyi_2018/4ms"))
+figure

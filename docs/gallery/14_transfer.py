@@ -8,3 +8,4 @@ The three transfer functions that turn an order parameter into a number between 
 import airflock
 
 figure = airflock.plots.transfer(airflock.load("vasarhelyi_2018/4ms"))
+figure

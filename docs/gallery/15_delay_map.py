@@ -12,3 +12,4 @@ settings = {"agents": 40, "duration": 120.0}
 scenario = airflock.load("vasarhelyi_2018/8ms", settings)
 table = airflock.sweep(scenario, over, seeds=2)
 figure = airflock.plots.heatmap(table, list(over), "phi_corr", scenario=scenario)
+figure

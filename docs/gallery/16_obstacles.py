@@ -9,3 +9,4 @@ import airflock
 
 scenario = airflock.load("vasarhelyi_2018/obstacles", {"duration": 180.0})
 figure = airflock.plots.trajectories(airflock.simulate(scenario, seed=1))
+figure

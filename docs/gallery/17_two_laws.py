@@ -6,8 +6,8 @@ The law of Virágh et al. (2014) and that of Vásárhelyi et al. (2018), with th
 Each partial fitness shows what a law does well.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import airflock
 
@@ -15,7 +15,7 @@ parts = ["f_speed", "f_corr", "f_wall", "f_coll", "f_disc", "f_cluster"]
 new = airflock.load("vasarhelyi_2018/4ms", {"duration": 300.0})
 old = airflock.load("vasarhelyi_2018/4ms", {"duration": 300.0}, law="viragh_2014")
 
-figure = Figure(figsize=(7, 3.5), layout="constrained")
+figure = plt.figure(figsize=(7, 3.5), layout="constrained")
 axes = figure.subplots()
 for shift, scenario in ((-0.2, old), (0.2, new)):
     table = airflock.score(scenario, seeds=5)[parts]

@@ -10,3 +10,4 @@ import airflock
 scenario = airflock.load("vasarhelyi_2018/4ms", {"duration": 300.0})
 flights = {f"seed {seed}": airflock.simulate(scenario, seed) for seed in (1, 2, 3)}
 figure = airflock.plots.rotations(flights)
+figure

@@ -5,8 +5,8 @@ Five speeds, five sets
 The optimised sets of Vásárhelyi et al. (2018, Table S1) and the partial fitnesses that they reach.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import airflock
 
@@ -14,7 +14,7 @@ speeds = [4, 6, 8, 16, 32]
 parts = ["f_speed", "f_corr", "f_wall", "f_coll", "f_disc", "f_cluster", "fitness"]
 table = np.array([airflock.score(f"vasarhelyi_2018/{v}ms", seeds=3)[parts].mean() for v in speeds])
 
-figure = Figure(figsize=(6.5, 3.5), layout="constrained")
+figure = plt.figure(figsize=(6.5, 3.5), layout="constrained")
 axes = figure.subplots()
 shown = axes.imshow(table, vmin=0, vmax=1, aspect="auto")
 axes.set_xticks(range(len(parts)), parts)

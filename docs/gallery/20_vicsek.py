@@ -6,8 +6,8 @@ The model of Vicsek et al. (1995) passes from order to disorder as the noise gro
 chance alone gives: one over the root of the number of agents.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import airflock
 
@@ -16,7 +16,7 @@ noise = [float(x) for x in np.linspace(0.2, 6.2, 9)]
 table = airflock.sweep(scenario, {"model.eta": noise}, seeds=3, settings={"metrics.kind": "order"})
 mean = table.groupby("model.eta")["polarisation"].agg(["mean", "std"])
 
-figure = Figure(figsize=(6, 4), layout="constrained")
+figure = plt.figure(figsize=(6, 4), layout="constrained")
 axes = figure.subplots()
 axes.errorbar(mean.index, mean["mean"], mean["std"], marker="o", capsize=3)
 axes.axhline(1.0 / np.sqrt(scenario.agents), ls="--", color="grey")

@@ -6,14 +6,14 @@ As the zone of orientation widens, a group passes from a swarm to a mill and to 
 Polarisation reveals schools, milling reveals mills.
 """
 
-from matplotlib.figure import Figure
+import matplotlib.pyplot as plt
 
 import airflock
 
 names = ["swarm", "torus", "dynamic_parallel", "highly_parallel"]
 scores = {name: airflock.score(f"couzin_2002/{name}", seeds=2).mean() for name in names}
 
-figure = Figure(figsize=(7, 3.5), layout="constrained")
+figure = plt.figure(figsize=(7, 3.5), layout="constrained")
 axes = figure.subplots()
 for shift, what in ((-0.2, "polarisation"), (0.2, "milling")):
     axes.bar([i + shift for i in range(len(names))], [scores[name][what] for name in names], 0.4, label=what)

@@ -5,8 +5,8 @@ A mill from above
 The last seconds of a group that turns about its own centre, seen along its axis of rotation.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import airflock
 
@@ -18,7 +18,7 @@ axis = np.cross(x, v, axis=1).mean(axis=(0, 2))
 across = np.linalg.svd(axis[None])[2][1:]  # two directions across the axis
 flat = np.einsum("ds,tsi->tdi", across, x)
 
-figure = Figure(figsize=(5, 5), layout="constrained")
+figure = plt.figure(figsize=(5, 5), layout="constrained")
 axes = figure.subplots()
 axes.plot(flat[:, 0], flat[:, 1], lw=0.6, alpha=0.7)
 axes.set(xlabel="m", ylabel="m", aspect="equal")

@@ -5,12 +5,12 @@ What a polarisation looks like
 Headings of the same particles at four levels of noise; the number is the polarisation at that instant.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import airflock
 
-figure = Figure(figsize=(10, 3), layout="constrained")
+figure = plt.figure(figsize=(10, 3), layout="constrained")
 for axes, noise in zip(figure.subplots(1, 4), (0.2, 2.0, 3.5, 6.0), strict=True):
     scenario = airflock.load("vicsek_1995/transition", {"duration": 300.0, "eta": noise})
     last = airflock.simulate(scenario, seed=1).isel(time=-1, keypoint=0)

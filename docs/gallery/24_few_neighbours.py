@@ -7,7 +7,7 @@ the k nearest of those that it hears, or those whose Voronoi cells border its ow
 with fewer it aligns less. Each point is the mean of two flights.
 """
 
-from matplotlib.figure import Figure
+import matplotlib.pyplot as plt
 
 import airflock
 
@@ -17,7 +17,7 @@ table = airflock.sweep(name, over, seeds=2, settings={**settings, "topology.kind
 aligned = table.groupby("topology.k")["phi_corr"].mean()
 cells = airflock.score(airflock.load(name, {**settings, "topology.kind": "voronoi"}), seeds=2)
 
-figure = Figure(figsize=(7, 3.5), layout="constrained")
+figure = plt.figure(figsize=(7, 3.5), layout="constrained")
 axes = figure.subplots()
 axes.plot(aligned.index, aligned, "o-", label="k nearest")
 axes.axhline(cells["phi_corr"].mean(), color="grey", label="Voronoi cells")

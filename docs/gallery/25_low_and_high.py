@@ -6,8 +6,8 @@ Two flocks for each group of order parameters. The numbers below a flock are its
 and an arrow is one second of flight.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 import airflock
@@ -89,7 +89,7 @@ PAIRS = [
 
 def drawn(names, *flocks):
     """Two flocks side by side, with their scores."""
-    figure = Figure(figsize=(8, 4.2), layout="constrained")
+    figure = plt.figure(figsize=(8, 4.2), layout="constrained")
     for axes, (places, velocities) in zip(figure.subplots(1, 2), flocks, strict=True):
         found = measured(places, velocities)
         axes.quiver(*places.T, *velocities.T, angles="xy", scale_units="xy", scale=1.0, width=0.008, color="C0")

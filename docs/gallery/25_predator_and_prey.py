@@ -7,12 +7,12 @@ middle of a ring of prey, which draw it equally to all sides; the circles are th
 chases through the swarm. Lines are the last two seconds of its path.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import airflock
 
-figure = Figure(figsize=(8, 4), layout="constrained")
+figure = plt.figure(figsize=(8, 4), layout="constrained")
 for axes, name in zip(figure.subplots(1, 2), ("ring", "hunt"), strict=True):
     scenario = airflock.load(f"chen_2014/{name}", {"duration": 30.0})
     x = airflock.simulate(scenario, seed=1).position.isel(keypoint=0).values

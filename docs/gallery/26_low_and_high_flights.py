@@ -6,8 +6,8 @@ What a flight among buildings, a formation of wings, or a flock from which some 
 below a flight are its scores.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 import airflock
@@ -41,7 +41,7 @@ def written(value):
 
 def drawn(names, *flights):
     """Two flights side by side, from above: paths, agents at the end, buildings in grey, goals as stars."""
-    figure = Figure(figsize=(9, 4.6), layout="constrained")
+    figure = plt.figure(figsize=(9, 4.6), layout="constrained")
     for axes, (name, keys) in zip(figure.subplots(1, 2), flights, strict=True):
         scenario = airflock.load(name, keys)
         found = airflock.score(scenario, seeds=[2]).iloc[0]

@@ -6,11 +6,11 @@ Some of 100 animals prefer a direction, east; nobody knows who they are (Couzin 
 the group's centre from its start, in four flights for each share of animals that know.
 """
 
-from matplotlib.figure import Figure
+import matplotlib.pyplot as plt
 
 import airflock
 
-figure = Figure(figsize=(8, 3.4), layout="constrained")
+figure = plt.figure(figsize=(8, 3.4), layout="constrained")
 axes = figure.subplots()
 for share, colour in ((2, "0.7"), (10, "tab:blue"), (20, "tab:red")):
     knowing = {"name": "informed", "agents": f"{share} %", "model": {"omega": 0.5, "direction": 0.0}}

@@ -9,3 +9,4 @@ import airflock
 
 recording = airflock.simulate(airflock.load("kidger/city", {"duration": 60.0}), seed=1)
 figure = airflock.plots.through(recording)
+figure

@@ -9,3 +9,4 @@ import airflock
 
 recording = airflock.simulate(airflock.load("kidger/city", {"duration": 20.0}), seed=1)
 figure = airflock.plots.rays(recording)
+figure

@@ -5,7 +5,7 @@ How much wind a flock can take
 Gusts push all drones; beyond some strength they push them over the walls.
 """
 
-from matplotlib.figure import Figure
+import matplotlib.pyplot as plt
 
 import airflock
 
@@ -14,7 +14,7 @@ settings = {"agents": 40, "duration": 200.0}
 table = airflock.sweep("vasarhelyi_2018/4ms", {"wind.gust": gusts}, seeds=4, settings=settings)
 mean = table.groupby("wind.gust")[["phi_corr", "f_wall"]].mean()
 
-figure = Figure(figsize=(6, 3.5), layout="constrained")
+figure = plt.figure(figsize=(6, 3.5), layout="constrained")
 axes = figure.subplots()
 for name, marker in (("phi_corr", "o"), ("f_wall", "s")):
     axes.plot(mean.index, mean[name], marker=marker, label=name)

@@ -10,3 +10,4 @@ import airflock
 
 scenario = airflock.load("vasarhelyi_2018/real_6ms", {"duration": 60.0})
 figure = airflock.plot(scenario, "reception", seed=1)
+figure

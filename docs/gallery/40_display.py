@@ -9,3 +9,4 @@ import airflock
 
 show = airflock.display(["AIR", "FLY"], 60, failing=0.05, seed=1)
 figure = airflock.plots.stood(show, ["AIR", "FLY"])
+figure

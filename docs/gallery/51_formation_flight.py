@@ -11,3 +11,4 @@ import airflock
 
 scenario = airflock.load("dimock_2003/physical", {"agents": 7, "duration": 30.0})
 figure = airflock.plot(airflock.simulate(scenario, seed=2), "wash")
+figure

@@ -23,3 +23,4 @@ print(f"fitness {result.fitness:.3f} with", {name: round(value, 3) for name, val
 # Grey is the effect of luck alone: one candidate is flown once, and a flight's fitness has a spread.
 search = table[table["stage"] == "search"]
 figure = airflock.plots.convergence(search, "fitness", what="a small evolution")
+figure

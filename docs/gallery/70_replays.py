@@ -26,3 +26,4 @@ airflock.replay(drones, rate=2.0)
 # %%
 # From above, the mill at the end.
 figure = airflock.plots.trajectories(mill, stop=60.0)
+figure

@@ -10,6 +10,7 @@ import airflock
 scenario = airflock.load("vasarhelyi_2018/4ms", {"duration": "2 min", "agents": 50})
 recording = airflock.simulate(scenario, seed=7)
 figure = airflock.plot(recording, "trajectories")
+figure
 
 # %%
 # Watch it

@@ -151,6 +151,7 @@ measured = ["polarisation", "milling", airflock.metric(Turning)]
 scenario = airflock.load("mill.toml", law=law, metrics=measured)
 recording = airflock.simulate(scenario, seed=1)
 figure = airflock.plots.trajectories(recording.sel(time=slice(175.0, None)))
+figure
 
 # %%
 # Most of the motion goes around the centre, and yet there is little milling: some turn left, the others right.

@@ -16,8 +16,8 @@ Run the notebook once before the lesson: the first flight of each law takes some
 at once. Words for the board: agent, heading, neighbour, polarisation, milling, delay.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
 
 import airflock
 
@@ -28,7 +28,7 @@ import airflock
 # is the length of the mean heading: 1 if all fly alike.
 ordered = airflock.load("vicsek_1995/ordered", {"duration": 200.0, "metrics.kind": "order"})
 noisy = airflock.load("vicsek_1995/ordered", {"duration": 200.0, "metrics.kind": "order", "eta": 6.0})
-figure = Figure(figsize=(8, 4), layout="constrained")
+figure = plt.figure(figsize=(8, 4), layout="constrained")
 for axes, scenario, title in zip(figure.subplots(1, 2), (ordered, noisy), ("little noise", "much noise"), strict=True):
     last = airflock.simulate(scenario, seed=1).isel(time=-1, keypoint=0)
     axes.quiver(*last.position.values, *last.velocity.values, width=0.004)
@@ -46,7 +46,7 @@ print(f"random directions: {by_lot:.3f}")
 noise = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5]
 table = airflock.sweep("vicsek_1995/transition", {"model.eta": noise}, 3, settings={"duration": 300.0})
 line = table.groupby("model.eta")["polarisation"].mean()
-curve = Figure(figsize=(6, 3.5), layout="constrained")
+curve = plt.figure(figsize=(6, 3.5), layout="constrained")
 axes = curve.subplots()
 axes.plot(line.index, line, marker="o")
 axes.set(xlabel="noise, rad", ylabel="polarisation", ylim=(0, 1))

@@ -6,9 +6,9 @@ From a table of positions to order parameters, leaders and a comparison with a m
 so the truth is known. Put your own in its place.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 import airflock
 from airflock.recordings.measures import delays, neighbours, surroundings
@@ -53,6 +53,7 @@ notes = []
 recording = airflock.load_tracks("fish.csv", map={"id": "fish"}, unit="mm", fps=25.0, bridge=0.5, say=notes.append)
 print(*notes, sep="\n")
 figure = airflock.plots.trajectories(recording.sel(time=slice(20.0, 30.0)))
+figure
 
 # %%
 # Order parameters
@@ -78,7 +79,7 @@ pd.DataFrame({"found, s": found.round(2), "true, s": pd.Series(lag[1:], [f"fish 
 
 # %%
 curves = delays.delay_correlation(recording, longest=2.0).sel(leader="fish 0")
-plot = Figure(figsize=(6, 3.2), layout="constrained")
+plot = plt.figure(figsize=(6, 3.2), layout="constrained")
 axes = plot.subplots()
 for name in ("fish 1", "fish 4", "fish 7"):
     axes.plot(curves["delay"], curves.sel(follower=name), label=name)

@@ -6,9 +6,9 @@ Which law is better, on equal terms: the same robots, radio, arena, order parame
 so the flights of one seed are a pair, and the luck of the start cancels.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 import airflock
 
@@ -27,7 +27,7 @@ pd.DataFrame({name: table[shown].mean() for name, table in tables.items()}).roun
 # Look before you count
 # ---------------------
 # The last half minute of one flight of each law, on the same axes.
-figure = Figure(figsize=(9, 4.5), layout="constrained")
+figure = plt.figure(figsize=(9, 4.5), layout="constrained")
 panels = figure.subplots(1, 2, sharex=True, sharey=True)
 for axes, (name, scenario) in zip(panels, laws.items(), strict=True):
     paths = airflock.simulate(scenario, seed=0).sel(time=slice(270.0, None)).position.isel(keypoint=0)
@@ -74,7 +74,7 @@ pd.DataFrame(
 # -------------------------------
 # Fly the same two laws over the delay of the radio. A law that is better at one delay need not be at another.
 delays = {"radio.delay": [0.0, 0.5, 1.0, 2.0]}
-curves = Figure(figsize=(6, 3.5), layout="constrained")
+curves = plt.figure(figsize=(6, 3.5), layout="constrained")
 axes = curves.subplots()
 for name in laws:
     course = airflock.sweep("vasarhelyi_2018/4ms", delays, 6, settings=settings, law=name)

@@ -36,6 +36,7 @@ pd.DataFrame({"optimum": result.parameters, "working range": result.ranges})
 # %%
 table = pd.read_csv(study / "evaluations.csv")
 figure = airflock.plots.convergence(table[table["stage"] == "search"], "fitness", what="four gains, 20 drones")
+figure
 
 # %%
 # How safe is it?

@@ -43,6 +43,7 @@ for name in ("6ms", "real_6ms"):
 # %%
 # Look at the worst flight of the second set.
 figure = airflock.plot("real_6ms.toml", seed=int(table["fitness"].idxmin()))
+figure
 
 # %%
 # What does more delay cost?

@@ -37,3 +37,4 @@ course.describe().loc[["mean", "std"]].round(3)
 
 # %%
 figure = airflock.plots.trajectories(tracks)
+figure

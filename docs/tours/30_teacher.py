@@ -6,7 +6,7 @@ Does a flock need a leader, or good radio? Ten minutes before the lesson: fly, s
 exercises is :doc:`/generated/notebooks/30_lesson`.
 """
 
-from matplotlib.figure import Figure
+import matplotlib.pyplot as plt
 
 import airflock
 
@@ -17,13 +17,14 @@ mean = table.groupby("radio.range")[["phi_corr", "n_disc"]].mean()
 
 # %%
 # Nobody leads. Whether they flock depends on whom they hear.
-figure = Figure(figsize=(6, 3.5), layout="constrained")
+figure = plt.figure(figsize=(6, 3.5), layout="constrained")
 axes = figure.subplots()
 axes.plot(mean.index, mean["phi_corr"], marker="o", label="velocity correlation in clusters")
 axes.plot(mean.index, mean["n_disc"] / 30, marker="s", label="share that hears nobody")
-axes.set(xlabel="radio range, m", ylim=(0, 1), xscale="log")
+axes.set(xlabel="radio range, m", ylim=(0, 1))
 axes.legend(frameon=False)
 
 # %%
 # You can look at every flight.
 paths = airflock.plot("vasarhelyi_2018/4ms", settings=small | {"radio.range": 80.0}, seed=1)
+paths

@@ -42,6 +42,8 @@ _TOKEN = re.compile(
     re.DOTALL,
 )
 
+_UNQUOTED = re.compile(r"\s*([\w.-]+)\s*=\s*([-+]?[\d.]+ ?[a-zA-Zµ°%][\w/^°%]*)\s*(?:#.*)?")  # v_flock = 6 m/s
+
 
 class TextError(AirflockError):
     """A text from outside is too large, nested too deeply, or no text at all; says what, not where."""
@@ -124,9 +126,17 @@ def toml(text: str) -> dict[str, Any]:
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
-        raise FormatError(str(fault)) from fault
+        raise FormatError(f"{fault}{_quotes(text, str(fault))}") from fault
     _walk(document)
     return document
+
+
+def _quotes(text: str, said: str) -> str:
+    """What to write where the line that a parser stopped at holds a number with a unit."""
+    place = re.search(r"at line (\d+)", said)
+    line = text.splitlines()[int(place[1]) - 1] if place else ""
+    with_unit = _UNQUOTED.fullmatch(line[:MOST_KEY])
+    return f'; a number with its unit stands in quotes: {with_unit[1]} = "{with_unit[2]}"' if with_unit else ""
 
 
 def toml_value(text: str) -> Any:

@@ -127,6 +127,20 @@ def test_a_node_minds_a_clock_by_the_limits_of_its_card():
     assert phases == {0.8: Phase.FLOCK, -0.8: Phase.HOLD}
 
 
+@pytest.mark.parametrize(
+    ("ahead", "limits", "phase", "suspects"),
+    [(0.9, {}, Phase.FLOCK, False), (1.5, {}, Phase.HOLD, True), (1.5, {"clock_spread": 1.0}, Phase.FLOCK, False)],
+)
+def test_a_clock_that_is_more_than_a_second_ahead_is_told_by_the_ages_of_packets(ahead, limits, phase, suspects):
+    """By its own node, if it lets such old packets in: by default it refuses them all. The others suspect nobody."""
+    fleet = flown(LINKS, hit("clock", {"at": 1.0, "ahead": ahead}), duration=6.0, **limits)
+    assert [node.phase for node in fleet.nodes] == [Phase.FLOCK, phase, Phase.FLOCK]
+    assert [node.peers.clocks_suspect() for node in fleet.nodes] == [False, suspects, False]
+    own = fleet.nodes[1]
+    assert (own.refused["clock"] > 0) == ("clock_spread" in limits)
+    assert own.wire.clock_offset() == 0.0, "of ten samples of the autopilot's clock the least delayed is an old one"
+
+
 def test_a_delay_between_two_decisions_leaves_nobody_deaf():
     """Packets wait for the next decision, and are 0.4 s old then, which seemed too old to count."""
     fleet, alone = (flown({"radio.delay": 0.25, "radio.range": far}, ()) for far in (80.0, 0.0))

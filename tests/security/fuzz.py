@@ -28,9 +28,12 @@ import time
 import traceback
 from pathlib import Path
 
-import damages
-import mutations
-import other_files
+# whoever forks has one thread: what libraries begin in theirs is not there in a child (Python 3.12 warns of it)
+os.environ.update(JE_ARROW_MALLOC_CONF="background_thread:false", OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
+
+import damages  # noqa: E402
+import mutations  # noqa: E402
+import other_files  # noqa: E402
 
 HANG = 20.0  # s of a processor
 WAITS = 10.0  # times as long by the clock: on a busy machine a case waits for its turn

@@ -3,11 +3,9 @@
 import subprocess
 import sys
 
-import fuzz
-import mutations
 import pytest
 
-from airflock.recordings import isolated
+FUZZ = f"{__file__.rpartition('/')[0]}/fuzz.py"
 
 
 @pytest.mark.parametrize(
@@ -19,19 +17,13 @@ from airflock.recordings import isolated
         ("commands", 300),
         ("caches", 12),
         ("disks", 40),
+        ("recordings", 300),
     ],
 )
-def test_no_input_leaves_a_foreign_exception_a_hang_or_other_numbers(what, count, seed, tmp_path, monkeypatch):
-    for name in ("subprocess", "LEAST_TIME"):
-        monkeypatch.setattr(isolated, name, getattr(isolated, name))  # given back at the end
-    mutations.warm(what)
-    failures, _ = fuzz.attack(fuzz.CASES[what], count, seed, folder=tmp_path, hang=fuzz.PATIENCE.get(what, fuzz.HANG))
-    assert failures == [], f"repeat with: python tests/security/fuzz.py {what} --seed {seed} --only NUMBER"
-
-
-def test_no_recording_leaves_a_foreign_exception_a_hang_or_other_numbers(seed):
-    """In a small process of its own: a reader is forked for each, and a fork copies the tables of all memory."""
-    asked = ["recordings", "300", "--seed", str(seed), "--batch", str(fuzz.BATCH)]
-    done = subprocess.run([sys.executable, fuzz.__file__, *asked], capture_output=True, text=True)
+def test_no_input_leaves_a_foreign_exception_a_hang_or_other_numbers(what, count, seed):
+    """In a small process of its own: it forks, which copies the tables of all memory, and leaves all threads behind."""
+    asked = [FUZZ, what, str(count), "--seed", str(seed)]
+    done = subprocess.run([sys.executable, "-W", "always::DeprecationWarning", *asked], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr[-3000:]
-    assert "300 of 300 cases" in done.stdout and " 0 failures" in done.stdout
+    assert f"{count} of {count} cases" in done.stdout and " 0 failures" in done.stdout
+    assert "multi-threaded" not in done.stderr, "it forked beside another thread"

@@ -83,7 +83,7 @@ def test_rates_are_per_flock_hour_and_drone_hour():
     one, other = campaign("r_min<1 at 0.3/h"), campaign("r_min<1 at 0.01/drone-h")
     p = one.probability(one.limits[0])
     assert p == pytest.approx(1.0 - math.exp(-0.3 / 6.0)) == other.probability(other.limits[0])
-    assert per_hour(p, one.hours) == pytest.approx(0.3) == 30 * other.told(other.limits[0], p)
+    assert per_hour(p, one.hours) == pytest.approx(0.3) == 30 * other.in_own_unit(other.limits[0], p)
 
 
 def test_what_was_interrupted_ends_as_if_it_had_not_been(tmp_path):

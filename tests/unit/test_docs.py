@@ -168,3 +168,14 @@ def test_meanings_of_names_become_a_list_and_sections_stay(monkeypatch):
         "* ``far, near``: m,", "  or", "", "nan where none.", "",
     ]  # fmt: skip
     assert kept == section
+
+
+@pytest.mark.parametrize("folder", ["gallery", "notebooks", "tours"])
+def test_a_notebook_shows_each_picture_in_the_cell_that_draws_it(folder):
+    """Jupyter shows what a cell ends with, and figures of pyplot."""
+    for path in sorted((DOCS / folder).glob("*.py")):
+        for cell in path.read_text(encoding="utf-8").split("\n# %%\n"):
+            *_, last = ast.parse(cell).body or [ast.Pass()]
+            assert "matplotlib.figure" not in cell, f"{path.name}: Jupyter shows no bare Figure"
+            if "= airflock.plot" in cell:
+                assert isinstance(last, ast.Expr) and isinstance(last.value, ast.Name), f"{path.name}: {cell[:60]}"

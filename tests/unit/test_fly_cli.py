@@ -89,6 +89,22 @@ def test_mistakes_of_a_preparation_are_told_together_and_nothing_is_written(airf
     assert not list(tmp_path.iterdir())
 
 
+def test_what_a_card_leaves_off_is_said_in_a_line(airflock, tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        f'extends = "{REAL}"\n[[faults]]\nkind = "motor"\nat = 5\nagents = [1]\n'
+        '[[faults]]\nkind = "clock"\nper_hour = 2\n'
+        '[[faults]]\nkind = "motor"\nat = 9\nagents = [2]\n'
+        '[[groups]]\nname = "all"\nmodel = { p_rep = { value = 0.13, spread = 0.01 } }\n'
+    )
+    code, _, lines = airflock("fly", "prepare", "mine.toml", *HERE)
+    assert code == 0 and [line for line in lines if "leaves off" in line] == [
+        "note: the card leaves off the scenario's faults: motor, clock",
+        "note: the card leaves off the scenario's tolerances of groups: p_rep",
+    ]
+    code, _, lines = airflock("fly", "prepare", REAL, *HERE, "--out", "other.json")
+    assert code == 0 and not [line for line in lines if "leaves off" in line]
+
+
 def test_orders_are_checked_before_they_are_sent(airflock):
     airflock("fly", "prepare", REAL, *HERE)
     code, _, lines = airflock("fly", "order", "mission.json", "strat", "--radio", "udp:127.0.0.1:1", "--target", 9)

@@ -8,7 +8,8 @@ import pytest
 import toys
 from airflock.errors import ScenarioError
 from airflock.evolve.folder import open_folder
-from airflock.evolve.run import Interrupted, run, study_of
+from airflock.evolve.request import study_of
+from airflock.evolve.run import Interrupted, run
 from airflock.evolve.search import search, total_flights, windowed
 from airflock.evolve.store import Batch, Store
 from airflock.executors.in_process import InProcess

@@ -1,5 +1,7 @@
 """Margins: how much worse a number may get is found where it is known, and hardening widens the one that is short."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -7,15 +9,18 @@ from typer.testing import CliRunner
 from airflock.cli.main import app
 from airflock.errors import FlightError, ScenarioError
 from airflock.evolve import harden
-from airflock.evolve.held import broken
+from airflock.evolve.held import WALLS, Broken, Constraints, broken
 from airflock.evolve.margins import read_margins
 from airflock.evolve.reach import FARTHEST, FINE, Reach, reach, shortest
-from airflock.evolve.steps import flown
+from airflock.evolve.steps import flown, recipe
+from airflock.evolve.trial import Trial
+from airflock.limits.limit import read
 from airflock.scenarios.files import load
 from inside import simulate
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 PAPER = load("vasarhelyi_2018/6ms", {"radio.delay": 0.5})
+LATE = Broken("late")
 
 
 def margin(name, scenario=PAPER):
@@ -37,41 +42,43 @@ def flights(monkeypatch, score):
 @pytest.mark.parametrize("end", [0.51, 0.6, 0.77, 1.0, 1.9, 3.9])
 def test_how_far_a_number_may_go_is_found_to_a_tenth(end):
     """All holds up to a delay that is known."""
-    found = reach(margin("radio.delay"), lambda worse: "late" if worse[0].radio.delay > end else "")
-    assert found.value <= end < found.margin.value(found.breaks) <= FINE * found.value and found.why == "late"
-    again = reach(found.margin, lambda worse: "late" if worse[0].radio.delay > 1.2 * end else "", found)
+    found = reach(margin("radio.delay"), lambda worse: LATE if worse[0].radio.delay > end else None)
+    assert found.value <= end < found.margin.value(found.breaks) <= FINE * found.value and found.broken == LATE
+    again = reach(found.margin, lambda worse: LATE if worse[0].radio.delay > 1.2 * end else None, found)
     assert again.value <= 1.2 * end < again.margin.value(again.breaks) and again.holds > found.holds
-    back = reach(found.margin, lambda worse: "late" if worse[0].radio.delay > end / 1.2 else "", found)
+    back = reach(found.margin, lambda worse: LATE if worse[0].radio.delay > end / 1.2 else None, found)
     assert back.holds < found.holds or found.holds == 1.0  # no better than as the scenario is
 
 
 def test_another_set_whose_margin_ends_in_the_same_place_flies_two_values():
-    near, tried = Reach(margin("radio.delay"), 1.5, 1.6, "late"), []
+    near, tried = Reach(margin("radio.delay"), 1.5, 1.6, LATE), []
 
     def test(worse):
         tried.append(worse[0].radio.delay)
-        return "late" if worse[0].radio.delay > 0.77 else ""
+        return LATE if worse[0].radio.delay > 0.77 else None
 
     assert reach(near.margin, test, near) == near and tried == pytest.approx([0.8, 0.75])
 
 
 def test_where_nothing_breaks_a_margin_reaches_to_the_end_of_its_range_or_as_far_as_is_looked():
-    found = reach(margin("radio.delay"), lambda worse: "")
+    found = reach(margin("radio.delay"), lambda worse: None)
     assert (
         found.holds == FARTHEST and not found.ends and found.told == ("radio.delay: what held holds up to 4 s at least")
     )
-    lossy = reach(margin("radio.loss"), lambda worse: "" if worse[0].radio.loss <= 1.0 else "beyond its range")
+    lossy = reach(
+        margin("radio.loss"), lambda worse: None if worse[0].radio.loss <= 1.0 else Broken("beyond its range")
+    )
     assert lossy.value == pytest.approx(0.7) and not lossy.ends  # 0 has no factor: 0.1 counts as 2, 0.7 as 8
 
 
 def test_less_range_is_worse_and_agents_are_whole():
-    near = reach(margin("radio.range"), lambda worse: "alone" if worse[0].radio.range < 31.0 else "")
+    near = reach(margin("radio.range"), lambda worse: Broken("alone") if worse[0].radio.range < 31.0 else None)
     assert near.margin.value(near.breaks) < 31.0 <= near.value and "down to" in near.told
     tried = []
 
     def crowded(worse):
         tried.append(worse[0].agents)
-        return "crowded" if worse[0].agents > 103 else ""
+        return Broken("crowded") if worse[0].agents > 103 else None
 
     found = reach(margin("agents"), crowded)
     assert found.value <= 103.0 < found.margin.value(found.breaks) and all(n == int(n) for n in tried)
@@ -85,7 +92,7 @@ def test_the_shortest_of_several_margins_is_found_and_of_the_others_that_they_ar
         s = worse[0]
         tried.append(s)
         late, noisy = s.radio.delay > 1.6 * PAPER.radio.delay, s.sensors.noise > 4.0 * PAPER.sensors.noise
-        return "late" if late else "noisy" if noisy else ""
+        return LATE if late else Broken("noisy") if noisy else None
 
     names = ["sensors.noise", "radio.delay", "body.noise"]
     found = shortest([margin(name) for name in names], test)
@@ -159,6 +166,42 @@ def test_a_few_more_contacts_by_chance_end_no_margin():
     for count, ends in ((3, False), (15, True)):
         after = {"n_coll": 1.0 * (np.arange(60) < count)}
         assert broken(before, after) and bool(broken(before, after, surely=True)) == ends
+
+
+@pytest.mark.parametrize(
+    ("scores", "walls"),
+    [({"f_wall": 0.5}, True), ({"phi_wall": 1.0}, True), ({"n_coll": 1.0}, False), ({"f_coll": 0.5}, False)],
+)
+@pytest.mark.parametrize("names", [("half_wall", "clearance"), ("a", "b")])
+def test_what_is_broken_is_of_walls_by_what_it_is_and_not_by_what_scenarios_are_called(scores, walls, names):
+    """A scenario called half_wall had its collisions taken for contacts: its name has f_wall in it."""
+    scenarios = [replace(PAPER, name=name) for name in names]
+    before = {"f_wall": np.ones(9), "f_coll": np.ones(9), "phi_wall": np.zeros(9), "n_coll": np.zeros(9)}
+    after = before | {name: np.full(9, value) for name, value in scores.items()}
+    found = Constraints([], 0.0).broken(scenarios, [before, before], [before, after])
+    assert found is not None and found.at_walls == walls and found.why.endswith(f", in {names[1]}")
+
+
+@pytest.mark.parametrize(("score", "walls"), [("r_min", False), ("clearance", True)])
+def test_what_a_limit_breaks_is_of_walls_where_its_score_is(score, walls):
+    constraints, spread = Constraints([read(f"{score}<1 at 1%", PAPER)], 0.0), np.linspace(0.0, 0.1, 9)
+    usual = {"fitness": np.ones(9), "r_min": 9.0 + spread, "clearance": 9.0 + spread}
+    found = constraints.broken([PAPER], [usual], [usual | {score: spread}])
+    assert found is not None and found.at_walls == (score in WALLS) == walls
+
+
+def test_what_cannot_be_flown_is_not_of_walls_whatever_its_words_are(monkeypatch):
+    """Its reason may name start.wall_clearance, a key; then room at walls was tried first."""
+
+    def score(s, seed):
+        if s.agents > 150:
+            raise FlightError("agent 151 finds no room; start.wall_clearance = 20 m leaves none; f_wall")
+        return {}
+
+    flights(monkeypatch, score)
+    trial = Trial([PAPER], recipe(PAPER)[0], range(2), Constraints([], 0.05), read_margins("agents", [PAPER])[0])
+    assert trial.along is not None and "wall_clearance" in trial.along.told
+    assert not trial.touches() and not trial.short_at_walls()
 
 
 def test_no_other_margin_becomes_shorter_than_the_shortest_was(monkeypatch):

@@ -16,6 +16,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
+from matplotlib.text import Text
 from typer.testing import CliRunner
 
 import airflock
@@ -516,7 +517,7 @@ def test_smoothed_series_keep_constants_and_say_their_window(smooth):
     recording = flight(agents=12, document={**SQUARE, "agents": 12})
     figure = series(recording, smooth=smooth)
     upper = figure.axes[0]
-    title = figure._suptitle.get_text()
+    title = " ".join(text.get_text() for text in figure.findobj(Text))
     assert ("means over 5 s" in title) == (smooth == 5.0)
     line = next(line for line in upper.lines if line.get_label().startswith("$\\phi^{\\mathrm{vel}}"))
     course = airflock.over_time(recording)["phi_vel"]

@@ -17,7 +17,7 @@ from airflock.errors import ScenarioError
 from airflock.evolve import harden
 from airflock.evolve.run import run
 from airflock.evolve.safe import allowed, excess, flights_that_count, safe_first
-from airflock.evolve.study import make_study, with_limits
+from airflock.evolve.study import make_study
 from airflock.executors.in_process import InProcess
 from airflock.limits.chance import chance, indices
 from airflock.limits.limit import read
@@ -48,9 +48,9 @@ def flight(parameters, seed):
 
 def searched(folder, limits=()):
     """The result of a search on the toy."""
-    study = toys.study(population=12, generations=40, seeds=4, averages=2, pool=24, top=4, final_seeds=100)
+    few = {"population": 12, "generations": 40, "seeds": 4, "averages": 2, "pool": 24, "top": 4, "final_seeds": 100}
+    study = toys.study(limits=limits, **few)
     folder.mkdir(exist_ok=True)
-    study = with_limits(study, limits) if limits else study
     return run(study, folder, InProcess(flight, 1))
 
 
@@ -177,7 +177,7 @@ def test_a_study_without_limits_is_what_it_was_and_one_with_them_says_so():
     )  # fmt: skip
     assert "limits" not in plain.document() and "reserve" not in plain.document()["search"]
     assert limited.document()["limits"] == [NEAR] and limited.document()["search"]["reserve"] == 10
-    assert with_limits(plain, [NEAR]).search.seeds == 2 and with_limits(plain, [NEAR], seeds=True).search.seeds == 1
+    assert toys.study(limits=[NEAR]).search.seeds == 2 and toys.study(limits=[NEAR], seeds=1).search.seeds == 1
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,8 @@ import toys
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.batched import Batched
 from airflock.evolve.folder import open_folder
-from airflock.evolve.run import Interrupted, asked_for, on_device, run, score_of, study_of
+from airflock.evolve.request import asked_for, sound_device, study_of
+from airflock.evolve.run import Interrupted, run, score_of
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import FILE, Batch, Store
 from airflock.evolve.study import differences, load_study, shipped
@@ -363,7 +364,7 @@ def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monke
 )
 def test_devices_that_cannot_be_are_one_line(device, scheduler, words):
     with pytest.raises(StudyError, match=words):
-        on_device(toys.study(), device, scheduler)
+        sound_device(device, scheduler)
 
 
 def test_a_study_of_another_device_is_another_study():

@@ -30,7 +30,8 @@ from airflock.tune.feasible import infeasible
 from airflock.tune.folder import MOST_SEEDS
 from airflock.tune.next_flight import replays
 from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
-from airflock.tune.run import tune, usual_limits
+from airflock.tune.request import usual_limits
+from airflock.tune.run import tune
 from airflock.tune.start import start_of
 
 SEEDS = "SELECT seed FROM flight WHERE stage=?"

@@ -137,3 +137,19 @@ def test_a_conversion_is_told_with_its_key_in_the_order_of_the_file():
     told = [note.partition(" = ")[0] for note in notes if " is " in note]
     assert told[:3] == ["radio.loss", "radio.range", "radio.delay"]
     assert told[3:6] == ["groups[0].body.tau.spread", "faults[0].at", "faults[0].share"]
+
+
+@pytest.mark.parametrize("written", ["v_flock = 6 m/s", "v_flock = 20 km/h  # slow", "v_flock=6m/s"])
+def test_a_number_with_its_unit_outside_quotes_says_what_to_write(tmp_path, written):
+    path = tmp_path / "mine.toml"
+    path.write_text(f'extends = "{NAME}"\n[model]\n{written}\n')
+    with pytest.raises(ScenarioError) as fault:
+        load(path)
+    said = str(fault.value).partition("stands in quotes: ")[2]
+    path.write_text(f'extends = "{NAME}"\n[model]\n{said}\n')
+    assert said and load(path).document["model"]["v_flock"] == pytest.approx(5.6, abs=0.5)
+
+
+def test_a_decimal_comma_says_which_number_was_meant():
+    with pytest.raises(ScenarioError, match=r"radio\.delay = 0,4: has a decimal comma; write 0\.4$"):
+        load(NAME, {"radio.delay": "0,4"})

@@ -27,7 +27,7 @@ BACK = 4.0  # s, mean time before the first crossing from which noise is drawn a
 WORST = 5
 
 
-def refuse(campaign: Campaign) -> None:
+def sound_split(campaign: Campaign) -> None:
     """Refuse what cannot be split, before anything flies."""
     faults = []
     if not any(limit.score == "r_min" for limit in campaign.limits):

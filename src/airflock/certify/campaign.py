@@ -59,9 +59,9 @@ class Campaign:
         """A limit as a probability per flight."""
         return limit.probability(self.hours, self.scenario.agents)
 
-    def told(self, limit: Limit, probability: float) -> float:
+    def in_own_unit(self, limit: Limit, probability: float) -> float:
         """A probability per flight in the unit of a limit."""
-        return limit.told(probability, self.hours, self.scenario.agents)
+        return limit.in_own_unit(probability, self.hours, self.scenario.agents)
 
     @cached_property
     def intervals(self) -> dict[str, tuple[float, float]]:

@@ -214,7 +214,7 @@ def bound(campaign: Campaign, verdict: Verdict) -> str:
     """Upper bound in the limit's own unit."""
     if verdict.high == 1.0:
         return ""
-    return f"{campaign.told(verdict.limit, verdict.high):.3g} {UNIT_WORDS[verdict.limit.unit]}"
+    return f"{campaign.in_own_unit(verdict.limit, verdict.high):.3g} {UNIT_WORDS[verdict.limit.unit]}"
 
 
 def statement(campaign: Campaign, verdict: Verdict, rate: float = 0.0) -> str:
@@ -223,7 +223,7 @@ def statement(campaign: Campaign, verdict: Verdict, rate: float = 0.0) -> str:
     flown = f"{verdict.events:,} events in {n:,} flights of {s.flight.duration:g} s by {s.agents} agents"
     if verdict.needs:
         time = f", {duration(verdict.needs / rate)} on this machine" if rate else ""
-        could = f"{campaign.told(limit, verdict.could):.2g} {UNIT_WORDS[limit.unit]}"
+        could = f"{campaign.in_own_unit(limit, verdict.could):.2g} {UNIT_WORDS[limit.unit]}"
         return f"{limit.text}: not shown: needs {verdict.needs:,} flights{time}; the given time can show {could}"
     if verdict.high == 1.0 and not verdict.refuted:
         return f"{limit.text}: not shown: time ran out before there were enough flights: {flown}"
@@ -232,7 +232,7 @@ def statement(campaign: Campaign, verdict: Verdict, rate: float = 0.0) -> str:
     if limit.timed and limit.unit == "h":
         said += f" ({per_hour(verdict.high, campaign.hours) / s.agents:.3g} per drone hour)"
     if verdict.refuted:
-        least = f"{campaign.told(limit, verdict.low):.3g} {UNIT_WORDS[limit.unit]}"
+        least = f"{campaign.in_own_unit(limit, verdict.low):.3g} {UNIT_WORDS[limit.unit]}"
         return f"{limit.text}: refuted: {limit.event} happens at least {least} {sure}: {flown}"
     if verdict.shown:
         return f"{limit.text}: shown: {said} {sure}: {flown}"
@@ -254,7 +254,7 @@ def entry(campaign: Campaign, verdict: Verdict, found: Hazard | None) -> dict[st
         "text": limit.text, "event": limit.event, "unit": limit.unit, "shown": verdict.shown,
         "refuted": verdict.refuted, "flights": verdict.flights, "events": verdict.events,
         "low": verdict.low, "high": verdict.high,
-        "low_told": campaign.told(limit, verdict.low), "high_told": campaign.told(limit, verdict.high),
+        "low_told": campaign.in_own_unit(limit, verdict.low), "high_told": campaign.in_own_unit(limit, verdict.high),
     }  # fmt: skip
     if verdict.probability is not None:
         made["probability"] = verdict.probability

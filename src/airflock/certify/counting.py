@@ -190,7 +190,7 @@ def due(campaign: Campaign, limit: Limit) -> Iterator[tuple[int, float, float]]:
     probability = campaign.probability(limit)
     if campaign.flights:
         yield campaign.flights, campaign.alpha, campaign.alpha
-    elif probability is not None:  # `run` gives every campaign without a rate a number of flights
+    elif probability is not None:  # `planned` gives every campaign without a rate a number of flights
         yield from schedule(probability, campaign.alpha)
 
 

@@ -19,7 +19,7 @@ from airflock.executors.cluster import Cluster
 from airflock.executors.in_process import InProcess
 from airflock.untrusted import own_path
 
-PILOT = 16  # flights that tell how many there is time for
+TRIAL = 16  # flights that tell how many there is time for
 
 
 @contextmanager
@@ -61,10 +61,10 @@ def planned(campaign: Campaign, executor: Executor, budget: float, folder: Path,
         known = read(folder / f"{FOLDER}.toml").get("flights")
         return replace(campaign, flights=known if isinstance(known, int) else None)
     began = time.monotonic()
-    own = [seed(campaign.hash, TOLERANCE, (1 << 29) + i) for i in range(PILOT)]
+    own = [seed(campaign.hash, TOLERANCE, (1 << 29) + i) for i in range(TRIAL)]
     for landed in executor.fly([Flight(0, i, campaign.parameters(s), s) for i, s in enumerate(own)]):
         if landed.values is None:
             raise StudyError(f"{campaign.scenario.name}: seed {landed.flight.seed}: {landed.reason}")
-    able = 0.9 * budget * PILOT / max(time.monotonic() - began, 1e-6)
+    able = 0.9 * budget * TRIAL / max(time.monotonic() - began, 1e-6)
     digits = 10.0 ** max(0, math.floor(math.log10(max(able, 1.0))) - 1)
     return replace(campaign, flights=max(1, min(int(able / digits) * int(digits), (1 << 30) - 1)))

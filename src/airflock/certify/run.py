@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from airflock.asked import Asked
+from airflock.certify.branches import sound_split
 from airflock.certify.campaign import FOLDER, Campaign
 from airflock.certify.certificate import Certificate
 from airflock.certify.counting import Count, Watch, count
@@ -13,8 +15,8 @@ from airflock.certify.executing import executor_for, folder_of, planned
 from airflock.certify.flyer import Flyer
 from airflock.certify.hazard import Hazard, hazard
 from airflock.certify.maps import bounds_over, sound_axes
-from airflock.certify.request import asked, campaign_of, check_options
-from airflock.evolve.folder import open_folder, sweep, versions, write
+from airflock.certify.request import campaign_of, sound_budget, sound_workers, tolerance_keys
+from airflock.evolve.folder import open_folder, remove_unfinished, versions, write
 from airflock.evolve.run import Interrupted
 from airflock.evolve.store import Store
 from airflock.executors import Executor
@@ -115,10 +117,16 @@ def certify(
     (True, 0)
     """
     found = variant(scenario, settings, law, trust=trust)
-    campaign = campaign_of(found, limit, confidence, flights, uncertain=uncertain, precision=precision, device=device)
-    keys = asked(campaign, tolerance, split)
-    axes = sound_axes(campaign.scenario, over) if over else {}
-    check_options(budget, timeout, scheduler, device)
+    asked = Asked()
+    chosen: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
+    campaign = asked.read(campaign_of, found, limit, confidence, flights, **chosen)
+    if split:
+        asked.read(sound_split, campaign)
+    keys = asked.read(tolerance_keys, found, tolerance)
+    axes = asked.read(sound_axes, found, over) if over else {}
+    asked.read(sound_budget, budget)
+    asked.read(sound_workers, timeout, scheduler, device)
+    asked.refuse()
     with folder_of(folder) as path:
         executor = executor_for(campaign, scheduler, threads, timeout)
         try:
@@ -158,7 +166,7 @@ def run(
 
     with Store(folder) as store:
         store.begin(versions())
-        sweep(folder)
+        remove_unfinished(folder)
         write(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
         flyer = Flyer(campaign, store, executor, note=note)
         try:

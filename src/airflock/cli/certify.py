@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,7 +10,6 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.cli.progress import counted, line
-from airflock.errors import gathering
 from airflock.suffixes import PICTURES, SCENARIOS
 
 Where = Annotated[
@@ -65,6 +65,7 @@ Device = Annotated[str, typer.Option(help="cpu, or python (not compiled, for deb
 
 
 def certify(
+    ctx: typer.Context,
     scenario: Where,
     limit: Limits = None,
     confidence: Annotated[float, typer.Option(help="Confidence that all limits hold together.")] = 0.95,
@@ -97,7 +98,9 @@ def certify(
 
     Example: airflock certify vasarhelyi_2018/real_6ms --limit "r_min<1 at 0.1/h" --budget 10min --out certificate.toml
     """
+    asked = options.asked(ctx)
     if check:
+        asked.refuse()
         others = {
             "--limit": limit, "--flights": flights, "--out": out, "--resume": resume, "--tolerance": tolerance,
             "--tolerance-of": tolerance_of, "--split": split, "--map": over, "--uncertain": uncertain, "--plot": plot,
@@ -107,30 +110,30 @@ def certify(
         options.refuse([f"--check: flies again what the certificate holds; leave out {left_out}"] if left_out else [])
         _check(scenario, threads, trust, as_json)
         return
+    from airflock.certify import request
+    from airflock.certify.branches import sound_split
     from airflock.certify.maps import sound_axes
-    from airflock.certify.request import asked, campaign_of, check_options
     from airflock.cli.sweep import axis
-    from airflock.scenarios.files import load
 
-    faults: list[str] = []
-    seconds, campaign = 1.0, None
-    also: dict[str, Any] = {}
-    with gathering(faults):
-        options.writable((out, SCENARIOS), (plot, PICTURES), reads=[scenario])
-    with gathering(faults):
-        seconds = options.time_of(budget)
-    with gathering(faults):
-        loaded = load(scenario, options.settings(changes, agents, duration), law, trust=trust)
-        how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-        campaign = campaign_of(loaded, limit or [], confidence, flights, **how)
-        also = {"keys": asked(campaign, tolerance_of or tolerance, split), "split": split}
-        also["axes"] = sound_axes(campaign.scenario, dict(axis(text) for text in over)) if over else {}
-    with gathering(faults):
-        check_options(seconds, timeout, scheduler, device)
+    asked.read(options.writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
+    seconds = asked.read(options.time_of, budget)
+    loaded = options.loaded(asked, scenario, options.changed(asked, changes, agents, duration), law, trust=trust)
+    asked.read(request.sound_confidence, confidence)
+    asked.read(request.sound_flights, flights)
+    asked.read(request.sound_flyer, precision, device)
+    how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
+    campaign = asked.read(request.campaign_of, loaded, limit or [], confidence, flights, **how)
+    also: dict[str, Any] = {"split": split, "axes": {}}
+    also["keys"] = asked.read(request.tolerance_keys, loaded, tolerance_of or tolerance)
+    if split:
+        asked.read(sound_split, campaign)
+    if over:
+        axes = asked.each(partial(axis, option="--map"), over)
+        also["axes"] = asked.read(sound_axes, loaded, asked.read(dict, axes))
+    asked.read(request.sound_workers, timeout, scheduler, device)
     if resume and out is None:
-        faults.append("--resume: name the certificate whose flights are to be continued with --out")
-    options.refuse(faults)
-    assert campaign is not None
+        asked.note("--resume: name the certificate whose flights are to be continued with --out")
+    asked.refuse()
     tables.say_notes(campaign.scenario.notes)
     if scheduler is None:
         options.compile_first(campaign.flown, precision, device)

@@ -6,11 +6,13 @@ from typing import Annotated, Any
 
 import typer
 
+from airflock.asked import WRONG, or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import searching
 
 
 def evolve(
+    ctx: typer.Context,
     scenario: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file, or a study file.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the study.", show_default=False)],
     algorithm: Annotated[str | None, typer.Option(help="cmaes, ga, nsga2 or nsga3.", show_default="cmaes")] = None,
@@ -86,11 +88,11 @@ def evolve(
 
     Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
     """
-    from airflock.errors import StudyError
     from airflock.evolve.folder import open_folder
-    from airflock.evolve.run import asked_for, check_timeout, executor_for, on_device, run
-    from airflock.evolve.sensitivity import METHODS
+    from airflock.evolve.request import asked_for, sound_device, sound_method, sound_timeout
+    from airflock.evolve.run import executor_for, on_device, run
 
+    asked = options.asked(ctx)
     given = {
         "algorithm": algorithm,
         "population": population,
@@ -103,19 +105,22 @@ def evolve(
         "start": start,
         "averages": averages,
     }
-    study, taken = asked_for(
+    found = asked.read(
+        asked_for,
         scenario,
-        options.settings(changes, agents, duration),
-        search_keys={key: value for key, value in given.items() if value is not None},
+        or_else(options.changed(asked, changes, agents, duration), {}),
+        search_keys={key: value for key, value in given.items() if value is not None and value is not WRONG},
         limit=limit or (),
         trust=trust,
         fast=fast,
         folder=out if resume else None,
     )
-    if sensitivity and sensitivity not in METHODS:
-        raise StudyError(f"--sensitivity {sensitivity}: none of {', '.join(METHODS)}")
-    check_timeout(timeout)
-    study = on_device(study, device, scheduler)
+    asked.read(sound_method, sensitivity)
+    asked.read(sound_timeout, timeout)
+    asked.read(sound_device, device, scheduler)
+    asked.refuse()
+    study, taken = found
+    study = on_device(study, device)
     open_folder(out, study, resume=resume)
     tables.say_notes(
         [*(note for each in study.scenarios for note in each.notes), *study.notes, *([taken] if taken else [])]

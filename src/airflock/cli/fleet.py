@@ -1,21 +1,24 @@
 """Verb fleet: a scenario flown by nodes and vehicles that speak MAVLink, beside the simulator if wanted."""
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from airflock.asked import or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
-from airflock.errors import gathering
 from airflock.spelling import meant
 from airflock.suffixes import RECORDINGS
 
+SYSTEMS = tuple(range(1, 251))  # ids that drones may have
+
 
 def fleet(
+    ctx: typer.Context,
     scenario: options.Where,
     seeds: options.Seeds = 1,
     first_seed: options.FirstSeed = 0,
@@ -82,35 +85,48 @@ def fleet(
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 300 --mode processes --card fleet.json,
     and beside it airflock watch fleet.json
     """
-    from airflock.fleet import compare, flying, realtime
-    from airflock.fleet.faults import read_faults
+    from airflock.fleet import compare, flying
     from airflock.fleet.starting import READY_TIME
-    from airflock.scenarios.files import load
 
-    wrong: list[str] = []
-    with gathering(wrong):
-        options.writable((save, RECORDINGS), (card_file, (".json",)))
-    with gathering(wrong):
-        settings = options.settings(changes, agents, duration)
-        loaded = load(scenario, settings | ({"body.kind": body} if body in flying.BODIES else {}), trust=trust)
-        loaded = compare.sampled(loaded, loaded.sensors.period or loaded.flight.dt)
-        broken = read_faults(faults, tuple(range(1, loaded.agents + 1))) if faults else ()
-    options.refuse(wrong + _option_faults(vehicle, body, mode, card_file, against))
+    asked, live = options.asked(ctx), mode != flying.LOCKSTEP
+    asked.read(options.writable, (save, RECORDINGS), (card_file, (".json",)))
+    settings = options.changed(asked, changes, agents, duration)
+    if body in flying.BODIES:
+        settings = asked.read(lambda given: given | {"body.kind": body}, settings)
+    loaded = options.loaded(asked, scenario, settings, trust=trust)
+    loaded = asked.read(lambda found: compare.sampled(found, found.sensors.period or found.flight.dt), loaded)
+    numbers = asked.read(options.seeds_of, first_seed, seeds)
+    members = asked.read(lambda found: tuple(range(1, found.agents + 1)), loaded)
+    broken = asked.read(_broken, faults, or_else(members, SYSTEMS), live)
+    asked.note(*_option_faults(vehicle, body, mode, card_file, against))
+    asked.read(_one_card, card_file, loaded, numbers)
+    asked.refuse()
     tables.say_notes(loaded.notes)
-    live = mode != flying.LOCKSTEP
-    options.refuse(realtime.refused(broken) if live else [])
-    if card_file is not None and loaded.varied and seeds > 1:
-        options.refuse([f"--card {card_file}: with tolerances each seed has its own card; add --seeds 1"])
     how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "ground": ground, "join": join, "card_file": card_file}
     how["silent"] = True if silence is None and not against else silence
     series = flying.Fleets(loaded, vehicle)
     ticks = seeds * int(loaded.flight.duration + (READY_TIME if ground else 0.0))
     with counted(f"{loaded.name}: fleet", ticks, quiet=as_json) as done, _imports_kept():
-        numbers = range(first_seed, first_seed + seeds)
         for flown in flying.in_turn(loaded, numbers, faults=broken, done=done, say=tables.say, **how):
             series.add(flown, beside=against is not None, follows=not ground and not live)
             _save(save, flown.seed, seeds, flown)
     _tell(series, as_json)
+
+
+def _broken(file: Path | None, members: tuple[int, ...], live: bool) -> Sequence[Any]:
+    """Faults of a file, if there is one, that such a fleet can suffer."""
+    from airflock.fleet import realtime
+    from airflock.fleet.faults import read_faults
+
+    found = () if file is None else read_faults(file, members)
+    options.refuse(realtime.refused(found) if live else [])
+    return found
+
+
+def _one_card(file: Path | None, scenario: Any, seeds: Sequence[int]) -> None:
+    """Refuse one card for several seeds where each seed has drones of its own."""
+    if file is not None and scenario.varied and len(seeds) > 1:
+        options.refuse([f"--card {file}: with tolerances each seed has its own card; add --seeds 1"])
 
 
 def _option_faults(vehicle: str, body: str | None, mode: str, card_file: Path | None, against: str | None) -> list[str]:

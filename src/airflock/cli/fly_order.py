@@ -6,8 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
+from airflock.asked import Asked
 from airflock.cli import options, tables
-from airflock.errors import CardError, gathering
+from airflock.errors import CardError
 
 KILL = "; the motors stop when kill --confirm follows within 5 s"
 
@@ -33,23 +34,23 @@ def order(
     from airflock.mavlink.keys import read_key
     from airflock.mavlink.signing import Signer
     from airflock.onboard.card import read_card
+    from airflock.onboard.ports import sound_port
 
-    faults: list[str] = []
+    asked = Asked()
     what = orders.Do.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
     if what is None or do == "confirm_kill":
-        faults.append(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
+        asked.note(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
     if (do == "goto") != (point is not None):
-        faults.append("--point LAT,LON,ALT belongs to goto, and goto needs it")
-    where = options.place_on_earth("--point", point, faults) if point else (0.0, 0.0, 0.0)
-    with gathering(faults):
-        card = read_card(card_file)
-        if target and target not in card.members:
-            faults.append(f"--target {target}: the card's members are {', '.join(map(str, card.members))}")
-        if point and not faults:
-            options.refuse(_beyond(card, where, point))
-    with gathering(faults):
-        key, private = read_key(card_file.with_suffix(".key")), read_key(card_file.with_suffix(".operator"))
-    options.refuse(faults)
+        asked.note("--point LAT,LON,ALT belongs to goto, and goto needs it")
+    where = asked.read(options.place_on_earth, "--point", point) if point else (0.0, 0.0, 0.0)
+    card = asked.read(read_card, card_file)
+    asked.read(_sound_target, card, target)
+    if point:
+        asked.read(_within, card, where, point)
+    key = asked.read(read_key, card_file.with_suffix(".key"))
+    private = asked.read(read_key, card_file.with_suffix(".operator"))
+    asked.read(sound_port, radio)
+    asked.refuse()
     assert what is not None
     utc = time.time_ns() // 1000
     place = (round(where[0] * 1e7), round(where[1] * 1e7), round(where[2] * 1e3))
@@ -73,13 +74,21 @@ def _send(radio: str, message: Any, sign: Any) -> None:
         port.close()
 
 
-def _beyond(card: Any, where: tuple[float, float, float], point: str) -> list[str]:
-    """What no drone would obey: a point outside the card's fence, which they refuse, each by itself."""
+def _sound_target(card: Any, target: int) -> None:
+    """Refuse a drone that is no member of the mission."""
+    if target and target not in card.members:
+        raise CardError([f"--target {target}: the card's members are {', '.join(map(str, card.members))}"])
+
+
+def _within(card: Any, where: tuple[float, float, float], point: str) -> None:
+    """Refuse what no drone would obey: a point outside the card's fence, which they refuse, each by itself."""
     x, y, z = card.site.local(*where)
     if not card.low <= z <= card.high:
-        return [
+        line = (
             f"--point {point}: lies {z:.4g} m above the site; the fence reaches from {card.low:g} to {card.high:g} m "
             f"(ALT is above sea level, the site's is {where[2] - z:g} m)"
-        ]
+        )
+        raise CardError([line])
     far = card.fence.outside(x, y)
-    return [f"--point {point}: lies {far:.4g} m outside of the fence"] if far > 0.0 else []
+    if far > 0.0:
+        raise CardError([f"--point {point}: lies {far:.4g} m outside of the fence"])

@@ -1,23 +1,27 @@
 """Verb fly prepare: the flight card of a mission, and its keys."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import typer
 
+from airflock.asked import WRONG, Asked, or_else
 from airflock.cli import options, tables
-from airflock.errors import CardError, gathering
+from airflock.errors import CardError
 from airflock.spelling import meant
 
 DATAGRAM = 95  # bytes of a signed status packet
 OVERHEAD = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64
 PREAMBLE = 2e-4  # s of a packet before its first bit; WiFi's long preamble
+NOWHERE = (0.0, 0.0, 0.0)
 SHARE = 0.6  # of the channel's time that a flock may take; our choice: random access breaks down beyond
 FAST_BITS, SLOW_BITS = 6e6, 250e3  # bit/s: WiFi's multicast rate as it should be set; IEEE 802.15.4
 
 
 def prepare(
+    ctx: typer.Context,
     scenario: options.Where,
     site: Annotated[
         str, typer.Option(metavar="LAT,LON,ALT", help="Centre of the arena on the ground; ALT above sea level, m.")
@@ -49,36 +53,33 @@ def prepare(
     """
     import secrets
 
-    from airflock.fleet.prepare import card_document
+    from airflock.fleet.prepare import MARGIN, card_document, left_off
     from airflock.mavlink.orders import new_keys
     from airflock.onboard.card import card_of, hash_of
-    from airflock.scenarios.files import load
 
-    faults: list[str] = []
-    where, systems = options.place_on_earth("--site", site, faults), _members(members, faults)
-    with gathering(faults):
-        options.writable((out, (".json",)))
+    asked = options.asked(ctx)
+    where, systems = asked.read(options.place_on_earth, "--site", site), asked.read(_members, members)
+    asked.read(options.writable, (out, (".json",)))
     files = Files(out, out.with_suffix(".key"), out.with_suffix(".operator"))
-    faults += [f"{path}: exists; a mission is never overwritten" for path in files if path.exists()]
-    loaded = None
-    with gathering(faults):
-        loaded = load(scenario, options.settings(changes), trust=trust)
-    safety = _limits(limits, faults)
+    asked.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
+    loaded = options.loaded(asked, scenario, asked.read(options.settings, changes), trust=trust)
+    safety = _limits(limits, loaded, asked)
     private, public = new_keys()
-    document: dict[str, Any] = {}
-    if loaded is not None:
-        with gathering(faults):
-            document = card_document(
-                loaded, site=where, members=systems, mission=1 + secrets.randbelow(2**32 - 1),
-                expires=int(time.time() + 3600.0 * hours), operator=public, autopilot=autopilot, height=height,
-                margin=margin, safety=safety,
-            )  # fmt: skip
-            card_of({**document, "hash": hash_of(document)}, str(out))
-    loads = airtimes(len(systems), document["safety"], fast_bits, slow_bits) if document else []
-    faults += [each.fault(len(systems)) for each in loads if each.share > SHARE]
-    if faults or loaded is None:
-        raise CardError(faults)
-    tables.say_notes(loaded.notes)
+
+    def card_for(scenario: Any) -> dict[str, Any]:
+        made = card_document(
+            scenario, site=or_else(where, NOWHERE), members=or_else(systems, [1]),
+            mission=1 + secrets.randbelow(2**32 - 1), expires=int(time.time() + 3600.0 * or_else(hours, 1.0)),
+            operator=public, autopilot=autopilot, height=or_else(height, None), margin=or_else(margin, MARGIN),
+            safety=safety,
+        )  # fmt: skip
+        card_of({**made, "hash": hash_of(made)}, str(out))
+        return made
+
+    document = asked.read(card_for, loaded)
+    loads = asked.read(_airtimes, systems, document, fast_bits, slow_bits)
+    asked.refuse()
+    tables.say_notes([*loaded.notes, *left_off(loaded)])
     card = _write_mission(files, document, private)
     if as_json:
         radio = {each.radio: each.share for each in loads}
@@ -122,21 +123,27 @@ def airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> li
     return loads
 
 
-def _limits(given: list[str] | None, faults: list[str]) -> dict[str, Any]:
+def _airtimes(systems: list[int], document: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
+    """What the drones of a card take of their radios. Raises CardError where that is too much."""
+    loads = airtimes(len(systems), document["safety"], fast, slow)
+    if faults := [each.fault(len(systems)) for each in loads if each.share > SHARE]:
+        raise CardError(faults)
+    return loads
+
+
+def _limits(given: list[str] | None, scenario: Any, asked: Asked) -> dict[str, Any]:
     """Limits of the card that --limit changes; what is wrong is noted, and left out."""
     from airflock.core.parameters import declarations
+    from airflock.fleet.prepare import limits_of
     from airflock.onboard.safety import Safety
 
     known = [name for name, _, _ in declarations(Safety)]
-    safety: dict[str, Any] = {}
-    with gathering(faults):
-        safety = options.settings(given)
-    faults += [
-        f"--limit {name}: is not a limit; {meant(name, known, ', '.join(known))}"
-        for name in safety
-        if name not in known
-    ]
-    return {name: value for name, value in safety.items() if name in known}
+    safety = or_else(asked.read(options.settings, given, option="--limit"), {})
+    wrong = [name for name in safety if name not in known]
+    asked.note(*(f"--limit {name}: is not a limit; {meant(name, known, ', '.join(known))}" for name in wrong))
+    safety = {name: value for name, value in safety.items() if name in known}
+    changed = asked.read(lambda flown: replace(limits_of(flown), **safety), scenario)
+    return {} if changed is WRONG else safety
 
 
 def _write_mission(files: Files, document: dict[str, Any], private: bytes) -> Any:
@@ -170,13 +177,13 @@ def _say_prepared(files: Files, card: Any, loads: list[Airtime]) -> None:
         tables.say(f"set {guard.name} {safe}: {why}")
 
 
-def _members(text: str, faults: list[str]) -> list[int]:
+def _members(text: str) -> list[int]:
+    """System ids, as they are written in a line."""
     members: list[int] = []
     for part in text.split(","):
         first, dash, last = part.partition("-")
         last = last if dash else first
         if not (first.isdigit() and last.isdigit() and 0 <= int(last) - int(first) <= 250):
-            faults.append(f"--members {text}: write 1-10 or 1,2,5")
-            return [1]
+            raise CardError([f"--members {text}: write 1-10 or 1,2,5"])
         members += range(int(first), int(last) + 1)
     return members

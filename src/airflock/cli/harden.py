@@ -1,19 +1,22 @@
 """Verb harden: from an optimum to parameters that may be flown."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from airflock.asked import if_right, or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import counted, searching
-from airflock.errors import ScenarioError, gathering
+from airflock.errors import ScenarioError
 from airflock.suffixes import SCENARIOS
 
 NUMBER = 6  # columns that a number takes: a narrow terminal must not cut it off
 
 
 def harden(
+    ctx: typer.Context,
     scenario: Annotated[
         str, typer.Argument(metavar="FILE|PRESET|DIR", help="An optimum: a scenario, or a study's folder.")
     ],
@@ -61,29 +64,26 @@ def harden(
     Example: airflock harden study --out flyable.toml --margin radio.delay --margin faults
     """
     from airflock.evolve.folder import write
-    from airflock.evolve.harden import document
+    from airflock.evolve.harden import asked_for, document
 
-    faults: list[str] = []
-    optima: list[Any] = []
-    with gathering(faults):
-        optima = _optima(scenario, options.settings(changes, None, duration), trust)
-    places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, len(optima) + 1))]
-    for place in places:
-        with gathering(faults):
-            options.writable((place, SCENARIOS), reads=[scenario])
+    asked = options.asked(ctx)
+    settings = asked.read(options.settings, changes, None, duration)
+    optima = if_right(settings, asked.read(_optima, scenario, or_else(settings, {}), trust))
+    places = asked.read(_places, out, len(or_else(optima, [])), scenario)
     again = r_coll is not None or delay is not None
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
-        if factor is not None and not 1.0 <= factor <= 100.0:
-            faults.append(f"{name} {factor:g} lies outside [1, 100]")
-    if again and len(optima) > 1:
-        faults.append(f"{scenario}: is a study of {len(optima)} scenarios; --r-coll and --delay take one")
+        asked.read(_sound_factor, name, factor)
+    if again and len(or_else(optima, [])) > 1:
+        asked.note(f"{scenario}: is a study of {len(optima)} scenarios; --r-coll and --delay take one")
     if again and limit:
-        faults.append("--limit is for the recipe; leave it out with --r-coll and --delay")
+        asked.note("--limit is for the recipe; leave it out with --r-coll and --delay")
     if again and margin:
-        faults.append("--margin is for the recipe; leave it out with --r-coll and --delay")
-    options.refuse(faults)
+        asked.note("--margin is for the recipe; leave it out with --r-coll and --delay")
+    if not again:
+        asked.read(asked_for, optima, or_else(cost, 0.0), limit or (), margin or ())
+    numbers = asked.read(options.seeds_of, first_seed, seeds)
+    asked.refuse()
     tables.say_notes(note for each in optima for note in each.notes)
-    numbers = range(first_seed, first_seed + seeds)
     if again:
         stricter = (r_coll or 1.0, delay or 1.0)
         steps = _evolved_again(scenario, optima[0], stricter, generations, out, numbers, threads, as_json)
@@ -106,6 +106,19 @@ def harden(
         raise typer.Exit(1)
 
 
+def _places(out: Path, optima: int, where: str) -> list[Path]:
+    """Files to write, one for each optimum."""
+    places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, optima + 1))]
+    options.writable(*((place, SCENARIOS) for place in places), reads=[where])
+    return places
+
+
+def _sound_factor(name: str, factor: float | None) -> None:
+    """Refuse a factor that makes nothing stricter."""
+    if factor is not None and not 1.0 <= factor <= 100.0:
+        raise ScenarioError([f"{name} {factor:g} lies outside [1, 100]"])
+
+
 def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
     """The optimum, or that of each scenario of a study's folder."""
     from airflock.evolve.result import BEST, further_best
@@ -119,7 +132,7 @@ def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
 
 
 def _evolved_again(
-    where: str, optimum: Any, factors: tuple[float, float], generations: int, out: Path, numbers: range,
+    where: str, optimum: Any, factors: tuple[float, float], generations: int, out: Path, numbers: Sequence[int],
     threads: int | None, quiet: bool,
 ) -> list[Any]:  # fmt: skip
     """Workaround (i): the optimum, and what is evolved with a larger radius of collision and a longer delay."""

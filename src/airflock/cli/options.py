@@ -8,6 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
+from airflock.asked import Asked, if_right, or_else
+from airflock.cli.verb import FAULTS
 from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import suffix_fault
 from airflock.untrusted import from_outside, is_file, toml_value
@@ -56,6 +58,11 @@ PlotFile = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw the trajectories of the first flight.")
 ]
 SaveFile = Annotated[Path | None, typer.Option("--save", metavar="FILE.nc", help="Save the recordings as netCDF.")]
+
+
+def asked(context: typer.Context) -> Asked:
+    """What a verb is asked for, with the numbers of its command line that are none or lie outside their ranges."""
+    return Asked(context.meta.get(FAULTS, ()))
 
 
 def settings(
@@ -161,13 +168,43 @@ def compile_first(scenario: Any, precision: int, device: str) -> None:
         compile_for(scenario, precision=precision)
 
 
-def place_on_earth(option: str, text: str, faults: list[str]) -> tuple[float, float, float]:
-    """Latitude and longitude (degrees) and altitude (m) from text; what is wrong is noted."""
+def changed(asked: Asked, changes: list[str] | None, agents: int | None, duration: str | None) -> dict[str, Any]:
+    """What `settings` makes of these options, the others being judged where the number of agents is none."""
+    return if_right(agents, asked.read(settings, changes, or_else(agents, None), duration))
+
+
+def loaded(asked: Asked, name: str, changed: Mapping[str, Any], law: str | None = None, *, trust: bool) -> Any:
+    """The scenario of a name with what is changed; the name and its file are judged where a change is none."""
+    from airflock.scenarios.files import load
+
+    return if_right(changed, asked.read(load, name, or_else(changed, {}), law, trust=trust))
+
+
+def seeds_of(first: int, count: int) -> list[int]:
+    """The seeds of --first-seed and --seeds."""
+    from airflock.scenarios.seeds import sound_seeds
+
+    return sound_seeds(range(first, first + count))
+
+
+def sound_flying(device: str, precision: int, scheduler: str | None = None) -> None:
+    """Refuse a device that nobody knows, a number of bits that is none, and workers with another device than a cpu."""
+    from airflock.engine import sound_device, sound_precision
+    from airflock.executors.cluster import fly_on_their_cpu
+
+    together = Asked()
+    together.read(sound_device, device)
+    together.read(sound_precision, precision)
+    together.read(fly_on_their_cpu, scheduler, device)
+    together.refuse()
+
+
+def place_on_earth(option: str, text: str) -> tuple[float, float, float]:
+    """Latitude and longitude (degrees) and altitude (m) from text."""
     try:
         latitude, longitude, altitude = (float(part) for part in text.split(","))
         if not math.isfinite(latitude + longitude + altitude):
             raise ValueError
-    except ValueError:
-        faults.append(f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120")
-        return 0.0, 0.0, 0.0
+    except ValueError as fault:
+        raise ScenarioError([f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120"]) from fault
     return latitude, longitude, altitude

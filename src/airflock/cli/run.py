@@ -8,13 +8,13 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
-from airflock.errors import gathering
 from airflock.suffixes import PICTURES, RECORDINGS, TABLES
 
 Scores = Mapping[str, Any]  # order parameters, or keys with their values, by name
 
 
 def run(
+    ctx: typer.Context,
     scenario: options.Where,
     seeds: options.Seeds = 1,
     first_seed: options.FirstSeed = 0,
@@ -37,18 +37,16 @@ def run(
     """
     from airflock.engine import picked
     from airflock.executors.scores import scores
-    from airflock.scenarios.files import load
-    from airflock.scenarios.seeds import sound_seeds
 
-    faults: list[str] = []
-    with gathering(faults):
-        options.writable((save, RECORDINGS), (plot, PICTURES))
-    with gathering(faults):
-        changed = options.settings(changes, agents, duration)
-        found = load(scenario, changed, law, trust=trust)
-    options.refuse(faults)
+    asked = options.asked(ctx)
+    asked.read(options.writable, (save, RECORDINGS), (plot, PICTURES))
+    changed = options.changed(asked, changes, agents, duration)
+    found = options.loaded(asked, scenario, changed, law, trust=trust)
+    numbers = asked.read(options.seeds_of, first_seed, seeds)
+    asked.read(options.sound_flying, device, precision, scheduler)
+    asked.refuse()
     tables.say_notes(found.notes)
-    numbers, flights = sound_seeds(range(first_seed, first_seed + seeds)), [found] * seeds
+    flights = [found] * seeds
     if scheduler is None:
         device = picked(flights, device, precision=precision, say=tables.say)
         options.tell_time(flights, threads, device)

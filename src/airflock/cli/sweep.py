@@ -8,15 +8,17 @@ from typing import Annotated, Any
 
 import typer
 
+from airflock.asked import WRONG, Asked, if_right, or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
-from airflock.errors import ScenarioError, gathering
+from airflock.errors import ScenarioError
 from airflock.suffixes import PICTURES, TABLES
 
 MOST_VALUES = 100_000  # of one key, and points of a whole grid
 
 
 def sweep(
+    ctx: typer.Context,
     scenario: options.Where,
     over: Annotated[
         list[str],
@@ -52,62 +54,45 @@ def sweep(
 
     Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
     """
-    from airflock.recordings.sweeps import flown
-    from airflock.scenarios.seeds import sound_seeds
+    from airflock.recordings.sweeps import flown, grid, scenarios_at, shown
 
-    faults: list[str] = []
-    with gathering(faults):
-        options.writable((table, TABLES), (plot, PICTURES))
-    fixed: dict[str, Any] = {}
-    with gathering(faults):
-        fixed = options.settings(changes, agents, duration)
-    keys, points = _grid(over, plot, faults)
-    scenarios, show = _planned(scenario, points, fixed, law, trust, show, faults)
+    asked = options.asked(ctx)
+    asked.read(options.writable, (table, TABLES), (plot, PICTURES))
+    fixed = options.changed(asked, changes, agents, duration)
+    axes = _axes(over, plot, asked)
+    points = asked.read(grid, axes)
+    scenarios = if_right(fixed, asked.read(scenarios_at, scenario, points, or_else(fixed, {}), law, trust=trust))
+    name = asked.read(shown, show, scenarios)
+    numbers = asked.read(options.seeds_of, first_seed, seeds)
+    asked.read(options.sound_flying, device, precision, scheduler)
+    asked.refuse()
     tables.say_notes(alike(dict.fromkeys(note for found in scenarios for note in found.notes)))
-    numbers = sound_seeds(range(first_seed, first_seed + seeds))
     if scheduler is None:
         options.tell_time([found for found in scenarios for _ in numbers], threads, device)
         options.compile_first(scenarios[0], precision, device)
     with counted(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
         chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
         tidy = flown(points, scenarios, numbers, **chosen, say=tables.say, scheduler=scheduler)
-    _keep(tidy, keys, show, scenarios[0], table, plot)
+    _keep(tidy, list(axes), name, scenarios[0], table, plot)
     if as_json:
         tables.emit_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})
     else:
-        _print(tidy, keys, show)
+        _print(tidy, list(axes), name)
 
 
-def _grid(over: list[str], plot: Path | None, faults: list[str]) -> tuple[list[str], list[dict[str, Any]]]:
-    """Keys that are swept and every point of their grid; what is wrong is added to the faults."""
-    from airflock.recordings.sweeps import grid
+def _axes(over: list[str], plot: Path | None, asked: Asked) -> dict[str, list[Any]]:
+    """Keys that are swept, with the values of each; of those that can be read, the rest being noted."""
+    axes = [found for text in over if (found := asked.read(axis, text)) is not WRONG]
+    asked.read(distinct, [text.partition("=")[0].strip() for text in over], plot)
+    return asked.read(_bounded, axes)
 
-    axes = []
-    for text in over:
-        with gathering(faults):
-            axes.append(axis(text))
-    with gathering(faults):
-        distinct([key for key, _ in axes], plot)
+
+def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
+    """Axes of a grid that is not too large."""
     size = math.prod(len(values) for _, values in axes)
     if size > MOST_VALUES:
-        options.refuse([*faults, f"--over: a grid of {size} points is more than {MOST_VALUES}"])
-    return list(dict(axes)), grid(dict(axes))
-
-
-def _planned(
-    scenario: str, points: list[dict[str, Any]], fixed: dict[str, Any], law: str | None, trust: bool,
-    show: str | None, faults: list[str],
-) -> tuple[list[Any], str]:  # fmt: skip
-    """The scenario of each point, and the order parameter to show; ends with all faults if there are any."""
-    from airflock.recordings.sweeps import scenarios_at, shown
-
-    scenarios: list[Any] = []
-    with gathering(faults):
-        scenarios = scenarios_at(scenario, points, fixed, law, trust=trust)
-    with gathering(faults):
-        show = shown(show, scenarios)
-    options.refuse(faults)
-    return scenarios, str(show)
+        raise ScenarioError([f"--over: a grid of {size} points is more than {MOST_VALUES}"])
+    return dict(axes)
 
 
 def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | None, plot: Path | None) -> None:
@@ -144,8 +129,8 @@ def distinct(keys: Sequence[str], plot: Path | None) -> None:
         raise ScenarioError(list(dict.fromkeys(faults)))
 
 
-def axis(text: str) -> tuple[str, list[Any]]:
-    """Key and values from KEY=a,b,c or KEY=low:high:count."""
+def axis(text: str, option: str = "--over") -> tuple[str, list[Any]]:
+    """Key and values from KEY=a,b,c or KEY=low:high:count, as an option was given."""
     key, equals, values = text.partition("=")
     key = key.strip()
     parts = values.split(":")
@@ -153,16 +138,16 @@ def axis(text: str) -> tuple[str, list[Any]]:
         try:
             low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
         except ValueError as fault:
-            raise ScenarioError([f"--over {text}: write low:high:count, for instance radio.delay=0:2:5"]) from fault
+            raise ScenarioError([f"{option} {text}: write low:high:count, for instance radio.delay=0:2:5"]) from fault
         if not 1 <= count <= MOST_VALUES:
-            raise ScenarioError([f"--over {text}: the count lies outside [1, {MOST_VALUES}]"])
+            raise ScenarioError([f"{option} {text}: the count lies outside [1, {MOST_VALUES}]"])
         step = (high - low) / max(count - 1, 1)
         return key, [low + step * i for i in range(count)]
     if not equals or not values or len(parts) == 2:
-        raise ScenarioError([f"--over {text}: write KEY=a,b,c or KEY=low:high:count"])
-    numbers = [options.value(part, f"--over {key}") for part in values.split(",")]
+        raise ScenarioError([f"{option} {text}: write KEY=a,b,c or KEY=low:high:count"])
+    numbers = [options.value(part, f"{option} {key}") for part in values.split(",")]
     if any(isinstance(value, (dict, list)) for value in numbers):
-        raise ScenarioError([f"--over {text}: a table or a list cannot be swept; give numbers or choices"])
+        raise ScenarioError([f"{option} {text}: a table or a list cannot be swept; give numbers or choices"])
     return key, numbers
 
 

@@ -5,12 +5,14 @@ from typing import Annotated, Any
 
 import typer
 
+from airflock.asked import or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import line
-from airflock.errors import gathering
+from airflock.errors import ScenarioError
 
 
 def tune(
+    ctx: typer.Context,
     scenario: Annotated[
         list[str],
         typer.Argument(metavar="FILE|PRESET|LOGS", help="Your drones, field and speed; or logs, with --like."),
@@ -64,24 +66,22 @@ def tune(
 
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
-    from airflock.scenarios.files import load
+    from airflock.certify.request import sound_confidence
+    from airflock.tune.folder import kept_plan
+    from airflock.tune.request import request_of
     from airflock.tune.run import tune
-    from airflock.tune.start import start_of
 
-    faults: list[str] = []
-    seconds, base = 1.0, None
-    with gathering(faults):
-        seconds = options.time_of(budget)
-    if like is None and (len(scenario) > 1 or heard is not None):
-        faults.append(f"{', '.join(scenario)}: give one scenario to tune; with logs, give --like PRESET")
-    elif like is None and Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
-        faults.append(f"{scenario[0]}: is not a scenario file (.toml); with logs, give --like PRESET")
-    else:
-        with gathering(faults):
-            base = load(like or scenario[0], options.settings(changes, agents, duration), trust=trust)
-    options.refuse(faults)
-    assert base is not None
-    tables.say_notes(start_of(base)[0].notes if like is None else base.notes)  # as it will fly
+    asked = options.asked(ctx)
+    seconds = asked.read(options.time_of, budget)
+    settings = options.changed(asked, changes, agents, duration)
+    base = options.loaded(asked, asked.read(_named, scenario, like, heard), settings, trust=trust)
+    start = asked.read(_as_it_will_fly, base, like)
+    plan = asked.read(kept_plan, out, start, resume) if like is None else None  # with logs, of what they will tell
+    if confidence is not None:
+        asked.read(sound_confidence, confidence)
+    asked.read(request_of, start, limit or (), margin or (), confidence, or_else(plan, None))
+    asked.refuse()
+    tables.say_notes(start.notes)
     options.compile_first(base, 32, "cpu")
     what: Any = base if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
@@ -105,6 +105,24 @@ def tune(
         _print(tuning, shown)
     if not tuning.shown:
         raise typer.Exit(1)
+
+
+def _named(scenario: list[str], like: str | None, heard: Path | None) -> str:
+    """The scenario that names law, field and speed: the one that is tuned or, with logs, what they are like."""
+    if like is not None:
+        return like
+    if len(scenario) > 1 or heard is not None:
+        raise ScenarioError([f"{', '.join(scenario)}: give one scenario to tune; with logs, give --like PRESET"])
+    if Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
+        raise ScenarioError([f"{scenario[0]}: is not a scenario file (.toml); with logs, give --like PRESET"])
+    return scenario[0]
+
+
+def _as_it_will_fly(base: Any, like: str | None) -> Any:
+    """The scenario from which tuning starts; with logs it is not known yet, but takes the same limits and margins."""
+    from airflock.tune.start import start_of
+
+    return base if like is not None else start_of(base)[0]
 
 
 def _print(tuning: Any, shown: list[str]) -> None:

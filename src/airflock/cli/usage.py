@@ -29,14 +29,15 @@ def usage_fault(fault: Any, words: Sequence[str]) -> str:
     return f"{verb}: {_said(fault, context, words)}" if verb else _said(fault, context, words)
 
 
-def infinite(context: Any) -> list[str]:
-    """Options with a range that were given nan or inf, one line each."""
+def infinite(context: Any) -> list[tuple[str, str]]:
+    """Options with a range that were given nan or inf: the parameter's name, and one line."""
     faults = []
     for parameter in context.command.params:
         value, ends = context.params.get(parameter.name), _ends(parameter)
         if isinstance(value, float) and not math.isfinite(value) and ends != (None, None):
             verb = _path(context).partition(" ")[2]
-            faults.append(f"{verb}: {_name(parameter)} {value:g} is not a finite number; give {_span(*ends)}")
+            said = f"{verb}: {_name(parameter)} {value:g} is not a finite number; give {_span(*ends)}"
+            faults.append((str(parameter.name), said))
     return faults
 
 

@@ -40,13 +40,18 @@ class Choice:
         return f"device auto: {self.device}, {self.why}" if self.why else ""
 
 
+def sound_device(device: str) -> None:
+    """Refuse a device that nobody knows. Raises ScenarioError."""
+    if device not in DEVICES:
+        raise ScenarioError([f"device = {device!r} is none of {', '.join(DEVICES)}"])
+
+
 def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) -> Choice:
     """Device for these flights: ScenarioError for an unknown name, DeviceError where a named one cannot fly them.
 
     plans : one per scenario
     """
-    if device not in DEVICES:
-        raise ScenarioError([f"device = {device!r} is none of {', '.join(DEVICES)}"])
+    sound_device(device)
     if device != "cuda" and device != "auto":
         return Choice(device)
     from airflock.gpu import required, trouble

@@ -38,14 +38,19 @@ def plan_of(
     given_start : the start is handed over with each flight
     absence     : agents may be absent; where a fault takes agents out, or empty batteries do, they may in any case
     """
-    if precision not in (32, 64):
-        raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
+    sound_precision(precision)
     key = "plan", precision, record, metrics, grid, near, given_start, absence
     if key not in scenario.prepared:
         build = _build(scenario, precision, record, grid, near, given_start, absence)
         scenario.prepared[key] = _planned(scenario, metrics, build)
     found: Plan = scenario.prepared[key]
     return found
+
+
+def sound_precision(precision: int) -> None:
+    """Refuse a number of bits that is none. Raises ScenarioError."""
+    if precision not in (32, 64):
+        raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
 
 
 def _build(

@@ -46,7 +46,7 @@ def open_folder(folder: Path, study: Documented, *, resume: bool, kind: str = "s
         raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
 
 
-def sweep(folder: Path) -> None:
+def remove_unfinished(folder: Path) -> None:
     """Remove what a process that was killed had begun to write; only for the one who holds the writer's lock."""
     for path in folder.glob(".*.*.*"):
         if path.suffix in (".toml", ".csv", ".parquet", ".png"):

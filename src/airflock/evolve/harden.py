@@ -18,7 +18,7 @@ from typing import Any
 from airflock.errors import ScenarioError
 from airflock.evolve.folder import plain
 from airflock.evolve.held import Constraints
-from airflock.evolve.margins import FAULTS, read_margins
+from airflock.evolve.margins import FAULTS, Margin, read_margins
 from airflock.evolve.objective_table import read_limits
 from airflock.evolve.space import declared
 from airflock.evolve.steps import APART, RECIPE, ROOM, Measured, Step, recipe, together
@@ -96,14 +96,9 @@ def harden(
     """
     single = isinstance(scenario, (Scenario, str, os.PathLike))
     scenarios = [loaded(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
-    held, faults = read_limits({"limits": limit}, scenarios)
-    faults += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
-    margins, wrong = read_margins(margin, scenarios)
-    faults += wrong
-    if faults:
-        raise ScenarioError(faults)
+    constraints, margins = asked_for(scenarios, cost, limit, margin)
     steps = [*steps, *(APART if margins else ())]
-    trial = Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, Constraints(held, cost), margins, threads, done)
+    trial = Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, constraints, margins, threads, done)
     found = [trial.first]
     hit = float((together(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()
@@ -117,6 +112,19 @@ def harden(
         found += trial.tried(step)
     last = trial.on_fresh_seeds()
     return [*found, *trial.beside(), last]
+
+
+def asked_for(
+    scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[str] = (), margin: str | Sequence[str] = ()
+) -> tuple[Constraints, list[Margin]]:
+    """What must go on to hold, and what is to be widened. Raises ScenarioError, all faults together."""
+    held, faults = read_limits({"limits": limit}, scenarios)
+    faults += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
+    margins, wrong = read_margins(margin, scenarios)
+    faults += wrong
+    if faults:
+        raise ScenarioError(faults)
+    return Constraints(held, cost), margins
 
 
 def document(scenario: Scenario, step: Measured) -> dict[str, Any]:

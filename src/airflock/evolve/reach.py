@@ -4,13 +4,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from airflock.evolve.held import Broken
 from airflock.evolve.margins import Margin
 from airflock.scenarios.scenario import Scenario
 
 FARTHEST = 8.0  # factor up to which a number is made worse
 FINE = 1.1  # ratio of the first value at which something breaks and the last one at which all holds
 
-Test = Callable[[Sequence[Scenario]], str]  # flies scenarios that are worse; what no longer holds in them, or nothing
+Test = Callable[[Sequence[Scenario]], Broken | None]  # flies scenarios that are worse; what no longer holds in them
 
 
 @dataclass(frozen=True)
@@ -19,18 +20,23 @@ class Reach:
 
     holds  : largest factor that was flown at which all holds; 1: as the scenario is
     breaks : smallest that was flown at which something does not; inf: none up to FARTHEST or to the end of its range
-    why    : what breaks there
+    broken : what breaks there
     """
 
     margin: Margin
     holds: float = 1.0
     breaks: float = math.inf
-    why: str = ""
+    broken: Broken | None = None
 
     @property
     def ends(self) -> bool:
         """Whether something breaks at all."""
         return math.isfinite(self.breaks)
+
+    @property
+    def at_walls(self) -> bool:
+        """Whether it ends with contacts with walls and obstacles."""
+        return self.broken is not None and self.broken.at_walls
 
     @property
     def value(self) -> float:
@@ -46,7 +52,7 @@ class Reach:
     @property
     def told(self) -> str:
         """How far it reaches and what ends it, in words."""
-        end = f", not at {self.margin.told(self.breaks)}: {self.why}" if self.ends else ""
+        end = f", not at {self.margin.told(self.breaks)}: {self.broken.why}" if self.broken else ""
         return f"{self.margin.name}: what held holds {self.far}{end}"
 
 
@@ -93,5 +99,5 @@ def _halved(found: Reach, test: Test) -> Reach:
 
 
 def _tried(found: Reach, factor: float, test: Test) -> Reach:
-    why = test(found.margin.worse(factor))
-    return replace(found, breaks=factor, why=why) if why else replace(found, holds=factor)
+    broken = test(found.margin.worse(factor))
+    return replace(found, breaks=factor, broken=broken) if broken else replace(found, holds=factor)

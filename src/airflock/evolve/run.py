@@ -1,6 +1,5 @@
 """The public door: a study from beginning to end in one folder, begun or continued."""
 
-import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -8,24 +7,22 @@ from pathlib import Path
 from typing import Any
 
 from airflock import atomic
+from airflock.asked import Asked
 from airflock.errors import StudyError
-from airflock.evolve.fitness import Objective, Own
-from airflock.evolve.folder import open_folder, sweep, versions
+from airflock.evolve.fitness import Own
+from airflock.evolve.folder import open_folder, remove_unfinished, versions
 from airflock.evolve.pictures import draw
+from airflock.evolve.request import asked_for, sound_device, sound_method, sound_timeout
 from airflock.evolve.result import Result
-from airflock.evolve.resumed import resumed
 from airflock.evolve.search import Watch, search
-from airflock.evolve.search_table import fast as fast_keys
-from airflock.evolve.sensitivity import METHODS
 from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
-from airflock.evolve.study import Study, load_study, make_study, with_limits
+from airflock.evolve.study import Study
 from airflock.evolve.winner import conclude
 from airflock.executors import Executor, Score
-from airflock.executors.cluster import Cluster, fly_on_their_cpu
+from airflock.executors.cluster import Cluster
 from airflock.executors.in_process import InProcess
-from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.untrusted import own_path
 
@@ -127,93 +124,19 @@ def evolve(
     True
     """
     folder = own_path(out)
-    study, _ = asked_for(
-        what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust, fast=fast,
-        folder=folder if resume else None,
+    asked = Asked()
+    found = asked.read(
+        asked_for, what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust,
+        fast=fast, folder=folder if resume else None,
     )  # fmt: skip
-    if sensitivity and sensitivity not in METHODS:
-        raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
-    check_timeout(timeout)
-    study = on_device(study, device, scheduler)
+    asked.read(sound_method, sensitivity)
+    asked.read(sound_timeout, timeout)
+    asked.read(sound_device, device, scheduler)
+    asked.refuse()
+    study = on_device(found[0], device)
     open_folder(folder, study, resume=resume)
     executor = executor_for(study, scheduler, threads, timeout)
     return run(study, folder, executor, watch, sensitivity=sensitivity)
-
-
-def asked_for(
-    what: Any,
-    settings: Mapping[str, Any] | None = None,
-    space: Mapping[str, Any] | None = None,
-    objective: Mapping[str, Any] | None = None,
-    fitness: Own | None = None,
-    search_keys: Mapping[str, Any] | None = None,
-    over_scenarios: str | None = None,
-    limit: str | Sequence[str] = (),
-    *,
-    trust: bool = False,
-    fast: bool = False,
-    folder: Path | None = None,
-) -> tuple[Study, str]:
-    """As `study_of`; if a folder is given, what is not asked for is as that holds it. Also a note of what it gave."""
-
-    def ask(changes: Mapping[str, Any] | None, keys: Mapping[str, Any], limits: Any, *, quick: bool = False) -> Study:
-        return study_of(what, changes, space, objective, fitness, keys, over_scenarios, limits, trust=trust, fast=quick)
-
-    limits = [limit] if isinstance(limit, str) else list(limit)
-    study = ask(settings, search_keys or {}, limits, quick=fast)
-    if folder is None or isinstance(what, Study):
-        return study, ""
-    keys = fast_keys(search_keys or {}, limits=bool(limits)) if fast else search_keys or {}
-    return resumed(folder, study, settings or {}, keys, limits, ask)
-
-
-def study_of(
-    what: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario],
-    settings: Mapping[str, Any] | None = None,
-    space: Mapping[str, Any] | None = None,
-    objective: Mapping[str, Any] | None = None,
-    fitness: Own | None = None,
-    search_keys: Mapping[str, Any] | None = None,
-    over_scenarios: str | None = None,
-    limit: str | Sequence[str] = (),
-    *,
-    trust: bool = False,
-    fast: bool = False,
-) -> Study:
-    """The study that `evolve` is asked for."""
-    if isinstance(what, Study):
-        asked: dict[str, Any] = {"settings": settings, "space": space, "objective": objective, "fitness": fitness}
-        asked |= {"limit": limit, "over_scenarios": over_scenarios, "fast": fast}
-        beside = [*(key for key, value in asked.items() if value), *(search_keys or {})]
-        if beside:
-            said = ", ".join(beside)
-            raise StudyError(f"{said}: a Study object sets this itself; give a preset, a file or a Scenario")
-        return what
-    by_hand, search_keys = search_keys or {}, fast_keys(search_keys or {}, limits=bool(limit)) if fast else search_keys
-    given = {"space": space, "objective": objective, "over_scenarios": over_scenarios}
-    tables = {key: value for key, value in given.items() if value is not None}
-    if isinstance(what, Scenario) or (isinstance(what, Sequence) and not isinstance(what, str)):
-        several = [what] if isinstance(what, Scenario) else list(what)
-        scenarios = [variant(each, settings, trust=trust) for each in several]
-        if not scenarios:
-            raise StudyError("evolve is given an empty list of scenarios")
-        where = ", ".join(scenario.name for scenario in scenarios)
-        study = make_study(tables, where, search=search_keys, scenario=scenarios, trust=trust)
-    else:
-        study = load_study(what, settings=settings, search=search_keys, tables=tables, trust=trust)
-    if fitness is not None:
-        code = getattr(fitness, "__code__", None)
-        text = _text_of(code) if code is not None else ""
-        name = getattr(fitness, "__name__", "fitness")
-        study = replace(study, objectives=(Objective(name, own=fitness, text=text),))
-    limits = [limit] if isinstance(limit, str) else list(limit)
-    return with_limits(study, limits, seeds="seeds" in by_hand) if limits else study
-
-
-def _text_of(code: Any) -> str:
-    """Hash of what a function does, the same in every process."""
-    constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
-    return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
 
 
 def score_of(study: Study, place: int = 0) -> Score:
@@ -228,19 +151,11 @@ def score_of(study: Study, place: int = 0) -> Score:
     return score
 
 
-def check_timeout(timeout: float | None) -> None:
-    """Refuse a time limit in which no flight could fly."""
-    if timeout is not None and not timeout > 0.0:
-        raise StudyError(f"timeout = {timeout:g} s must be above 0")
-
-
-def on_device(study: Study, device: str, scheduler: str | None = None) -> Study:
+def on_device(study: Study, device: str) -> Study:
     """The study for a device: cpu, cuda, or what auto picks for a generation of it. A missing one is one line."""
+    sound_device(device)
     if device == "cpu":
         return study
-    fly_on_their_cpu(scheduler, device)
-    if device not in ("cuda", "auto"):
-        raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
     from airflock.engine import picked
 
     generation = [study.scenario] * study.population(0) * study.whole("seeds")
@@ -284,7 +199,7 @@ def run(
     try:
         with Store(folder) as store:
             store.begin(versions())
-            sweep(folder)
+            remove_unfinished(folder)
             try:
                 centres = search(study, store, executor, watch)
                 result = conclude(study, store, executor, centres, folder, note)

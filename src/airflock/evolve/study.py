@@ -155,6 +155,7 @@ def load_study(
     settings: Mapping[str, Any] | None = None,
     search: Mapping[str, Any] | None = None,
     tables: Mapping[str, Any] | None = None,
+    limits: Sequence[str] = (),
     trust: bool = False,
 ) -> Study:
     """Study from a file, from a shipped study's name, or of a scenario as it is, between bounds of its own.
@@ -162,6 +163,7 @@ def load_study(
     settings : keys of the scenario to change, such as "duration"
     search   : keys of the table [search] to change, such as "population"
     tables   : tables "space" or "objective" that replace the file's
+    limits   : what may happen how rarely, in place of what the file says
     trust    : whether code that the files name may run: a law, fitness functions
     Raises ScenarioError with one line per fault.
     """
@@ -174,10 +176,12 @@ def load_study(
             document = read_toml(path)
         if not tells_of_study(document):
             document = {"scenario": text, **(tables or {})}
-            return make_study(document, text, settings=settings, search=search, trust=trust)
+            return make_study(document, text, settings=settings, search=search, limits=limits, trust=trust)
         where = text if text in known else str(path)
         document = {**document, **(tables or {})}
-        return make_study(document, where, settings=settings, search=search, folder=path.parent, trust=trust)
+        return make_study(
+            document, where, settings=settings, search=search, folder=path.parent, limits=limits, trust=trust
+        )
 
 
 def _once(where: str, fault: str) -> str:
@@ -193,11 +197,13 @@ def make_study(
     search: Mapping[str, Any] | None = None,
     folder: Path | None = None,
     scenario: Scenario | Sequence[Scenario] | None = None,
+    limits: Sequence[str] = (),
     trust: bool = False,
 ) -> Study:
     """Study from a nested dict; `trust` lets code run that it names.
 
     scenario : in place of its key of that name; or several, in place of `scenarios`
+    limits   : in place of those of its objective; each candidate then flies twice at least, unless `search` has seeds
     """
     document, faults = formats.current(document, where), []
     for key in document:
@@ -205,6 +211,9 @@ def make_study(
             of_search = key in {field.name for field in fields(Search)}
             hint = f"did you mean search.{key}?" if of_search else meant(key, KEYS, f"known: {', '.join(KEYS)}")
             faults.append(f"{key}: unknown key; {hint}")
+    table = document.get("search", {})
+    found, more = schema.check("search", {**table, **(search or {})} if isinstance(table, Mapping) else table, Search)
+    faults += more
     if scenario is None:
         scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
         if more or not scenarios:
@@ -223,35 +232,18 @@ def make_study(
     over = document.get("over_scenarios", "mean")
     faults += faults_together(scenarios, labels, space, over)
     objectives, more = read_objectives(document.get("objective", {}), scenarios[0], folder, trust=trust)
-    limits, of_limits = read_limits(document.get("objective", {}), scenarios)
+    kept, of_limits = read_limits({"limits": list(limits)} if limits else document.get("objective", {}), scenarios)
     faults += more + of_limits
-    table = document.get("search", {})
-    if isinstance(table, Mapping):
-        found, more = schema.check("search", {**table, **(search or {})}, Search)
-    else:
-        found, more = schema.check("search", table, Search)
-    faults += more
     if found is not None:
-        faults += search_faults(found, objectives, space, str(over), limits=bool(limits))
+        if limits and "seeds" not in (search or {}) and found.seeds < 2.0:
+            found = replace(found, seeds=2.0)
+        faults += search_faults(found, objectives, space, str(over), limits=bool(kept))
     if faults or space is None or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     return Study(
         scenarios[0], space, objectives, found, str(document.get("title", "")), notes=tuple(notes),
-        others=scenarios[1:], over_scenarios=str(over), labels=labels, limits=limits,
+        others=scenarios[1:], over_scenarios=str(over), labels=labels, limits=kept,
     )  # fmt: skip
-
-
-def with_limits(study: Study, limits: Sequence[str], *, seeds: bool = False) -> Study:
-    """The study with limits in place of its own; two flights of a candidate instead of one, unless `seeds` are given.
-
-    Raises ScenarioError, all faults together.
-    """
-    found, faults = read_limits({"limits": list(limits)}, study.scenarios)
-    search = study.search if seeds or study.search.seeds > 1 else replace(study.search, seeds=2.0)
-    faults += search_faults(search, study.objectives, study.space, study.over_scenarios, limits=True)
-    if faults:
-        raise ScenarioError([f"{study.scenario.name}: {fault}" for fault in faults])
-    return replace(study, limits=found, search=search)
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any], at: str = "") -> list[str]:

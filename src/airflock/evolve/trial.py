@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from airflock.errors import AirflockError, ScenarioError
-from airflock.evolve.held import Constraints, at_walls, excess_of, gains
+from airflock.evolve.held import Broken, Constraints, excess_of, gains
 from airflock.evolve.landscape import ZERO, why_zero
 from airflock.evolve.margins import Margin
 from airflock.evolve.measures import measures
@@ -67,12 +67,12 @@ class Trial:
         Or in some flight where the short margin ends.
         """
         seen = any("phi_wall" in table and float(table["phi_wall"].max()) > 0.0 for table in self.table)
-        seen = seen or (self.along is not None and at_walls(self.along.why))
+        seen = seen or (self.along is not None and self.along.at_walls)
         return seen or excess_of(self.constraints.at_walls, self.scenarios, self.table) > 0.0
 
     def short_at_walls(self) -> bool:
         """Whether what is short is of walls and obstacles: the end of the short margin, or limits farther from kept."""
-        if self.along is not None and at_walls(self.along.why):
+        if self.along is not None and self.along.at_walls:
             return True
         walls, others = (
             excess_of(limits, self.scenarios, self.table)
@@ -203,12 +203,12 @@ class Trial:
 
     def _harm(
         self, worse: Sequence[Scenario], parameters: Mapping[str, float], seeds: Sequence[int], before: Sequence[Table]
-    ) -> str:
-        """What that held for the optimum no longer holds where scenarios are worse, in words; empty if all does."""
+    ) -> Broken | None:
+        """What that held for the optimum no longer holds where scenarios are worse; None if all does."""
         try:
             return self.constraints.broken(worse, before, self._fly(parameters, seeds, worse), surely=True)
         except AirflockError as fault:  # no room for so many agents, for instance
-            return f"cannot be flown: {str(fault).splitlines()[0]}"
+            return Broken(f"cannot be flown: {str(fault).splitlines()[0]}")
 
     def _reach(
         self, near: Reach, parameters: Mapping[str, float], seeds: Sequence[int], before: Sequence[Table]

@@ -89,6 +89,14 @@ def card_document(
     }
 
 
+def left_off(scenario: Scenario) -> list[str]:
+    """What of a scenario no card holds, in a line for each: real drones bring their own."""
+    kinds = ", ".join(dict.fromkeys(entry.fault.name for entry in scenario.faults))
+    spread = ", ".join(dict.fromkeys(key for group in scenario.groups for _, key in group.spread))
+    said = {"faults": kinds, "tolerances of groups": spread}
+    return [f"the card leaves off the scenario's {what}: {names}" for what, names in said.items() if names]
+
+
 def _refuse_unflyable(scenario: Scenario) -> None:
     """Raise a CardError where a scenario has what no card can hold."""
     fault = ""

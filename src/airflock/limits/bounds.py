@@ -3,8 +3,8 @@
 A look counts the events of the first n flights. Looks are at sizes that are fixed beforehand, and the j-th look pays
 alpha / (j (j + 1)) of what may go wrong, which sums up to alpha over all looks that could ever be taken. So all upper
 bounds hold together with the confidence that was asked for, whenever and for whatever reason counting stops, and so do
-all lower ones. Upper bounds are
-paid for from the first size that could show the limit, lower bounds, which refute it, from a few flights on.
+all lower ones. Upper bounds are paid for from the first size that could show the limit, lower bounds, which refute it,
+from a few flights on.
 """
 
 import math

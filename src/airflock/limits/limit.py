@@ -62,7 +62,7 @@ class Limit:
             return self.rate
         return per_flight(self.rate * (agents if self.unit == "drone-h" else 1.0), hours)
 
-    def told(self, probability: float, hours: float, agents: int) -> float:
+    def in_own_unit(self, probability: float, hours: float, agents: int) -> float:
         """A probability per flight in the limit's own unit."""
         if self.unit == "flight":
             return probability

@@ -10,6 +10,7 @@ from airflock.onboard.mission import AIR, FLOCKING, Phase
 
 FRESH = 2.0  # s; a peer whose last status is younger is heard
 AGES = 10  # packets whose ages tell of a clock
+OLD = 1.0  # s beyond the radio's delay; a member whose packets are all older seems to have a clock that is behind
 BEYOND = 100.0  # m; a member may be this far beyond the fence and still be believed
 PHASES = {int(phase): phase for phase in Phase}
 REASONS = ("mission", "card", "phase", "fast", "far", "jump", "time")
@@ -98,7 +99,7 @@ class Peers:
         wrong, limit = 0, self._card.safety.clock_error
         for peer in self.all.values():
             if len(peer.ages) == AGES:
-                if -limit <= min(peer.ages) <= self._card.delay + 1.0:
+                if -limit <= min(peer.ages) <= self._card.delay + OLD:
                     return False
                 wrong += 1
         return wrong >= 2

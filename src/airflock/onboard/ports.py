@@ -18,6 +18,7 @@ try:
 except ImportError:  # Windows
     termios = None
 
+FORMS = "give udp:HOST:PORT, udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD"
 LONGEST = 2048  # bytes read at once
 MOST = 1000  # datagrams read at one look; what a flood brings beyond waits, or is lost as on a jammed radio
 KEPT = 1 << 20  # bytes that wait unread in a socket, as far as the system allows
@@ -58,7 +59,18 @@ def open_port(text: str) -> Port:
         raise LinkError(f"{text}: {fault.strerror}") from fault
     except UnicodeError as fault:
         raise LinkError(f"{text}: is not a valid name of a computer") from fault
-    raise LinkError(f"{text}: give udp:HOST:PORT, udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")
+    raise LinkError(f"{text}: {FORMS}")
+
+
+def sound_port(text: str) -> None:
+    """Refuse the text of a port that can be none, before it is opened. Raises LinkError, one line."""
+    kind, _, rest = text.partition(":")
+    if kind == "udp":
+        here, _, there = rest.partition(">")
+        for told in (here, there) if there else (here,):
+            _address(told, text)
+    elif kind != "serial":
+        raise LinkError(f"{text}: {FORMS}")
 
 
 def _place(rest: str, text: str) -> Place:

@@ -3,6 +3,7 @@
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from airflock.plots import style
 
@@ -34,6 +35,7 @@ def convergence(
         axes.fill_between(low.index, low, high, color=color, alpha=0.15, linewidth=0.0)
         axes.plot(groups.mean(), color=color, linewidth=1.6, label=f"run {run}: mean, 10 to 90 %")
         axes.plot(best, color=color, linewidth=1.0, linestyle="--", label=f"run {run}: best so far")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))  # half a generation is none
     style.dress(axes, "generation", objective)
     style.legend(axes)
     style.heading(axes, what or "Convergence", f"{len(table)} candidates")

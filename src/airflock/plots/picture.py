@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from airflock.errors import AirflockError, RecordingError
 from airflock.plots.exposure import exposure
+from airflock.plots.flight import flown_with
 from airflock.plots.flocked import flocked
 from airflock.plots.rays import rays
 from airflock.plots.reception import received
@@ -91,12 +92,20 @@ def plot(
     if kind not in KINDS:
         raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}{meant(kind, KINDS, lead='; ')}")
     if kind in OF_A_SCENARIO:
+        _refuse_tracks(what, kind)
         scenario = _scenario(what, settings, law, trust)
         return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)
     keep = ("heard",) if kind == "reception" else ()
     recording = flight_of(what, seed, settings, law, trust=trust, keep=keep)
     with named(what):
         return _of_recording(recording, kind, start, stop, ax)
+
+
+def _refuse_tracks(what: What, kind: str) -> None:
+    """Raise RecordingError for tracks where a law or a fitness is drawn: they have none."""
+    recording = load_recording(what) if _is_file(what) else what  # type: ignore[arg-type]
+    if isinstance(recording, xr.Dataset) and flown_with(recording) is None:
+        raise RecordingError(f"{_name(what)}: tracks were flown by no scenario, which the kind {kind} draws")
 
 
 def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None, ax: Axes | None) -> Figure:

@@ -11,13 +11,14 @@ from matplotlib.figure import Figure
 
 from airflock.errors import AirflockError, RecordingError
 from airflock.plots import style
-from airflock.plots.flight import details_of, name_of, window
+from airflock.plots.flight import details_of, flown_with, name_of, window
 from airflock.recordings.attributes import faults
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.scores import over_time
 
 CORR, VEL, LAP = r"$\phi^{\mathrm{corr}}$", r"$\phi^{\mathrm{vel}}/v^{\mathrm{flock}}$", r"$\phi^{\mathrm{LAP}}$"
-STEADY = 1e-4  # share of its value by which a steady value differs
+STEADY = 1e-3  # share of its value by which a steady value differs
+OF_WALLS = ("out", "outside")  # courses that say nothing where there are none
 NAMED = 8  # faults that are named where they begin; more are lines only
 SHARE = 200.0  # of a course that is shown, its smoothing window
 NEAREST, NEAREST_MEAN = r"min $r_{ij}^{\mathrm{min}}$", r"mean $r_{ij}^{\mathrm{min}}$"
@@ -128,7 +129,11 @@ class Pen:
 
 
 def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax: Axes | None) -> Figure:
-    """Every value of a metric set that has no picture of its own, one below the other."""
+    """Every value of a metric set that has no picture of its own, one below the other; none of what is not there."""
+    walled = flown_with(recording) is not None
+    names = [name for name in course.columns if course[name].notna().any() and (walled or name not in OF_WALLS)]
+    units = course.attrs.get("units", {})
+    course = course[names]
     figure, grid = style.panels(ax, len(course.columns), 1, 7.0, 0.6 + 1.1 * len(course.columns), sharex=True)
     panels = grid[:, 0]
     pen = Pen(course, smooth)
@@ -136,10 +141,12 @@ def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax:
         values = course[name].dropna()  # values of the collision clock stand at its instants only
         own = pen if len(values) == len(course) else Pen(course.loc[values.index], smooth)
         own.draw(axes, values, style.LINES[number % len(style.LINES)], name)
-        style.dress(axes, "time (s)" if axes is panels[-1] else "", name)
+        style.dress(axes, "time (s)" if axes is panels[-1] else "", f"{name}\n({units.get(name) or 1})")
+        axes.ticklabel_format(axis="y", useOffset=False)
         middle, spread = float(values.mean()), float(np.ptp(values)) if len(values) else 0.0
         if spread < STEADY * abs(middle):  # rounding is no course
             axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
+    figure.align_ylabels(list(panels))
     style.overall(figure, name_of(recording), f"{details_of(recording)}{pen.told}")
     return style.root(figure)
 

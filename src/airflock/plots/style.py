@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 
 from airflock.errors import AirflockError
 from airflock.stage.colours import WHEEL
@@ -114,7 +115,7 @@ def second_axis(axes: Axes, label: str, color: str) -> Axes:
 def heading(axes: Axes, what: str, details: str = "", *, color: str = INK) -> None:
     """Title at the upper left: what in bold, details in grey below it."""
     lift = 18.0 if details else 6.0
-    axes.set_title(what, loc="left", fontsize=HEAD, fontweight="bold", color=color, pad=lift)
+    axes.set_title(what, loc="left", fontsize=HEAD, fontweight="bold", color=color, pad=lift, parse_math=False)
     if details:
         shade = GREY if color == INK else color
         axes.annotate(
@@ -134,11 +135,12 @@ def letter(axes: Axes, name: str) -> None:
 
 
 def overall(figure: Figure, what: str, details: str = "") -> None:
-    """Title of a picture of several panels."""
-    text = what.replace("_", r"\_").replace(" ", r"\ ")
-    figure.suptitle(
-        rf"$\bf{{{text}}}$" + (f"   {details}" if details else ""), x=0.01, ha="left", fontsize=TEXT + 0.5, color=INK
-    )
+    """Title of a picture of several panels: what in bold, details behind it; both may hold any sign."""
+    look: dict[str, Any] = {"fontsize": TEXT + 0.5, "color": INK, "parse_math": False}
+    title = figure.suptitle(what, x=0.01, ha="left", fontweight="bold", **look)
+    if details:
+        behind = Annotation(details, (1.0, 0.0), (10.0, 0.0), title, "offset points", va="bottom", **look)
+        figure.add_artist(behind)
 
 
 def legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 4, *, above: bool = False) -> None:

@@ -11,7 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from airflock.errors import AirflockError, RecordingError
+from airflock.errors import AirflockError, RecordingError, bounded
 from airflock.plots import style
 from airflock.plots.flight import (
     Paths,
@@ -27,6 +27,7 @@ from airflock.plots.flight import (
     world_of,
 )  # fmt: skip
 from airflock.plots.scene_paths import through
+from airflock.recordings.attributes import axes_of
 from airflock.world import arena
 
 WINDOW = 60.0  # s; longer paths cover each other
@@ -98,11 +99,13 @@ def trajectories(
     dots: dict[str, Any] = {"depthshade": False} if space else {}
     axes.scatter(*ends, s=size, color=style.INK, linewidths=0.4, edgecolors="white", zorder=5, label="end", **dots)
     _draw_world(axes, world)
+    labels = axes_of(recording)
     if space:
-        _in_space(axes, shown, world)
+        _in_space(axes, shown, world, labels)
     else:
-        _from_above(axes, shown, world)
+        _from_above(axes, shown, world, labels)
     said = details_of(recording, shown) + (" · each agent in its own colour" if way == "agent" else "")
+    said += " · dots: at the end" + (f" · thick: {_called(recording, chosen)}" if chosen >= 0 else "")
     if space and ax is None:
         style.overall(figure, name_of(recording), said)
     else:
@@ -113,7 +116,11 @@ def trajectories(
             shrink=0.6 if space else 0.8, pad=0.1 if space else 0.02,
         )  # fmt: skip
         if way == "heading":
-            bar.set_ticks([0.0, 90.0, 180.0, 270.0, 360.0], labels=["east", "north", "west", "south", "east"])
+            right, up, _ = labels
+            turn = ["east", "north", "west", "south"]
+            if right != "east":
+                turn = [f"+{right}", f"+{up}", f"−{right}", f"−{up}"]
+            bar.set_ticks([0.0, 90.0, 180.0, 270.0, 360.0], labels=[*turn, turn[0]])
     return figure
 
 
@@ -207,22 +214,30 @@ def _draw_world(axes: Any, world: arena.Parameters) -> None:
             axes.plot(*corners.T, color=color, linewidth=1.2 if corners.shape[1] == 2 else 0.8, zorder=1)
 
 
-def _from_above(axes: Any, shown: Paths, world: arena.Parameters) -> None:
+def _called(recording: xr.Dataset, agent: int) -> str:
+    """What a picture calls an agent: its number in a flight, its name of tracks."""
+    name = str(recording["individual"].values[agent]) if "individual" in recording.coords else str(agent)
+    if name == f"agent_{agent}":
+        return f"agent {agent}"
+    return f"individual {name}" if name.isdigit() else bounded(name, 30)
+
+
+def _from_above(axes: Any, shown: Paths, world: arena.Parameters, labels: tuple[str, str, str]) -> None:
     left, right, bottom, top = extent(shown, world, view_of(2))
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
     axes.set_aspect("equal")
-    style.dress(axes, "east (m)", "north (m)", grid=False)
+    style.dress(axes, f"{labels[0]} (m)", f"{labels[1]} (m)", grid=False)
 
 
-def _in_space(axes: Any, shown: Paths, world: arena.Parameters) -> None:
+def _in_space(axes: Any, shown: Paths, world: arena.Parameters, labels: tuple[str, str, str]) -> None:
     points = np.concatenate([*(w.corners for w in walls(world)), shown.position.transpose(0, 2, 1).reshape(-1, 3)])
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     span = np.maximum(high - low, 1.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(span / span.max(), zoom=1.1)
-    for name, text in (("x", "east (m)"), ("y", "north (m)"), ("z", "up (m)")):
-        getattr(axes, f"set_{name}label")(text, fontsize=style.TEXT, color=style.INK)
+    for name, text in zip("xyz", labels, strict=True):
+        getattr(axes, f"set_{name}label")(f"{text} (m)", fontsize=style.TEXT, color=style.INK)
         axis = getattr(axes, f"{name}axis")
         axis.pane.set_visible(False)
         axis.set_tick_params(labelsize=style.SMALL)

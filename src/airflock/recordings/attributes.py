@@ -14,7 +14,7 @@ import xarray as xr
 
 from airflock.errors import RecordingError, bounded
 from airflock.faults.registry import KINDS
-from airflock.recordings.layout import check_dataset
+from airflock.recordings.layout import EAST_NORTH_UP, FRAME, check_dataset
 from airflock.scenarios.laws import MODELS
 from airflock.untrusted import from_outside, json_object
 
@@ -56,6 +56,12 @@ def name_of(recording: xr.Dataset) -> str:
     first = files[0].rpartition("/")[2].rpartition(".")[0] or files[0]
     more = f" and {len(files) - 1} more" if len(files) > 1 else ""
     return str(recording.attrs.get("airflock_name") or f"{bounded(first, 60) or 'recording'}{more}")
+
+
+def axes_of(recording: xr.Dataset) -> tuple[str, str, str]:
+    """What to call the axes: east, north, up of flights and of tracks on the ground; else x, y, z, as of a tank."""
+    known = recording.attrs.get("airflock_scenario") or recording.attrs.get(FRAME) == EAST_NORTH_UP
+    return ("east", "north", "up") if known else ("x", "y", "z")
 
 
 def measured_by(recording: xr.Dataset) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from airflock.recordings.differences import velocities
 
 DIMENSIONS = ("time", "space", "keypoint", "individual")
 SHORTEST = 1e-6  # s between frames: the shortest motion step there is
+FRAME, EAST_NORTH_UP = "airflock_frame", "east-north-up"  # of tracks whose axes are known to be those of the ground
 UNITS = {"position": "m", "velocity": "m/s"}
 
 

@@ -5,8 +5,9 @@ same order: what names of the rule stand for, choices and vectors of its records
 come along.
 """
 
+from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping
-from functools import lru_cache
+from threading import Lock
 from typing import Any, NamedTuple, Protocol
 
 from airflock.rules.integers import free
@@ -77,7 +78,28 @@ def _same(known: Any, found: Any) -> bool:
     return known is found or (type(known) is type(found) and isinstance(known, (str, int, float)) and known == found)
 
 
-@lru_cache(maxsize=4096)
-def copies_of(*_: Hashable) -> list[tuple[list[Question], str]]:
-    """Copies of a rule under one name and under all else that its text depends on: questions and text of each."""
-    return []
+class Copies:
+    """Texts that were written for rules, each with the questions that it depends on; the last that were asked for.
+
+    most : rules, each under one name and under all else that its text depends on; each : texts of one of them
+    """
+
+    def __init__(self, most: int = 4096, each: int = 256):
+        self._most, self._each, self._lock = most, each, Lock()
+        self._kept: OrderedDict[Hashable, tuple[tuple[list[Question], str], ...]] = OrderedDict()
+
+    def text(self, of: Hashable, notes: Notes) -> str | None:
+        """The text that was written where all answers were those of now; None if none was."""
+        with self._lock:
+            known = self._kept.get(of, ())
+            if known:
+                self._kept.move_to_end(of)
+        return next((text for asked, text in known if notes.hold(asked)), None)
+
+    def keep(self, of: Hashable, notes: Notes, text: str) -> None:
+        """Keep a text, with what was asked while it was written."""
+        with self._lock:
+            self._kept[of] = (*self._kept.get(of, ())[-self._each + 1 :], (notes.asked, text))
+            self._kept.move_to_end(of)
+            while len(self._kept) > self._most:
+                self._kept.popitem(last=False)

@@ -47,6 +47,8 @@ SPELLINGS = {
 # a digit can go on only after a blank (1 1/s), so that no unit takes digits from its number
 NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s+(?=\S)|(?![\d.]))(.*?)\s*")
 
+DECIMAL_COMMA = re.compile(r",\d+")
+
 
 def factor(unit: str, declared: str) -> float | None:
     """Declared units in one of `unit`, for instance 0.001 for ms where s is declared; None if it is no such unit."""
@@ -97,6 +99,8 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
             return given, "", ""  # no number at all: told with the allowed range by the check of the section
         if not match[2]:
             return None, "", f"{name} = {value!r} {_unitless(match[1], declared)}"
+        if DECIMAL_COMMA.match(match[2]):
+            return None, "", f"{name} = {value}: has a decimal comma; write {match[1]}.{match[2][1:]}"
         value, unit = float(match[1]), match[2]
     if not isinstance(unit, str) or unit in ("", declared.unit):
         if unit and isinstance(unit, str) and unit == declared.unit:

@@ -21,6 +21,8 @@ TRAILS = 40  # nodes, rewritten in turn: a trail is so many frames long
 NARROW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
 WIDE = 0.8
 SETTLING = 2.0  # s; a page that was just opened or pointed elsewhere is not led yet
+BREADTH = 1.2  # width by height from which on a page shows a field beside its panel
+TURNED = 0.02  # by which width by height differs when a telephone is turned, and not when a bar slides away
 FEW = 32  # segments of a kind of lines at first
 STILL = (1.0, 0.0, 0.0, 0.0)
 
@@ -58,7 +60,8 @@ class View:
         self._moving: list[Any] = []
         self._aim: dict[str, Any] = {}
         self._met: dict[int, float] = {}
-        self.server.on_client_connect(self._welcome)
+        self._narrow: dict[int, float] = {}  # by page: width by height, at most BREADTH
+        self.server.on_client_connect(self._meet)
         self._turn = 0
 
     @property
@@ -97,14 +100,26 @@ class View:
         for client in self.server.get_clients().values():
             self._welcome(client)
 
-    def _point(self, camera: Any) -> None:
-        for name, value in self._aim.items():  # the position first: it takes look_at along
+    def _meet(self, client: Any) -> None:
+        """Point the camera of a page that opens, and listen to what it tells of its size."""
+        self._welcome(client)
+        client.camera.on_update(lambda _: self._sized(client))
+
+    def _sized(self, client: Any) -> None:
+        """Point the camera of a page anew that has become narrow, or no longer is: it tells its size as it looks."""
+        narrow = min(client.camera.aspect, BREADTH)
+        if abs(narrow - self._narrow.get(client.client_id, BREADTH)) > TURNED:
+            self._narrow[client.client_id] = narrow
+            self._welcome(client)
+
+    def _point(self, camera: Any, aspect: float = BREADTH) -> None:
+        for name, value in drawn_back(self._aim, aspect).items():  # the position first: it takes look_at along
             setattr(camera, name, value)
 
     def _welcome(self, client: Any) -> None:
         """Point the camera of one page; until the page has answered, what it says of its camera is old."""
         self._met[client.client_id] = time.monotonic()
-        self._point(client.camera)
+        self._point(client.camera, self._narrow.get(client.client_id, BREADTH))
 
     def ground(self, name: str, span: float, height: float, centre: NDArray[Any]) -> None:
         """A grid of 20 by 20 squares."""
@@ -270,3 +285,16 @@ def _round(length: float) -> float:
     """1, 2 or 5 times a power of ten near a length, m."""
     power = 10.0 ** np.floor(np.log10(max(length, 1e-9)))
     return float(min((1.0, 2.0, 5.0, 10.0), key=lambda digit: abs(digit * power - length)) * power)
+
+
+def drawn_back(aim: Mapping[str, Any], aspect: float) -> dict[str, Any]:
+    """An aim of a camera for a page of an aspect, width by height: a narrow one sees as far sideways as others do.
+
+    The field of view is that of the height, so the camera of a telephone draws back until the width shows as much.
+    """
+    if not aim or not 0.0 < aspect < BREADTH:
+        return dict(aim)
+    closer = aspect / BREADTH
+    target = np.asarray(aim["look_at"])
+    place = target + (np.asarray(aim["position"]) - target) / closer
+    return {**aim, "position": tuple(place), "near": aim["near"] / closer, "far": aim["far"] / closer}

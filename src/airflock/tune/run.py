@@ -1,29 +1,27 @@
 """The public door: start, evolve, harden, certify, report; each stage is continued where it was left."""
 
-import math
 import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from airflock.certify.request import campaign_of
+from airflock.asked import Asked, or_else
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.bounds import usual_space
-from airflock.evolve.margins import read_margins
 from airflock.evolve.run import Interrupted
 from airflock.evolve.safe import flights_that_count
-from airflock.metrics.registry import numbers_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.feasible import infeasible
 from airflock.tune.folder import keep_plan, kept_plan
 from airflock.tune.logs import TOLD, FromLogs, Paths, identified
-from airflock.tune.plan import CONFIDENCE, plan_of
+from airflock.tune.plan import plan_of
+from airflock.tune.request import request_of, sound_budget
 from airflock.tune.result import Tuned
 from airflock.tune.stages import Note, Stage, Watch, certificate, hardening, rate_of, search
-from airflock.tune.start import has_walls, start_of
+from airflock.tune.start import start_of
 from airflock.untrusted import own_path
 
 
@@ -102,38 +100,38 @@ def tune(
     airflock.errors.ScenarioError: limit 'r_mim<3 at 1%': r_mim: unknown order parameter; did you mean r_min?
     """
     began = time.monotonic()
-    if not 0.0 < budget < math.inf:
-        raise StudyError(f"budget = {budget:g} s is not positive")
     folder = own_path(out)
-    mine, logs = _mine(folder, scenario, like, heard, settings, trust)
-    start, notes = start_of(mine)
-    plan = kept_plan(folder, start, resume)
-    limits = list(limit) or (plan.limits if plan else []) or usual_limits(start)
-    sure = (plan.confidence if plan else CONFIDENCE) if confidence is None else confidence
-    asked = campaign_of(start, limits, sure)  # refused before anything flies
-    margins = [margin] if isinstance(margin, str) else list(margin) or (plan.margins if plan else [])
-    if faults := read_margins(margins, [start])[1]:
-        raise ScenarioError(faults)
-    telling = flights_that_count([each for each in asked.limits if each.rate is not None], start)
+    parts = Asked()  # all of it is refused before anything flies
+    parts.read(sound_budget, budget)
+    if like is not None:
+        parts.refuse()  # before logs are read, which takes long
+    begun = parts.read(_begun, scenario, like, heard, settings, folder, trust)
+    start = parts.read(lambda found: found.start, begun)
+    plan = parts.read(kept_plan, folder, start, resume)
+    asked = parts.read(request_of, start, limit, margin, confidence, or_else(plan, None))
+    parts.refuse()
+    logs = begun.logs
+    sure, rated = asked.campaign.confidence, [each for each in asked.campaign.limits if each.rate is not None]
     if plan is None:
-        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling, margins=margins)
-        plan = replace(made, limits=limits, confidence=sure, margins=margins)
+        telling = flights_that_count(rated, start)
+        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling, margins=asked.margins)
+        plan = replace(made, limits=asked.limits, confidence=sure, margins=asked.margins)
         keep_plan(folder, start, plan)
-    searched = [each.text for each in asked.limits if each.rate is not None]
+    searched = [each.text for each in rated]
     if logs is not None and not (folder / TOLD).is_file():
         logs.save(folder)
-    short = infeasible(asked, plan)
+    short = infeasible(asked.campaign, plan)
     for line in short:
         if note is not None:
             note(line)
-    notes = [*notes, *usual_space(start)[1], *short]
+    notes = [*begun.notes, *usual_space(start)[1], *short]
     watch = watch or (lambda stage: None)
     try:
         result = search(folder, start, plan, searched, threads, watch)
         if result.dead:
-            raise StudyError(f"{mine.name}: {result.dead}")
-        tuned, steps, why = hardening(folder, plan, searched, threads, trust, watch, margins)
-        shown = certificate(folder, tuned, limits, sure, plan, threads, watch)
+            raise StudyError(f"{start.name}: {result.dead}")
+        tuned, steps, why = hardening(folder, plan, searched, threads, trust, watch, asked.margins)
+        shown = certificate(folder, tuned, asked.limits, sure, plan, threads, watch)
         found = Tuned(
             folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
             {} if logs is None else logs.told,
@@ -147,38 +145,31 @@ def tune(
     return found
 
 
-def _mine(
-    folder: Path,
+class _Begun(NamedTuple):
+    """Where a tuning begins: its scenario, what was set in it, and what logs told if it began with logs."""
+
+    start: Scenario
+    notes: list[str]
+    logs: FromLogs | None
+
+
+def _begun(
     what: Scenario | str | os.PathLike[str] | Paths,
     like: Scenario | str | os.PathLike[str] | None,
     heard: str | os.PathLike[str] | None,
     settings: Mapping[str, Any] | None,
+    folder: Path,
     trust: bool,
-) -> tuple[Scenario, FromLogs | None]:
-    """The scenario to tune, and what logs told of it if it began with logs."""
+) -> _Begun:
     paths = [what] if isinstance(what, (Scenario, str, os.PathLike)) else list(what)
     if like is None:
         if len(paths) != 1 or heard is not None:
             raise ScenarioError(
                 ["tune takes one scenario; for logs, give --like PRESET, the scenario with their law, field and speed"]
             )
-        return variant(paths[0], settings, trust=trust), None
+        return _Begun(*start_of(variant(paths[0], settings, trust=trust)), None)
     files = [path for path in paths if not isinstance(path, Scenario)]
     if not files or len(files) != len(paths):
         raise ScenarioError(["like is given, so give log files, not a scenario"])
     found = identified(folder, files, variant(like, settings, trust=trust), heard)
-    return found.scenario, found
-
-
-def usual_limits(scenario: Scenario) -> list[str]:
-    """Collisions, and contacts where there are walls or obstacles, rarer than once in a hundred flock hours each.
-
-    Raises ScenarioError where distances are not measured.
-    """
-    if "r_min" not in numbers_of(scenario.measures, scenario.metrics):
-        kind = scenario.measures.name
-        raise ScenarioError(
-            [f"{scenario.name}: metrics.kind = {kind!r} has no r_min to limit; say what is to be shown with --limit"]
-        )
-    contacts = ["clearance<0 at 0.01/h"] if has_walls(scenario) else []
-    return [f"r_min<{scenario.metrics.r_coll:g} at 0.01/h", *contacts]
+    return _Begun(*start_of(found.scenario), found)

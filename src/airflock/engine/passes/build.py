@@ -13,7 +13,8 @@ from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
 from airflock.engine.specialise.values import Function
 from airflock.engine.stages.state import FAULT, SCENE
-from airflock.rules.generate import Source, law_mark
+from airflock.rules.generate import Source
+from airflock.rules.rewrite import law_mark
 
 JIT = "@njit(**JIT)"
 ONCE = "@njit(**ONCE)"

@@ -24,7 +24,9 @@ def align(tracks: list[Track], same: bool, findings: Findings) -> bool:
             "agree, and distances between individuals need that; write --same-clock if they do, or --map utc:=COLUMN"
         )
         return False
-    worst = max((to_utc(track) for track in own if track.utc is not None), default=0.0)
+    if len(lacking) == len(own):
+        return True  # all of one file, whose clock is theirs
+    worst = max(to_utc(track) for track in own if track.utc is not None)
     findings.notes.append(f"clocks aligned by GNSS time, largest residual {1e3 * worst:.1f} ms")
     return True
 

@@ -26,6 +26,7 @@ class Layout:
     labels: dict[str, str] = field(default_factory=dict)
     id: str = ""  # a column, or "" where the whole file is one individual
     datum: str = ""
+    ground: bool = False  # whether its axes are known to point east and north
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -68,6 +69,7 @@ def layout(where: str, columns: Sequence[str], options: Options) -> Layout:
         _complete(found, columns, faults)
     if faults:
         raise RecordingError("\n".join(faults))
+    found.ground = bool(options.axes) or headers.split(found.labels.get("x", ""))[0] in headers.EASTWARDS
     _ned(found, options)
     for name in px4.beside(columns, options):
         found.trees[name], found.factors[name], found.labels[name] = expressions.parsed(repr(name), name), 1.0, name

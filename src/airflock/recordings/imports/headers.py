@@ -35,6 +35,7 @@ for _axis, (_place, _speed, _wish, _words) in enumerate(
     ALIASES[_speed] = tuple(f"{p}{w}" for p in ("v", "v_", "vel_", "velocity_", "speed_") for w in _words)
     wishes = ("c", "c_", "cmd_", "cmd_v", "command_", "command_v", "target_v", "target_vel_", "set_v", "sp_v", "tv")
     ALIASES[_wish] = tuple(f"{p}{w}" for p in wishes for w in _words)
+EASTWARDS = frozenset(alias for alias in (*ALIASES["x"], "pe") if alias.split("_")[-1] in ("e", "east", "pe"))
 ALIASES |= {"x": (*ALIASES["x"], "pe"), "y": (*ALIASES["y"], "pn")}  # of ArduPilot's XKF1, beside PD, VN, VE, VD
 DOWN = {"down": "z", "pos_d": "z", "pos_down": "z", "position_down": "z", "vd": "vz", "vel_d": "vz", "vel_down": "vz",
         "pd": "z", "cmd_d": "cz", "cmd_vd": "cz", "cmd_down": "cz"}  # fmt: skip
@@ -67,6 +68,12 @@ def split(header: str) -> tuple[str, str]:
             if plain.endswith(f"_{unit}") and len(plain) > len(unit) + 1:
                 return plain[: -len(unit) - 1], unit
     return plain, ""
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is nothing but a unit, also in brackets."""
+    plain = text.strip().strip("[]()").strip().lower()
+    return plain in {*LENGTHS, *TIMES, *SPEEDS, *ANGLES, *PIXELS}
 
 
 def _plain(text: str) -> str:

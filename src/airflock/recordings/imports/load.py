@@ -33,6 +33,7 @@ from airflock.recordings.imports.track import (
     Track,
     nothing,
 )
+from airflock.recordings.layout import EAST_NORTH_UP, FRAME
 from airflock.untrusted import own_path
 
 
@@ -161,10 +162,19 @@ def load_tracks(
         "source_software": "airflock import", "source_file": ", ".join(sources), "airflock_comparable": int(comparable),
         "airflock_import": json.dumps({"notes": findings.notes}),
     }  # fmt: skip
+    if _on_ground(tracks, options):
+        found.attrs[FRAME] = EAST_NORTH_UP
     if say is not None:
         for note in findings.notes:
             say(note)
     return found
+
+
+def _on_ground(tracks: list[Track], options: Options) -> bool:
+    """Whether the axes are known to point east and north: of a site or an autopilot, or because the user says so."""
+    first = tracks[0]
+    autopilot = Path(first.source).suffix.lower() in registry.OF_AUTOPILOTS
+    return first.origin is not None or first.ground or bool(options.axes) or autopilot
 
 
 def read_tracks(

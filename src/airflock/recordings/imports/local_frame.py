@@ -3,7 +3,10 @@
 import numpy as np
 
 from airflock.recordings.imports import geodesy
+from airflock.recordings.imports.expressions import quoted
 from airflock.recordings.imports.track import COMMAND, GEODETIC, POSITION, VELOCITY, Findings, Track
+
+DEGREES = {"lat": 90.0, "lon": 360.0}  # the largest that there are
 
 
 def to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, findings: Findings) -> None:
@@ -18,11 +21,13 @@ def to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, fi
         return
     if origin is None and placed:
         origin = placed[0].origin
+    wrong: set[str] = set()
     for track in geodetic:
         fault = _degrees_fault(track)
-        if fault:
+        if fault and track.source not in wrong:
+            wrong.add(track.source)
             findings.fault(fault)
-        elif len(track.columns["lat"]):
+        elif not fault and len(track.columns["lat"]):
             if origin is None:
                 origin = _first_fix(track)
                 findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
@@ -35,13 +40,15 @@ def to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, fi
 def _degrees_fault(track: Track) -> str:
     """The first row that is no latitude and longitude, and what to write; empty if all are."""
     lat, lon = track.columns["lat"], track.columns["lon"]
-    bad = np.flatnonzero((np.abs(lat) > 90.0) | (np.abs(lon) > 360.0))
+    beyond = {name: np.abs(track.columns[name]) > most for name, most in DEGREES.items()}
+    bad = np.flatnonzero(beyond["lat"] | beyond["lon"])
     if not bad.size:
         return ""
-    name = track.label("lat" if abs(lat[bad[0]]) > 90.0 else "lon")
+    names = [name for name in DEGREES if beyond[name].any()]
+    ways = " ".join(f'--map "{name}:={quoted(track.label(name))}*1e-7"' for name in names)
     return (
-        f"{track.source}: column {name}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, {lon[bad[0]]:g} is no "
-        f"latitude and longitude; if it is in 1e-7 degrees, write --map 'lat:={track.label('lat')}*1e-7'"
+        f"{track.source}: column {', '.join(map(track.label, names))}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, "
+        f"{lon[bad[0]]:g} is no latitude and longitude; if it is in 1e-7 degrees, write {ways}"
     )
 
 

@@ -26,6 +26,8 @@ READERS: dict[str, tuple[str, Reader]] = {
     ".npz": ("NumPy arrays", arrays.read_npy),
 }
 
+OF_AUTOPILOTS = (".ulg", ".bin", ".tlog", ".log")  # their axes are those of the ground
+
 
 def read(path: Path, options: Options, findings: Findings) -> list[Track]:
     """Tracks of a file; raises RecordingError for what is no known format."""
