@@ -54,6 +54,7 @@ NAMES = {
     "Flown": ("cpu", "Flown"),
     "SCRIPT": ("background_compile", "SCRIPT"),
     "alone": ("compile_lock", "alone"),
+    "never_collected": ("never_collected", "never_collected"),
     "compile_aside": ("background_compile", "compile_aside"),
     "driver_of": ("drivers", "driver_of"),
     "flight_driver": ("drivers", "flight_driver"),

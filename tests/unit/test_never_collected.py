@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from airflock.engine.never_collected import never_collected
+from inside import never_collected
 
 BEGIN = """
 import gc, weakref, airflock

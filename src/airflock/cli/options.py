@@ -189,8 +189,8 @@ def seeds_of(first: int, count: int) -> list[int]:
 
 def sound_flying(device: str, precision: int, scheduler: str | None = None) -> None:
     """Refuse a device that nobody knows, a number of bits that is none, and workers with another device than a cpu."""
-    from airflock.engine import sound_device, sound_precision
     from airflock.executors.cluster import fly_on_their_cpu
+    from airflock.hardware import sound_device, sound_precision
 
     together = Asked()
     together.read(sound_device, device)

@@ -8,12 +8,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from airflock.engine.devices import sound_device as sound_device
     from airflock.engine.flight import Flight as Flight
     from airflock.engine.measuring import measure_frames as measure_frames
     from airflock.engine.plan import Plan as Plan
     from airflock.engine.planning import plan_of as plan_of
-    from airflock.engine.planning import sound_precision as sound_precision
     from airflock.engine.simulate import compile_for as compile_for
     from airflock.engine.simulate import driver_text as driver_text
     from airflock.engine.simulate import fly as fly
@@ -36,8 +34,6 @@ _WHERE = {
     "plan_of": "planning",
     "score_flight": "simulate",
     "score_flights": "simulate",
-    "sound_device": "devices",
-    "sound_precision": "planning",
 }
 __all__ = [*_WHERE]
 

@@ -12,12 +12,12 @@ from airflock.engine.cpu import Flown
 from airflock.engine.passes.flock import owners
 from airflock.engine.plan import Plan
 from airflock.engine.tables import tables
-from airflock.errors import DeviceError, ScenarioError
+from airflock.errors import DeviceError
+from airflock.hardware import sound_device
 from airflock.scenarios.cost import seconds_of, total_seconds
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import cores
 
-DEVICES = ("auto", "cpu", "cuda", "python")
 MOST_TOGETHER = 20_000  # agents whose pairs one block of a GPU can look at in reasonable time
 WORTH = 5.0  # s of work on all cores from which a GPU is worth its start
 # How much longer a block of a GPU takes for one flock than a core does, and how many flocks a multiprocessor flies in
@@ -38,12 +38,6 @@ class Choice:
     def note(self) -> str:
         """One line for a person, empty if there is nothing to say."""
         return f"device auto: {self.device}, {self.why}" if self.why else ""
-
-
-def sound_device(device: str) -> None:
-    """Refuse a device that nobody knows. Raises ScenarioError."""
-    if device not in DEVICES:
-        raise ScenarioError([f"device = {device!r} is none of {', '.join(DEVICES)}"])
 
 
 def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) -> Choice:

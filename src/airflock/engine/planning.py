@@ -10,7 +10,7 @@ from airflock.core.radio import FEW
 from airflock.core.vocabulary import asks
 from airflock.engine.facts import Build, OwnLaw
 from airflock.engine.plan import Plan
-from airflock.errors import ScenarioError
+from airflock.hardware import sound_precision
 from airflock.rules.probe import probe, probe_body, probe_fault, probe_radio, probe_sensor, probe_topology
 from airflock.scenarios.cells import by_cells, has_room, measured_by_cells, takes_all_cores
 from airflock.scenarios.scenario import Scenario
@@ -45,12 +45,6 @@ def plan_of(
         scenario.prepared[key] = _planned(scenario, metrics, build)
     found: Plan = scenario.prepared[key]
     return found
-
-
-def sound_precision(precision: int) -> None:
-    """Refuse a number of bits that is none. Raises ScenarioError."""
-    if precision not in (32, 64):
-        raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
 
 
 def _build(
