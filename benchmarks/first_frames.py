@@ -49,7 +49,14 @@ def seconds(what, cache):
     )
     printed = moved = compiled = float("nan")
     try:
-        address = next(found.group() for line in process.stdout if (found := re.search(r"http://\S+", line)))
+        told = []
+        for line in process.stdout:
+            told.append(line)
+            if found := re.search(r"http://\S+", line):
+                break
+        else:
+            raise SystemExit(f"{what}: no page: {''.join(told).strip()}")
+        address = found.group()
         printed = time.perf_counter() - begun
         socket, frames, line = connected(address), 0, None
         while time.perf_counter() - begun < PATIENCE and not (moved > 0.0 and (compiled > 0.0 or line is None)):

@@ -53,7 +53,7 @@ class Asked:
         if parts is WRONG:
             return WRONG  # type: ignore[return-value]
         found = [self.read(reader, part) for part in parts or ()]
-        return WRONG if WRONG in found else found
+        return WRONG if any(part is WRONG for part in found) else found
 
     def note(self, *faults: str) -> None:
         """Note what else is wrong."""

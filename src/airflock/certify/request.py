@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from airflock.asked import Asked
 from airflock.certify.campaign import Campaign
 from airflock.errors import ScenarioError, StudyError
-from airflock.executors.cluster import fly_on_their_cpu
+from airflock.executors.cluster import fly_on_their_cpu, sound_timeout
+from airflock.hardware import sound_precision
 from airflock.limits.limit import read_all
 from airflock.scenarios.scenario import Scenario
 
@@ -48,13 +49,11 @@ def sound_flights(flights: int | None) -> None:
 
 def sound_flyer(precision: int, device: str) -> None:
     """Refuse a precision and a device on which no certificate flies."""
-    faults = []
-    if precision not in (32, 64):
-        faults.append(f"precision = {precision} is neither 32 nor 64")
+    asked = Asked()
+    asked.read(sound_precision, precision)
     if device not in ("cpu", "python"):
-        faults.append(f"device = {device!r}: a certificate flies on cpu or python")
-    if faults:
-        raise ScenarioError(faults)
+        asked.note(f"device = {device!r}: a certificate flies on cpu or python")
+    asked.refuse()
 
 
 def tolerance_keys(scenario: Scenario, tolerance: bool | Sequence[str]) -> tuple[str, ...]:
@@ -75,7 +74,6 @@ def sound_budget(budget: float) -> None:
 def sound_workers(timeout: float | None, scheduler: str | None, device: str) -> None:
     """Refuse a time in which no flight could fly on a worker, and a scheduler's workers in plain Python."""
     asked = Asked()
-    if timeout is not None and not timeout > 0.0:
-        asked.note(f"timeout = {timeout:g} s is not positive")
+    asked.read(sound_timeout, timeout)
     asked.read(fly_on_their_cpu, scheduler, device)
     asked.refuse()

@@ -89,8 +89,9 @@ def evolve(
     Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
     """
     from airflock.evolve.folder import open_folder
-    from airflock.evolve.request import asked_for, sound_device, sound_method, sound_timeout
+    from airflock.evolve.request import asked_for, sound_device, sound_method
     from airflock.evolve.run import executor_for, on_device, run
+    from airflock.executors.cluster import sound_timeout
 
     asked = options.asked(ctx)
     given = {

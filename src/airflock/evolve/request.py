@@ -21,21 +21,20 @@ from airflock.scenarios.scenario import Scenario
 def asked_for(
     what: Any,
     settings: Mapping[str, Any] | None = None,
-    space: Mapping[str, Any] | None = None,
-    objective: Mapping[str, Any] | None = None,
-    fitness: Own | None = None,
     search_keys: Mapping[str, Any] | None = None,
-    over_scenarios: str | None = None,
     limit: str | Sequence[str] = (),
     *,
-    trust: bool = False,
     fast: bool = False,
     folder: Path | None = None,
+    **others: Any,
 ) -> tuple[Study, str]:
-    """As `study_of`; if a folder is given, what is not asked for is as that holds it. Also a note of what it gave."""
+    """As `study_of`, which takes the others; if a folder is given, what is not asked for is as that holds it.
+
+    Also a note of what the folder gave.
+    """
 
     def ask(changes: Mapping[str, Any] | None, keys: Mapping[str, Any], limits: Any, *, quick: bool = False) -> Study:
-        return study_of(what, changes, space, objective, fitness, keys, over_scenarios, limits, trust=trust, fast=quick)
+        return study_of(what, changes, search_keys=keys, limit=limits, fast=quick, **others)
 
     limits = [limit] if isinstance(limit, str) else list(limit)
     study = ask(settings, search_keys or {}, limits, quick=fast)
@@ -98,12 +97,6 @@ def sound_method(sensitivity: str) -> None:
     """Refuse a method of finding sensitivities that nobody knows."""
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
-
-
-def sound_timeout(timeout: float | None) -> None:
-    """Refuse a time limit in which no flight could fly."""
-    if timeout is not None and not timeout > 0.0:
-        raise StudyError(f"timeout = {timeout:g} s must be above 0")
 
 
 def sound_device(device: str, scheduler: str | None = None) -> None:

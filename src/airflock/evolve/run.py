@@ -12,7 +12,7 @@ from airflock.errors import StudyError
 from airflock.evolve.fitness import Own
 from airflock.evolve.folder import open_folder, remove_unfinished, versions
 from airflock.evolve.pictures import draw
-from airflock.evolve.request import asked_for, sound_device, sound_method, sound_timeout
+from airflock.evolve.request import asked_for, sound_device, sound_method
 from airflock.evolve.result import Result
 from airflock.evolve.search import Watch, search
 from airflock.evolve.sensitivity import sensitivity as sensitivities
@@ -21,7 +21,7 @@ from airflock.evolve.store import Store
 from airflock.evolve.study import Study
 from airflock.evolve.winner import conclude
 from airflock.executors import Executor, Score
-from airflock.executors.cluster import Cluster
+from airflock.executors.cluster import Cluster, sound_timeout
 from airflock.executors.in_process import InProcess
 from airflock.scenarios.scenario import Scenario
 from airflock.untrusted import own_path
@@ -126,8 +126,8 @@ def evolve(
     folder = own_path(out)
     asked = Asked()
     found = asked.read(
-        asked_for, what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust,
-        fast=fast, folder=folder if resume else None,
+        asked_for, what, settings, search_keys, limit, fast=fast, folder=folder if resume else None, space=space,
+        objective=objective, fitness=fitness, over_scenarios=over_scenarios, trust=trust,
     )  # fmt: skip
     asked.read(sound_method, sensitivity)
     asked.read(sound_timeout, timeout)

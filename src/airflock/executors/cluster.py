@@ -39,6 +39,12 @@ def fly_on_their_cpu(scheduler: str | None, device: str) -> None:
         raise StudyError(f"device = {device}: workers of a scheduler fly on their cpu; leave out one of the two")
 
 
+def sound_timeout(timeout: float | None) -> None:
+    """Refuse a time limit in which no flight could fly. Raises StudyError."""
+    if timeout is not None and not timeout > 0.0:
+        raise StudyError(f"timeout = {timeout:g} s must be above 0")
+
+
 class Cluster:
     """Workers of a dask scheduler."""
 
