@@ -17,12 +17,23 @@ def draw(build: Builder) -> noise.Draw:
     if not build.apart or build.plan.sequential:
         return None
     if "draw" not in build.stages:
-        leave = build.slots and not sorted_by_cells(build.plan)
-        made = specialise(build, noise.draw, order=argument("order") if build.slots else Itself(), leave=leave)
-        known = "n, " * leave + "m, " + "order, " * build.slots
-        build.function(
-            f"draw({known}step, stream, world, seed_low, seed_high, u0, u1, u2, u3)", ["apart()", *made.lines],
-            once=True,
-        )  # fmt: skip
+        by_place = not build.slots or _leave(build)
+        _draw(build, "draw", by_place)
+        if build.slots and by_place:
+            _draw(build, "draw_by_number", False)
         build.function("normal(m, a, b, g, h)", ["apart()", *specialise(build, noise.normal).lines], once=True)
-    return noise.Drawn(build.stages["draw"], build.stages["normal"])
+    return noise.Drawn(build.stages["draw"], build.stages.get("draw_by_number"), build.stages["normal"])
+
+
+def _leave(build: Builder) -> bool:
+    """Whether some agents may leave, of whose numbers the others keep the order."""
+    return build.slots and not sorted_by_cells(build.plan)
+
+
+def _draw(build: Builder, name: str, by_place: bool) -> None:
+    """A function that draws words for agents that lie at their own numbers, or for all by their numbers."""
+    made = specialise(build, noise.draw, order=Itself() if by_place else argument("order"))
+    known = "m, " if by_place else "m, order, "
+    build.function(
+        f"{name}({known}step, stream, world, seed_low, seed_high, u0, u1, u2, u3)", ["apart()", *made.lines], once=True
+    )

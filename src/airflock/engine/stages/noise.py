@@ -12,9 +12,14 @@ OUTER = random.OUTER
 
 
 class Drawn(NamedTuple):
-    """`draw` and `normal` as functions of the driver, each once, whoever asks."""
+    """`draw` and `normal` as functions of the driver, each once, whoever asks.
+
+    words     : draws for agents that lie at their own numbers, or for all by their numbers where they are sorted
+    by_number : draws by their numbers where some may have left, of whom the others keep the order; None where none may
+    """
 
     words: Callable[..., Any]
+    by_number: Callable[..., Any] | None
     normal: Callable[..., Any]
 
 
@@ -22,35 +27,36 @@ Draw = Drawn | None  # None: their loops stand where they are asked for
 
 
 def draw(
-    n: int, m: int, order: Row, step: Any, stream: int, world: Any, seed_low: Any, seed_high: Any, u0: Row, u1: Row,
-    u2: Row, u3: Row, *, leave: bool,
+    m: int, order: Row, step: Any, stream: int, world: Any, seed_low: Any, seed_high: Any, u0: Row, u1: Row, u2: Row,
+    u3: Row,
 ) -> None:  # fmt: skip
-    """Four random words of a stream per agent, in four rows.
-
-    order : numbers of the agents
-    leave : whether some may have left, of whose numbers the others keep the order; until then each lies at its own
-            number, and a loop that counts takes a tenth less than one that looks the number up
-    """
-    if leave and order[n - 1] == n - 1:
-        for i in range(m):
-            u0[i], u1[i], u2[i], u3[i] = random.philox(i, step, stream, world, seed_low, seed_high)
-    else:
-        for i in range(m):
-            u0[i], u1[i], u2[i], u3[i] = random.philox(order[i], step, stream, world, seed_low, seed_high)
+    """Four random words of a stream per agent, in four rows; order: numbers of the agents."""
+    for i in range(m):
+        u0[i], u1[i], u2[i], u3[i] = random.philox(order[i], step, stream, world, seed_low, seed_high)
 
 
 def fill(u: Columns, flock: Flock, whole: Any, step: Any, stream: int, m: int, drawn: Draw) -> None:
-    """The same of this world."""
+    """The same of this world.
+
+    Until somebody leaves each agent lies at its own number, and a loop that counts takes a tenth less than one that
+    looks the number up. The two are functions of their own: beside the other, either is compiled to a slower one.
+    """
     if drawn is None:
-        for i in range(m):
-            u[0][i], u[1][i], u[2][i], u[3][i] = random.philox(
-                flock.number[i], step, stream, whole.world, whole.seed_low, whole.seed_high
-            )
-    else:
-        ask(
-            drawn.words, n=whole.agents, m=m, order=flock.number, step=step, stream=stream, world=whole.world,
-            seed_low=whole.seed_low, seed_high=whole.seed_high, u0=u[0], u1=u[1], u2=u[2], u3=u[3],
+        draw(
+            m, flock.number, step, stream, whole.world, whole.seed_low, whole.seed_high, u[0], u[1], u[2], u[3]
         )  # fmt: skip
+    elif drawn.by_number is not None and flock.number[whole.agents - 1] != whole.agents - 1:
+        call(drawn.by_number, u, flock, whole, step, stream, m)
+    else:
+        call(drawn.words, u, flock, whole, step, stream, m)
+
+
+def call(function: Callable[..., Any], u: Columns, flock: Flock, whole: Any, step: Any, stream: int, m: int) -> None:
+    """Call a function of the driver that draws."""
+    ask(
+        function, m=m, order=flock.number, step=step, stream=stream, world=whole.world, seed_low=whole.seed_low,
+        seed_high=whole.seed_high, u0=u[0], u1=u[1], u2=u[2], u3=u[3],
+    )  # fmt: skip
 
 
 def normal(m: int, a: Row, b: Row, g: Row, h: Row) -> None:
