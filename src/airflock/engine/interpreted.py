@@ -141,7 +141,7 @@ def _plainly(plan: Plan) -> Plan:
 def _driver(build: Builder, label: str, exact: bool) -> ModuleType:
     """Module of the stages that a builder holds."""
     text = "\n\n".join([HEAD.format(label=label), *build.functions]) + "\n"
-    text = must_replace(text, drivers.SPAN, "m = n  # no vectors to fill")
+    text = must_replace(text, drivers.span(build.plan), "m = n  # no vectors to fill")
     if build.slots:  # numbers of agents: as a row of plain numbers is seen as integers
         text = must_replace(text, "].view(np.int64)", '].cast("B").cast("q")')
     text = text if exact else _skipping(text)

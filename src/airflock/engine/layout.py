@@ -62,12 +62,13 @@ def layout_of(
     shaped: dict[str, tuple[tuple[int, ...], Any]] = {
         "held": ((HELD,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": (gusts, real),
         "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
-        "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
-        "past": ((ring, plan.in_ring, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),
-        "labels": ((2, m), label), "there": ((2,), np.float64),
+        "shapes": ((shapes[0] if later else 0, shapes[1]), real), "words": ((4, m), np.uint32),
+        "near": ((NEAR,), np.int64), "labels": ((2, m), label), "there": ((2,), np.float64),
     }  # fmt: skip
     shaped |= {name: (array.shape, array.dtype) for name, array in beginnings.items()}
     shaped |= {name: (size, real) for name, size in kept}
+    # last, since faults and agents that differ add to them: what lies before lies to their first rows as ever
+    shaped |= {"work": ((count, m), real), "past": ((ring, plan.in_ring, m), real)}
     places, end = [], 0
     for name, (shape, kind) in shaped.items():
         places.append((name, end, shape, np.dtype(kind)))

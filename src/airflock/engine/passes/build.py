@@ -12,12 +12,14 @@ from airflock.engine import vectors
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
 from airflock.engine.specialise.values import Function
-from airflock.engine.stages.state import FAULT, SCENE
+from airflock.engine.stages.state import FAULT, NUMBER, SCENE
 from airflock.rules.generate import Source
 from airflock.rules.rewrite import law_mark
 
 JIT = "@njit(**JIT)"
 ONCE = "@njit(**ONCE)"
+# what names of rows begin with that only faults and agents that differ need
+FEW = (FAULT, NUMBER, "unhindered_", "reach_", "clock", "sent_clock")
 
 
 class Builder:
@@ -30,7 +32,7 @@ class Builder:
     by_pairs : whether each pair of agents draws its random words by itself, not four receivers at once
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
     drifts   : whether agents may be watched by how fast they are beside the drift of the flock
-    trails   : whether rows of faults come last in the work table
+    trails   : whether rows of faults and of agents that differ come last in the work table
     drops    : whether the compiler drops a sum over agents that nobody reads
     """
 
@@ -60,16 +62,16 @@ class Builder:
     def row(self, name: str) -> int:
         """Index of a row of the work table, from its end where it is negative.
 
-        Unperturbed perception shares the rows of the truth. Rows of faults and of who lies where come last, so that
-        the others lie to each other as they do in a flight without: loops take a fortieth longer where rows that are
-        written lie a page from rows that are read.
+        Unperturbed perception shares the rows of the truth. Rows of faults, of agents that differ and of who lies where
+        come last, so that the others lie to each other as they do in a flight without: loops take a fortieth longer
+        where rows that are written lie a page from rows that are read.
         """
         plan = self.plan
         if not plan.believes and name in {f"m{a}" for a in "xyz"} | {f"mv{a}" for a in "xyz"}:
             name = name[1:]
         if not plan.told and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
             name = name[1:]
-        if self.trails and (name.startswith(FAULT) or (name == "order" and not plan.grid)):
+        if self.trails and (name.startswith(FEW) or (name == "order" and not plan.grid)):
             return self.last.setdefault(name, -1 - len(self.last))
         return self.first.setdefault(name, len(self.first))
 

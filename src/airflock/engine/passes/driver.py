@@ -61,11 +61,6 @@ MADE: dict[str, Callable[[Builder], None]] = {  # what makes the function of eac
 CALLED = ("snapshot", "receive", "meet")  # made whatever is due: others call them, or a kernel holds them
 
 
-# Loops over agents take 32 at a time (four vectors of eight); the rest runs one by one, at three times the cost each. A
-# short rest is left as it is (5 % of a flight of 100), a long one is filled up with agents that are far away.
-SPAN = "m = n if n % 32 <= 10 else work.shape[1]"
-
-
 def flight(plan: Plan) -> str:
     """Text of the driver that flies one world: function `advance(first, last, half, held, ...)`.
 
@@ -125,7 +120,18 @@ def make(build: Builder) -> None:
 
 def _agents(build: Builder) -> list[str]:
     """Lines that count agents, and those with the ones that only fill up vectors."""
-    return [*build.whole("agents"), "n = agents", SPAN]
+    return [*build.whole("agents"), "n = agents", span(build.plan)]
+
+
+def span(plan: Plan) -> str:
+    """Line that counts lanes: of agents, and of what fills up vectors.
+
+    Loops take 32 agents at a time (four vectors of eight); the rest runs one by one, at three times the cost each. A
+    short rest is left as it is (5 % of a flight of 100), a long one is filled up with agents that are far away. So is
+    any where numbers differ among agents, of which each would be spread over another vector before the rest.
+    """
+    varied = any(letter for each in plan.every for letter, _ in each.varied)
+    return "m = work.shape[1]" if varied and not plan.sequential else "m = n if n % 32 <= 10 else work.shape[1]"
 
 
 def _sampled(plan: Plan) -> dict[str, tuple[list[tuple[int, str]], int]]:

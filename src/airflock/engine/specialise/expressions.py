@@ -216,8 +216,8 @@ class Expressions:
         if called is words.ask:
             return self._asked(node, scope)
         arguments = self._items(node.args, scope)
-        if called in (words.between, words.beyond):
-            return replace(arguments[0], within=tuple(arguments[1:]), outside=called is words.beyond)
+        if called is words.between:
+            return replace(arguments[0], within=tuple(arguments[1:]))
         if called is sum:
             total, *terms = [self.printed(term, node, scope) for term in arguments[0]]
             for term in terms:

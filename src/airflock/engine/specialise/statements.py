@@ -191,22 +191,14 @@ class Statements(Expressions):
         return [ast.For(self.target(node.target, scope), over, self.block(node.body, scope), [], lineno=0)]
 
     def cut(self, over: Loop, within: tuple[ast.expr, ast.expr], target: ast.Name, done: list[ast.stmt]) -> ast.stmt:
-        """A loop over some of the lanes; the others are two ranges, for which there is one text."""
-        first, end = within
-        bound, lane, zero = ast.Name(over.bound, LOAD), ast.Name(target.id, LOAD), ast.Constant(0)
+        """A loop over some of the lanes."""
+        lane = ast.Name(target.id, LOAD)
         if not self.build.ranges:
+            first, end = within
             inside: list[ast.expr] = [ast.Compare(first, [ast.LtE()], [lane]), ast.Compare(lane, [ast.Lt()], [end])]
-            test: ast.expr = ast.BoolOp(ast.And(), inside)
-            test = ast.UnaryOp(ast.Not(), test) if over.outside else test
-            return _loop(target, [bound], [ast.If(test, done, [])])
-        ends = [first, end]
-        if over.outside:
-            part = ast.Name("part", LOAD)
-            ends = [ast.IfExp(part, end, zero), ast.IfExp(part, bound, first)]
+            return _loop(target, [ast.Name(over.bound, LOAD)], [ast.If(ast.BoolOp(ast.And(), inside), done, [])])
         # a lane that cannot be negative is not asked whether it counts from a row's end: else no loop is a vector's
-        ends = [ast.Call(ast.Name("u64", LOAD), [each], []) for each in ends]
-        inner = _loop(target, ends, done)
-        return _loop(ast.Name("part", STORE), [ast.Constant(2)], [inner]) if over.outside else inner
+        return _loop(target, [ast.Call(ast.Name("u64", LOAD), [each], []) for each in within], done)
 
     def by_law(self, over: Loop, node: ast.For, scope: Scope) -> list[ast.stmt]:
         """What a loop does for an agent; where laws differ, for an agent of this one."""

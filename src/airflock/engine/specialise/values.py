@@ -23,14 +23,13 @@ class Loop:
     """A loop over all agents (`agents`, `lanes`: in turn the one agent that is due) or over the others of one.
 
     law    : the loop is only over those who fly by this law
-    within : and over those from one lane up to another, or where it is `outside`, over the others
+    within : and over those from one lane up to another
     """
 
     bound: str
     agents: bool
     law: int | None = None
     within: tuple[ast.expr, ast.expr] | None = None
-    outside: bool = False
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,6 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Axes, Flock
 from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, ask, choose, least, most, real
 
-BLOCK = 32  # lanes that loops take at a time (`passes.driver.SPAN`)
-
 
 def lasts(i: int, kind: Fault, time: Any, flock: Flock, numbers: Any) -> Any:
     """Whether agent i suffers from a kind of fault at a time (s); half a step is as good as none."""
@@ -22,11 +20,11 @@ def lasts(i: int, kind: Fault, time: Any, flock: Flock, numbers: Any) -> Any:
     )
 
 
-def struck(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, m: int, *, plan: Plan) -> tuple[int, int]:
+def struck(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan: Plan) -> tuple[int, int]:
     """Lanes among which all lie who suffer from a fault of motion at a time (s) or later: the first, and the end.
 
-    They are whole blocks, as loops take lanes, so that nobody who is in none is flown otherwise. There may be more of
-    them than need be: who suffers no longer by a step, whatever the rounding, or lies between two who do.
+    There may be more of them than need be: who suffers no longer by a step, whatever the rounding, or lies between two
+    who do.
     """
     lowest = LIMIT
     highest = ZERO
@@ -40,8 +38,8 @@ def struck(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, m: int, 
     first = 0
     end = 0
     if highest > HALF:
-        first = int(lowest) // BLOCK * BLOCK
-        end = min((int(highest) + BLOCK - 1) // BLOCK * BLOCK, m)
+        first = int(lowest)
+        end = int(highest)
     return first, end
 
 
@@ -134,8 +132,9 @@ def overrule(agents: Iterable[int], flock: Flock, numbers: Any, time: float, *, 
 
 def hinder(i: int, moved: Any, kind: Fault, time: Any, flock: Flock, numbers: Any, *, plan: Plan) -> Any:
     """What the rule `motion` of a kind of fault makes of a motion step, m/s."""
+    before = flock.unhindered
     return ask(
-        kind.motion, vx=flock.velocity[X][i], vy=flock.velocity[Y][i], vz=flock.velocity[Z][i],
+        kind.motion, vx=before[X][i], vy=before[Y][i], vz=before[Z][i],
         cx=flock.command[X][i], cy=flock.command[Y][i], cz=flock.command[Z][i],
         nx=moved[X], ny=moved[Y], nz=moved[Z], dt=numbers.c.dt, **about(i, kind, time, flock, plan=plan),
     )  # fmt: skip

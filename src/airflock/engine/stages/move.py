@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from airflock.core.fault import Fault
 from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import beside
 from airflock.engine.stages.faults import hinder, lasts
@@ -17,7 +16,6 @@ from airflock.engine.stages.words import (
     aliases,
     ask,
     between,
-    beyond,
     choose,
     fields,
     integer,
@@ -36,23 +34,28 @@ def respond(
     lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
     hurt_first: int, hurt_end: int, *, plan: Plan,
 ) -> None:  # fmt: skip
-    """Velocities by the rule of the body and, among those of whom anybody suffers from any, by those of its faults."""
+    """Velocities by the rule of the body and then, among those of whom anybody suffers from any, by its faults."""
+    v = flock.velocity
     faults = plan.suffers("motion")
-    if faults and plan.sequential:
-        accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=faults)
-    elif faults:
-        sound, hurt = beyond(lanes, hurt_first, hurt_end), between(lanes, hurt_first, hurt_end)
-        accelerate(sound, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=())
-        accelerate(hurt, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=faults)
-    else:
-        accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=())
+    hurt = () if not faults else lanes if plan.sequential else between(lanes, hurt_first, hurt_end)
+    for i in hurt:
+        for a in range(plan.dimensions):
+            flock.unhindered[a][i] = v[a][i]
+    accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
+    for i in hurt:
+        t = (v[X][i], v[Y][i], v[Z][i])
+        for kind in faults:
+            on = lasts(i, kind, time, flock, numbers)
+            s = hinder(i, t, kind, time, flock, numbers, plan=plan)
+            t = (choose(on, s[X], t[X]), choose(on, s[Y], t[Y]), choose(on, s[Z], t[Z]))
+        for a in range(plan.dimensions):
+            v[a][i] = t[a]
 
 
 def accelerate(
-    lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
-    *, plan: Plan, faults: tuple[Fault, ...],
-) -> None:  # fmt: skip
-    """Velocities by the rule of the body, and by those of these faults."""
+    lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
+) -> None:
+    """Velocities by the rule of the body."""
     v, command = flock.velocity, flock.command
     for i in lanes:
         t = ask(
@@ -62,13 +65,6 @@ def accelerate(
             memory=column_of(i, plan.body.Memory, flock.body), dt=numbers.c.dt, wing=numbers.wing,
             b=numbers_of(i, "b", flock, numbers, plan=plan),
         )  # fmt: skip
-        for kind in faults:
-            on = lasts(i, kind, time, flock, numbers)
-            s = hinder(i, t, kind, time, flock, numbers, plan=plan)
-            t = (
-                choose(on, s[X], t[X]), choose(on, s[Y], t[Y]), choose(on, s[Z], t[Z]),
-                *([t[3]] if plan.body.Memory else []),
-            )  # fmt: skip
         for a in range(plan.dimensions):
             v[a][i] = t[a]
         for c in fields(plan.body.Memory):

@@ -11,6 +11,7 @@ from airflock.engine.stages.words import NOTHING, Itself, fields
 
 Row = Any  # one number per agent: row[i]
 FAULT = "fault_"  # what names of rows with numbers of a fault begin with
+NUMBER = "number_"  # those of rows with a number that differs among agents
 # The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts
 # (rays cast at this decision, whether positions before are known); goals, aim (where the goal is, its number) and
 # reached (time of each, s; -1 before); later (bounds, time and number of each shape that is yet to appear; time -1 once
@@ -102,6 +103,7 @@ class Flock:
     heading: Axes = axes("head_")  # unit vector
     excursion: Row = row("excursion_")  # how far it is outside the arena or inside of what stands in it, m
     before: Axes = axes("before_")  # where it was when it was last looked at, m
+    unhindered: Axes = axes("unhindered_v")  # velocity before a motion step, m/s
     touches: Row = row("touches_")  # whether it touched the scene since then, 1 or 0
     rays: Row = row("rays_")  # rays that it cast at its last decision
     errors: Columns = columns("e")  # normal numbers of the sensors
@@ -155,7 +157,7 @@ def kept_row(kind: str, asked: str, what: str) -> str:
 
 def own_row(letter: str, name: str) -> str:
     """Name of the row with a number that differs among agents; without a letter it is of no record."""
-    return f"number_{letter}_{name}" if letter else name
+    return f"{NUMBER}{letter}_{name}" if letter else name
 
 
 def column_of(i: int, record: Any, rows: Columns) -> Any:

@@ -101,11 +101,6 @@ def between(lanes: Any, first: Any, end: Any) -> Any:
     return [i for i in lanes if first <= i < end]
 
 
-def beyond(lanes: Any, first: Any, end: Any) -> Any:
-    """The others."""
-    return [i for i in lanes if not first <= i < end]
-
-
 def vector() -> Any:
     """A local vector, zero along each axis that is not set; in a driver one variable for each that is."""
     return [ZERO, ZERO, ZERO]
