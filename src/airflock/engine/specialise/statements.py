@@ -13,7 +13,6 @@ from airflock.engine.specialise.dead import written
 from airflock.engine.specialise.expressions import LOCALS, STAGES, Expressions
 from airflock.engine.specialise.values import (
     LOAD,
-    STORE,
     Bundle,
     Components,
     Loop,
