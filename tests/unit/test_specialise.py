@@ -117,7 +117,7 @@ def test_a_fault_names_file_line_and_stage(stage, said):
 def test_loops_that_search_stay_loops_and_may_be_left():
     found = made(sought)
     assert found.lines == [
-        "clock = work[0]", "rays_ = work[1]", "for attempt in range(1000):", "    while clock[i] > ZERO:",
+        "clock = work[-1]", "rays_ = work[0]", "for attempt in range(1000):", "    while clock[i] > ZERO:",
         "        clock[i] = clock[i] - attempt", "    if rays_[i] > ZERO:", "        return attempt",
     ]  # fmt: skip
     assert found.answer == "-1"

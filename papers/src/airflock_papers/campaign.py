@@ -42,7 +42,7 @@ SEEDS = {
     ("vasarhelyi_2018", "limits"): 40,
     ("vasarhelyi_2018", "tuning"): 40,
     ("vasarhelyi_2018", "real"): 10,
-    ("zapotecatl_2016", "sequential"): 6,
+    ("zapotecatl_2016", "sequential"): 15,
     ("kidger", "alone"): 10,
     ("kidger", "conduct"): 10,
     ("kidger", "tuning"): 40,
