@@ -43,11 +43,11 @@ def move(build: Builder) -> None:
     plan = build.plan
     struck = plan.struck and build.ranges
     if struck:
-        found = specialise(build, faults.struck)
+        found = specialise(build, faults.struck, kept=not plan.edge)
         build.function("struck(time, m, row, work)", found.lines, f"return {found.answer}")
     made = specialise(
         build, motion.move, noise=Call(f"noise({NOISE})"), gusts=Call(f"gusts({GUSTS})"),
-        watched=bool(watched(plan)) or not build.drifts, drifts=drifts(build),
+        watched=bool(watched(plan)) or not build.drifts, drifts=drifts(build), kept=struck and not plan.edge,
     )  # fmt: skip
     parts: dict[str, tuple[str, list[str]]] = {}
     if build.wants(plan.body.move, "move", "gx", "gy", "gz"):

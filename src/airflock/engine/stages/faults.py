@@ -20,12 +20,17 @@ def lasts(i: int, kind: Fault, time: Any, flock: Flock, numbers: Any) -> Any:
     )
 
 
-def struck(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan: Plan) -> tuple[int, int]:
+def struck(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan: Plan, kept: bool) -> tuple[int, int]:
     """Lanes among which all lie who suffer from a fault of motion at a time (s) or later: the first, and the end.
 
     There may be more of them than need be: who suffers no longer by a step, whatever the rounding, or lies between two
     who do.
+
+    kept : whether velocities are kept for a step's faults until this is asked again; else each step copies its own
     """
+    for a in range(plan.dimensions) if kept else ():
+        for i in lanes:
+            flock.before_step[a][i] = flock.velocity[a][i]
     lowest = LIMIT
     highest = ZERO
     for i in lanes:
@@ -132,7 +137,7 @@ def overrule(agents: Iterable[int], flock: Flock, numbers: Any, time: float, *, 
 
 def hinder(i: int, moved: Any, kind: Fault, time: Any, flock: Flock, numbers: Any, *, plan: Plan) -> Any:
     """What the rule `motion` of a kind of fault makes of a motion step, m/s."""
-    before = flock.unhindered
+    before = flock.before_step
     return ask(
         kind.motion, vx=before[X][i], vy=before[Y][i], vz=before[Z][i],
         cx=flock.command[X][i], cy=flock.command[Y][i], cz=flock.command[Z][i],

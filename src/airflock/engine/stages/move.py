@@ -32,15 +32,15 @@ def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
 
 def respond(
     lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
-    hurt_first: int, hurt_end: int, *, plan: Plan,
+    hurt_first: int, hurt_end: int, *, plan: Plan, kept: bool,
 ) -> None:  # fmt: skip
     """Velocities by the rule of the body and then, among those of whom anybody suffers from any, by its faults."""
     v = flock.velocity
     faults = plan.suffers("motion")
     hurt = () if not faults else lanes if plan.sequential else between(lanes, hurt_first, hurt_end)
-    for i in hurt:
+    for i in () if kept else hurt:
         for a in range(plan.dimensions):
-            flock.unhindered[a][i] = v[a][i]
+            flock.before_step[a][i] = v[a][i]
     accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
     for i in hurt:
         t = (v[X][i], v[Y][i], v[Z][i])
@@ -50,6 +50,8 @@ def respond(
             t = (choose(on, s[X], t[X]), choose(on, s[Y], t[Y]), choose(on, s[Z], t[Z]))
         for a in range(plan.dimensions):
             v[a][i] = t[a]
+        for a in range(plan.dimensions) if kept else ():
+            flock.before_step[a][i] = t[a]
 
 
 def accelerate(
@@ -74,7 +76,7 @@ def accelerate(
 def move(
     agents: Iterable[int], lanes: Iterable[int], flock: Flock, numbers: Any, step: int, n: int,
     noise: Callable[[], None], gusts: Callable[[], Any], held: Any, hurt_first: int, hurt_end: int,
-    *, plan: Plan, watched: bool, drifts: bool,
+    *, plan: Plan, watched: bool, drifts: bool, kept: bool,
 ) -> Any:  # fmt: skip
     """Velocities by the body, positions by the velocity before or after; returns the largest squared speed.
 
@@ -82,6 +84,7 @@ def move(
     watched              : whether somebody wants to know that speed; else it is 0
     drifts, held         : whether it is that beside the drift of the flock (`stages.approach`)
     hurt_first, hurt_end : lanes of those among whom somebody suffers from a fault of motion (`stages.faults.struck`)
+    kept                 : whether their velocities are kept from step to step, so that no step copies them
     """
     x, v = flock.position, flock.velocity
     g = aliases()
@@ -96,7 +99,7 @@ def move(
     if plan.windy:
         wx, wy, wz = gusts()
     if plan.integration != "old":
-        respond(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan)
+        respond(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
     fastest = ZERO
     for i in lanes if watched else ():  # whole vectors, of which some lanes have no agent
         if drifts:
@@ -108,7 +111,7 @@ def move(
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
     if plan.integration == "old":
-        respond(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan)
+        respond(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
     if plan.edge:
         for i in agents:
             for a in range(plan.dimensions):

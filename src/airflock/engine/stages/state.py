@@ -103,7 +103,7 @@ class Flock:
     heading: Axes = axes("head_")  # unit vector
     excursion: Row = row("excursion_")  # how far it is outside the arena or inside of what stands in it, m
     before: Axes = axes("before_")  # where it was when it was last looked at, m
-    unhindered: Axes = axes("unhindered_v")  # velocity before a motion step, m/s
+    before_step: Axes = axes("unhindered_v")  # velocity before a motion step, of whoever may suffer from a fault, m/s
     touches: Row = row("touches_")  # whether it touched the scene since then, 1 or 0
     rays: Row = row("rays_")  # rays that it cast at its last decision
     errors: Columns = columns("e")  # normal numbers of the sensors
