@@ -16,6 +16,7 @@ from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.stages.approach import BEGUN, ENDED, GAP
 from airflock.engine.stages.state import own_row
 from airflock.engine.tables import Tables
+from airflock.scenes.tree import AWAY
 
 AGENTS, RING = WHOLE.index("agents"), WHOLE.index("ring")
 
@@ -40,6 +41,9 @@ class FlightMemory:
         self.buffer, self.arrays = layout.filled()
         own = self.arrays
         own["row"][:], own["whole"][:] = tables.row, tables.whole
+        for c, axis in enumerate(plan.axes):  # a driver that fills up vectors may go on where one that does not began
+            own["work"][driver.ROWS[axis], agents:] = AWAY
+            own["past"][:, c, agents:] = AWAY
         for name, begin in plan.beginnings.items():
             if name in driver.ROWS:
                 own["work"][driver.ROWS[name]] = begin

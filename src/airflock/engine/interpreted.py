@@ -123,13 +123,13 @@ def flight_driver(plan: Plan, exact: bool = False) -> ModuleType:
 
 @cache
 def _flight_driver(plan: Plan, exact: bool) -> ModuleType:
-    return _driver(drivers.stages(_plainly(plan), lenient=True), plan.model.name, exact)
+    return _driver(drivers.stages(_plainly(plan), lenient=True), plan.model.name, drivers.span(plan), exact)
 
 
 @cache
 def replay_driver(plan: Plan) -> ModuleType:
     """Interpreted driver that measures recordings."""
-    return _driver(drivers.replay_stages(_plainly(plan)), "recordings", False)
+    return _driver(drivers.replay_stages(_plainly(plan)), "recordings", drivers.SPAN, False)
 
 
 def _plainly(plan: Plan) -> Plan:
@@ -138,10 +138,10 @@ def _plainly(plan: Plan) -> Plan:
     return plan
 
 
-def _driver(build: Builder, label: str, exact: bool) -> ModuleType:
-    """Module of the stages that a builder holds."""
+def _driver(build: Builder, label: str, lanes: str, exact: bool) -> ModuleType:
+    """Module of the stages that a builder holds; lanes : its line that counts those which fill up vectors."""
     text = "\n\n".join([HEAD.format(label=label), *build.functions]) + "\n"
-    text = must_replace(text, drivers.span(build.plan), "m = n  # no vectors to fill")
+    text = must_replace(text, lanes, "m = n  # no vectors to fill")
     if build.slots:  # numbers of agents: as a row of plain numbers is seen as integers
         text = must_replace(text, "].view(np.int64)", '].cast("B").cast("q")')
     text = text if exact else _skipping(text)

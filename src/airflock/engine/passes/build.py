@@ -18,7 +18,7 @@ from airflock.rules.rewrite import law_mark
 
 JIT = "@njit(**JIT)"
 ONCE = "@njit(**ONCE)"
-# what names of rows begin with that only faults and agents that differ need
+# what names of rows begin with that only numbers that differ need, and faults of motion, radio and clock
 FEW = (FAULT, NUMBER, "unhindered_", "reach_", "clock", "sent_clock")
 
 

@@ -61,6 +61,11 @@ MADE: dict[str, Callable[[Builder], None]] = {  # what makes the function of eac
 CALLED = ("snapshot", "receive", "meet")  # made whatever is due: others call them, or a kernel holds them
 
 
+# Loops over agents take 32 at a time (four vectors of eight); the rest runs one by one, at three times the cost each. A
+# short rest is left as it is (5 % of a flight of 100), a long one is filled up with agents that are far away.
+SPAN = "m = n if n % 32 <= 10 else work.shape[1]"
+
+
 def flight(plan: Plan) -> str:
     """Text of the driver that flies one world: function `advance(first, last, half, held, ...)`.
 
@@ -98,7 +103,10 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
         ", values, sums, frames" + (", scratch" if flock.owners(plan) else "") + (", cells" if plan.grid else "")
     )
     build.function(
-        f"advance(first, last, half, held, {arguments})", _agents(build), made.lines, f"return {made.answer}"
+        f"advance(first, last, half, held, {arguments})",
+        _agents(build, span(plan)),
+        made.lines,
+        f"return {made.answer}",
     )
     return build
 
@@ -118,20 +126,18 @@ def make(build: Builder) -> None:
             one(build.laws[int(law)] if name in BY_LAW else build)
 
 
-def _agents(build: Builder) -> list[str]:
+def _agents(build: Builder, lanes: str) -> list[str]:
     """Lines that count agents, and those with the ones that only fill up vectors."""
-    return [*build.whole("agents"), "n = agents", span(build.plan)]
+    return [*build.whole("agents"), "n = agents", lanes]
 
 
 def span(plan: Plan) -> str:
-    """Line that counts lanes: of agents, and of what fills up vectors.
+    """Line of a flight that counts lanes: any rest is filled up where numbers differ among agents.
 
-    Loops take 32 agents at a time (four vectors of eight); the rest runs one by one, at three times the cost each. A
-    short rest is left as it is (5 % of a flight of 100), a long one is filled up with agents that are far away. So is
-    any where numbers differ among agents, of which each would be spread over another vector before the rest.
+    Else each number would be spread over another vector before the rest, for each agent that meets the others.
     """
     varied = any(letter for each in plan.every for letter, _ in each.varied)
-    return "m = work.shape[1]" if varied and not plan.sequential else "m = n if n % 32 <= 10 else work.shape[1]"
+    return "m = work.shape[1]" if varied and not plan.sequential else SPAN
 
 
 def _sampled(plan: Plan) -> dict[str, tuple[list[tuple[int, str]], int]]:
@@ -172,7 +178,7 @@ def replay_stages(plan: Plan) -> Builder:
     build.function(
         "measure_frames(first, row, whole, edges, spans, scene, work, memory, labels, values, sums, frames, series,"
         " frame_period" + (", scratch" if flock.owners(plan) else "") + (", cells)" if plan.grid else ")"),
-        _agents(build),
+        _agents(build, SPAN),
         made.lines,
         f"return {made.answer}",
     )

@@ -38,7 +38,7 @@ def move(build: Builder) -> None:
 
     They stand in its own lines, which compile to the same bits as ever; where agents move in turn they are functions.
     Where rows of faults are read beside those of states, all are told to lie apart: else those that are written are
-    compared with every other at every step. Bodies with a memory keep their bits so (decision 0116).
+    compared with every other at every step. Not where a body remembers, as of decision 0116.
     """
     plan = build.plan
     struck = plan.struck and build.ranges

@@ -17,7 +17,7 @@ from airflock.engine.stages.words import FAR, ONE, ZERO, between, choose, intege
 # places in `held` (`passes.driver.flight` says what each is); DRIFT is the first of three
 TRAVELLED, GAP, CALM, ENDED, BEGUN, DRIFT, PACE, REACH = 0, 1, 2, 3, 4, 5, 8, 9
 HELD = 10
-BLOCK = 32  # lanes that loops take at a time (`passes.driver.span`)
+BLOCK = 32  # lanes that loops take at a time (`passes.driver.SPAN`)
 SLACK = 0.01  # m
 ROUNDING = 5e-7  # how much nearer two agents come in a step by rounding in single precision, for each m from the origin
 
