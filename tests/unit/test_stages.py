@@ -170,7 +170,7 @@ class World:
             range(n), range(n), flock, numbers, step, n,
             lambda: noise.noise(flock, whole, step, n, plan=plan),
             lambda: gusts.gusts(numbers, whole, step, state["gust"], plan=plan), state["held"],
-            0, 0, plan=plan, watched=True, drifts=True,  # nobody suffers
+            0, 0, plan=plan, watched=True, drifts=True, kept=False,  # nobody suffers
         )  # fmt: skip
         return state
 
