@@ -116,7 +116,7 @@ def of_optimum(
     one = statistics.one
     return [
         Measured(f"s1.mean.{v}ms", "fitness", at, statistics.mean(ours["fitness"])),
-        Measured(f"s1.soft.{v}ms", "r0_rep over r_min_mean", at, one(p["r0_rep"] / gap), apart),
+        Measured(f"s1.soft.{v}ms", "r0_rep over r_min_mean", at, one(p["r0_rep"] / gap, len(ours)), apart),
         Measured(f"s1.long.{v}ms", "r0_frict over range", at, one(p["r0_frict"] / reach), slack),
         Measured(f"s1.twice.{v}ms", "v_shill over v_flock", at, one(p["v_shill"] / v)),
         *(
