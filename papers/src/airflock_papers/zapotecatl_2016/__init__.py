@@ -67,6 +67,8 @@ def fly(wanted: Sequence[str], flights: Flights) -> Flown:
         measured += verdicts.measured(part, found[part], published().drop(COARSE_OFF if flights.quick else []))
         if part == "sequential" and not flights.quick:
             measured.append(verdicts.by_eq_18(_fly_by_eq_18(flights)))
+            settled = verdicts.seldom(_fly_seldom(flights))
+            measured = [settled if each.id == settled.id else each for each in measured]
     return measured, found
 
 
@@ -83,6 +85,15 @@ def _fly_by_eq_18(flights: Flights) -> pd.DataFrame:
     r_s = verdicts.DENSE
     scenario = load("zapotecatl_2016/best", {"model.r_s": r_s / 100, "model.r_a": 0.0, "metrics.count": "each"})
     return flights.score("Collisions by Eq. 18", {(r_s, 0): scenario}, flights.count(15, 2))
+
+
+def _fly_seldom(flights: Flights) -> pd.DataFrame:
+    """More flights where collisions are the fewest: a tenth of them has six tenths of all contacts."""
+    at, _ = verdicts.MINIMA["f_collision"]
+    scenario = load(
+        "zapotecatl_2016/best", {"model.r_s": at[0] / 100, "model.r_a": at[1] / 100, "metrics.count": "program"}
+    )
+    return flights.score("Fewest collisions", {at: scenario}, flights.count(120, 2))
 
 
 PAPER = Paper(

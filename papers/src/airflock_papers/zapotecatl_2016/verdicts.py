@@ -88,6 +88,15 @@ def minimum(column: str, at: tuple[int, int], value: float, flown: pd.DataFrame,
     ]
 
 
+def seldom(flown: pd.DataFrame) -> Measured:
+    """The value of the minimum of collisions by as many flights as settle it."""
+    at, value = MINIMA["f_collision"]
+    found = statistics.mean(flown.loc[at, "f_collision"])
+    p = statistics.welch(found, value, found.sd or 0.0, FLIGHTS)
+    note = f"median {flown.loc[at, 'f_collision'].median():.3g}"
+    return Measured("minimum.f_collision.value", "f_collision", _at(at), found, note, p)
+
+
 def trend(column: str, axis: int, sign: int, flown: pd.DataFrame) -> Measured:
     """Share of the steps from one radius to the next that are wrong beyond the 95 % interval, or change nothing."""
     places = sorted(set(flown.index.droplevel(2)))
