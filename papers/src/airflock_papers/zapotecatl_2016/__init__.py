@@ -90,9 +90,7 @@ def _fly_by_eq_18(flights: Flights) -> pd.DataFrame:
 def _fly_seldom(flights: Flights) -> pd.DataFrame:
     """More flights where collisions are the fewest: a tenth of them has six tenths of all contacts."""
     at, _ = verdicts.MINIMA["f_collision"]
-    scenario = load(
-        "zapotecatl_2016/best", {"model.r_s": at[0] / 100, "model.r_a": at[1] / 100, "metrics.count": "program"}
-    )
+    scenario = configurations("zapotecatl_2016/best", update="sequential", **{"metrics.count": "program"})[at]
     return flights.score("Fewest collisions", {at: scenario}, flights.count(120, 2))
 
 

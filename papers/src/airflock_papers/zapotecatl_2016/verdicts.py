@@ -77,13 +77,11 @@ def sentences(flown: pd.DataFrame, means: pd.DataFrame) -> list[Measured]:
 
 def minimum(column: str, at: tuple[int, int], value: float, flown: pd.DataFrame, means: pd.DataFrame) -> list[Measured]:
     """Value and place of a minimum that a caption prints."""
-    found = statistics.mean(flown.loc[at, column])
-    p = statistics.welch(found, value, found.sd or 0.0, FLIGHTS)  # the caption has no SD: ours for both
     least: Any = means[column].idxmin()
     values = flown.loc[at, column]
     note = f"least of ours {means[column].min():.3g} at {_cm(least)}; median here {values.median():.3g}"
     return [
-        Measured(f"minimum.{column}.value", column, _at(at), found, note, p),
+        at_minimum(column, at, value, values, note),
         Measured(f"minimum.{column}.place", f"rank by {column}", _at(at), _rank(means[column], at), note),
     ]
 
@@ -91,10 +89,15 @@ def minimum(column: str, at: tuple[int, int], value: float, flown: pd.DataFrame,
 def seldom(flown: pd.DataFrame) -> Measured:
     """The value of the minimum of collisions by as many flights as settle it."""
     at, value = MINIMA["f_collision"]
-    found = statistics.mean(flown.loc[at, "f_collision"])
-    p = statistics.welch(found, value, found.sd or 0.0, FLIGHTS)
-    note = f"median {flown.loc[at, 'f_collision'].median():.3g}"
-    return Measured("minimum.f_collision.value", "f_collision", _at(at), found, note, p)
+    values = flown.loc[at, "f_collision"]
+    return at_minimum("f_collision", at, value, values, f"median {values.median():.3g}")
+
+
+def at_minimum(column: str, at: tuple[int, int], value: float, flown: pd.Series, note: str) -> Measured:
+    """Value of a minimum that a caption prints, by flights at its place."""
+    found = statistics.mean(flown)
+    p = statistics.welch(found, value, found.sd or 0.0, FLIGHTS)  # the caption has no SD: ours for both
+    return Measured(f"minimum.{column}.value", column, _at(at), found, note, p)
 
 
 def trend(column: str, axis: int, sign: int, flown: pd.DataFrame) -> Measured:
