@@ -8,7 +8,7 @@ import pandas as pd
 from airflock.scenarios.files import load, presets
 from airflock_papers.claims import judge, read_claims
 from airflock_papers.statements import load as load_statements
-from airflock_papers.vasarhelyi_2018 import evolved, table_s1
+from airflock_papers.vasarhelyi_2018 import evolved, searches, table_s1
 from airflock_papers.vasarhelyi_2018.published import optimum
 
 PARTIAL = ("f_speed", "f_coll", "f_disc", "f_wall", "f_cluster", "f_corr")
@@ -86,6 +86,26 @@ def test_independent_runs_are_alike_or_not():
         found = verdicts(data(6, ours, ours, runs))["s1.alike"]
         assert found.verdict == verdict
         assert "(printed 19.7)" in found.note  # whether a run that differs has found the printed optimum
+
+
+def test_committed_runs_say_what_the_runs_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(searches, "_path", lambda: tmp_path / "runs.csv")
+    rng = np.random.default_rng(2)
+    found = {
+        v: [result(parameters(v, v_shill=15.0 * rng.random()), rng.random(), rng.random()) for _ in range(several)]
+        for v, several in table_s1.RUNS.items()
+    }
+    searches.write(found)
+    kept, fresh = searches.measured(searches.runs()), searches.measured(searches.by_rank(found))
+    assert [(each.id, each.at, each.note) for each in kept] == [(each.id, each.at, each.note) for each in fresh]
+    assert np.allclose([each.value.ours for each in kept], [each.value.ours for each in fresh], rtol=1e-8, atol=1e-9)
+    assert len(kept) == 8  # five luckiest candidates, three spreads
+
+
+def test_pairs_are_the_seeds_that_both_have_flown():
+    luck = np.random.default_rng(3).normal(0.0, 0.1, 1600)
+    gain, _ = table_s1.gains(6, flights(0.82 + luck), flights(0.80 + luck[:400]), None)
+    assert gain.value.runs == 400 and abs(gain.value.ours - 0.02) < 1e-9 and gain.value.sd < 1e-9
 
 
 def test_parameters_in_proportion_to_the_speed_have_the_exponent_1():

@@ -17,9 +17,8 @@ from airflock.scenarios.scenario import Scenario
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
 from airflock_papers.vasarhelyi_2018.published import SPEEDS
-from airflock_papers.vasarhelyi_2018.table_s1 import COLUMNS, exponent, means_tested, of_optimum
+from airflock_papers.vasarhelyi_2018.table_s1 import COLUMNS, FLIGHTS, exponent, means_tested, of_optimum
 
-FLIGHTS = 1600  # of each optimum: with 400 the p of a mean near its bound was 0.02 or 0.16, by chance
 STOPS: Mapping[str, float] = {"low": 0.0, "middle": 0.5, "high": 1.0}  # places in the space, as shares of each axis
 
 
