@@ -5,7 +5,8 @@ Takes an hour on two cores; ended and run again it goes on where it was. `python
 
 import sys
 
-from airflock_papers.flights import Flights, progress_bar
+from airflock_papers.flights import Flights
+from airflock_papers.progress import progress_bar
 from airflock_papers.vasarhelyi_2018 import beyond
 
 if __name__ == "__main__":

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 
 from airflock.errors import AirflockError
 from airflock_papers.claims import VERDICTS, Measured, judge
-from airflock_papers.flights import Flights, Progress, progress_bar
+from airflock_papers.flights import Flights
 from airflock_papers.paper import Paper
+from airflock_papers.progress import Progress, progress_bar
 from airflock_papers.statements import Statement, load
 
 GOOD = {kind: verdicts[0] for kind, verdicts in VERDICTS.items()}

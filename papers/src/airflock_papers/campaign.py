@@ -25,7 +25,7 @@ from airflock_papers import PAPERS, breaks
 from airflock_papers import committed as tables
 from airflock_papers.catalogue import find
 from airflock_papers.claims import VERDICTS, read_claims
-from airflock_papers.quick import teller
+from airflock_papers.progress import teller
 from airflock_papers.statements import Statement, load
 from airflock_papers.texts import texts
 

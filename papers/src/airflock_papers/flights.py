@@ -1,7 +1,6 @@
 """Flights behind the claims: many scenarios and seeds on all cores, with word of how far they are."""
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,8 +12,7 @@ from airflock.recordings.scores import over_time
 from airflock.scenarios.change import remade
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_threads
-
-Progress = Callable[[str, int, int], None]  # title, flights done, flights in all
+from airflock_papers.progress import Progress
 
 
 @dataclass
@@ -99,27 +97,3 @@ def with_changes(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
             value = getattr(owner, name) * float(value.removeprefix("times "))
         settings[key] = value
     return remade(scenario, settings)
-
-
-@contextmanager
-def progress_bar() -> Iterator[Progress]:
-    """Progress bars on the error stream, one per title."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bars
-
-    with Bars(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    ) as bars:
-        tasks: dict[str, Any] = {}
-
-        def tell(title: str, done: int, total: int) -> None:
-            if title not in tasks:
-                tasks[title] = bars.add_task(title, total=total)
-            bars.update(tasks[title], completed=done)
-
-        yield tell

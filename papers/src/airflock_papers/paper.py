@@ -6,7 +6,8 @@ from typing import Any
 
 from airflock.errors import AirflockError
 from airflock_papers.claims import Claim, Measured, judge, unmeasured
-from airflock_papers.flights import Flights, Progress, progress_bar
+from airflock_papers.flights import Flights
+from airflock_papers.progress import Progress, progress_bar
 from airflock_papers.statements import load
 
 Flown = tuple[list[Measured], dict[str, Any]]  # measurements, and by part what is behind them

@@ -8,7 +8,6 @@ soon differ whole, and a verdict of few flights may be another by chance: each r
 """
 
 import json
-import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -19,12 +18,12 @@ from airflock.untrusted import TextError, json_object, read_text
 from airflock_papers import PAPERS
 from airflock_papers import committed as tables
 from airflock_papers.catalogue import find
+from airflock_papers.progress import teller
 from airflock_papers.texts import texts
 
 COMMITTED = "quick.csv"
 LEFT_OUT = {("kidger", "cost"): "measures this machine", ("vasarhelyi_2018", "fig2"): "takes an hour"}
 ALSO = {"vasarhelyi_2018": ("optima", "gains", "searches")}  # of the page EVOLVED.md, from the optima that ship
-EVERY = 10.0  # s between two lines of progress
 
 
 class Verdict(NamedTuple):
@@ -95,23 +94,6 @@ def _flown(
     paper = find(name)
     claims = paper.run(only=part, quick=True, threads=threads, progress=tell)
     return [(claim.id, claim.verdict, float(f"{claim.ours or 0.0:.4g}")) for claim in claims]
-
-
-def teller(log: Path, say: Callable[[str], None], what: str) -> Callable[[str, int, int], None]:
-    """Progress as lines, to the log and to the caller, at most one every ten seconds."""
-    last = -EVERY
-
-    def tell(title: str, done: int, total: int) -> None:
-        nonlocal last
-        if time.monotonic() - last < EVERY:
-            return
-        last = time.monotonic()
-        line = f"{what}: {title}, {done} of {total}"
-        with log.open("a", encoding="utf-8") as file:
-            file.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {line}\n")
-        say(line)
-
-    return tell
 
 
 def committed() -> list[Verdict]:

@@ -19,7 +19,8 @@ from airflock_papers import claims as records
 from airflock_papers import page
 from airflock_papers.catalogue import find
 from airflock_papers.claims import Claim, Measured, judge, judged_again, unflown
-from airflock_papers.flights import Flights, progress_bar
+from airflock_papers.flights import Flights
+from airflock_papers.progress import progress_bar
 from airflock_papers.statements import Statement, load
 from airflock_papers.texts import texts
 

@@ -15,7 +15,8 @@ from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_threads
 from airflock_papers.dimock_2003.units import FOOT, SPAN, Gains
-from airflock_papers.flights import Progress, with_changes
+from airflock_papers.flights import with_changes
+from airflock_papers.progress import Progress
 
 V_SETTLE = 0.5  # m/s; a formation that moves less has settled, twice what the noise in flight makes of it
 

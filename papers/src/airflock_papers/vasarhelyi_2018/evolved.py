@@ -8,8 +8,9 @@ from pathlib import Path
 from airflock import atomic
 from airflock_papers import page
 from airflock_papers.claims import Claim, judge
-from airflock_papers.flights import Flights, progress_bar
+from airflock_papers.flights import Flights
 from airflock_papers.page import Section
+from airflock_papers.progress import progress_bar
 from airflock_papers.statements import load
 from airflock_papers.statistics import Estimate
 from airflock_papers.vasarhelyi_2018 import searches, table_s1

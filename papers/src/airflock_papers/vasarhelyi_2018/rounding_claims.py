@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from airflock_papers import page, statistics
 from airflock_papers.claims import Claim, Measured, judge, unflown
-from airflock_papers.flights import Flights, progress_bar
+from airflock_papers.flights import Flights
 from airflock_papers.page import Section
+from airflock_papers.progress import progress_bar
 from airflock_papers.statements import load
 from airflock_papers.vasarhelyi_2018.published import COLUMNS, SPEEDS, program_runs
 from airflock_papers.vasarhelyi_2018.rounding import (
