@@ -49,6 +49,8 @@ ROWS = [
     ("17b", P.CLEARED, {"armed": False, "misses": ("no position",)}, P.READY, {"fault": "x"}, P.FAULT),
     ("18", P.CLEARED, {"armed": False, "due": True}, P.ARMING, {"misses": ("battery",)}, P.READY),
     ("19", P.ARMING, {"streamed_for": 2.0}, P.TAKEOFF, {"killed": True}, P.DONE),
+    ("19c", P.ARMING, {"order": Do.LAND}, P.READY, {"killed": True}, P.DONE),
+    ("19c", P.ARMING, {"armed": False, "order": Do.HOLD}, P.READY, None, None),
     ("19b", P.ARMING, {"armed": False, "phase_for": 11.0}, P.READY, {"killed": True}, P.DONE),
     ("20", P.TAKEOFF, {"at_layer": True}, P.GATHER, {"gnss_bad_for": 1.0}, P.HOLD),
     ("21", P.TAKEOFF, {"neighbour_near": True}, P.HOLD, {"at_layer": True}, P.GATHER),
@@ -89,8 +91,8 @@ def test_every_row_fires_and_gives_way_to_a_higher_one(number, phase, given, to,
 
 
 def test_all_28_rows_of_the_table_are_here():
-    whole = {number.rstrip("b") for number, *_ in ROWS}
-    assert whole == {row.number.rstrip("b") for row in TABLE} == {str(k) for k in range(1, 29)}
+    whole = {number.rstrip("bc") for number, *_ in ROWS}
+    assert whole == {row.number.rstrip("bc") for row in TABLE} == {str(k) for k in range(1, 29)}
     assert {number for number, *_ in ROWS} == {row.number for row in TABLE}
 
 

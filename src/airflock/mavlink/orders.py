@@ -34,6 +34,9 @@ class Do(IntEnum):
     PING = 10  # the operator is there
 
 
+CALL_OFF = frozenset({Do.HOLD, Do.RETURN, Do.LAND})  # they end what is flown, and call off a start not yet followed
+
+
 class Order(NamedTuple):
     """One order.
 

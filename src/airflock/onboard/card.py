@@ -94,6 +94,10 @@ class Card:
         """Height (m) of a member's own layer."""
         return self.safety.base + self.safety.layer * self.members.index(member)
 
+    def turn(self, member: int) -> float:
+        """How long (s) after the start of the first member this one starts."""
+        return self.safety.start_step * self.members.index(member)
+
     def pilot(self, member: int) -> Pilot:
         """The pilot of one member."""
         index = self.members.index(member)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
-from airflock.mavlink.orders import Do
+from airflock.mavlink.orders import CALL_OFF, Do
 from airflock.onboard.safety import Safety
 
 
@@ -158,6 +158,7 @@ TABLE: tuple[Row, ...] = (
     Row("17", _of(P.READY), "nothing is missing", lambda f, s: not f.misses and not f.armed, P.CLEARED),
     Row("17b", _of(P.CLEARED), "something is missing", lambda f, s: bool(f.misses) or f.armed, P.READY),
     Row("18", _of(P.CLEARED), "the operator's start is due", lambda f, s: f.due, P.ARMING),
+    Row("19c", _of(P.ARMING), "the start is called off", lambda f, s: f.order in CALL_OFF, P.READY),
     Row("19", _of(P.ARMING), "armed in our mode", lambda f, s: f.armed and f.mode_ours and f.streamed_for >= s.stream,
         P.TAKEOFF),
     Row("19b", _of(P.ARMING), "not armed in time", lambda f, s: f.phase_for > s.arm_time, P.READY),

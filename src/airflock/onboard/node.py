@@ -25,6 +25,7 @@ from airflock.onboard.wire import Wire
 
 EPSILON = 1e-6  # s; two clocks of a lock-step meet within it
 RETRY = 1.0  # s between two tries of a command
+KILLING = 3.0  # s at least for which a kill is repeated to an autopilot that is armed
 TELL = frozenset({Phase.BOOT, Phase.READY, Phase.CLEARED})
 
 
@@ -159,6 +160,11 @@ class Node:
         step = look(self.phase, known, self.card.safety)
         if step.row is not None:
             self._enter(step.to, step.row.event, now, out)
+            if known.order in orders.CALL_OFF and step.row.number != "23" and self.phase in FLY:
+                self.operator.again(known.order)  # something else came first at this tick
+        if known.killed and self.phase != Phase.DONE:
+            self.operator.killed = False  # it must not wait for the moment at which the pilot gives the drone back
+            self._notes.append(f"not killed: in {self.phase.name} this node does not fly the drone")
         self.peers.joined = False
         self._tell(known)
         self._steer(now, known, out)
@@ -172,6 +178,8 @@ class Node:
         if own is not None:
             self._stay = self.pilot.stay(self.card.law_state(own), now)
         order = self.operator.next()
+        if self.phase in TELL and self.operator.missed(self.utc(now), self.card.turn(self.member)):
+            self._notes.append("not started: something was missing when its turn came; order the start once more")
         if order == Do.GOTO and self._goal_outside():
             order = None
             self._notes.append("the point that was ordered lies outside the fence; not followed")
@@ -201,14 +209,13 @@ class Node:
             self._before, self.operator.held, self.operator.resume = Phase.FLOCK, True, False
         if to == Phase.ARMING:
             assert self.wire.state is not None
+            self.operator.held = self.operator.resume = False
             self.home = (self.wire.state.x, self.wire.state.y, self.card.layer(self.member))
         if was == Phase.ARMING and to == Phase.READY:
             self.operator.start_at = None
             out.autopilot.append(self._say.arm(False))
         if was == Phase.ARMING and to == Phase.TAKEOFF:
             self._flew_at, self._overloads = now, 0
-        if to == Phase.DONE and self.operator.killed:
-            out.autopilot.append(self._say.arm(False, force=True))
         if to in (Phase.FLOCK, Phase.GOTO) and was not in (Phase.FLOCK, Phase.GOTO):
             self._next_law = now
         if to == Phase.RETURN and self.home is None and self.wire.state is not None:
@@ -227,6 +234,11 @@ class Node:
     def _steer(self, now: float, known: Facts, out: Out) -> None:
         """Say to the autopilot what the phase asks for: a setpoint, a mode, or nothing."""
         phase, say = self.phase, self._say
+        if phase == Phase.DONE and self.operator.killed:
+            if (known.armed or now == self._since) and self._try(now):
+                out.autopilot.append(say.arm(False, force=True))
+            elif not known.armed and now - self._since > KILLING:
+                self.operator.killed = False  # whoever arms it from now on has another flight in mind
         if phase == Phase.LAND and not known.mode_land and self._try(now):
             out.autopilot.append(say.set_mode(self.card.autopilot.land))
         streams = phase in FLY or phase == Phase.ARMING or (phase == Phase.MANUAL and known.resume)

@@ -3,11 +3,12 @@
 from typing import Any
 
 from airflock.errors import LinkError
-from airflock.mavlink.orders import Do, Order, order_of
+from airflock.mavlink.orders import CALL_OFF, Do, Order, order_of
 from airflock.onboard.card import Card
 
 SECOND_STEP = 5_000_000  # µs; a kill must be confirmed within
 SPREAD = 5_000_000  # µs; an order given longer ago is not obeyed
+START_WITHIN = 10_000_000  # µs after its turn a drone may still start; our choice: later somebody may stand beside it
 REASONS = ("seal", "mission", "old", "replay", "no library")
 
 
@@ -52,7 +53,7 @@ class Operator:
 
     def _obey(self, order: Order, utc: int) -> None:
         if order.do == Do.START:
-            self.start_at, self.held, self.resume = order.at, False, False
+            self.start_at = order.at
         elif order.do == Do.HOLD:
             self.held, self.resume = True, False
         elif order.do == Do.RESUME:
@@ -65,13 +66,26 @@ class Operator:
         elif order.do == Do.CONFIRM_KILL:
             self.killed = utc - self._kill_at <= SECOND_STEP
         elif order.do in (Do.RETURN, Do.LAND):
-            self.start_at, self.held = None, False
+            self.held = False
+        if order.do in CALL_OFF:
+            self.start_at = None
         self._new.append(order.do)
 
     def next(self) -> Do | None:
         """The order to be done at this tick, in the order in which they came."""
         return self._new.pop(0) if self._new else None
 
+    def again(self, order: Do) -> None:
+        """Take an order at the next tick once more, for something else came first at this one."""
+        self._new.insert(0, order)
+
     def due(self, utc: int, member_delay: float) -> bool:
         """Whether the start was ordered and the own turn (s after it) has come."""
-        return self.start_at is not None and 0 <= utc - self.start_at - round(member_delay * 1e6) < 60_000_000
+        return self.start_at is not None and utc - self.start_at - round(member_delay * 1e6) >= 0
+
+    def missed(self, utc: int, member_delay: float) -> bool:
+        """Whether the own turn was so long ago that it starts no more; then the start is forgotten."""
+        if self.start_at is None or utc - self.start_at - round(member_delay * 1e6) <= START_WITHIN:
+            return False
+        self.start_at = None
+        return True
