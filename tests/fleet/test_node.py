@@ -188,11 +188,14 @@ def test_an_autopilot_that_is_not_heard_is_told_until_it_is():
 
 @pytest.mark.parametrize(("change", "line"), [
     (lambda v: setattr(v, "armed", True), "is armed already; disarm it"),
-    (lambda v: v.parameters.update(COM_OF_LOSS_T=3.0), "COM_OF_LOSS_T = 3 lies outside"),
-    (lambda v: v.parameters.update(GF_ACTION=0), "GF_ACTION = 0 lies outside"),
+    (lambda v: v.parameters.update(COM_OF_LOSS_T=3.0), r"COM_OF_LOSS_T = 3 is not within \[0, 1\]"),
+    (lambda v: v.parameters.update(GF_ACTION=0), "GF_ACTION = 0 is not within"),
+    (lambda v: v.parameters.update(GF_ACTION=4), "GF_ACTION = 4 is not .* not 4: .* 4 cuts the motors"),
+    (lambda v: setattr(v, "state", v.state._replace(z=-40.0)), "stands 40.0 m below the card's site"),
+    (lambda v: setattr(v, "state", v.state._replace(y=2e6)), r"is 2000 km away from the card's site"),
     (lambda v: setattr(v, "battery", 20.0), "battery: 20 %"),
     (lambda v: setattr(v, "accuracy", 9.0), "accuracy 9.0 m"),
-    (lambda v: setattr(v, "started", STARTED + 700_000), r"clock: \+0.70 s"),
+    (lambda v: setattr(v, "started", STARTED + 700_000), r"clock: \+0.70 s .* start the node anew"),
     (lambda v: setattr(v, "state", v.state._replace(x=500.0)), "outside the fence: is the card's site right"),
 ])  # fmt: skip
 def test_each_miss_is_told_in_a_line(change, line):

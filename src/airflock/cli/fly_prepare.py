@@ -172,9 +172,8 @@ def _say_prepared(files: Files, card: Any, loads: list[Airtime]) -> None:
     for load in loads:
         tables.say(f"{load.radio} radio: {load.share:.0%} of its time, by an estimate from its bit rate")
     for guard in card.autopilot.guards:
-        safe = "to the own system id" if guard.own else f"within [{guard.low:g}, {guard.high:g}]"
         why = guard.reason(card.safety.speed_max, card.safety.response)
-        tables.say(f"set {guard.name} {safe}: {why}")
+        tables.say(f"set {guard.name} {guard.told()}: {why}")
 
 
 def _members(text: str) -> list[int]:

@@ -14,8 +14,8 @@ MODES = {
 PARAMETERS: dict[str, dict[str, float | int]] = {
     "px4": {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 4, "GF_ACTION": 3, "MIS_TAKEOFF_ALT": 10.0, "MAV_SYS_ID": 1},
     "ardupilot": {
-        "GUID_TIMEOUT": 1.0, "FENCE_ENABLE": 1, "FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 5.0, "SYSID_MYGCS": 255,
-        "SYSID_THISMAV": 1,
+        "GUID_TIMEOUT": 1.0, "FENCE_ENABLE": 1, "FENCE_ACTION": 1, "FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 5.0,
+        "SYSID_MYGCS": 255, "SYSID_THISMAV": 1,
     },
 }  # fmt: skip
 ON_LOSS = {3: RTL, 4: LAND, 5: HOLD}  # COM_OBL_RC_ACT of PX4

@@ -29,6 +29,7 @@ STREAMS = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message →
 class Guard(NamedTuple):
     """A parameter of the autopilot that must lie between two values before anything arms, and why.
 
+    but    : a value between them that is not safe either
     own    : it must be the autopilot's own system id instead
     silent : a time-out, s, until which the drone flies on; `reason` says how far
     """
@@ -39,10 +40,23 @@ class Guard(NamedTuple):
     why: str
     own: bool = False
     silent: float = 0.0
+    but: float | None = None
 
     def range(self, member: int) -> tuple[float, float]:
         """Least and largest value that is safe for a member of a flock."""
         return (float(member), float(member)) if self.own else (self.low, self.high)
+
+    def told(self, member: int | None = None) -> str:
+        """The values that are safe, in words; without a member those of all."""
+        if self.own and member is None:
+            return "to the own system id"
+        low, high = self.range(member or 0)
+        return f"within [{low:g}, {high:g}]" + ("" if self.but is None else f", not {self.but:g}")
+
+    def safe(self, value: float, member: int) -> bool:
+        """Whether a value is safe for a member of a flock."""
+        low, high = self.range(member)
+        return low <= value <= high and value != self.but
 
     def reason(self, speed: float, response: float) -> str:
         """Why, for a drone of a largest speed (m/s) that gets slower with a relaxation time (s)."""
@@ -96,14 +110,15 @@ AUTOPILOTS = {
         guards=(
             Guard("COM_OF_LOSS_T", 0.0, 1.0, "s after the last setpoint until it acts", silent=1.0),
             Guard("COM_OBL_RC_ACT", 4.0, 4.0, "on lost setpoints: 4 land; one that hovers is hit by one that flies on"),
-            Guard("GF_ACTION", 2.0, 5.0, "its own fence acts: 2 hold, 3 return, 5 land"),
+            Guard("GF_ACTION", 2.0, 5.0, "its own fence acts: 2 hold, 3 return, 5 land; 4 cuts the motors", but=4.0),
         ),
     ),
     "ardupilot": Autopilot(
         "ardupilot", number=3, ours=4, land=9, hold=17, climbs=False, bytewise=False,
         guards=(
             Guard("GUID_TIMEOUT", 0.1, 1.0, "s after the last setpoint until it brakes", silent=3.0),
-            Guard("FENCE_ENABLE", 1.0, 1.0, "its own fence acts"),
+            Guard("FENCE_ENABLE", 1.0, 1.0, "its own fence is on"),
+            Guard("FENCE_ACTION", 1.0, 5.0, "and acts; 0 reports only"),
             Guard("FS_GCS_ENABLE", 5.0, 5.0, "when heartbeats end: 5 land; a drone that hovers is hit in the end"),
             Guard("FS_GCS_TIMEOUT", 2.0, 5.0, "s after the last heartbeat until it lands"),
             Guard("SYSID_MYGCS", 1.0, 250.0, "whose heartbeats count: those of the node, of the same system", own=True),

@@ -29,6 +29,10 @@ class Safety(Record):
         3.0, "m", low=0.0, high=1000.0, source=OURS, meaning="distance from the fence at which outward speed is 0"
     )
     base: float = quantity(10.0, "m", low=2.0, high=500.0, source=OURS, meaning="height of the lowest layer")
+    uneven: float = quantity(
+        5.0, "m", low=0.5, high=500.0, source=OURS,
+        meaning="largest height of a drone on the ground above or below the site",
+    )  # fmt: skip
     layer: float = quantity(3.0, "m", low=0.5, high=50.0, source=OURS, meaning="distance of two layers")
     start_step: float = quantity(2.0, "s", low=0.0, high=60.0, source=OURS, meaning="from one start to the next")
     start_apart: float = quantity(3.0, "m", low=0.5, high=100.0, source=OURS, meaning="smallest distance on the ground")

@@ -78,23 +78,32 @@ def _parameter_misses(card: Card, member: int, wire: Wire) -> list[str]:
         if value is None:
             found.append(f"{guard.name}: the autopilot has not reported it")
             continue
-        low, high = guard.range(member)
-        if not low <= value <= high:
+        if not guard.safe(value, member):
             why = guard.reason(card.safety.speed_max, card.safety.response)
-            found.append(f"{guard.name} = {value:g} lies outside [{low:g}, {high:g}]: {why}")
+            found.append(f"{guard.name} = {value:g} is not {guard.told(member)}: {why}")
     return found
 
 
 def _own_misses(card: Card, wire: Wire, now: float) -> list[str]:
     """What is wrong with the own position, battery or stand."""
     s, found, own = card.safety, [], wire.state
-    if own is None or now - wire.state_at > s.stale:
+    if wire.far:
+        found.append(
+            f"the drone is {wire.far * 1e-3:.0f} km away from the card's site: is the site right? It is latitude, "
+            "longitude in degrees, altitude above mean sea level in m"
+        )
+    elif own is None or now - wire.state_at > s.stale:
         found.append("no own position from the autopilot")
     elif card.outside(*own[:3]) > 0.0:
         found.append(f"the drone is {card.outside(*own[:3]):.0f} m outside the fence: is the card's site right?")
+    elif abs(own.z) > s.uneven:
+        found.append(
+            f"the drone stands {abs(own.z):.1f} m {'above' if own.z > 0.0 else 'below'} the card's site, by which all "
+            f"heights are told; at most {s.uneven:g} m (safety.uneven): is the site's altitude above mean sea level?"
+        )
     elif wire.disagreement(now) > s.jump:
         found.append(f"local and global position of the autopilot differ by {wire.disagreement(now):.0f} m")
-    if wire.origin is None:
+    if wire.origin is None and not wire.far:
         found.append("GPS_GLOBAL_ORIGIN: the autopilot has not reported it")
     if wire.fix < 3 or wire.h_acc > s.h_acc:
         accuracy = f"accuracy {min(wire.h_acc, 999.0):.1f} m"
@@ -113,7 +122,10 @@ def _clock_misses(card: Card, wire: Wire, peers: Peers) -> list[str]:
     if offset is None:
         return ["SYSTEM_TIME: the autopilot has not reported the time"]
     if abs(offset) > card.safety.clock_error:
-        return [f"clock: {offset:+.2f} s off the autopilot's; at most {card.safety.clock_error:g} s"]
+        return [
+            f"clock: {offset:+.2f} s off the autopilot's; at most {card.safety.clock_error:g} s; set this computer's "
+            "clock, then start the node anew"
+        ]
     return ["clock: it differs from the clocks of all others"] if peers.clocks_suspect() else []
 
 

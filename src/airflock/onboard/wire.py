@@ -20,6 +20,7 @@ class Wire:
 
     member  : its system id; site: origin of local coordinates
     state   : own position and velocity, local; state_at : when they were heard, s; -1e9: never
+    far     : distance (m) from the site of a position so far away that it was refused last; 0: none was
     refused : frames with implausible content; strangers: system ids of other autopilots on this wire
     """
 
@@ -40,6 +41,7 @@ class Wire:
         self.clocks: list[float] = []
         self.strangers: set[int] = set()
         self.refused = 0
+        self.far = 0.0
         self._jump = 5.0
 
     def __call__(self, data: bytes, now: float, utc: int, jump: float) -> None:
@@ -89,8 +91,10 @@ class Wire:
 
     def _global(self, v: dict[str, Any], now: float, utc: int) -> bool:
         x, y, z = self._site.local(v["lat"] * 1e-7, v["lon"] * 1e-7, v["alt"] * 1e-3)
-        if max(abs(x), abs(y), abs(z)) >= FARTHEST or abs(v["lat"]) > 900_000_000 or abs(v["lon"]) > 1_800_000_000:
+        self.far = max(abs(x), abs(y), abs(z))
+        if self.far >= FARTHEST or abs(v["lat"]) > 900_000_000 or abs(v["lon"]) > 1_800_000_000:
             return False
+        self.far = 0.0
         velocity = turned(v["vx"] * 0.01, v["vy"] * 0.01, v["vz"] * 0.01)
         self.global_state, self.global_at = State(x, y, z, *velocity), now
         if self.origin is None:
