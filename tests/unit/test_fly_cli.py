@@ -1,6 +1,8 @@
 """The verbs fly and fleet: cards and keys are written whole or not at all, and mistakes are told all at once."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -173,6 +175,31 @@ def test_a_node_that_a_service_stops_keeps_its_log_and_its_memory(airflock, tmp_
     (log,) = tmp_path.glob("mission-2-*.log")
     code, out, lines = airflock("fly", "replay", "mission.json", log, "--json")
     assert code == 0 and json.loads(out)["ticks"] >= 2 and not lines, "what it did since it last saved"
+
+
+@pytest.mark.parametrize("hears", ["nobody", "a full disk"])
+def test_a_node_flies_on_when_the_terminal_that_it_was_started_from_has_gone(airflock, tmp_path, hears):
+    airflock("fly", "prepare", REAL, *HERE)
+    ports = ["--autopilot", "udp:127.0.0.1:39438", "--radio", "udp:127.0.0.1:39439>127.0.0.1:39440"]
+    command = [sys.executable, "-m", "airflock.onboard", "mission.json", "--member", "2", "--i-am-the-pilot", *ports]
+    if hears == "nobody":
+        reads, writes = os.pipe()
+        os.close(reads)
+    else:
+        writes = os.open("/dev/full", os.O_WRONLY)
+    with os.fdopen(writes, "w") as out:
+        node = subprocess.Popen(command, stdout=out, stderr=subprocess.PIPE, text=True)
+    memory, until = tmp_path / "mission-2.memory", time.monotonic() + 60.0
+    while not memory.exists() and time.monotonic() < until:
+        time.sleep(0.01)
+    node.send_signal(signal.SIGHUP)
+    time.sleep(6.0)  # after 3 s it says that no autopilot is heard
+    assert node.poll() is None, node.communicate()
+    node.terminate()
+    _, told = node.communicate(timeout=60.0)
+    assert "airflock: stopped; " in told and "No space" not in told and "pipe" not in told.lower().replace("stdout", "")
+    (log,) = tmp_path.glob("mission-2-*.log")
+    assert '"notes":["missing: no heartbeat' in log.read_text()
 
 
 @pytest.mark.parametrize("host", ["nobody.invalid", "a..b", "x" * 70])

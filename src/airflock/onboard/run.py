@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple, NoReturn, Protocol, TextIO
@@ -62,6 +63,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser().parse_args(arguments)
     if threading.current_thread() is threading.main_thread():  # only there are signals heard
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # a service that is stopped ends as by Ctrl-C
+        if hasattr(signal, "SIGHUP"):  # none on Windows
+            signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the terminal that it was started from has gone, as ssh does
     try:
         return _run(given)
     except AirflockError as fault:
@@ -127,8 +130,10 @@ def _run(given: argparse.Namespace) -> int:
 
 
 def _say(text: str) -> None:
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    """Say a line, if anybody can still hear it: a terminal that has gone or a full disk must not bring a drone down."""
+    with suppress(OSError):
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
 
 
 def fly(
