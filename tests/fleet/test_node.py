@@ -208,6 +208,19 @@ def test_each_miss_is_told_in_a_line(change, line):
     assert [n for n in notes if re.search(line, n)], notes
 
 
+def test_an_autopilot_that_is_started_anew_on_the_ground_is_asked_once_more():
+    """By hand its parameters and its streams may have changed meanwhile, and its origin has."""
+    node, vehicle = node_with_vehicle()
+    live(node, vehicle, 0.0, 5.0)
+    assert node.wire.parameters["GF_ACTION"] == 3.0 and node.wire.origin is not None
+    usual, vehicle.booted = dict(vehicle.rates), 8.0
+    vehicle.rates = usual | dict.fromkeys(("local", "global", "gps", "landed"), 0.0)  # what was asked for is forgotten
+    vehicle.parameters["GF_ACTION"] = 0
+    notes = live(node, vehicle, 8.0, 14.0)
+    assert any("GF_ACTION = 0 is not within" in note for note in notes), notes
+    assert node.wire.state is not None and node.wire.state_at > 13.0 and node.wire.origin is not None
+
+
 def test_another_autopilot_is_a_fault():
     node, _ = node_with_vehicle()
     other = Vehicle("ardupilot", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=STARTED)

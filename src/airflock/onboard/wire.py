@@ -12,6 +12,7 @@ AUTOPILOT = 1  # component id
 FARTHEST = 1e5  # m from the site; and m/s: nothing that flies here is there
 NOT_AN_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: ground stations and companions
 CLOCKS = 10  # samples of the autopilot's clock that are kept
+REBOOT = 2000  # ms; messages that overtake each other differ by less
 MOVES = 0.3  # m/s; who flies faster than this cannot stay at the same place
 
 
@@ -43,6 +44,7 @@ class Wire:
         self.refused = 0
         self.far = 0.0
         self._jump = 5.0
+        self._since_boot = 0
 
     def __call__(self, data: bytes, now: float, utc: int, jump: float) -> None:
         """Take bytes from the wire at now (s) and utc (µs of Unix time); jump: largest plausible step (m)."""
@@ -59,6 +61,19 @@ class Wire:
         if handler is not None and not handler(self, frame.values(), now, utc):
             self.refused += 1
 
+    def _boots(self, since_boot: int) -> None:
+        """Forget what an autopilot told before it was started anew on the ground: it is to be asked once more.
+
+        since_boot : ms, of a message; one that went back by more than REBOOT tells of a new start
+        """
+        if since_boot >= self._since_boot - REBOOT:
+            self._since_boot = max(since_boot, self._since_boot)
+        elif not self.armed:
+            self._since_boot, self.state, self.state_at = since_boot, None, -1e9
+            self.global_state, self.global_at, self.origin, self.landed = None, -1e9, None, None
+            self.fix, self.h_acc, self.battery = 0, 1e9, None
+            self.parameters, self.clocks = {}, []
+
     def _heartbeat(self, v: dict[str, Any], now: float, utc: int) -> bool:
         self.kind, self.mode, self.armed = v["autopilot"], v["custom_mode"], bool(v["base_mode"] & ARMED)
         self.heartbeat_at = now
@@ -71,6 +86,7 @@ class Wire:
         return True
 
     def _system_time(self, v: dict[str, Any], now: float, utc: int) -> bool:
+        self._boots(v["time_boot_ms"])
         if v["time_unix_usec"] < 1_500_000_000_000_000:
             return False  # no satellite has told it the time yet
         self.clocks = [*self.clocks[1 - CLOCKS :], (v["time_unix_usec"] - utc) * 1e-6]
@@ -81,6 +97,7 @@ class Wire:
         return True
 
     def _local(self, v: dict[str, Any], now: float, utc: int) -> bool:
+        self._boots(v["time_boot_ms"])
         numbers = [v[key] for key in ("x", "y", "z", "vx", "vy", "vz")]
         if not all(isfinite(n) and abs(n) < FARTHEST for n in numbers):
             return False
@@ -90,6 +107,7 @@ class Wire:
         return True
 
     def _global(self, v: dict[str, Any], now: float, utc: int) -> bool:
+        self._boots(v["time_boot_ms"])
         x, y, z = self._site.local(v["lat"] * 1e-7, v["lon"] * 1e-7, v["alt"] * 1e-3)
         self.far = max(abs(x), abs(y), abs(z))
         if self.far >= FARTHEST or abs(v["lat"]) > 900_000_000 or abs(v["lon"]) > 1_800_000_000:
