@@ -40,7 +40,7 @@ from airflock.studio.origin import Origin
 from airflock.studio.pace import Pace
 from airflock.studio.perceiving import Perceiving, _vectors
 from airflock.studio.player import Player
-from airflock.studio.score_tables import differences
+from airflock.studio.score_tables import difference_table, differences
 from airflock.studio.shading import Shading, together, ways
 from airflock.studio.side import Side, value_of
 from airflock.studio.trails import PIECE, Trails
@@ -515,6 +515,14 @@ def test_two_parameter_sets_side_by_side_meet_the_same_noise():
         alone = airflock.open(airflock.load(PRESET, {**FEW, "radio.delay": delay}), 3).advance(steps=300)
         np.testing.assert_array_equal(side.flight.state, alone.state)
     assert player.where == f"{PRESET} | radio.delay = 2.0"
+
+
+def test_what_differs_stands_with_its_unit():
+    a, b = (
+        airflock.load(PRESET, {**FEW, "radio.delay": delay, "agents": count}) for delay, count in ((1, 12), (2, 13))
+    )
+    told = difference_table(a, b)
+    assert "<td>radio.delay (s)</td>" in told and "<td>agents</td>" in told
 
 
 def test_flights_of_other_dimensions_are_not_compared():
