@@ -622,6 +622,13 @@ def test_what_an_agent_perceives_is_drawn_where_it_is(interpreted):
     assert f"hears {len(seen.heard)} others" in drawn.words
 
 
+@pytest.mark.parametrize(("agents", "said"), [(1, "hears nobody<br>"), (2, "hears 1 other, at most ")])
+def test_whom_few_agents_hear_is_told_in_words(interpreted, agents, said):
+    player = Player(FlightRequest(PRESET, {"agents": agents, "radio.range": 1000.0}, 3))
+    player.fly(300)
+    assert said in Perceiving().of(player.side, 0, 1.0, 6.0).words
+
+
 def test_repulsion_and_alignment_of_a_selected_agent_are_those_of_the_paper(interpreted):
     """Arrows of a law whose neighbours act through one vector: Eqs 2-3, and Eqs 4-7 (Vásárhelyi et al. 2018)."""
     player = Player(FlightRequest(PRESET, {"agents": 30, "start.separation": 9.0}, seed=2))
