@@ -60,13 +60,14 @@ def fit_to_print() -> Iterator[None]:
 
     One thread at a time: the settings are those of all of Matplotlib, and are put back as they were.
     """
+    settings: Any = rcParams  # their type takes no keys but written-out ones
     with _writing:
-        before = {key: rcParams[key] for key in FILES}
-        rcParams.update(FILES)
+        before = {key: settings[key] for key in FILES}
+        settings.update(FILES)
         try:
             yield
         finally:
-            rcParams.update(before)
+            settings.update(before)
 
 
 @contextmanager
