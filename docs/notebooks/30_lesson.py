@@ -53,7 +53,8 @@ axes.set(xlabel="noise, rad", ylabel="polarisation", ylim=(0, 1))
 
 # %%
 # **Exercise 2.** At which noise is the polarisation half of its largest value? Does the answer depend on the number of
-# particles? Fly `settings={"agents": 100}` in a box with half the side.
+# particles? Fly a quarter of them in a box with half the side:
+# `settings={"duration": 300.0, "agents": 100, "world.side": 5.0}`.
 
 # %%
 # 3. More neighbours, more order?

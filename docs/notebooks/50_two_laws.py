@@ -33,6 +33,7 @@ for axes, (name, scenario) in zip(panels, laws.items(), strict=True):
     paths = airflock.simulate(scenario, seed=0).sel(time=slice(270.0, None)).position.isel(keypoint=0)
     axes.plot(paths.sel(space="x"), paths.sel(space="y"), lw=0.6)
     axes.set(title=name, aspect="equal", xlabel="east, m")
+panels[0].set_ylabel("north, m")
 
 # %%
 # Pairs

@@ -68,6 +68,17 @@ def test_pause_seek_and_space(recording, tab, tmp_path):
     assert not tab.faults
 
 
+def test_whoever_wants_less_motion_starts_it_by_hand(recording, browser, tmp_path):
+    page = browser.new_page(reduced_motion="reduce")
+    page.goto(airflock.replay(recording).save(tmp_path / "show.html").as_uri(), timeout=PATIENCE)
+    page.wait_for_function("window.replay", timeout=PATIENCE)
+    time.sleep(1.0)
+    assert page.evaluate("replay.time") == 0.0 and page.locator("#play").inner_text() == "Play"
+    page.locator("#play").click()
+    page.wait_for_function("window.replay.time > 0", timeout=PATIENCE)
+    page.close()
+
+
 def test_colours_stand_for_what_the_menu_says(tab, tmp_path):
     given = {"agents": 12, "duration": 12.0, "groups": [{"agents": [4, 5], "name": "slow"}, {"name": "rest"}]}
     scenario = airflock.load("vasarhelyi_2018/4ms", given)

@@ -1,7 +1,10 @@
 """The law of rules and the contract: what is refused, with the file, the line and the reason."""
 
 import math
+import random
 import re
+from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -17,6 +20,7 @@ from airflock.core.vocabulary.metrics import METRIC
 from airflock.errors import RuleError
 from airflock.metrics.registry import METRICS
 from airflock.rules import law
+from airflock.rules.generate import Source
 from airflock.rules.probe import probe
 from airflock.scenarios.laws import MODELS
 
@@ -61,6 +65,52 @@ def extreme(dx, r):
 
 def walrus(dx):
     return (far := dx * dx) + far
+
+
+COUNT = 0.0
+NEVER = math.inf
+
+
+def counting(dx):
+    global COUNT
+    COUNT += dx
+    return COUNT
+
+
+def nested(dx):
+    def twice(x):
+        return 2.0 * x
+
+    return twice(dx)
+
+
+def endless(r):
+    return 1.0 if r < math.inf else 0.0
+
+
+def guarded(r):
+    return 0.0 if math.isnan(r) else r
+
+
+def named(r):
+    return 1.0 if r < NEVER else 0.0
+
+
+def listed(dx, r):
+    both = [dx, r]
+    return both[0]
+
+
+def drawn(dx):
+    return dx * random.gauss(0.0, 1.0)
+
+
+def worded(dx, *, r):
+    return dx * r
+
+
+def any_number(*given):
+    return given[0]
 
 
 def named_like_indices(k, n, e, m, row, word, p):
@@ -111,6 +161,15 @@ def test_what_counts_or_points_is_an_integer_whatever_its_name():
         (doubled, "real is what the engine calls here"),
         (extreme, "max of fewer than two numbers; write max(a, b)"),
         (walrus, "NamedExpr is not allowed"),
+        (counting, "sets COUNT outside; what an agent keeps between decisions is its Memory"),
+        (nested, "twice is defined inside; write it beside the rule"),
+        (listed, "List is not allowed in a rule; write a tuple, or a name for each number"),
+        (endless, "math.inf: compiled, every number counts as finite; write 1e30"),
+        (guarded, "math.isnan: compiled, every number counts as finite"),
+        (named, "NEVER is not finite; write 1e30"),
+        (drawn, "random.gauss: only math may be used through a module name; write percept.normal(0)"),
+        (worded, "has * in its arguments"),
+        (any_number, "has * in its arguments"),
     ],
 )
 def test_a_fault_names_file_line_and_reason(rule, said):
@@ -249,3 +308,68 @@ def test_an_attribute_that_is_misspelt_names_the_near_one_and_its_line(rule, mea
     line = rule.__code__.co_firstlineno + 1
     with pytest.raises(RuleError, match=rf"test_law.py:{line}: .* has no attribute {re.escape(meant)}$"):
         probe(model(SimpleNamespace(**parts), "mine"), Gain())
+
+
+def rounded(dx):
+    return float(f"{dx:.2f}")
+
+
+@cache
+def kept(dx):
+    return Sums(dx)
+
+
+@dataclass(frozen=True)
+class Fixed:
+    gain: float = 1.0
+
+
+@dataclass
+class Plain:
+    x: float
+
+
+def of_dataclass(dx):
+    return Plain(dx)
+
+
+def sets_a_number(dx, p):
+    p.gain = 2.0
+    return Sums(dx * p.gain)
+
+
+@pytest.mark.parametrize(("rule", "record", "line", "said"), [
+    (kept, Sums, 0, "rule kept has a decorator; a rule is a plain function"),
+    (of_dataclass, Plain, 0, "mine: Plain must be a NamedTuple"),
+    (sets_a_number, Sums, 1, "FrozenInstanceError: cannot assign to field 'gain'"),
+])  # fmt: skip
+def test_what_is_no_rule_or_no_record_is_told_with_its_line(rule, record, line, said):
+    """Each ended as a fault of the program, or was told of the text that a dataclass writes for itself."""
+    parts = {"Parameters": Fixed, "COMMAND": "velocity", "decide": decide, "neighbour": rule, "Sums": record}
+    first = getattr(rule, "__wrapped__", rule).__code__.co_firstlineno
+    with pytest.raises(RuleError, match=rf"test_law.py:{first + line}: .*{re.escape(said)}"):
+        probe(model(SimpleNamespace(**parts), "mine"), Fixed())
+
+
+@pytest.mark.parametrize(("name", "stands_for", "said"), [
+    ("gauss", [0.5], "nor a NamedTuple"), ("sqrt", np.sqrt, "nor a NamedTuple; write math.sqrt"),
+])  # fmt: skip
+def test_a_name_that_no_driver_has_is_told_with_its_line(name, stands_for, said, tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text(f"def rule(dx):\n    first = dx\n    return first * {name}(dx)\n", encoding="utf-8")
+    space = {name: stands_for}
+    exec(compile(file.read_text(encoding="utf-8"), str(file), "exec"), space)
+    with pytest.raises(RuleError, match=f"mine.py:3: rule rule uses {name}, .*{said}$"):
+        Source("", {}).name(space["rule"])
+
+
+def test_a_text_that_a_rule_makes_is_for_plain_python_alone():
+    """Numba knows no format of a number: it ended as a fault of the program."""
+    with pytest.raises(RuleError, match=rf"test_law.py:{rounded.__code__.co_firstlineno + 1}: .* makes a text"):
+        Source("", {}).name(rounded)
+    lenient = Source("", {})
+    lenient.lenient = True
+    lenient.name(rounded)
+    space = {"real": float}
+    exec("\n".join(lenient.blocks), space)
+    assert space[lenient.name(rounded)](3.14159) == 3.14

@@ -13,6 +13,7 @@ import imageio.v3 as iio
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
@@ -169,6 +170,13 @@ def test_missing_positions_shed_no_light_and_take_none_away_elsewhere():
 
 def save_to_nowhere(figure):
     assert len(figure._repr_png_()) > 1000
+
+
+def test_a_notebook_shows_a_wide_field_without_empty_paper_above_and_below():
+    low = flight()
+    low["position"].values[:, 1] *= 0.1
+    rows, columns = iio.imread(trajectories(low)._repr_png_()).shape[:2]
+    assert rows < 0.5 * columns
 
 
 def test_light_adds_up_to_one_unit_per_agent_and_second_faded():
@@ -377,6 +385,20 @@ def test_a_figure_is_saved_in_the_format_of_its_ending(tmp_path, ending):
     start = path.read_bytes()[:5]
     assert start == {"png": b"\x89PNG\r", "pdf": b"%PDF-", "svg": b"<?xml"}[ending]
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
+def test_the_same_figure_gives_the_same_file_and_settings_stay(tmp_path, ending):
+    before = dict(rcParams)
+    first, again = (save_figure(transfer(), tmp_path / f"{name}.{ending}").read_bytes() for name in "ab")
+    assert first == again
+    assert dict(rcParams) == before
+
+
+def test_a_pdf_embeds_its_fonts_as_truetype(tmp_path):
+    # Type 3, which Matplotlib writes if it is told nothing, is refused by IEEE PDF eXpress, ACM and others
+    content = save_figure(transfer(), tmp_path / "a.pdf").read_bytes()
+    assert b"/FontFile2" in content and b"/Type3" not in content
 
 
 def test_unknown_endings_and_missing_folders_are_refused_in_one_line(tmp_path):

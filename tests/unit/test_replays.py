@@ -119,6 +119,12 @@ def test_whoever_is_absent_is_not_shown_and_stays_where_it_was(recording):
     assert None not in about(page)["charts"][0][1]
 
 
+def test_a_lone_agent_has_no_chart_of_the_nearest_pair():
+    alone = airflock.load("vasarhelyi_2018/4ms", {"agents": 1, "duration": 1.0})
+    told = about(airflock.replay(airflock.simulate(alone, device="python")))
+    assert [title for title, _ in told["charts"]] == ["mean speed (m/s)"]
+
+
 def test_layers_hold_clusters_faults_groups_and_what_the_recording_knows_of_each():
     given = {"agents": 12, "duration": 6.0, "groups": [{"agents": [4, 5], "name": "slow"}, {"name": "rest"}]}
     scenario = airflock.load("vasarhelyi_2018/4ms", given)

@@ -77,6 +77,7 @@ def test_share_flocked_is_drawn_with_goals_and_collisions(monkeypatch):
     monkeypatch.setattr(module, "measure", lambda *_: ({"time_to_goal": [0.2, np.nan]}, course))
     upper, lower = flocked(recording()).axes
     assert len(upper.lines) == 3  # share, polarisation, and the goal that was reached
+    assert [text.get_text() for text in upper.get_legend().texts] == ["flocked", "polarisation", "goal reached"]
     assert lower.lines[1].get_ydata()[-1] == 40.0 and lower.get_yscale() == "symlog"
     few = course.assign(n_coll=[1.0] * 4 + [0.0] * 36)
     monkeypatch.setattr(module, "measure", lambda *_: ({}, few))
@@ -195,5 +196,8 @@ def test_a_formation_is_drawn_with_what_each_bird_saves():
     said = [float(text.get_text().replace(" %", "")) for text in axes.texts if text.get_text().endswith("%")]
     assert len(said) == 3 and said[1] == said[2] < -20.0 and said[1] < said[0]  # who flies behind saves most
     assert len(axes.lines) == 3 and np.ptp(axes.lines[0].get_xdata()) == pytest.approx(span)
+    frames[0, 1] = 0.0  # one behind the other, each in the downwash of those ahead
+    words = [text.get_text() for text in wash(dataset(frames, 3, 1.0, about, "velocity")).axes[0].texts]
+    assert any("% above that of lone birds" in said for said in words)
     with pytest.raises(RecordingError, match="fly in space"):
         wash(recording("kidger/final_2d"))

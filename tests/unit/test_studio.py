@@ -40,7 +40,7 @@ from airflock.studio.origin import Origin
 from airflock.studio.pace import Pace
 from airflock.studio.perceiving import Perceiving, _vectors
 from airflock.studio.player import Player
-from airflock.studio.score_tables import differences
+from airflock.studio.score_tables import difference_table, differences
 from airflock.studio.shading import Shading, together, ways
 from airflock.studio.side import Side, value_of
 from airflock.studio.trails import PIECE, Trails
@@ -517,6 +517,14 @@ def test_two_parameter_sets_side_by_side_meet_the_same_noise():
     assert player.where == f"{PRESET} | radio.delay = 2.0"
 
 
+def test_what_differs_stands_with_its_unit():
+    a, b = (
+        airflock.load(PRESET, {**FEW, "radio.delay": delay, "agents": count}) for delay, count in ((1, 12), (2, 13))
+    )
+    told = difference_table(a, b)
+    assert "<td>radio.delay (s)</td>" in told and "<td>agents</td>" in told
+
+
 def test_flights_of_other_dimensions_are_not_compared():
     with pytest.raises(StudioError, match="share one scene"):
         Player(FlightRequest(PRESET, {"agents": 3}, against="couzin_2002/torus"))
@@ -612,6 +620,13 @@ def test_what_an_agent_perceives_is_drawn_where_it_is(interpreted):
     shaft = drawn.lines["command"][0][0]
     np.testing.assert_allclose((shaft[1] - shaft[0])[:2], np.array(seen.command) * 5.0 / 6.0)
     assert f"hears {len(seen.heard)} others" in drawn.words
+
+
+@pytest.mark.parametrize(("agents", "said"), [(1, "hears nobody<br>"), (2, "hears 1 other, at most ")])
+def test_whom_few_agents_hear_is_told_in_words(interpreted, agents, said):
+    player = Player(FlightRequest(PRESET, {"agents": agents, "radio.range": 1000.0}, 3))
+    player.fly(300)
+    assert said in Perceiving().of(player.side, 0, 1.0, 6.0).words
 
 
 def test_repulsion_and_alignment_of_a_selected_agent_are_those_of_the_paper(interpreted):

@@ -78,7 +78,7 @@ def _distances(axes: Axes, found: "Certificate") -> None:
         if verdict.limit.score == "r_min":
             axes.axvline(verdict.limit.value, color=style.RED, lw=0.8, ls="--")
     axes.set_xlim(left=0.0)
-    style.dress(axes, "smallest distance in a flight, m", "share of flights below")
+    style.dress(axes, "smallest distance in a flight (m)", "share of flights below")
 
 
 def tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
@@ -151,7 +151,7 @@ def _map(axes: Axes, found: "Certificate") -> None:
         axes.contour(columns, rows, high, levels=[told["level"]], colors=style.RED, linewidths=1.2)
     axes.plot([], [], color=style.RED, label=f"{100.0 * told['level']:g} % of flights")
     across, down = (
-        key if unit == "1" else f"{key}, {unit}" for key, unit in zip(told["keys"], told["units"], strict=True)
+        key if unit == "1" else f"{key} ({unit})" for key, unit in zip(told["keys"], told["units"], strict=True)
     )
     style.dress(axes, down, across, grid=False)
     style.legend(axes, above=True)

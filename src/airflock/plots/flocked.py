@@ -54,12 +54,12 @@ def flocked(
     pen = Pen(course, smooth)
     handles = pen.draw(upper, course["flocked"], style.BLUE, "flocked")
     handles += pen.draw(upper, course["polarisation"], style.GREEN, "polarisation")
-    for time in values.get("time_to_goal", []):
-        if begin <= time <= end:
-            upper.axvline(time, color=style.ORANGE, linewidth=0.7, zorder=0)
+    reached = [time for time in values.get("time_to_goal", []) if begin <= time <= end]
+    lines = [upper.axvline(time, color=style.ORANGE, linewidth=0.7, zorder=0, label="goal reached") for time in reached]
+    handles += lines[:1]
     upper.set_ylim(0.0, 1.05)
     style.dress(upper, y="share (1)")
-    style.legend(upper, handles, columns=2, above=True)
+    style.legend(upper, handles, columns=3, above=True)
     lower.plot(course.index, course["n_clusters"], color=style.PURPLE, linewidth=0.9, label="sub-swarms")
     lower.plot(course.index, course["n_coll"].cumsum(), color=style.RED, linewidth=0.9, label="collisions so far")
     if max(course["n_clusters"].max(), course["n_coll"].sum()) > 2.0 * FEW:  # else one tick would be all

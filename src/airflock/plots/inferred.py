@@ -34,10 +34,10 @@ def inferred(found: Inferred, *, ax: Axes | None = None) -> Figure:
             if part == 0:
                 panel.set_title(name, fontsize=style.TEXT, color=style.INK)
             else:
-                panel.set_xlabel("left – right, m", fontsize=style.SMALL)
-        panels[part][0].set_ylabel("back – front, m", fontsize=style.SMALL)
+                panel.set_xlabel("left – right (m)", fontsize=style.SMALL)
+        panels[part][0].set_ylabel("back – front (m)", fontsize=style.SMALL)
         bar = figure.colorbar(drawn, ax=list(panels[part]), shrink=0.85)
-        bar.set_label(f"acceleration {what}, m/s²", fontsize=style.SMALL)
+        bar.set_label(f"acceleration {what} (m/s²)", fontsize=style.SMALL)
         bar.ax.tick_params(labelsize=style.SMALL)
     style.overall(figure, "inferred", found.verdict)
     return style.root(figure)

@@ -2,11 +2,13 @@
 
 import io
 import os
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 
 from airflock.atomic import atomic
@@ -16,6 +18,10 @@ from airflock.untrusted import own_path
 
 # no dates: the same figure gives the same file
 DATES: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+# TrueType, because many publishers refuse the Type 3 fonts that are Matplotlib's default; and ids in .svg that do not
+# differ from time to time. Both can be said only to all of Matplotlib.
+FILES: dict[str, Any] = {"pdf.fonttype": 42, "svg.hashsalt": "airflock"}
+_writing = threading.Lock()
 
 
 class PictureError(RecordingError):
@@ -38,7 +44,7 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
     >>> airflock.plots.save_figure(airflock.plots.trajectories(recording), "flight.png").name
     'flight.png'
     """
-    with complete_or_absent(path, PICTURES) as temporary:
+    with complete_or_absent(path, PICTURES) as temporary, fit_to_print():
         ending, content = temporary.suffix.lower(), io.BytesIO()
         figure.savefig(  # in memory: the writer of .pdf breaks in its own ways where a disk is full
             content, format=ending[1:], dpi=resolution, metadata=DATES.get(ending, {}),
@@ -46,6 +52,22 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
         )  # fmt: skip
         temporary.write_bytes(content.getvalue())  # no buffer of it: Python 3.12 crashes where an error holds one
     return own_path(path)
+
+
+@contextmanager
+def fit_to_print() -> Iterator[None]:
+    """Files that are written inside embed their fonts as publishers take them, and are the same each time.
+
+    One thread at a time: the settings are those of all of Matplotlib, and are put back as they were.
+    """
+    settings: Any = rcParams  # their type takes no keys but written-out ones
+    with _writing:
+        before = {key: settings[key] for key in FILES}
+        settings.update(FILES)
+        try:
+            yield
+        finally:
+            settings.update(before)
 
 
 @contextmanager

@@ -168,7 +168,8 @@ def _triad(axes: Any, view: View, box: tuple[float, float, float, float]) -> Non
             arrowprops={"arrowstyle": "-|>", "color": style.GREY, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
         )
         axes.annotate(name, foot + 1.08 * tip, fontsize=style.SMALL, color=style.GREY, ha="center", va="center")
-    axes.annotate(f"{length:g} m", foot + [0.0, -0.035 * (top - bottom)], fontsize=style.SMALL, color=style.GREY)
+    below = [foot[0], corner[1] - 0.035 * (top - bottom)]  # of all arrows: one may point down
+    axes.annotate(f"{length:g} m", below, fontsize=style.SMALL, color=style.GREY)
 
 
 def nearby(scenario: Scenario, shown: Paths) -> NDArray[np.float64]:

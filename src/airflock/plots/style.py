@@ -1,6 +1,7 @@
 """One look for all pictures: colours that colour-blind readers tell apart, quiet axes, titles that say what is shown.
 
-Everything is set on the figure at hand; global settings of Matplotlib are neither read on purpose nor changed.
+Everything is set on the figure at hand; global settings of Matplotlib are neither read on purpose nor changed, but for
+the two of files while one is written (`save`).
 """
 
 import io
@@ -43,7 +44,7 @@ class Picture(Figure):
 
     def _repr_png_(self) -> bytes:
         stream = io.BytesIO()
-        self.savefig(stream, format="png", dpi=110)
+        self.savefig(stream, format="png", dpi=110, bbox_inches="tight", pad_inches=0.08)
         return stream.getvalue()
 
 

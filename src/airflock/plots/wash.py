@@ -131,7 +131,8 @@ def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None =
     style.dress(axes, "across (m)", "ahead (m)", grid=False)
     axes.set(xlim=right, ylim=ahead, aspect="equal")
     saving = 1.0 - found.drag.mean() / found.solo
-    instant = f"t = {shown.times[frame]:.4g} s · induced drag {saving:.0%} below that of lone birds"
+    against = f"{100.0 * abs(saving):.0f} % {'below' if saving >= 0.0 else 'above'} that of lone birds"
+    instant = f"t = {shown.times[frame]:.4g} s · induced drag {against}"
     style.heading(axes, name_of(recording), f"{details_of(recording)} · {instant}")
     style.colour_bar(figure, picture, axes, "upwash (m/s)", shrink=0.7)
     return figure

@@ -6,7 +6,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -120,7 +120,7 @@ def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") 
         "height": [float(np.nanmin(frames[:, axes - 1])), float(np.nanmax(frames[:, axes - 1]))],
         "leap": _leap(scenario), "collisions": [[first + t, i, j] for t, i, j in collisions],
         "events": _events(recording, scenario), "stage": stage,
-        "charts": [["mean speed (m/s)", _short(_mean(speed))], ["nearest pair (m)", _short(nearest[::stride])]],
+        "charts": _known({"mean speed (m/s)": _mean(speed), "nearest pair (m)": nearest[::stride]}),
     }  # fmt: skip
     return Replay(_page(name, about, packed.data), name)
 
@@ -165,6 +165,11 @@ def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
     ever = present.any(axis=0)
     found[:, :, ~ever] = found[:, :, [int(ever.argmax())]]
     return found
+
+
+def _known(courses: Mapping[str, NDArray[Any]]) -> list[list[Any]]:
+    """Charts, as titles and values, of what is known at some time: a lone agent has no nearest pair."""
+    return [[title, _short(values)] for title, values in courses.items() if np.isfinite(values).any()]
 
 
 def _mean(speed: NDArray[Any]) -> NDArray[Any]:

@@ -29,7 +29,8 @@ function drawChart({ canvas, values }, time) {
   pen.lineWidth = 1.6;
   pen.beginPath();
   values.forEach((v, i) => {
-    if (v !== null) pen.lineTo(values.length > 1 ? i / (values.length - 1) * w : 0, y(v));
+    const x = values.length > 1 ? i / (values.length - 1) * w : 0;
+    if (v !== null) values[i - 1] == null ? pen.moveTo(x, y(v)) : pen.lineTo(x, y(v));  // no line over a gap
   });
   pen.stroke();
   pen.strokeStyle = "#E69F00";

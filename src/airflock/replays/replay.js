@@ -37,7 +37,8 @@ function draw(whole, time) {
 
 // ----------------------------------------------------------------------------------------------------- controls
 
-let now = first, playing = true, speed = 1;
+let now = first, speed = 1;
+let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;  // else it waits for Play
 
 function seek(time) {
   now = Math.min(Math.max(time, first), last);
@@ -79,7 +80,7 @@ function choose(event) {
 function say() {
   const seed = about.seed === null ? "" : ` · seed ${about.seed}`;
   const who = chosen < 0 ? "" : ` · agent ${chosen}`;
-  $("said").textContent = `${about.name} · ${agents} agents${seed}${who}`;
+  $("said").textContent = `${about.name} · ${agents} agent${agents === 1 ? "" : "s"}${seed}${who}`;
   $("clock").textContent = `${now.toFixed(1)} s`;
 }
 
@@ -115,6 +116,7 @@ async function main() {
   tell();
   layTrails();
   useCamera(camera);
+  play(playing);
   let then = performance.now(), charted = -1e9;
   const busy = [];
   const tick = stamp => {

@@ -3,7 +3,7 @@
 import ast
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any
 
@@ -14,6 +14,10 @@ from airflock.rules.nodes import walk
 ALLOWED_CALLS = {"min", "max", "abs", "float", "int", "range", "len"}
 RESERVED = {"min": "least", "max": "most"}  # what a driver calls instead: no name for a variable beside it
 TAKEN = "real"  # what a driver makes of every literal
+INSTEAD = {"random": "percept.normal(0) or percept.uniform(0) in decide", "time": "percept.time in decide"}
+NOT_FINITE = {"inf", "nan", "isinf", "isnan", "isfinite"}  # compiled arithmetic takes all numbers for finite
+INNER = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+HEAPED = ast.List, ast.Dict, ast.Set
 FORBIDDEN = (
     ast.Try, ast.With, ast.Raise, ast.Lambda, ast.ListComp, ast.DictComp, ast.SetComp, ast.GeneratorExp, ast.NamedExpr,
 )  # fmt: skip
@@ -21,37 +25,79 @@ FORBIDDEN = (
 
 def faults(rule: Callable[..., Any]) -> list[str]:
     """Everything in a rule that a compiler or a GPU would not take, each as one line with its place."""
+    if not inspect.isfunction(rule):
+        raise RuleError(f"{place_of(rule)}: rule {rule.__name__} has a decorator; a rule is a plain function")
     node = tree_of(rule)
-    code = rule.__code__
-    found = []
-    integers = integers_of(rule)
-
-    def complain(where: ast.AST, text: str) -> None:
-        line = code.co_firstlineno + getattr(where, "lineno", 1) - 1
-        found.append(f"{code.co_filename}:{line}: rule {rule.__name__}: {text}")
-
-    if node.decorator_list:
-        complain(node, "has a decorator; a rule is a plain function")
-    if TAKEN in code.co_varnames:
-        complain(node, f"{TAKEN} is what the engine calls here; give the variable another name")
+    told = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
     for item in walk(node):
-        called = RESERVED.get(getattr(item.func, "id", "")) if isinstance(item, ast.Call) else None
-        if called in code.co_varnames:
-            complain(item, f"{called} is what the engine calls here; give the variable another name")
-        if isinstance(item, ast.Call) and getattr(item.func, "id", "") in RESERVED and len(item.args) < 2:
-            complain(item, f"{item.func.id} of fewer than two numbers; write {item.func.id}(a, b)")  # type: ignore[attr-defined]
-        if isinstance(item, FORBIDDEN):
-            complain(item, f"{type(item).__name__} is not allowed in a rule")
-        if isinstance(item, ast.BinOp) and not isinstance(item.op, (ast.Pow, *BITWISE)):
-            for side, other in ((item.left, item.right), (item.right, item.left)):
-                if isinstance(side, ast.Constant) and type(side.value) is int and not is_integer(other, integers, rule):
-                    complain(item, f"integer {side.value} in float arithmetic; write {side.value}.0")
-        if isinstance(item, ast.Attribute) and isinstance(item.value, ast.Name):
-            module = rule.__globals__.get(item.value.id)
-            if inspect.ismodule(module) and module.__name__ != "math":
-                instead = f"; write math.{item.attr}" if hasattr(math, item.attr) else ""
-                complain(item, f"{item.value.id}.{item.attr}: only math may be used through a module name{instead}")
-    return found
+        told += [(item, text) for text in (*_of_text(item, node), *_of_numbers(item, rule), *_of_names(item, rule))]
+    return [f"{place_of(rule, getattr(item, 'lineno', 1) - 1)}: rule {rule.__name__}: {text}" for item, text in told]
+
+
+def _of_signature(node: ast.FunctionDef, variables: tuple[str, ...]) -> Iterator[str]:
+    if node.decorator_list:
+        yield "has a decorator; a rule is a plain function"
+    if node.args.kwonlyargs or node.args.vararg or node.args.kwarg:
+        yield "has * in its arguments; a rule is called with values in their order"
+    if TAKEN in variables:
+        yield f"{TAKEN} is what the engine calls here; give the variable another name"
+
+
+def _of_text(item: ast.AST, node: ast.FunctionDef) -> Iterator[str]:
+    """Statements and expressions that no rule has."""
+    if isinstance(item, FORBIDDEN):
+        yield f"{type(item).__name__} is not allowed in a rule"
+    if isinstance(item, HEAPED):
+        yield f"{type(item).__name__} is not allowed in a rule; write a tuple, or a name for each number"
+    if isinstance(item, (ast.Global, ast.Nonlocal)):
+        yield f"sets {', '.join(item.names)} outside; what an agent keeps between decisions is its Memory"
+    if isinstance(item, INNER) and item is not node:
+        yield f"{item.name} is defined inside; write it beside the rule"
+
+
+def _of_numbers(item: ast.AST, rule: Callable[..., Any]) -> Iterator[str]:
+    """Integers among floats, and numbers that are not finite."""
+    if isinstance(item, ast.BinOp) and not isinstance(item.op, (ast.Pow, *BITWISE)):
+        integers = integers_of(rule)
+        for side, other in ((item.left, item.right), (item.right, item.left)):
+            if isinstance(side, ast.Constant) and type(side.value) is int and not is_integer(other, integers, rule):
+                yield f"integer {side.value} in float arithmetic; write {side.value}.0"
+    if isinstance(item, ast.Name) and not _finite(rule.__globals__.get(item.id)):
+        yield f"{item.id} is not finite; write 1e30 for what is far"
+
+
+def _of_names(item: ast.AST, rule: Callable[..., Any]) -> Iterator[str]:
+    """Names that the engine has for itself, and names of modules."""
+    if isinstance(item, ast.Call) and isinstance(item.func, ast.Name) and item.func.id in RESERVED:
+        called = RESERVED[item.func.id]
+        if called in rule.__code__.co_varnames:
+            yield f"{called} is what the engine calls here; give the variable another name"
+        if len(item.args) < 2:
+            yield f"{item.func.id} of fewer than two numbers; write {item.func.id}(a, b)"
+    if isinstance(item, ast.Attribute) and isinstance(item.value, ast.Name):
+        module = rule.__globals__.get(item.value.id)
+        if module is math and item.attr in NOT_FINITE:
+            yield f"math.{item.attr}: compiled, every number counts as finite; write 1e30 for what is far"
+        elif inspect.ismodule(module) and module is not math:
+            instead = f"; write math.{item.attr}" if hasattr(math, item.attr) else _instead(module, item.attr)
+            yield f"{item.value.id}.{item.attr}: only math may be used through a module name{instead}"
+
+
+def place_of(rule: Any, line: int = 0) -> str:
+    """File and line of a rule, also of one that a decorator hides; `line` counts within it, from 0."""
+    code = getattr(inspect.unwrap(getattr(rule, "py_func", rule)), "__code__", None)
+    return f"{code.co_filename}:{code.co_firstlineno + line}" if code is not None else "?"
+
+
+def _finite(value: object) -> bool:
+    """Whether a global is no number, or a finite one."""
+    return not isinstance(value, float) or math.isfinite(value)
+
+
+def _instead(module: Any, name: str) -> str:
+    """What to write in place of a name of a module."""
+    source = INSTEAD.get(module.__name__, INSTEAD["random"] if name == "random" else "")
+    return f"; write {source}" if source else ""
 
 
 @lru_cache(maxsize=4096)

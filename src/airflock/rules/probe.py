@@ -167,7 +167,11 @@ def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str
     except BdbQuit:  # the reader left the debugger: no fault of the rule
         raise
     except Exception as fault:  # a user's rule may fail in any way; show where
-        frames = [f for f in traceback.extract_tb(fault.__traceback__) if "airflock/rules/probe" not in f.filename]
+        frames = [
+            frame
+            for frame in traceback.extract_tb(fault.__traceback__)
+            if "airflock/rules/probe" not in frame.filename and frame.filename != "<string>"  # text of a dataclass
+        ]
         spot = f"{frames[-1].filename}:{frames[-1].lineno}" if frames else _place(rule)
         raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {raised(fault)}") from fault
     numbers = answer if isinstance(answer, tuple) else (answer,)
@@ -178,6 +182,8 @@ def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str
 
 
 def _same_length(rule: Callable[..., Any], answer: Any, record: Any, owner: str) -> None:
+    if not hasattr(record, "_fields"):
+        raise RuleError(f"{_place(rule)}: {owner}: {record.__name__} must be a NamedTuple")
     if not isinstance(answer, tuple) or len(answer) != len(record._fields):
         raise RuleError(f"{_place(rule)}: {owner}.{rule.__name__} must return {record.__name__}{record._fields}")
 

@@ -58,6 +58,14 @@ class Rewrite(Unrolled):
     def visit_Constant(self, node: ast.Constant) -> ast.expr:
         return self._real(node) if type(node.value) is float else node
 
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.expr:
+        if self.source.lenient:
+            return node
+        place = law.place_of(self.rule, node.lineno - 1)
+        raise RuleError(
+            f"{place}: rule {self.rule.__name__} makes a text; it does not compile; the device python flies it"
+        )
+
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         if isinstance(node.value, ast.Name):
             if node.value.id == "math" and isinstance(getattr(math, node.attr, None), float):
@@ -175,8 +183,12 @@ class Rewrite(Unrolled):
             return ast.Name(self.notes.name(value, NOTHING), node.ctx)
         if isinstance(value, types.ModuleType) or (self.source.lenient and hasattr(builtins, node.id)):
             return node
-        why = "it does not compile; the device python flies it" if hasattr(builtins, node.id) else "it is not defined"
+        why = (
+            "; it does not compile; the device python flies it" if hasattr(builtins, node.id) else "; it is not defined"
+        )
+        if value is not None:
+            why = f"; write math.{node.id}" if callable(value) and hasattr(math, node.id) else ""
         raise RuleError(
-            f"{self.rule.__code__.co_filename}: rule {self.rule.__name__} uses {node.id}, which is neither a number, "
-            "a plain function nor a NamedTuple" + (f"; {why}" if value is None else "")
+            f"{law.place_of(self.rule, node.lineno - 1)}: rule {self.rule.__name__} uses {node.id}, which is neither a "
+            f"number, a plain function nor a NamedTuple{why}"
         )

@@ -14,7 +14,7 @@ from airflock.studio.fleet_drawing import FOLLOWED, LINKS, WAYS, FleetDrawing
 from airflock.studio.fleet_tables import about, faults_of, members_table, notes_of, trouble_of
 from airflock.studio.measures import KEPT, Pairs
 from airflock.studio.requests import Asked
-from airflock.studio.room import note
+from airflock.studio.room import note, told
 from airflock.studio.view import View
 
 FRAMES = 30  # per second
@@ -126,8 +126,7 @@ class FleetPage:
             f"<div style='padding:0 0.75em'><b>{html.escape(card.name)}</b><br><small>{heard} of {count} drones heard, "
             f"{len(observer.flying(now))} fly · mission {card.mission} · card {card.hash[:8]}</small></div>"
         )
-        said = trouble_of(observer, now)
-        self.trouble.content = f"<div style='padding:0 0.75em;color:#b00020'>{html.escape(said)}</div>" if said else ""
+        self.trouble.content = told(trouble_of(observer, now), bad=True)
         self.key.content = self.drawing.shown.key
         self.members.content = members_table(observer, now)
         self.faults.content, self.notes.content = faults_of(observer), notes_of(observer)

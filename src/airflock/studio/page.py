@@ -15,7 +15,7 @@ from airflock.studio.measuring import Measuring
 from airflock.studio.opening import Opening
 from airflock.studio.player import Player
 from airflock.studio.playing import Playing
-from airflock.studio.room import Room
+from airflock.studio.room import Room, told
 from airflock.studio.selecting import Selecting
 from airflock.studio.tuning import Tuning
 from airflock.studio.view import View
@@ -124,10 +124,8 @@ class Page:
         agents = f"{' and '.join(map(str, counts))} agent{'s' * (counts != [1])}"
         done = " and ".join(str(len(side.flight.events)) for side in player.sides)
         self.title.content = (
-            f"<div style='padding:0 0.75em'><b>{html.escape(player.where)}</b><br><small>t = {player.time:.1f} s · "
-            f"{agents} · seed {player.seed} · {state} · events: {done}</small></div>"
+            f"<div style='padding:0 0.75em;font-variant-numeric:tabular-nums'><b>{html.escape(player.where)}</b><br>"
+            f"<small>t = {player.time:.1f} s · {agents} · seed {player.seed} · {state} · events: {done}</small></div>"
         )
-        said = player.status
         self.rescue.visible = bool(player.failure)
-        tone = "#b00020" if player.failure else "#555"
-        self.trouble.content = f"<div style='padding:0 0.75em;color:{tone}'>{html.escape(said)}</div>" if said else ""
+        self.trouble.content = told(player.status, bad=bool(player.failure))

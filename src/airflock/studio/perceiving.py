@@ -169,7 +169,8 @@ def _about(seen: Seen, scenario: Scenario) -> list[str]:
     off = math.dist(seen.true[:3], seen.own[:3])
     wish = ", ".join(f"{part:.2f}" for part in seen.command)
     unit = {"velocity": " m/s", "acceleration": " m/s²"}.get(scenario.model.command, "")
-    heard = f"hears {len(seen.heard)} others, at most {oldest:.2g} s old"
+    others = "nobody" if not seen.heard else "1 other" if len(seen.heard) == 1 else f"{len(seen.heard)} others"
+    heard = f"hears {others}" + (f", at most {oldest:.2g} s old" if seen.heard else "")
     if sum(_noticed(seen)) < len(seen.heard):
         heard += f"; its law notices {sum(_noticed(seen))}"
     crossed = f"{_dash(colours.PURPLE, '✕')} where they were heard"

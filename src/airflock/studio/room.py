@@ -1,5 +1,6 @@
 """Room: a part of a page with one purpose, its controls and what it shows."""
 
+import html
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -31,3 +32,9 @@ class Room:
 def note(text: str) -> str:
     """Small print of a panel, as HTML."""
     return f"<div style='padding:0 0.75em;font-size:0.85em'>{text}</div>"
+
+
+def told(text: str, bad: bool) -> str:
+    """What a page says above its tabs, as HTML, at a distance from them; red where it is bad."""
+    look = f"padding:0 0.75em 0.6em;font-size:0.85em;color:{'#b00020' if bad else '#555'}"
+    return f"<div style='{look}'>{html.escape(text)}</div>" if text else ""

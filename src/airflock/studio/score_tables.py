@@ -5,6 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from airflock.core.parameters import Quantity, declarations, with_unit
 from airflock.engine import Flight
 from airflock.metrics.registry import reports
 from airflock.scenarios.scenario import Scenario
@@ -42,7 +43,8 @@ def difference_table(a: Scenario, b: Scenario) -> str:
     if not found:
         return _table([], "no difference, only chance that has grown")
     heads = "<tr><th></th><th style='text-align:right'>A</th><th style='text-align:right'>B</th></tr>"
-    rows = [_row(key, [_word(one), _word(other)]) for key, one, other in found]
+    units = _units(b) | _units(a)
+    rows = [_row(with_unit(key, units.get(key, "")), [_word(one), _word(other)]) for key, one, other in found]
     return _table([heads, *rows], f"{len(found)} parameter{'s' if len(found) > 1 else ''} with other values")
 
 
@@ -59,6 +61,16 @@ def differences(a: Scenario, b: Scenario) -> list[tuple[str, Any, Any]]:
             if one != other and (section, name) != ("", "duration"):
                 found.append((f"{section}.{name}".strip("."), one, other))
     return found
+
+
+def _units(scenario: Scenario) -> dict[str, str]:
+    """Key of each number of a scenario that has a unit → the unit, in brackets."""
+    return {
+        f"{section}.{name}".strip("."): f"({declared.unit})"
+        for section, record in scenario.records.items()
+        for name, declared, _ in declarations(record)
+        if isinstance(declared, Quantity) and declared.unit not in ("", "1")
+    }
 
 
 def _row(title: str, cells: Sequence[str], meaning: str = "") -> str:

@@ -19,6 +19,7 @@ from airflock.evolve.store import Store
 from airflock.identify.numbers import UNITS
 from airflock.plots.certificate import certificate
 from airflock.plots.convergence import convergence
+from airflock.plots.save import fit_to_print
 from airflock.scenarios.portrait import sentence
 from airflock.tune.assumed import defaults, said
 from airflock.tune.flown import circumstances, flights
@@ -44,7 +45,7 @@ def save(found: Tuned) -> None:
     pictures = [_png(figure) for figure in figures.values()]
     atomic.write(found.folder / PAGE, page(found, pictures, list(figures), shows))
     content = io.BytesIO()
-    with PdfPages(content, metadata={"CreationDate": None}) as pdf:
+    with fit_to_print(), PdfPages(content, metadata={"CreationDate": None}) as pdf:
         for figure in figures.values():
             pdf.savefig(figure, bbox_inches="tight")
     atomic.write(found.folder / FIGURES, content.getvalue())
