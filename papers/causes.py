@@ -52,8 +52,8 @@ DIAGONAL: dict[str, tuple[str, dict[str, Any], float]] = {
 }
 # Table S1: ends of printed ranges outside which our evolved numbers lie; speed (m/s), number, nearest end
 ENDS: tuple[tuple[int, str, float], ...] = (
-    (4, "r0_rep", 28.2), (4, "r0_frict", 87.8), (4, "v_shill", 9.4), (4, "a_shill", 1.24),
-    (8, "p_frict", 1.66), (8, "a_frict", 2.89), (16, "a_frict", 5.25), (32, "r0_frict", 252.0),
+    (4, "r0_rep", 28.2), (4, "r0_frict", 87.8), (6, "a_frict", 5.04), (8, "a_frict", 2.89), (16, "r0_frict", 198.0),
+    (16, "a_frict", 5.25), (16, "p_shill", 3.42), (32, "r0_frict", 252.0), (32, "r0_shill", 25.7),
 )  # fmt: skip
 NEAREST: dict[str, tuple[str, dict[str, Any]]] = {
     "4 m/s": ("real_4ms", {}),

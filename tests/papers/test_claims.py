@@ -12,7 +12,7 @@ from airflock.errors import AirflockError
 from airflock_papers import PAPERS, again, bounds, statistics
 from airflock_papers.claims import Claim, Measured, judge, read_claims, verdict_of, write_claims
 from airflock_papers.counts import count, headline
-from airflock_papers.page import NOT_KEPT, PART_BY_PART, flown_by
+from airflock_papers.page import PART_BY_PART, flown_by
 from airflock_papers.renew import above, renewed, words
 from airflock_papers.statements import LONGEST, load, read
 
@@ -224,5 +224,7 @@ def test_a_part_flown_again_is_held_against_every_page_of_its_paper() -> None:
 def test_every_committed_page_says_which_text_flew_it(path: Path) -> None:
     name = {"claims": "README", "evolved": "EVOLVED", "rounding": "ROUNDING"}[path.stem]
     header, _ = read_claims(path)
-    assert header["texts"] in (NOT_KEPT, PART_BY_PART) or re.fullmatch("[0-9a-f]{16}", header["texts"])
+    hashes = [each.rpartition(": ")[2] for each in str(header.get("renewed", "")).split("; ") if each]
+    hashes += [header["texts"]] if header["texts"] != PART_BY_PART else []
+    assert hashes and all(re.fullmatch("[0-9a-f]{16}", each) for each in hashes)
     assert flown_by(header) in path.with_name(f"{name}.md").read_text(encoding="utf-8")

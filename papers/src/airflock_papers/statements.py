@@ -19,7 +19,7 @@ from airflock_papers.quantities import QUANTITIES
 KINDS = ("paper", "program", "ours")
 UNTESTED = ("qualitative only", "not testable", "not flown yet")
 LONGEST = 25  # words of a quote
-OF_A_ROW = ("published", "published_sd", "bound", "reason")  # what a row of `each` gives as it is
+OF_A_ROW = ("published", "published_sd", "bound", "reason", "changed")  # what a row of `each` gives as it is
 # a number with its unit of time or its kind of place, as quotes and `at` write it
 TIMES = {
     "generation": r"generations?\s+(?P<a>\d+)|(?P<b>\d+)\s+generations?",

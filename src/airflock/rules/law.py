@@ -28,7 +28,7 @@ def faults(rule: Callable[..., Any]) -> list[str]:
     if not inspect.isfunction(rule):
         raise RuleError(f"{place_of(rule)}: rule {rule.__name__} has a decorator; a rule is a plain function")
     node = tree_of(rule)
-    told = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
+    told: list[tuple[ast.AST, str]] = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
     for item in walk(node):
         told += [(item, text) for text in (*_of_text(item, node), *_of_numbers(item, rule), *_of_names(item, rule))]
     return [f"{place_of(rule, getattr(item, 'lineno', 1) - 1)}: rule {rule.__name__}: {text}" for item, text in told]

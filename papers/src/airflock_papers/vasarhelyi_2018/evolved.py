@@ -29,8 +29,8 @@ ranges (`s1.range.*`).
 {table}"""
 READ_AS = {  # speed, m/s: words that end the note of a preset
     6: ": level",
-    8: ": level, or a hundredth below",
-    16: "; about half of it is the rounding of Table S1",
+    8: ": a hundredth; level without F_wall",
+    16: "; 0.03 of it is the rounding of Table S1",
     32: ": all of it is F_wall, an effect of the start",
 }
 TITLE = "Table S1 of Vásárhelyi et al. 2018, evolved again"
