@@ -53,7 +53,7 @@ def prepare(
     """
     import secrets
 
-    from airflock.fleet.prepare import MARGIN, card_document, left_off
+    from airflock.fleet.prepare import MARGIN, beside_the_scenario, card_document, left_off
     from airflock.mavlink.orders import new_keys
     from airflock.onboard.card import card_of, hash_of
 
@@ -81,6 +81,7 @@ def prepare(
     asked.refuse()
     tables.say_notes([*loaded.notes, *left_off(loaded)])
     card = _write_mission(files, document, private)
+    tables.say_notes(beside_the_scenario(loaded, card.safety, len(card.members)))
     if as_json:
         radio = {each.radio: each.share for each in loads}
         tables.emit_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})

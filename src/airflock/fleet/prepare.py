@@ -97,6 +97,29 @@ def left_off(scenario: Scenario) -> list[str]:
     return [f"the card leaves off the scenario's {what}: {names}" for what, names in said.items() if names]
 
 
+def beside_the_scenario(scenario: Scenario, safety: Safety, members: int) -> list[str]:
+    """What of a card the scenario did not fly, in a line for each: its scores and certificates do not speak of it."""
+    told = []
+    if members != scenario.agents:
+        told.append(
+            f"the card is for {members} drones, the scenario flies {scenario.agents}: scores and certificates of it do "
+            f"not speak of {members}"
+        )
+    likely = limits_of(scenario)
+    if safety.response < likely.response:
+        told.append(
+            f"response = {safety.response:g} s is shorter than that of the scenario's body, {likely.response:g} s: "
+            "distances to stop are told too short, unless the drones are as quick"
+        )
+    for name in ("accel", "brake"):
+        if getattr(safety, name) > likely.accel:
+            told.append(
+                f"{name} = {getattr(safety, name):g} m/s^2 is more than the scenario's body has, "
+                f"{likely.accel:g} m/s^2: distances to stop are told too short, unless the drones are as quick"
+            )
+    return told
+
+
 def _refuse_unflyable(scenario: Scenario) -> None:
     """Raise a CardError where a scenario has what no card can hold."""
     fault = ""

@@ -4,26 +4,22 @@ autopilot(bytes, now) and radio(datagram, now) take what arrives; tick(now) give
 give the same outputs to the bit, so that a log can be flown again.
 """
 
-from math import isfinite
 from typing import NamedTuple
 
-from airflock.core.agent import State
-from airflock.core.maths import norm
-from airflock.errors import AirflockError
 from airflock.mavlink import orders, status
 from airflock.mavlink.autopilots import TAKE_OFF, Speaker
 from airflock.mavlink.orders import Do
 from airflock.mavlink.signing import Receiver, Signer
-from airflock.onboard import guidance, saying
+from airflock.onboard import saying
 from airflock.onboard.card import Card
-from airflock.onboard.limiter import STILL, Velocity, limit
+from airflock.onboard.limiter import STILL, Velocity
 from airflock.onboard.mission import FLY, STANDING, Facts, Phase, look
 from airflock.onboard.operator import Operator
 from airflock.onboard.peers import Peers
-from airflock.onboard.situation import SLOW, Tick, Timers, facts
+from airflock.onboard.situation import Tick, Timers, facts
+from airflock.onboard.steering import EPSILON, Moment, Steering
 from airflock.onboard.wire import Wire
 
-EPSILON = 1e-6  # s; two clocks of a lock-step meet within it
 RETRY = 1.0  # s between two tries of a command
 KILLING = 3.0  # s at least for which a kill is repeated to an autopilot that is armed
 TELL = frozenset({Phase.BOOT, Phase.READY, Phase.CLEARED})
@@ -78,18 +74,16 @@ class Node:
         self._timers, self._since, self._before = Timers(), now, Phase.FLOCK
         self.home: tuple[float, float, float] | None = None
         self._twin = False  # somebody else signs as this member
-        self._goal: tuple[float, float, float] | None = None
         self.command: Velocity = STILL
-        self._wish: Velocity = STILL
-        self._last_tick, self._next_law, self._next_status = now, now, [now] * len(self._radios)
+        self._last_tick, self._next_status = now, [now] * len(self._radios)
         self._flew_at: float | None = None
         self._stream_since: float | None = None
         self._tried_at, self._beat_at, self._asked_at = -1e9, -1e9, -1e9
-        self._overloads, self._failed, self._fenced = 0, False, False
-        self._stands_at: tuple[float, float, float] | None = None  # where it came to stand in HOLD
+        self._overloads = 0
         self._stay: Velocity | None = None  # what keeps it where it stopped for somebody who is not heard
         self._told: tuple[str, ...] = ()
         self._notes: list[str] = []
+        self._steering = Steering(card, self.pilot, now, self._notes)
 
     # ------------------------------------------------------------------------------------------------------ in
 
@@ -154,9 +148,9 @@ class Node:
         late = now - self._last_tick > self.card.safety.late
         self._last_tick = now
         out = Out([], tuple([] for _ in self._radios), [])
-        known = self._facts(now, overload=late or self._failed)
+        known = self._facts(now, overload=late or self._steering.failed)
         self._overloads += known.overload
-        self._failed = False
+        self._steering.failed = False
         step = look(self.phase, known, self.card.safety)
         if step.row is not None:
             self._enter(step.to, step.row.event, now, out)
@@ -170,7 +164,7 @@ class Node:
         self._steer(now, known, out)
         self._speak(now, out)
         out.notes.extend(self._notes)
-        self._notes = []
+        self._notes.clear()
         return out
 
     def _facts(self, now: float, overload: bool) -> Facts:
@@ -184,12 +178,13 @@ class Node:
             order = None
             self._notes.append("the point that was ordered lies outside the fence; not followed")
         elif order == Do.GOTO:
-            self._goal, self.operator.held = self.operator.goal, False
+            self._steering.goal, self.operator.held = self.operator.goal, False
         if order == Do.RESUME and self.phase != Phase.MANUAL:
             self.operator.resume = False
         tick = Tick(
             now=now, utc=self.utc(now), phase=self.phase, before=self._before, home=self.home, twin=self._twin,
-            order=order, overload=overload, overloads=self._overloads, near_fence=self._fenced, lost_near=self.stands,
+            order=order, overload=overload, overloads=self._overloads, lost_near=self.stands,
+            near_fence=self._steering.fenced,
             streamed_for=0.0 if self._stream_since is None else now - self._stream_since, phase_for=now - self._since,
             time_over=self._flew_at is not None and now - self._flew_at > s.mission_time,
         )  # fmt: skip
@@ -217,7 +212,7 @@ class Node:
         if was == Phase.ARMING and to == Phase.TAKEOFF:
             self._flew_at, self._overloads = now, 0
         if to in (Phase.FLOCK, Phase.GOTO) and was not in (Phase.FLOCK, Phase.GOTO):
-            self._next_law = now
+            self._steering.begin(now)
         if to == Phase.RETURN and self.home is None and self.wire.state is not None:
             self.home = (self.wire.state.x, self.wire.state.y, self.card.layer(self.member))
         self.phase, self._since, self._tried_at = to, now, -1e9
@@ -254,7 +249,10 @@ class Node:
             return
         self._stream_since = now if self._stream_since is None else self._stream_since
         own = self.wire.state
-        self.command = STILL if own is None else self._limited(self._velocity(own, now, known), own)
+        flying = self.peers.flying() if phase == Phase.RETURN else {}
+        near = [peer.state for peer in flying.values() if peer.state is not None]
+        at = Moment(now, phase, self.home, self._stay, near, known.navigates)
+        self.command = STILL if own is None else self._steering.velocity(own, at)
         out.autopilot.append(say.velocity(self.command, round(now * 1e3)))
 
     def _climb(self) -> float:
@@ -267,55 +265,6 @@ class Node:
             return False
         self._tried_at = now
         return True
-
-    def _limited(self, wish: Velocity, own: State) -> Velocity:
-        s = self.card.safety
-        low = -1.0 if self.phase in (Phase.ARMING, Phase.TAKEOFF) else self.card.low
-        made = limit(wish, own, self.card.sides(own), (low, self.card.high), s)
-        self._fenced = made.fenced
-        return made.velocity
-
-    def _velocity(self, own: State, now: float, known: Facts) -> Velocity:
-        """What the phase wishes to fly, m/s."""
-        s, phase = self.card.safety, self.phase
-        if phase == Phase.HOLD and known.navigates:
-            if self._stands_at is None and norm(*own[3:]) < SLOW:
-                self._stands_at = own[:3]
-            return STILL if self._stands_at is None else guidance.stay_at(own, self._stands_at, s)
-        self._stands_at = None
-        if phase in (Phase.TAKEOFF, Phase.GATHER) and self.home is not None:
-            return guidance.keep(own, self.home, s)
-        if phase == Phase.RETURN and self.home is not None:
-            near = [peer.state for peer in self.peers.flying().values() if peer.state is not None]
-            wish = guidance.homewards(own, self.home, near, s)
-            return wish if self._stay is None else (*self._stay[:2], wish[2])
-        if phase not in (Phase.FLOCK, Phase.GOTO):
-            return STILL
-        if now >= self._next_law - EPSILON:
-            self._next_law = max(self._next_law + self.card.period, now)
-            self._wish = self._law(own, now)
-        x, y, z = self._wish if self._stay is None else self._stay
-        return x, y, guidance.climb(own, self.card.height, s) if self.card.flat else z
-
-    def _law(self, own: State, now: float) -> Velocity:
-        """What the law wishes, m/s; a law that fails or commands what is no velocity counts as an overload."""
-        goal = self._goal if self.phase == Phase.GOTO else None
-        at = self.card.law_state(own)
-        try:
-            told = None if goal is None else self.card.law_state(State(*goal, 0.0, 0.0, 0.0))[:3]
-            x, y, z = self.pilot.steer(at, now, told)
-        except (AirflockError, ArithmeticError, ValueError, TypeError, IndexError) as fault:
-            self._failed = True
-            self._notes.append(f"the law failed: {type(fault).__name__}: {fault}")
-            return STILL
-        if not (isfinite(x) and isfinite(y) and isfinite(z)):
-            self._failed = True
-            self._notes.append(f"the law commanded {(x, y, z)}, which is not a velocity")
-            return STILL
-        if goal is not None:
-            gx, gy, _ = guidance.make_for(own, goal, self.card.safety)
-            x, y = 0.5 * (x + gx), 0.5 * (y + gy)
-        return x, y, z
 
     # ------------------------------------------------------------------------------------------------- speaking
 
