@@ -1,6 +1,7 @@
 """Files of the user's own run as the text that they hold now, whatever bytecode lies beside them."""
 
 import os
+import subprocess
 import sys
 
 import pytest
@@ -83,3 +84,49 @@ def test_a_file_of_any_name_flies_as_one_of_a_plain_name(tmp_path, name):
         scenario = airflock.load("vasarhelyi_2018/4ms", settings, tmp_path / f"{stem}.py", trust=True)
         flown.append(airflock.open(scenario, 7, device="python").advance(steps=120).state)
     assert flown[0].std() > 0.0 and (flown[0] == flown[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("def neighbour(dx, dy)", "def neighbour(dx, dy, gain=2.0)", "declared in Parameters, and read as p.gain"),
+        ("def neighbour(dx, dy)", "def neighbour(self, dx, dy)", "asks for 'self'; a rule is a plain function"),
+        ('COMMAND = "velocity"', "", "lacks COMMAND"),
+        ("quantity(1.0", "quantity(11.0", "Parameters.pull = 11 m/s lies outside [0, 9] m/s"),
+        ("@dataclass(frozen=True, kw_only=True)", "", "is not a dataclass"),
+        ("    pull: float", "    push: float = 0.2\n    pull: float", "parameter push is not declared by quantity()"),
+    ],
+)
+def test_what_is_wrong_with_a_file_of_a_law_names_the_file(tmp_path, old, new, said):
+    path = tmp_path / "mine.py"
+    assert LAW.count(old) == 1
+    path.write_text(LAW.replace(old, new))
+    with pytest.raises(airflock.AirflockError) as fault:
+        airflock.load("vasarhelyi_2018/4ms", law=path)
+    assert str(fault.value).count("mine.py") == 1 and said in str(fault.value)
+
+
+def test_a_second_file_that_lies_beside_a_law_is_to_be_written_into_it(tmp_path):
+    (tmp_path / "soft.py").write_text("def lean(x):\n    return 0.1 * x\n")
+    for name, more in (("soft", "; code of your own is one file"), ("hard", "")):
+        path = tmp_path / f"{name}_law.py"
+        path.write_text(f"from {name} import lean\n{LAW}")
+        with pytest.raises(RuleError) as fault:
+            own_module(path, "model.kind", trust=True)
+        told = str(fault.value).removeprefix(f"{path}:1: ModuleNotFoundError: No module named '{name}'")
+        assert told.startswith(more) and bool(told) == bool(more)
+
+
+def test_a_rule_that_raises_in_flight_ends_in_a_line_with_its_place(tmp_path):
+    """Interpreted; compiled, a rule gives a number that is none, which a flight is refused for."""
+    path = tmp_path / "mine.py"
+    walls = "class Walls(NamedTuple):\n    x: float\ndef boundary(nx):\n    return Walls(math.acos(3.0 * nx))\n"
+    late = LAW.replace("import airflock", "import airflock, math").replace(
+        "def decide(own, sums, p)", "def decide(own, sums, walls, p)"
+    )
+    path.write_text(late.replace("def decide", f"{walls}def decide").replace("+ sums.x", "+ sums.x + walls.x"))
+    line = next(k for k, text in enumerate(path.read_text().splitlines(), 1) if "acos" in text)
+    words = ["run", "vasarhelyi_2018/4ms", "--law", str(path), "--agents", "3", "--duration", "1", "--device", "python"]
+    done = subprocess.run([sys.executable, "-m", "airflock", *words], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"airflock: {path}:{line}: ValueError: math domain error\n"

@@ -21,11 +21,11 @@ from airflock.metrics.registry import SETS, as_set, metric_set
 from airflock.metrics.registry import USUAL as USUAL_SET
 from airflock.radios.registry import RADIOS
 from airflock.radios.registry import USUAL as USUAL_RADIO
-from airflock.scenarios.own_code import own_code
+from airflock.scenarios.own_code import made_of
 from airflock.scenarios.schema import value_of
 from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
-from airflock.spelling import as_name, meant
+from airflock.spelling import meant
 from airflock.topology.registry import TOPOLOGIES
 from airflock.topology.registry import USUAL as USUAL_TOPOLOGY
 
@@ -68,7 +68,7 @@ class Family(Generic[T]):
         key = f"{self.section}.kind"
         if isinstance(kind, str) and kind.endswith(".py"):
             try:
-                return self.gather(own_code(key, kind, folder, trust=trust), as_name(Path(kind).stem)), []
+                return made_of(self.gather, key, kind, folder, trust=trust), []
             except AirflockError as fault:
                 return None, str(fault).splitlines()
         hint = meant(kind, self.known, f"known: {', '.join(self.known)}, or a file that ends in .py", cutoff=0.4)

@@ -13,8 +13,8 @@ from airflock.errors import AirflockError
 from airflock.faults.registry import KINDS
 from airflock.scenarios import schema, units
 from airflock.scenarios.groups import Group, members
-from airflock.scenarios.own_code import own_code
-from airflock.spelling import as_name, meant
+from airflock.scenarios.own_code import made_of
+from airflock.spelling import meant
 
 PERCEPTION = {"sense", "tell", "radio", "clock"}  # rules that disturb what agents know of each other
 MOST = 255  # entries of a file: each draws by a number of its own
@@ -147,7 +147,7 @@ def _kind(
         return kinds[name], []
     if isinstance(name, str) and name.endswith(".py"):
         try:
-            return fault(own_code(f"{where}.kind", name, folder, trust=trust), as_name(Path(name).stem)), []
+            return made_of(fault, f"{where}.kind", name, folder, trust=trust), []
         except AirflockError as wrong:
             return None, str(wrong).splitlines()
     hint = meant(name, kinds, f"known: {', '.join(kinds)}, or a file that ends in .py")

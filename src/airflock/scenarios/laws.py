@@ -8,8 +8,8 @@ from typing import Any
 
 from airflock.core.contract import Model, model
 from airflock.errors import ScenarioError, bounded
-from airflock.scenarios.own_code import own_code
-from airflock.spelling import as_name, meant
+from airflock.scenarios.own_code import made_of
+from airflock.spelling import meant
 
 MODELS = (
     "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
@@ -29,7 +29,7 @@ def find_model(kind: Any, folder: Path | None = None, *, told: str = "model.kind
     if kind in MODELS:
         return model(import_module(f"airflock.models.{kind}"), kind)
     if kind.endswith(".py"):
-        return model(own_code(told, kind, folder, trust=trust), as_name(Path(kind).stem))
+        return made_of(model, told, kind, folder, trust=trust)
     hint = meant(kind, MODELS, f"known: {', '.join(MODELS)}, or a file that ends in .py", cutoff=0.4)
     raise ScenarioError([f"{told} = {kind!r}: unknown model; {hint}"])
 

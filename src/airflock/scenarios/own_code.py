@@ -8,15 +8,20 @@ import hashlib
 import inspect
 import json
 import traceback
+from collections.abc import Callable
 from importlib import util
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import FunctionType, ModuleType
+from typing import TypeVar
 
 from airflock.core.contract import Model
-from airflock.errors import RuleError, ScenarioError, bounded
-from airflock.spelling import raised
+from airflock.core.parameters import declarations
+from airflock.errors import ParameterError, RuleError, ScenarioError, bounded
+from airflock.spelling import as_name, raised
 from airflock.untrusted import is_file, own_path
+
+T = TypeVar("T")
 
 
 def own_code(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
@@ -50,8 +55,33 @@ def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:
     except (Exception, SystemExit, KeyboardInterrupt) as fault:  # the user's own file may fail in any way
         lines = [frame.lineno for frame in traceback.extract_tb(fault.__traceback__) if frame.filename == str(path)]
         place = f"{path}:{lines[-1]}" if lines else str(path)
-        raise RuleError(f"{place}: {bounded(raised(fault))}") from fault
+        raise RuleError(f"{place}: {bounded(raised(fault))}{_beside(path, fault)}") from fault
     return module
+
+
+def _beside(path: Path, fault: BaseException) -> str:
+    """What to do about a module that was not found, where it lies beside the file that asks for it."""
+    wanted = str(fault.name).partition(".")[0] if isinstance(fault, ModuleNotFoundError) else ""
+    if not wanted or not is_file(path.with_name(f"{wanted}.py")):
+        return ""
+    return f"; code of your own is one file, also of those who get it from you: write into it what {wanted}.py has"
+
+
+def made_of(make: Callable[[ModuleType, str], T], key: str, name: str, folder: Path | None = None, *, trust: bool) -> T:
+    """What is made of the module and the name of a user's own file; every fault names the file.
+
+    Raises what `own_module` and `make` raise.
+    """
+    module = own_code(key, name, folder, trust=trust)
+    try:
+        made = make(module, as_name(Path(name).stem))
+        if isinstance(record := getattr(module, "Parameters", None), type) and declarations(record):
+            record()  # its defaults are checked by their own ranges
+        return made
+    except (RuleError, ParameterError) as fault:
+        lines = str(fault).splitlines()
+        told = [line if Path(name).name in line else f"{name}: {line}" for line in lines]
+        raise type(fault)("\n".join(told)) from fault
 
 
 def law_hash(law: Model) -> str:

@@ -93,11 +93,16 @@ class Mean(NamedTuple):
 @cache
 def asks(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...]:
     """Names that a rule asks for, checked against the vocabulary of its kind."""
-    names = tuple(inspect.signature(rule).parameters)
+    asked = inspect.signature(rule).parameters
+    names = tuple(asked)
     known = VOCABULARY[kind]
     for name in names:
         if name not in known:
             hint = meant(name, known, ".", lead="; ", cutoff=0.6)
+            if asked[name].default is not inspect.Parameter.empty:
+                hint = f"; a number of the rule's own is declared in Parameters, and read as p.{name}."
+            elif name == "self":
+                hint = "; a rule is a plain function."
             where = f"{owner}.{kind}" if owner else kind
             raise RuleError(f"{where}({', '.join(names)}) asks for {name!r}{hint} Known: {', '.join(known)}")
     return names
