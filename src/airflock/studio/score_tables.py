@@ -10,6 +10,8 @@ from airflock.engine import Flight
 from airflock.metrics.registry import reports
 from airflock.scenarios.scenario import Scenario
 
+COLUMN = "text-align:right;padding-left:0.8em"
+
 
 def score_table(flights: Sequence[Flight], scores: Sequence[Mapping[str, Any]]) -> str:
     """Order parameters of this window, of the window before, and of the paper, as HTML; of two flights side by side."""
@@ -17,7 +19,7 @@ def score_table(flights: Sequence[Flight], scores: Sequence[Mapping[str, Any]]) 
     about, published = reports(flight.scenario.measures), {} if two else flight.scenario.published
     before = flight.windows[-1].scores if flight.windows and not two else {}
     heads = ["A", "B", "B − A"] if two else ["now", *(["before"] if before else []), *(["paper"] if published else [])]
-    rows = ["<tr>" + "".join(f"<th style='text-align:right'>{head}</th>" for head in ["", *heads]) + "</tr>"]
+    rows = [_heads(["", *heads])]
     for name, value in scores[0].items():
         if not isinstance(value, (int, float)):
             continue
@@ -42,10 +44,9 @@ def difference_table(a: Scenario, b: Scenario) -> str:
     found = differences(a, b)
     if not found:
         return _table([], "no difference, only chance that has grown")
-    heads = "<tr><th></th><th style='text-align:right'>A</th><th style='text-align:right'>B</th></tr>"
     units = _units(b) | _units(a)
     rows = [_row(with_unit(key, units.get(key, "")), [_word(one), _word(other)]) for key, one, other in found]
-    return _table([heads, *rows], f"{len(found)} parameter{'s' if len(found) > 1 else ''} with other values")
+    return _table([_heads(["", "A", "B"]), *rows], f"{len(found)} parameter{'s' if len(found) > 1 else ''} with other values")
 
 
 def differences(a: Scenario, b: Scenario) -> list[tuple[str, Any, Any]]:
@@ -73,8 +74,12 @@ def _units(scenario: Scenario) -> dict[str, str]:
     }
 
 
+def _heads(titles: Sequence[str]) -> str:
+    return "<tr>" + "".join(f"<th style='{COLUMN}'>{title}</th>" for title in titles) + "</tr>"
+
+
 def _row(title: str, cells: Sequence[str], meaning: str = "") -> str:
-    body = "".join(f"<td style='text-align:right;padding-left:0.8em'>{html.escape(cell)}</td>" for cell in cells)
+    body = "".join(f"<td style='{COLUMN}'>{html.escape(cell)}</td>" for cell in cells)
     return f"<tr title='{html.escape(meaning, quote=True)}'><td>{html.escape(title)}</td>{body}</tr>"
 
 
