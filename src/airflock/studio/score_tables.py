@@ -46,7 +46,9 @@ def difference_table(a: Scenario, b: Scenario) -> str:
         return _table([], "no difference, only chance that has grown")
     units = _units(b) | _units(a)
     rows = [_row(with_unit(key, units.get(key, "")), [_word(one), _word(other)]) for key, one, other in found]
-    return _table([_heads(["", "A", "B"]), *rows], f"{len(found)} parameter{'s' if len(found) > 1 else ''} with other values")
+    return _table(
+        [_heads(["", "A", "B"]), *rows], f"{len(found)} parameter{'s' if len(found) > 1 else ''} with other values"
+    )
 
 
 def differences(a: Scenario, b: Scenario) -> list[tuple[str, Any, Any]]:
