@@ -208,6 +208,17 @@ def test_each_miss_is_told_in_a_line(change, line):
     assert [n for n in notes if re.search(line, n)], notes
 
 
+def test_no_site_is_doubted_before_there_are_satellites():
+    """An autopilot without a fix may say that it is where the equator meets Greenwich."""
+    node, vehicle = node_with_vehicle()
+    vehicle.origin = CARD.site.geodetic(0.0, 0.0, 0.0)
+    vehicle.state = vehicle.state._replace(y=-5e6)
+    heard = node.autopilot
+    node.autopilot = lambda data, now: (heard(data, now), setattr(node.wire, "fix", 1))[0]
+    notes = live(node, vehicle, 0.0, 2.0)
+    assert any("no own position" in note for note in notes) and not any("away from the card" in note for note in notes)
+
+
 def test_an_autopilot_that_is_started_anew_on_the_ground_is_asked_once_more():
     """By hand its parameters and its streams may have changed meanwhile, and its origin has."""
     node, vehicle = node_with_vehicle()

@@ -121,16 +121,16 @@ def test_orders_are_checked_before_they_are_sent(airflock):
 
 def test_a_preparation_says_what_the_scenario_did_not_fly(airflock):
     """A card for another number of drones, or for drones quicker than the body: tau 1 s and a_max 6 m/s^2 here."""
-    agents, body = ["--set", "agents=3"], "the scenario's body"
+    agents, given = ["--set", "agents=3"], "what the scenario gives a card"
     code, _, lines = airflock("fly", "prepare", REAL, *HERE, *agents, "--limit", "response=1", "--limit", "brake=6")
     assert code == 0 and not [line for line in lines if "scenario" in line]
     limits = ["--limit", "response=0.01", "--limit", "brake=20", "--limit", "accel=7", "--out", "other.json"]
     code, _, lines = airflock("fly", "prepare", REAL, *HERE, *limits)
     told = [line for line in lines if line.startswith("note: ")]
     assert code == 0 and told[0].startswith("note: the card is for 3 drones, the scenario flies ")
-    assert told[1].startswith(f"note: response = 0.01 s is shorter than that of {body}, 1 s: ")
-    assert told[2].startswith(f"note: accel = 7 m/s^2 is more than {body} has, 6 m/s^2: ")
-    assert told[3].startswith(f"note: brake = 20 m/s^2 is more than {body} has, 6 m/s^2: ")
+    assert told[1].startswith(f"note: response = 0.01 s is shorter than {given}, 1 s: ")
+    assert told[2].startswith(f"note: accel = 7 m/s^2 is more than {given}, 6 m/s^2: ")
+    assert told[3].startswith(f"note: brake = 20 m/s^2 is more than {given}, 6 m/s^2: ")
 
 
 @pytest.mark.parametrize(

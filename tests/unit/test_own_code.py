@@ -7,8 +7,11 @@ import sys
 import pytest
 
 import airflock
+from airflock.engine import Flight
 from airflock.errors import RuleError, ScenarioError
 from airflock.scenarios.own_code import own_module
+from airflock.studio.flights import FlightRequest
+from airflock.studio.player import Player
 
 
 def test_a_file_that_was_changed_within_a_second_runs_as_it_is(tmp_path, monkeypatch):
@@ -117,8 +120,9 @@ def test_a_second_file_that_lies_beside_a_law_is_to_be_written_into_it(tmp_path)
         assert told.startswith(more) and bool(told) == bool(more)
 
 
-def test_a_rule_that_raises_in_flight_ends_in_a_line_with_its_place(tmp_path):
-    """Interpreted; compiled, a rule gives a number that is none, which a flight is refused for."""
+@pytest.fixture
+def raising(tmp_path):
+    """A law that raises near a wall, and where. The probe of its rules does not come there."""
     path = tmp_path / "mine.py"
     walls = "class Walls(NamedTuple):\n    x: float\ndef boundary(nx):\n    return Walls(math.acos(3.0 * nx))\n"
     late = LAW.replace("import airflock", "import airflock, math").replace(
@@ -126,7 +130,33 @@ def test_a_rule_that_raises_in_flight_ends_in_a_line_with_its_place(tmp_path):
     )
     path.write_text(late.replace("def decide", f"{walls}def decide").replace("+ sums.x", "+ sums.x + walls.x"))
     line = next(k for k, text in enumerate(path.read_text().splitlines(), 1) if "acos" in text)
+    return path, f"{path}:{line}: ValueError: math domain error"
+
+
+@pytest.mark.parametrize("make", ["partial(other)", "Lean()"])
+def test_a_rule_that_is_no_function_is_told_so(tmp_path, make):
+    path = tmp_path / "mine.py"
+    more = "from functools import partial\nclass Lean:\n    def __call__(self, dx):\n        return Sums(dx, dx)\n"
+    path.write_text(
+        LAW.replace("def neighbour", "def other").replace("def decide", f"{more}neighbour = {make}\ndef decide")
+    )
+    with pytest.raises(RuleError, match="a rule is a plain function"):
+        airflock.open(airflock.load("vasarhelyi_2018/4ms", {"agents": 3}, law=path), device="python")
+
+
+def test_a_rule_that_raises_in_flight_ends_in_a_line_with_its_place(raising):
+    """Interpreted; compiled, a rule gives a number that is none, which a flight is refused for."""
+    path, told = raising
     words = ["run", "vasarhelyi_2018/4ms", "--law", str(path), "--agents", "3", "--duration", "1", "--device", "python"]
     done = subprocess.run([sys.executable, "-m", "airflock", *words], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == f"airflock: {path}:{line}: ValueError: math domain error\n"
+    assert done.stderr == f"airflock: {told}\n"
+
+
+def test_a_page_stops_the_flight_of_a_rule_that_raises_and_goes_on(raising, monkeypatch):
+    """As the first seconds are flown, until there is a driver."""
+    plainly = lambda *given, **named: Flight(*given, **{**named, "device": "python"})  # noqa: E731
+    monkeypatch.setattr("airflock.studio.origin.Flight", plainly)
+    path, told = raising
+    player = Player(FlightRequest("vasarhelyi_2018/4ms", {"agents": 3}, law=path))
+    assert not player.fly(50) and player.failure == f"stopped: {told}"

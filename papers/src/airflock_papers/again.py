@@ -4,45 +4,36 @@ In a clone, `python -m airflock_papers.again NAME PART` prints each claim whose 
 1 if there is one. `airflock paper all --quick` asks the same of the small form of every part.
 """
 
+import argparse
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from airflock.errors import AirflockError
+from airflock_papers.campaign import Key, verdicts
 from airflock_papers.catalogue import find
-from airflock_papers.claims import Claim, read_claims
+from airflock_papers.claims import Claim
 
 
-def pages(folder: Path) -> list[Claim]:
-    """Claims of all pages of a paper; folder: papers/NAME.
-
-    Raises AirflockError if there are none.
-    """
-    found = [claim for path in sorted(folder.glob("*.toml")) for claim in read_claims(path)[1]]
-    if not found:
-        raise AirflockError(f"{folder}: no page of a paper; run this in a clone")
-    return found
-
-
-def changed(before: Iterable[Claim], flown: Iterable[Claim]) -> list[str]:
-    """A line for each claim that was flown whose verdict is not that of its page."""
-    verdicts = {claim.id: claim.verdict for claim in before}
-    return [
-        f"{claim.id}: {verdicts.get(claim.id, 'on no page')} is now {claim.verdict}"
-        for claim in flown
-        if verdicts.get(claim.id) != claim.verdict
-    ]
+def changed(name: str, before: Mapping[Key, str], flown: Iterable[Claim]) -> list[str]:
+    """A line for each claim of a paper that was flown whose verdict is not that of its page (`campaign.verdicts`)."""
+    found = [(claim, before.get((name, claim.id), "on no page")) for claim in flown]
+    return [f"{claim.id}: {was} is now {claim.verdict}" for claim, was in found if was != claim.verdict]
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 3:
-        sys.exit("usage: python -m airflock_papers.again NAME PART, in a clone")
+    parser = argparse.ArgumentParser(description="Fly a part of a paper whole, and compare its verdicts with its page.")
+    parser.add_argument("name", help="of the paper, for instance vasarhelyi_2018")
+    parser.add_argument("part", help="for instance rounding")
+    asked = parser.parse_args()
     try:
-        before = pages(Path("papers") / sys.argv[1])  # told before anything flies
-        claims = find(sys.argv[1]).run(only=sys.argv[2])
-    except AirflockError as error:
-        sys.exit(str(error))
-    lines = changed(before, claims)
+        paper, before = find(asked.name), verdicts(Path("papers"))
+        if not before:
+            raise AirflockError("papers: holds no pages with verdicts; call this in a clone of Airflock")
+        claims = paper.run(only=asked.part)
+    except AirflockError as fault:
+        parser.error(str(fault))
+    lines = changed(asked.name, before, claims)
     for line in lines:
         print(line)
     print(f"{len(claims)} claims flown whole, {len(lines)} of another verdict than their page")

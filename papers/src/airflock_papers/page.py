@@ -10,7 +10,7 @@ from airflock_papers import claims as records
 from airflock_papers.claims import SEEDS, Claim
 from airflock_papers.counts import headline
 
-NOT_KEPT, PART_BY_PART = "not kept", "of each part, below"  # in place of one hash for a whole page
+PART_BY_PART = "of each part, below"  # in place of one hash for a whole page
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,12 @@ def flown_by(header: Mapping[str, Any]) -> str:
     """Which texts flew a page, in words; header: of its claims.toml."""
     parts = [each.partition(": ")[::2] for each in str(header.get("renewed", "")).split("; ") if each]
     listed = ", ".join(f"{part} `{texts}`" for part, texts in parts)
-    texts = header.get("texts", NOT_KEPT)
-    told = {
-        NOT_KEPT: "The hash of the texts that flew this page was not kept" + f"; later parts: {listed}" * bool(parts),
-        PART_BY_PART: f"Each part by the text of its day: {listed}",
-    }.get(texts, f"`{texts}`" + f", later parts by others: {listed}" * bool(parts))
+    later = f", later parts by others: {listed}" if parts else ""
+    told = (
+        f"Each part by the text of its day: {listed}"
+        if header["texts"] == PART_BY_PART
+        else f"`{header['texts']}`{later}"
+    )
     return (
         f"{told}. Version {header['version']}, {header['precision']}. A hash stands for all rules, the engine, presets "
         "and parts (`airflock_papers.texts`)."

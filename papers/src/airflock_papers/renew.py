@@ -98,8 +98,7 @@ def renew(
     new = set(statements) - {claim.id for path in tables for claim in records.read_claims(path)[1]} if tables else set()
     claims = renewed(statements, old, found, str(header["command"]), new)
     sections = [replace(s, words=words(text, s.title) or s.words) for s in sections]
-    told = {"texts": page.NOT_KEPT}  # of a page from before they were
-    told |= {key: value for key, value in header.items() if key not in ("paper", "command", "seeds")}
+    told = {key: value for key, value in header.items() if key not in ("paper", "command", "seeds")}
     if parts:
         before = [
             each for each in str(header.get("renewed", "")).split("; ") if each and each.split(":")[0] not in parts

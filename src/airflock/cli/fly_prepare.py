@@ -79,9 +79,9 @@ def prepare(
     document = asked.read(card_for, loaded)
     loads = asked.read(_airtimes, systems, document, fast_bits, slow_bits)
     asked.refuse()
-    tables.say_notes([*loaded.notes, *left_off(loaded)])
     card = _write_mission(files, document, private)
-    tables.say_notes(beside_the_scenario(loaded, card.safety, len(card.members)))
+    beside = beside_the_scenario(loaded, card.safety, len(card.members))
+    tables.say_notes([*loaded.notes, *left_off(loaded), *beside])
     if as_json:
         radio = {each.radio: each.share for each in loads}
         tables.emit_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})

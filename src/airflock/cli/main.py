@@ -5,22 +5,18 @@ import atexit
 import gc
 import os
 import signal
-import site
 import sys
-import sysconfig
 import threading
 import traceback
 import warnings
 from bdb import BdbQuit
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cache import cache_folder
 from airflock.cli import (
     certify,
     display,
@@ -44,7 +40,6 @@ from airflock.cli import (
 from airflock.cli.usage import at_home, usage_fault
 from airflock.cli.verb import Verb
 from airflock.errors import AirflockError, bounded, bounded_lines, printable, reason
-from airflock.spelling import raised
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
 
@@ -166,19 +161,11 @@ def main() -> None:
     except MemoryError as fault:
         _end(f"needs more memory than there is: {fault}; ask for fewer agents, flights or samples", fault)
     except Exception as fault:  # the border: whatever else goes wrong is one line, too
-        if place := _own_place(fault):  # on the device python: compiled, a rule raises nothing
-            _end(f"{place}: {raised(fault)}", fault)
+        from airflock.scenarios.own_code import raised_there
+
+        if told := raised_there(fault):  # on the device python: compiled, a rule raises nothing
+            _end(told, fault)
         _end(f"unexpected {type(fault).__name__}: {fault}; please report it; AIRFLOCK_DEBUG=1 shows where", fault)
-
-
-def _own_place(fault: Exception) -> str:
-    """File and line in the user's own code where a fault was raised; empty if it was raised by anything else."""
-    last = traceback.extract_tb(fault.__traceback__)[-1]
-    ours = (*site.getsitepackages(), site.getusersitepackages(), sysconfig.get_path("stdlib"), str(cache_folder()))
-    ours += (str(Path(__file__).resolve().parents[1]),)
-    path = Path(last.filename).resolve()
-    own = path.is_file() and not any(path.is_relative_to(Path(folder).resolve()) for folder in ours)
-    return f"{last.filename}:{last.lineno}" if own else ""
 
 
 def _note(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:

@@ -108,13 +108,13 @@ def beside_the_scenario(scenario: Scenario, safety: Safety, members: int) -> lis
     likely = limits_of(scenario)
     if safety.response < likely.response:
         told.append(
-            f"response = {safety.response:g} s is shorter than that of the scenario's body, {likely.response:g} s: "
+            f"response = {safety.response:g} s is shorter than what the scenario gives a card, {likely.response:g} s: "
             "distances to stop are told too short, unless the drones are as quick"
         )
     for name in ("accel", "brake"):
         if getattr(safety, name) > likely.accel:
             told.append(
-                f"{name} = {getattr(safety, name):g} m/s^2 is more than the scenario's body has, "
+                f"{name} = {getattr(safety, name):g} m/s^2 is more than what the scenario gives a card, "
                 f"{likely.accel:g} m/s^2: distances to stop are told too short, unless the drones are as quick"
             )
     return told

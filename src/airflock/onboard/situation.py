@@ -87,9 +87,10 @@ def _parameter_misses(card: Card, member: int, wire: Wire) -> list[str]:
 def _own_misses(card: Card, wire: Wire, now: float) -> list[str]:
     """What is wrong with the own position, battery or stand."""
     s, found, own = card.safety, [], wire.state
-    if wire.far:
+    far = wire.far if wire.fix >= 3 else 0.0  # without satellites it may say that it is at 0 degrees north and east
+    if far:
         found.append(
-            f"the drone is {wire.far * 1e-3:.0f} km away from the card's site: is the site right? It is latitude, "
+            f"the drone is {far * 1e-3:.0f} km away from the card's site: is the site right? It is latitude, "
             "longitude in degrees, altitude above mean sea level in m"
         )
     elif own is None or now - wire.state_at > s.stale:
@@ -103,7 +104,7 @@ def _own_misses(card: Card, wire: Wire, now: float) -> list[str]:
         )
     elif wire.disagreement(now) > s.jump:
         found.append(f"local and global position of the autopilot differ by {wire.disagreement(now):.0f} m")
-    if wire.origin is None and not wire.far:
+    if wire.origin is None and not far:
         found.append("GPS_GLOBAL_ORIGIN: the autopilot has not reported it")
     if wire.fix < 3 or wire.h_acc > s.h_acc:
         accuracy = f"accuracy {min(wire.h_acc, 999.0):.1f} m"

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from matplotlib import rcParams
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from airflock.atomic import atomic
@@ -20,7 +20,7 @@ from airflock.untrusted import own_path
 DATES: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 # TrueType, because many publishers refuse the Type 3 fonts that are Matplotlib's default; and ids in .svg that do not
 # differ from time to time. Both can be said only to all of Matplotlib.
-FILES: dict[str, Any] = {"pdf.fonttype": 42, "svg.hashsalt": "airflock"}
+FILES: Any = {"pdf.fonttype": 42, "svg.hashsalt": "airflock"}
 _writing = threading.Lock()
 
 
@@ -60,14 +60,8 @@ def fit_to_print() -> Iterator[None]:
 
     One thread at a time: the settings are those of all of Matplotlib, and are put back as they were.
     """
-    settings: Any = rcParams  # their type takes no keys but written-out ones
-    with _writing:
-        before = {key: settings[key] for key in FILES}
-        settings.update(FILES)
-        try:
-            yield
-        finally:
-            settings.update(before)
+    with _writing, rc_context(FILES):
+        yield
 
 
 @contextmanager

@@ -26,7 +26,9 @@ FORBIDDEN = (
 def faults(rule: Callable[..., Any]) -> list[str]:
     """Everything in a rule that a compiler or a GPU would not take, each as one line with its place."""
     if not inspect.isfunction(rule):
-        raise RuleError(f"{place_of(rule)}: rule {rule.__name__} has a decorator; a rule is a plain function")
+        name = getattr(rule, "__name__", type(rule).__name__)
+        what = "has a decorator" if hasattr(rule, "__wrapped__") or hasattr(rule, "py_func") else "is an object"
+        raise RuleError(f"{place_of(rule)}: rule {name} {what}; a rule is a plain function")
     node = tree_of(rule)
     told: list[tuple[ast.AST, str]] = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
     for item in walk(node):

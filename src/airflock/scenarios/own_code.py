@@ -7,6 +7,7 @@ imported only if the caller says so: `trust=True`, `--trust`, or by giving the l
 import hashlib
 import inspect
 import json
+import sysconfig
 import traceback
 from collections.abc import Callable
 from importlib import util
@@ -15,6 +16,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TypeVar
 
+from airflock.cache import cache_folder
 from airflock.core.contract import Model
 from airflock.core.parameters import declarations
 from airflock.errors import ParameterError, RuleError, ScenarioError, bounded
@@ -82,6 +84,21 @@ def made_of(make: Callable[[ModuleType, str], T], key: str, name: str, folder: P
         lines = str(fault).splitlines()
         told = [line if Path(name).name in line else f"{name}: {line}" for line in lines]
         raise type(fault)("\n".join(told)) from fault
+
+
+def raised_there(fault: Exception) -> str:
+    """What code of the user's own raised, in a line with its place; empty if anything else raised it."""
+    last = traceback.extract_tb(fault.__traceback__)[-1]
+    path = Path(last.filename).resolve()
+    others = (
+        Path(__file__).resolve().parents[1],
+        Path(sysconfig.get_path("stdlib")).resolve(),
+        cache_folder().resolve(),
+    )
+    installed = {"site-packages", "dist-packages"} & set(path.parts)
+    if installed or not path.is_file() or any(path.is_relative_to(folder) for folder in others):
+        return ""
+    return f"{last.filename}:{last.lineno}: {bounded(raised(fault))}"
 
 
 def law_hash(law: Model) -> str:

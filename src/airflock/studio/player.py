@@ -5,6 +5,7 @@ from time import perf_counter
 
 from airflock.engine import Snapshot
 from airflock.errors import AirflockError, reason
+from airflock.scenarios.own_code import raised_there
 from airflock.spelling import raised
 from airflock.studio.flights import FlightRequest, Flights
 from airflock.studio.moments import Moments
@@ -115,8 +116,11 @@ class Player(Flights):
         try:
             for side in self.sides:
                 side.fly_to(end)
-        except AirflockError as fault:
-            self.failure = f"stopped: {fault}"
+        except Exception as fault:  # a rule of the user's own may raise anything, until it is compiled
+            told = str(fault) if isinstance(fault, AirflockError) else raised_there(fault)
+            if not told:
+                raise
+            self.failure = f"stopped: {told}"
             self.fault(self.failure)
             return False
         return True
