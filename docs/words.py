@@ -30,7 +30,7 @@ BESIDE = (
     "README.md", "CHANGELOG.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md",
     "paper/paper.md",
 )  # fmt: skip
-# what no message says → how each kind of fault is worded (decision 0084)
+# what no message says → how each kind of fault is worded
 WORDINGS = {
     r"\bis no key\b|\bno such (?:key|order parameter|paper|option|model|section|metric|part)\b": "NAME: unknown KIND",
     r"(?<!there )\bis no (?:number|table|list|name|model|body|scenario|recording|file|law)\b": "VALUE is not a KIND",

@@ -53,6 +53,14 @@ def test_decisions_and_the_front_pages_are_held_to_the_words_too():
     assert {path.name for path in (DOCS / "decisions").glob("*.md")} <= names
 
 
+def test_decision_records_have_one_format_and_are_numbered_in_order():
+    records = sorted((DOCS / "decisions").glob("*.md"))
+    assert [path.name[:5] for path in records] == [f"{number:04d}-" for number in range(1, len(records) + 1)]
+    for path in records:
+        heads = re.findall(r"^#+ .*$", path.read_text(encoding="utf-8"), re.M)
+        assert heads[0].startswith("# ") and heads[1:] == ["## Context", "## Decision", "## Consequence"], path.name
+
+
 def test_the_map_shows_every_package_and_module_at_the_top():
     told = (DOCS.parent / "ARCHITECTURE.md").read_text(encoding="utf-8").split("```")[1]
     top = [path for path in (DOCS.parent / "src/airflock").iterdir() if not path.name.startswith(("_", "."))]

@@ -48,7 +48,7 @@ class Search(Record):
         "1",
         low=0,
         high=1e5,
-        source="our choice; docs/decisions/0121",
+        source="our choice: ranks of single flights drifted to 0.035 below Table S1 at 6 m/s, four flights stayed",
         meaning="flights per candidate in the last generation; they grow from seeds on, after three tenths of all",
     )
     random_numbers: str = choice(
@@ -60,7 +60,7 @@ class Search(Record):
     racing: str = choice(
         "none",
         ("none", "optimistic"),
-        source="our choice; docs/decisions/0072",
+        source="our choice, after benchmarks/racing.py",
         meaning="whether candidates of several seeds that cannot reach the better half of a generation fly on",
     )
     restarts: float = quantity(
@@ -77,7 +77,7 @@ class Search(Record):
     flights: str = choice(
         "whole",
         ("whole", "growing"),
-        source="our choice; docs/decisions/0072",
+        source="our choice: most of what a search flies first does not flock at all",
         meaning="length of the search's flights: that of the scenario, or from an eighth of it up to it",
     )
     start: str = choice(
@@ -99,7 +99,7 @@ class Search(Record):
         "1",
         low=0,
         high=20,
-        source="our choice; docs/decisions/0072",
+        source="our choice: the mean of CMA-ES wanders on a plateau",
         meaning="further finalists: means of CMA-ES averaged over its last half, quarter, eighth, ... of generations",
     )
     windows: float = quantity(
@@ -107,7 +107,7 @@ class Search(Record):
         "1",
         low=0,
         high=100,
-        source="our choice; docs/decisions/0121",
+        source="our choice: the best place may lie on the way of the search, not at its end",
         meaning="further finalists: means of CMA-ES averaged over each of so many equal parts of its last half",
     )
     reserve: float = quantity(
@@ -115,7 +115,7 @@ class Search(Record):
         "1",
         low=1.0,
         high=1e6,
-        source="our choice; docs/decisions/0097",
+        source="our choice, after benchmarks/limits.py",
         meaning="with limits: how many times rarer than allowed an event is to look",
     )
     seed: float = quantity(
@@ -139,7 +139,7 @@ class Search(Record):
         "1",
         low=0,
         high=1e4,
-        source="our choice; docs/decisions/0121",
+        source="our choice: 60 flights cannot separate finalists that differ by 0.005",
         meaning="best finalists that fly twice as many fresh seeds; the worse half stops early; 0: none",
     )
 

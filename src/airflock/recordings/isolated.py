@@ -1,6 +1,7 @@
 """Recordings opened by another process, with a time limit: this process reads plain arrays and never opens HDF5.
 
-`docs/decisions/0028` says why. An `Opening` starts its process at once, so that it works while this one imports.
+A damaged file of 34 kB keeps HDF5 busy for ever, and neither a thread nor Ctrl-C can end it. An `Opening`
+starts its process at once, so that it works while this one imports.
 """
 
 import json
