@@ -49,7 +49,7 @@ def errors_of(path: Path) -> Iterator[str]:
 
 
 def paragraphs(path: Path) -> Iterator[tuple[int, str]]:
-    """Yield line number and text of each paragraph, without code, equations and markup; a glossary's fence is no code."""
+    """Yield line and text of each paragraph, without code, equations and markup; a glossary's fence is no code."""
     text = path.read_text(encoding="utf-8")
     lines = _comments(text) if path.suffix == ".py" else list(enumerate(text.splitlines(), 1))
     fenced, begun, gathered = False, 0, []
