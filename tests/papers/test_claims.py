@@ -168,10 +168,10 @@ def test_words_of_a_page_are_those_above_its_pictures_and_claims() -> None:
 
 
 @pytest.mark.parametrize("name", PAPERS)
-def test_the_front_page_tells_what_the_page_counts(name: str) -> None:
+def test_the_table_of_papers_has_the_counts_of_each_page(name: str) -> None:
     """Reproduced, of what is judged by a bound: claims, and quotes of which every claim is."""
-    front = (ROOT.parent / "README.md").read_text(encoding="utf-8")
-    told = re.search(rf"\| (\d+) of (\d+); (\d+) of (\d+): \[papers/{name}\]", front)
+    front = (ROOT / "README.md").read_text(encoding="utf-8")
+    told = re.search(rf"\| (\d+) of (\d+); (\d+) of (\d+): \[{name}\]", front)
     claims = read_claims(ROOT / name / "claims.toml")[1]
     found = count(claims)
     good, bad = (found.verdicts[verdict] for verdict in ("reproduced", "not reproduced"))

@@ -16,7 +16,8 @@ ALONE = 0.3  # share of generations after which flights of a candidate begin to 
 FEWEST = 8  # generations of a search with growing flights: one at least of each length but the last
 
 
-# a third of the published study's flights; what it is worth stands in benchmarks/RESULTS-searches.md
+# A third of the published study's flights. Measured with benchmarks/time_to_target.py: 9 of 10 searches reach the
+# fitness of Table S1 at 6 m/s.
 FAST: Mapping[str, Any] = {
     "population": 24, "generations": 72, "late_seeds": 9, "averages": 2, "windows": 4, "pool": 20, "top": 4,
     "final_seeds": 60, "again": 3,
