@@ -9,11 +9,13 @@ as plain values of JSON. A module may have `show(name) -> str`, which prints one
 
 import argparse
 import json
+import os
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).resolve().parent
+SOURCES = [str(HERE.parents[1] / folder) for folder in ("src", "papers/src")]  # of this checkout, installed or not
 MOST = 20  # differences that are printed of one snapshot
 LONGEST = 400  # letters that are printed of one value
 MISSING = "(missing)"
@@ -27,7 +29,8 @@ def names():
 def module(name):
     """Import the module of one snapshot; it may import the helpers of the tests."""
     if str(HERE.parent) not in sys.path:
-        sys.path.insert(0, str(HERE.parent))
+        sys.path[:0] = [str(HERE.parent), *SOURCES]
+        os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (*SOURCES, os.environ.get("PYTHONPATH"))))
     qualified = f"snapshot_{name}"  # `golden` or `store` alone may be something else on the path
     if qualified not in sys.modules:
         spec = spec_from_file_location(qualified, HERE / f"{name}.py")
