@@ -37,7 +37,7 @@ class Search(Record):
         "cmaes",
         ALGORITHMS,
         source=S6,
-        meaning="CMA-ES; a binary genetic algorithm; NSGA-II or NSGA-III (Pareto fronts)",
+        meaning="CMA-ES; a binary genetic algorithm; NSGA-II (Pareto fronts)",
     )
     population: float = quantity(100, "1", low=2, high=1e6, source=S6, meaning="candidates per generation")
     generations: float = quantity(150, "1", low=1, high=1e6, source=S6, meaning="generations per run")
@@ -158,15 +158,15 @@ def search_faults(
         for name in WHOLE
         if (value := getattr(search, name)) != int(value)
     ]
-    if search.algorithm in SEVERAL and len(objectives) < 2:
+    if search.algorithm == SEVERAL and len(objectives) < 2:
         faults.append(
-            f"search.algorithm = '{search.algorithm}' is for several objectives, but there is one; "
+            f"search.algorithm = '{SEVERAL}' is for several objectives, but there is one; "
             "give objective.maximise a list"
         )
-    if search.algorithm not in SEVERAL and len(objectives) > 1:
+    if search.algorithm != SEVERAL and len(objectives) > 1:
         faults.append(
             f"search.algorithm = '{search.algorithm}' takes one objective, but there are {len(objectives)}; "
-            f"give one, or search.algorithm = 'nsga2'"
+            f"give one, or search.algorithm = '{SEVERAL}'"
         )
     faults += _only_cmaes(search) + _racing_faults(search, objectives, over_scenarios)
     if limits and search.racing != "none":
