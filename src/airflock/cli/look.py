@@ -77,9 +77,7 @@ def video(
     end: End = None,
     space: Annotated[
         bool | None,
-        typer.Option(
-            "--space/--above", help="View at an angle with solid buildings, or from above.", show_default="as flown"
-        ),
+        typer.Option("--space/--above", help="View at an angle, or from above.", show_default="as flown"),
     ] = None,
     chart: Annotated[
         str,
