@@ -1,0 +1,76 @@
+"""Verbs of the command: options with spellings, types, choices, defaults, help, panel, and the text of the help."""
+
+from typing import Any
+
+import typer.main
+
+from airflock.cli.main import app
+
+OPEN = ("commands",)  # what a group of verbs has
+
+
+def _type_of(kind: Any) -> dict[str, Any]:
+    """Return the plain data of one option's type: its name, choices and range where it has them."""
+    data: dict[str, Any] = {"name": kind.name}
+    if hasattr(kind, "choices"):
+        data["choices"] = [str(getattr(each, "value", each)) for each in kind.choices]
+    if hasattr(kind, "types"):
+        data["parts"] = [_type_of(each) for each in kind.types]
+    for key in ("min", "max", "min_open", "max_open", "clamp", "exists", "file_okay", "dir_okay"):
+        if hasattr(kind, key):
+            data[key] = getattr(kind, key)
+    return data
+
+
+def _plain(value: Any) -> Any:
+    """Return a default as plain data; floats keep their bits as text."""
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if type(value).__name__ == "Sentinel" or "UNSET" in repr(value):
+        return None
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _parameter(parameter: Any) -> dict[str, Any]:
+    """Return the plain data of one option or argument."""
+    return {
+        "kind": parameter.param_type_name,
+        "spellings": [*parameter.opts, *parameter.secondary_opts],
+        "type": _type_of(parameter.type),
+        "required": parameter.required,
+        "multiple": bool(getattr(parameter, "multiple", False)),
+        "nargs": parameter.nargs,
+        "flag": bool(getattr(parameter, "is_flag", False)),
+        "default": _plain(parameter.default),
+        "metavar": parameter.metavar,
+        "help": getattr(parameter, "help", None),
+        "hidden": bool(getattr(parameter, "hidden", False)),
+        "panel": getattr(parameter, "rich_help_panel", None),
+    }
+
+
+def _verbs(command: Any, name: str) -> dict[str, Any]:
+    """Return a verb and its sub-verbs by their full names."""
+    text = command.help or ""
+    data = {
+        name: {
+            "panel": getattr(command, "rich_help_panel", None),
+            "hidden": bool(command.hidden),
+            "help": text.splitlines(),
+            "examples": [line.strip() for line in text.splitlines() if "airflock " in line],
+            "epilog": command.epilog,
+            "parameters": {each.name: _parameter(each) for each in command.params},
+            "order": [each.name for each in command.params],
+            "verbs": list(getattr(command, "commands", {})),
+        }
+    }
+    for verb, inner in getattr(command, "commands", {}).items():
+        data |= _verbs(inner, f"{name} {verb}")
+    return data
+
+
+def take() -> dict[str, Any]:
+    """Return the plain data of each verb by its full name, such as `airflock fly prepare`."""
+    return _verbs(typer.main.get_command(app), "airflock")
