@@ -23,7 +23,8 @@ import numpy as np
 from c_reference import Reference
 from trial import Trial
 
-from airflock.engine import fly, score_flight, score_flights, vectors
+from airflock.engine import fly, score_flight, score_flights
+from airflock.machine import vector_bits
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import cores
@@ -153,7 +154,7 @@ def machine(bits: int) -> dict[str, object]:
 
     return {
         "processor": cpu, "cores": cores(), "compiler": version.splitlines()[0],
-        "flags": " ".join(c_reference.flags(bits)), "c_vector_bits": bits, "airflock_vector_bits": vectors.bits(),
+        "flags": " ".join(c_reference.flags(bits)), "c_vector_bits": bits, "airflock_vector_bits": vector_bits(),
         "numba": numba.__version__, "python": platform.python_version(), "commit": commit.strip(),
     }  # fmt: skip
 

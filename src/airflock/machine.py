@@ -19,11 +19,29 @@ def processor() -> str:
 
 
 @cache
-def kind() -> str:
-    """Kind of the processor for which drivers are compiled, for instance znver4: flights of one seed have its bits."""
-    import llvmlite.binding as llvm
+def target() -> tuple[str, frozenset[str]]:
+    """Kind of the processor for which drivers are compiled, for instance znver4, and its features, for instance avx2.
 
-    return str(llvm.get_host_cpu_name())
+    They are those of this machine unless NUMBA_CPU_NAME and NUMBA_CPU_FEATURES name others. Everything that depends on
+    a processor is decided by these two.
+    """
+    import llvmlite.binding as llvm
+    from numba import config
+
+    features = llvm.get_host_cpu_features().flatten() if config.CPU_FEATURES is None else config.CPU_FEATURES
+    name = llvm.get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME
+    return str(name), frozenset(word[1:] for word in features.split(",") if word.startswith("+"))
+
+
+def kind() -> str:
+    """Kind of the processor for which drivers are compiled: flights of one seed have its bits."""
+    return target()[0]
+
+
+def vector_bits() -> int:
+    """Width of the vectors of drivers: 512 from Ice Lake and Zen 4 on, which keep their clock with them."""
+    features = target()[1]
+    return 512 if "avx512vbmi2" in features else 256 if "avx2" in features else 128
 
 
 @cache

@@ -19,6 +19,7 @@ from numba.core.untyped_passes import InlineClosureLikes
 
 from airflock.engine.compile_shortcuts import sparing
 from airflock.engine.libraries import SPREAD, DriverLibrary, InlinedLibrary
+from airflock.machine import vector_bits
 
 LATER = ("make_function", "build_list", "build_set", "build_map")  # what closures and arrays out of lists begin with
 ARRAY_VALUED = ("unary", "binop", "inplace_binop", "call")  # what is rewritten where its value is a whole array
@@ -217,3 +218,4 @@ def _when_grown(refresh: Callable[[], None]) -> Callable[[], None]:
 
 INNER: dict[str, Any] = {"pipeline_class": DriverCompiler, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 CALLED: dict[str, Any] = INNER | {"no_cpython_wrapper": False}
+WIDE = vector_bits() == 512  # whether `wide_vectors` of a driver asks for them

@@ -5,14 +5,13 @@ not one by the comparison that Numba makes of min (2.4 times on the nearest-neig
 expression without a branch: of two branches on one test LLVM makes two ways through a loop, and the extremes at their
 ends are then no reductions any more (9 times on the same loop). `copy_block` copies a few neighbours in a row of one
 contiguous table to another one, plus a shift, as one vector. `wide_vectors` asks for 512-bit vectors in the function
-that calls it: LLVM takes 256 bits by default, for processors whose clock falls with wider ones. `apart` promises that
-the arguments of the function that calls it lie apart in memory: else LLVM compares the places of all rows before each
-loop, and gives up on a loop that writes many. `alone` keeps the function that calls it out of those that call that one.
-`min` and `max` are Numba's of two numbers, and `as_bits` and `as_number` its views of the bits of one, which Numba
-compiles for each kind of number as functions that Python could call.
+that calls it, on processors that keep their clock then (`machine.vector_bits`): LLVM takes 256 bits by default. A
+driver asks for them on every processor, so that its text is the same on all. `apart` promises that the arguments of the
+function that calls it lie apart in memory: else LLVM compares the places of all rows before each loop, and gives up on
+a loop that writes many. `alone` keeps the function that calls it out of those that call that one. `min` and `max` are
+Numba's of two numbers, and `as_bits` and `as_number` its views of the bits of one, which Numba compiles for each kind
+of number as functions that Python could call.
 """
-
-from functools import cache
 
 TEXT = """
 def _extreme(instruction, comparison):
@@ -65,7 +64,9 @@ def choose(typing_context, test, a, b):
 @intrinsic
 def wide_vectors(typing_context):
     def emit(context, builder, signature, arguments):
-        set.add(builder.function.attributes, '"prefer-vector-width"="512"')  # llvmlite knows names without values only
+        if WIDE:
+            # llvmlite itself knows only names without values
+            set.add(builder.function.attributes, '"prefer-vector-width"="512"')
         return context.get_dummy_value()
     return types.void(), emit
 
@@ -109,14 +110,3 @@ def copy_block(typing_context, to, row, at, source, first, shift):
         return context.get_dummy_value()
     return types.void(to, types.int64, types.int64, source, types.int64, to.dtype), emit
 """
-
-
-@cache
-def bits() -> int:
-    """Width of the vectors of drivers on this processor: 512 from Ice Lake and Zen 4 on, which keep their clock."""
-    import llvmlite.binding as llvm
-
-    features = llvm.get_host_cpu_features()
-    if features.get("avx512vbmi2", False):
-        return 512
-    return 256 if features.get("avx2", False) else 128

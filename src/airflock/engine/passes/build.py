@@ -8,7 +8,6 @@ from typing import Any
 
 from airflock.core.contract import Metric
 from airflock.core.vocabulary import asks
-from airflock.engine import vectors
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
 from airflock.engine.specialise.values import Function
@@ -158,8 +157,7 @@ class Builder:
         self.stages[name] = Function(name, tuple(parameters.split(", ")))
         decorator = "@njit(parallel=True, **JIT)" if parallel else ONCE if once else JIT
         lines = ["alone()", *lines] if once else lines
-        lines = ["wide_vectors()", *lines] if vectors.bits() == 512 else lines
-        self.functions.append(f"{decorator}\ndef {head}:\n" + indent("\n".join(lines), "    "))
+        self.functions.append(f"{decorator}\ndef {head}:\n" + indent("\n".join(["wide_vectors()", *lines]), "    "))
 
     def stage(
         self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0", apart: bool = False

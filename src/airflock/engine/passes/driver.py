@@ -26,7 +26,7 @@ from llvmlite import ir
 from numba import njit, prange, types
 from numba.extending import intrinsic
 
-from airflock.engine.compiler import CALLED, INNER
+from airflock.engine.compiler import CALLED, INNER, WIDE
 
 real = np.float{bits}
 integer = np.int{bits}
