@@ -102,7 +102,10 @@ def write_files(folder: Path):
         table.to_csv(folder / f"drone{i}.csv", index=False)
         table = table.assign(time_us=times).set_axis(["TIME", "EAST", "NORTH"], axis=1)
         table.to_csv(folder / "logs" / f"{i}.csv", index=False)
-        down = [np.column_stack([v[:, 1], v[:, 0], np.full(len(v), z)]) for v, z in zip((place, speed, wish), (-20, 0, 0), strict=True)]
+        down = [
+            np.column_stack([v[:, 1], v[:, 0], np.full(len(v), z)])
+            for v, z in zip((place, speed, wish), (-20, 0, 0), strict=True)
+        ]
         for path in (folder / f"log_{i}.ulg", folder / "logs" / f"{i}.ulg"):
             write_ulog(path, 12.0 + times, *down, utc=1.7e9)
     packets(generator, flights).to_csv(folder / "heard.csv", index=False)

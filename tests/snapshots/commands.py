@@ -9,13 +9,13 @@ run in a smaller form. Of what opens a page, waits for an autopilot or installs 
 import json
 import re
 import shlex
+import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
-from haswell import environment
+from haswell import python
 from snapshots import options
 from snapshots._files import write_files
 
@@ -36,7 +36,7 @@ NOT_RUN = {  # words of a command, and why it is not run
 }
 SMALLER = {  # words of a command, and options that make it small; of two values of an option the last counts
     r"^airflock run": "--agents 5 --duration 5 --seeds 2",
-    r"^airflock evolve": "--population 4 --generations 2 --duration 5",
+    r"^airflock evolve": "--population 4 --generations 2 --agents 5 --duration 5",
     r"^airflock harden": "--generations 1 --duration 5 --seeds 2",
     r"^airflock certify (?!.*--check)": "--agents 5 --duration 5 --budget 5s",
     r"^airflock fleet": "--agents 3 --duration 5",
@@ -44,7 +44,8 @@ SMALLER = {  # words of a command, and options that make it small; of two values
     r"^airflock tune": "--agents 4 --duration 5 --budget 5s",
     r"^airflock plot mine": "--agents 4 --duration 5",
 }
-SECONDS = 60
+SECONDS = 180
+OFFLINE = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9", "BROWSER": "true"}
 
 
 def collect() -> dict[str, list[str]]:
@@ -69,15 +70,12 @@ def collect() -> dict[str, list[str]]:
 def _run(command: str, folder: Path) -> dict[str, Any]:
     """Run a command in a folder; return its status and the first lines that it wrote to stderr, if it failed."""
     program, *words = shlex.split(command)
-    module = ["-m", "airflock"] if program == "airflock" else []
     words = [name for word in words for name in _matching(word, folder)]
     words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]
-    offline = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9", "BROWSER": "true"}
     try:
-        done = subprocess.run(
-            [sys.executable, *module, *words], cwd=folder, env=environment() | offline, capture_output=True, text=True,
-            timeout=SECONDS, stdin=subprocess.DEVNULL,
-        )  # fmt: skip
+        done = python(
+            folder, *(["-m", "airflock"] if program == "airflock" else []), *words, seconds=SECONDS, **OFFLINE
+        )
     except subprocess.TimeoutExpired:
         return {"status": "took too long"}
     told = done.stderr.replace(str(folder), "FOLDER").splitlines()[-3:]
@@ -109,12 +107,12 @@ def _smaller(command: str) -> str:
     return " ".join([command, *(more for words, more in SMALLER.items() if re.search(words, command))])
 
 
-def _page(commands: list[str], verbs: dict[str, Any]) -> list[dict[str, Any]]:
-    """Run the commands of one page, or check their words."""
+def _page(commands: list[str], verbs: dict[str, Any], files: Path) -> list[dict[str, Any]]:
+    """Run the commands of one page in a folder with these files, or check their words."""
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_files(folder)
+        shutil.copytree(files, folder, dirs_exist_ok=True)
         for command in commands:
             why = next((why for words, why in NOT_RUN.items() if re.search(words, command)), None)
             row: dict[str, Any] = {"command": command}
@@ -137,4 +135,6 @@ def take() -> dict[str, Any]:
     else:
         pages = collect()
     verbs = options.take()
-    return {page: _page(commands, verbs) for page, commands in pages.items()}
+    with tempfile.TemporaryDirectory() as files:
+        write_files(Path(files))
+        return {page: _page(commands, verbs, Path(files)) for page, commands in pages.items()}

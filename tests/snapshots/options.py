@@ -6,8 +6,6 @@ import typer.main
 
 from airflock.cli.main import app
 
-OPEN = ("commands",)  # what a group of verbs has
-
 
 def _type_of(kind: Any) -> dict[str, Any]:
     """Return the plain data of one option's type: its name, choices and range where it has them."""
@@ -24,6 +22,7 @@ def _type_of(kind: Any) -> dict[str, Any]:
 
 def _plain(value: Any) -> Any:
     """Return a default as plain data; floats keep their bits as text."""
+    value = getattr(value, "value", value)  # typer wraps a default that nobody gave
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, list | tuple):
@@ -47,7 +46,7 @@ def _parameter(parameter: Any) -> dict[str, Any]:
         "metavar": parameter.metavar,
         "help": getattr(parameter, "help", None),
         "hidden": bool(getattr(parameter, "hidden", False)),
-        "panel": getattr(parameter, "rich_help_panel", None),
+        "panel": _plain(getattr(parameter, "rich_help_panel", None)),
     }
 
 
@@ -56,7 +55,7 @@ def _verbs(command: Any, name: str) -> dict[str, Any]:
     text = command.help or ""
     data = {
         name: {
-            "panel": getattr(command, "rich_help_panel", None),
+            "panel": _plain(getattr(command, "rich_help_panel", None)),
             "hidden": bool(command.hidden),
             "help": text.splitlines(),
             "examples": [line.strip() for line in text.splitlines() if "airflock " in line],

@@ -53,7 +53,9 @@ class Tap:
 
     def data(self) -> dict[str, Any]:
         """Return the plain data."""
-        streams = {key: {"frames": self.counts[key], "sha256": d.hexdigest()} for key, d in sorted(self.digests.items())}
+        streams = {
+            key: {"frames": self.counts[key], "sha256": d.hexdigest()} for key, d in sorted(self.digests.items())
+        }
         return {"streams": streams, "first": self.first}
 
 
