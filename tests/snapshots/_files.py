@@ -1,5 +1,6 @@
 """Files that the commands of snapshots read: a scenario, tracks of animals, logs of drones and packets they heard."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -109,6 +110,7 @@ def write_files(folder: Path):
         for path in (folder / f"log_{i}.ulg", folder / "logs" / f"{i}.ulg"):
             write_ulog(path, 12.0 + times, *down, utc=1.7e9)
     packets(generator, flights).to_csv(folder / "heard.csv", index=False)
-    for name in ("fish", "trial1", "trial2", "trial3", "drones"):
-        airflock(folder, "import", "fish.csv", "--unit", "mm", "--save", f"{name}.nc")
+    airflock(folder, "import", "fish.csv", "--unit", "mm", "--save", "fish.nc")
+    for name in ("trial1", "trial2", "trial3", "drones"):
+        shutil.copyfile(folder / "fish.nc", folder / f"{name}.nc")
     airflock(folder, "run", "vasarhelyi_2018/real_6ms", "--agents", "4", "--duration", "5", "--save", "flight.nc")

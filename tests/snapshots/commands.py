@@ -91,7 +91,10 @@ def _unknown(command: str, verbs: dict[str, Any]) -> list[str]:
     """Return the words of a command of airflock that are neither a verb nor one of its options."""
     plain = re.sub(r"'[^']*'|\"[^\"]*\"", "QUOTED", command.strip("`"))
     plain = re.split(r"\s[|>;&]|\.\.\.|…", plain)[0]
-    name, words = "airflock", plain.split()[1:]
+    if plain.startswith("python"):
+        name, words = "python -m airflock.onboard", plain.split()[3:]
+    else:
+        name, words = "airflock", plain.split()[1:]
     while words and f"{name} {words[0]}" in verbs:
         name, words = f"{name} {words[0]}", words[1:]
     if name == "airflock fly card" or words[:1] == ["VERB"]:
@@ -116,7 +119,7 @@ def _page(commands: list[str], verbs: dict[str, Any], files: Path) -> list[dict[
         for command in commands:
             why = next((why for words, why in NOT_RUN.items() if re.search(words, command)), None)
             row: dict[str, Any] = {"command": command}
-            if command.strip("`").startswith("airflock"):
+            if command.strip("`").startswith(("airflock", "python -m airflock.onboard")):
                 row["unknown"] = _unknown(command, verbs)
             if why is None:
                 ran = _smaller(command)

@@ -5,6 +5,7 @@ from typing import Any
 import typer.main
 
 from airflock.cli.main import app
+from airflock.onboard.run import parser
 
 
 def _type_of(kind: Any) -> dict[str, Any]:
@@ -70,6 +71,27 @@ def _verbs(command: Any, name: str) -> dict[str, Any]:
     return data
 
 
+def _node() -> dict[str, Any]:
+    """Return the options of the node on board, which argparse reads: the flying computer has no other library."""
+    node = parser()
+    shown = {
+        each.dest: {
+            "kind": "option" if each.option_strings else "argument",
+            "spellings": each.option_strings or [each.dest],
+            "type": {"name": getattr(each.type, "__name__", "str") if each.nargs != 0 else "boolean"},
+            "required": each.required,
+            "multiple": type(each).__name__ == "_AppendAction",
+            "default": _plain(each.default),
+            "metavar": each.metavar,
+            "help": each.help,
+        }
+        for each in node._actions
+    }
+    text = f"{node.description}\n{node.epilog}".splitlines()
+    examples = [line.strip() for line in text if "airflock" in line]
+    return {"help": text, "examples": examples, "parameters": shown, "order": list(shown), "verbs": []}
+
+
 def take() -> dict[str, Any]:
     """Return the plain data of each verb by its full name, such as `airflock fly prepare`."""
-    return _verbs(typer.main.get_command(app), "airflock")
+    return _verbs(typer.main.get_command(app), "airflock") | {"python -m airflock.onboard": _node()}
