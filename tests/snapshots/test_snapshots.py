@@ -1,0 +1,24 @@
+"""What must not change is as recorded; `python tests/snapshots/run.py NAME --write` records a change that is meant."""
+
+import pytest
+import run
+
+QUICK = {"drivers", "scenarios"}  # seconds each; .ci/nightly compares all
+
+
+@pytest.mark.parametrize("name", sorted(QUICK & set(run.names())))
+def test_snapshot_is_as_recorded(name):
+    found = run.compare(name)
+    assert not found[: run.MOST], f"{len(found)} items differ"
+
+
+def test_every_snapshot_has_a_record():
+    assert [name for name in run.names() if not run.record(name).exists()] == []
+
+
+def test_one_changed_value_is_seen():
+    old = {"a": {"b": [1, 2], "c": {}}, "d": "x"}
+    assert run.differences(old, {"a": {"b": [1, 2], "c": {}}, "d": "x"}) == []
+    assert run.differences(old, {"a": {"b": [1, 3], "c": {}}, "d": "x"}) == [("a / b / 1", 2, 3)]
+    assert run.differences(old, {"a": {"b": [1, 2]}, "d": "x"}) == [("a / c", {}, run.MISSING)]
+    assert run.differences({}, {"e": None}) == [("e", run.MISSING, None)]
