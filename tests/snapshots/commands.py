@@ -84,7 +84,8 @@ def _run(command: str, folder: Path) -> dict[str, Any]:
 
 def _matching(word: str, folder: Path) -> list[str]:
     """Return the files of a pattern as a shell does."""
-    return [str(path.relative_to(folder)) for path in sorted(folder.glob(word))] if "*" in word else [word]
+    found = sorted(folder.glob(word)) if "*" in word else ()
+    return [str(path.relative_to(folder)) for path in found] or [word]
 
 
 def _unknown(command: str, verbs: dict[str, Any]) -> list[str]:
