@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from splitting import counted
 
-from airflock.limits.bounds import look, schedule
+from airflock.certificates.bounds import look, schedule
 
 REPETITIONS, ALPHA, ONCE, MOST = 200, 0.05, 4000, 100.0  # MOST events expected in a repetition
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from c_reference import SCORES, parameters_of
 
-from airflock import gpu as device
 from airflock.scenarios.timing import clock
+from airflock.support import gpu as device
 
 HERE = Path(__file__).parent
 SOURCE = HERE / "vasarhelyi.cu"

@@ -10,12 +10,12 @@ import time
 from pathlib import Path
 
 from airflock.engine import score_flight, score_flights
-from airflock.evolve.run import executor_for
-from airflock.evolve.search import search
-from airflock.evolve.space import with_parameters
-from airflock.evolve.store import Batch, Store
-from airflock.evolve.study import load_study
-from airflock.executors.in_process import InProcess
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.space import with_parameters
+from airflock.runs.store import Batch, Store
+from airflock.search.run import executor_for
+from airflock.search.search import search
+from airflock.search.study import load_study
 
 NAME = "vasarhelyi_2018/6ms"
 

@@ -26,13 +26,13 @@ import cuda_c
 import numpy as np
 from c_reference import SCORES
 
-from airflock import gpu as device
 from airflock.engine import cpu, plan_of, score_flights
 from airflock.engine.cuda import launch
 from airflock.engine.cuda.kernel import ARGUMENTS
 from airflock.engine.cuda.memory import layout_of
 from airflock.engine.tables import tables
 from airflock.scenarios.files import load
+from airflock.support import gpu as device
 
 HERE = Path(__file__).parent
 PRESET = "vasarhelyi_2018/4ms"

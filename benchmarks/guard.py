@@ -47,8 +47,8 @@ def child() -> None:
     from airflock.engine.cpu import fly
     from airflock.engine.simulate import plan_of
     from airflock.engine.tables import tables
-    from airflock.errors import ScenarioError
     from airflock.scenarios.files import load, presets
+    from airflock.support.errors import ScenarioError
 
     ready = {}
     for line in sys.stdin:

@@ -23,10 +23,10 @@ from scipy.stats import ttest_ind, ttest_rel
 
 import airflock
 from airflock.engine import score_flights
-from airflock.identify import body, packets, periods, sensors, synthetic
-from airflock.identify.logs import Logs
-from airflock.identify.run import identify
-from airflock.many_tests import holm
+from airflock.estimate.identify import body, packets, periods, sensors, synthetic
+from airflock.estimate.identify.logs import Logs
+from airflock.estimate.identify.run import identify
+from airflock.support.many_tests import holm
 
 PRESET, DRONES, SECONDS, STEP, GROUND = "vasarhelyi_2018/real_6ms", 10, 300.0, 0.05, 120.0
 SAME = {"agents": DRONES, "duration": SECONDS, "radio.kind": "links", "radio.range": 250.0}

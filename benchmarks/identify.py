@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 import airflock
-from airflock.identify import body, packets, sensors, synthetic
-from airflock.identify.hills import LINKS
+from airflock.estimate.identify import body, packets, sensors, synthetic
+from airflock.estimate.identify.hills import LINKS
 
 KEYS = {"tau": "body.tau", "a_max": "body.a_max", "noise": "body.noise"}
 

@@ -18,10 +18,10 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 import airflock
-from airflock.evolve.cmaes import CMAES
-from airflock.evolve.safe import allowed, safe_first
-from airflock.limits.chance import index_of, indices
-from airflock.limits.limit import read
+from airflock.certificates.chance import index_of, indices
+from airflock.certificates.limit import read
+from airflock.search.cmaes import CMAES
+from airflock.search.safe import allowed, safe_first
 
 AXES, SD, GENERATIONS, POPULATION, FLIGHTS = 11, 1.5, 300, 24, 2
 SCENARIO = airflock.load("vasarhelyi_2018/6ms")

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from airflock.engine import score_flights
-from airflock.evolve.folder import read
-from airflock.evolve.racing import still_needed
-from airflock.evolve.space import with_parameters
-from airflock.evolve.space_table import read_space
-from airflock.evolve.store import Batch, Store
+from airflock.runs.folder import read
+from airflock.runs.space import with_parameters
+from airflock.runs.store import Batch, Store
 from airflock.scenarios.making import make
+from airflock.search.racing import still_needed
+from airflock.search.space_table import read_space
 
 SEEDS, GENERATIONS, FIRST = 4, (0, 3, 10, 30, 100), 4_000_000_000
 

@@ -37,8 +37,8 @@ def begin(sizes: Callable[..., Any] = SimpleNamespace) -> Any:
     import cuda_c
     from numba.cuda.simulator.kernel import FakeCUDAKernel
 
-    from airflock import gpu as device
     from airflock.engine.cuda import crowd, launch, memory
+    from airflock.support import gpu as device
 
     device.trouble = lambda: None
     device.describe = lambda: [{"name": "rehearsal"}]

@@ -24,10 +24,10 @@ from c_reference import Reference
 from trial import Trial
 
 from airflock.engine import fly, score_flight, score_flights
-from airflock.machine import vector_bits
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
-from airflock.threads import cores
+from airflock.support.machine import vector_bits
+from airflock.support.threads import cores
 
 PRESET, LINKS = "vasarhelyi_2018/4ms", "vasarhelyi_2018/real_gnss"
 SEEDS = (1, 2, 3)  # flights of one round on one thread

@@ -16,12 +16,13 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import beta
 
-from airflock import __version__, atomic
-from airflock.certify.branches import REPETITIONS, begun, falls, sample_period
-from airflock.certify.counting import BATCH
-from airflock.certify.splitting import estimate
-from airflock.evolve.store import Store
+from airflock import __version__
+from airflock.certificates.branches import REPETITIONS, begun, falls, sample_period
+from airflock.certificates.counting import BATCH
+from airflock.certificates.splitting import estimate
+from airflock.runs.store import Store
 from airflock.scenarios.files import load
+from airflock.support import atomic
 
 TIMES = 10
 

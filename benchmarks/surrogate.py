@@ -19,12 +19,12 @@ import numpy as np
 from cma.fitness_models import LQModel, SurrogatePopulation, kendall_tau
 
 from airflock.engine import score_flights
-from airflock.evolve.cmaes import CMAES
-from airflock.evolve.folder import read
-from airflock.evolve.space import with_parameters
-from airflock.evolve.space_table import read_space
-from airflock.evolve.store import Batch, Store
+from airflock.runs.folder import read
+from airflock.runs.space import with_parameters
+from airflock.runs.store import Batch, Store
 from airflock.scenarios.making import make
+from airflock.search.cmaes import CMAES
+from airflock.search.space_table import read_space
 
 TOLD = (2, 5, 10, 20, 30, 40, 50, 60, 71)  # generations
 FIRST = 3_200_000_000  # seeds of fresh flights

@@ -22,19 +22,20 @@ from typing import Any
 import numpy as np
 from surrogate import LqCMAES
 
-from airflock import __version__, atomic
+from airflock import __version__
 from airflock.engine import score_flight, score_flights
-from airflock.evolve import search
-from airflock.evolve.folder import open_folder
-from airflock.evolve.intervals import interval
-from airflock.evolve.optimisers import optimiser
-from airflock.evolve.run import executor_for, run
-from airflock.evolve.search import averaged
-from airflock.evolve.search_table import FAST
-from airflock.evolve.space import with_parameters
-from airflock.evolve.store import Batch, Store
-from airflock.evolve.study import load_study
+from airflock.runs.folder import open_folder
+from airflock.runs.space import with_parameters
+from airflock.runs.store import Batch, Store
 from airflock.scenarios.files import load
+from airflock.search import search
+from airflock.search.intervals import interval
+from airflock.search.optimisers import optimiser
+from airflock.search.run import executor_for, run
+from airflock.search.search import averaged
+from airflock.search.search_table import FAST
+from airflock.search.study import load_study
+from airflock.support import atomic
 
 NAME, FULL, COARSE = "vasarhelyi_2018/6ms", "vasarhelyi_2018/evolved_6ms", {"dt": 0.05, "metrics.period": 1.0}
 LQ_PARTS = 576  # parts of generations, which lq-CMA-ES asks for one by one: eight of each that flies as a whole

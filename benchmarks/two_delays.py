@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from airflock import atomic
 from airflock.engine import score_flights
-from airflock.evolve.folder import open_folder
-from airflock.evolve.intervals import interval
-from airflock.evolve.run import executor_for, run
-from airflock.evolve.space import with_parameters
-from airflock.evolve.study import load_study
+from airflock.runs.folder import open_folder
+from airflock.runs.space import with_parameters
+from airflock.search.intervals import interval
+from airflock.search.run import executor_for, run
+from airflock.search.study import load_study
+from airflock.support import atomic
 
 NAME, DELAYS = "vasarhelyi_2018/two_delays", (0.4, 1.0)
 FIRST, PAIRS = 3_000_000_000, 400

@@ -6,9 +6,9 @@ python tests/attacks.py 1000000 7
 import random
 import sys
 
-from airflock.mavlink.coordinates import Site
-from airflock.mavlink.signing import EPOCH, LAST_STAMP, Receiver, Signer
-from airflock.mavlink.status import MESSAGE, Status, message
+from airflock.drones.mavlink.signing import EPOCH, LAST_STAMP, Receiver, Signer
+from airflock.drones.mavlink.status import MESSAGE, Status, message
+from airflock.support.coordinates import Site
 
 KEY, NOW = bytes(range(32)), 1_800_000_000_000_000
 SITE = Site(47.5, 19.0, 120.0)

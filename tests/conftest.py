@@ -40,7 +40,7 @@ def pytest_collection_modifyitems(config, items):
 @pytest.fixture
 def gpu():
     """Skips a test where no GPU can be used; with AIRFLOCK_NEED_GPU set nothing is skipped, and the test fails."""
-    from airflock.gpu import trouble
+    from airflock.support.gpu import trouble
 
     if trouble() is not None:
         pytest.skip(f"{trouble()}; AIRFLOCK_NEED_GPU makes this a failure")
@@ -49,7 +49,7 @@ def gpu():
 @pytest.fixture
 def undrawn(monkeypatch):
     """Studies end without their pictures, which take longer than all the rest; tests/unit/test_studies.py has them."""
-    monkeypatch.setattr(import_module("airflock.evolve.run"), "draw", lambda *_: [])
+    monkeypatch.setattr(import_module("airflock.search.run"), "draw", lambda *_: [])
 
 
 @pytest.fixture

@@ -8,15 +8,15 @@ none. `PLANS` are few, for every change. `pairs` finds a larger set by itself, f
 from itertools import combinations
 from random import Random
 
-from airflock.body.registry import BODIES
 from airflock.core.parameters import choices, declarations
 from airflock.engine import plan_of
-from airflock.faults.registry import KINDS
-from airflock.radios.registry import RADIOS
+from airflock.parts.bodies.registry import BODIES
+from airflock.parts.faults.registry import KINDS
+from airflock.parts.radios.registry import RADIOS
+from airflock.parts.sensors.registry import SENSORS
+from airflock.parts.topologies.registry import TOPOLOGIES
 from airflock.scenarios.making import make
 from airflock.scenarios.sections import SECTIONS
-from airflock.sensors.registry import SENSORS
-from airflock.topology.registry import TOPOLOGIES
 from flocks import ISLANDS, NOTCHED, scenario
 
 GROUPS = ("none", "numbers", "spread", "laws")

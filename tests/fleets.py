@@ -1,10 +1,10 @@
 """Fleets and cards that several tests fly."""
 
 import airflock
-from airflock.fleet.lockstep import Fleet
-from airflock.fleet.prepare import card_document
-from airflock.mavlink.orders import new_keys
-from airflock.onboard.card import card_of, hash_of
+from airflock.drones.mavlink.orders import new_keys
+from airflock.drones.onboard.card import card_of, hash_of
+from airflock.fleets.lockstep import Fleet
+from airflock.fleets.prepare import card_document
 
 SITE = (47.5, 19.0, 120.0)
 QUIET = {"body.noise": 0.0, "sensors.noise": 0.0}

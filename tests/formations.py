@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from airflock.aero import lifting_line, wing
-from airflock.aero.filaments import influences
+from airflock.parts.aero import lifting_line, wing
+from airflock.parts.aero.filaments import influences
 
 FOOT, POUND = 0.3048, 4.4482216152605
 FT_LBF = FOOT * POUND  # W in a ft lbf/s

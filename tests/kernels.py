@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from airflock.rules.generate import Source
+from airflock.engine.text.generate import Source
 from inside import HEAD, JIT, load_driver, primitives
 
 

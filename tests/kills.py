@@ -21,12 +21,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import toys
-from airflock import atomic
-from airflock.evolve.folder import STUDY, open_folder, remove_unfinished, versions
-from airflock.evolve.search import search
-from airflock.evolve.store import FILE, Store
-from airflock.evolve.winner import conclude
-from airflock.executors.in_process import InProcess
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.folder import STUDY, open_folder, remove_unfinished, versions
+from airflock.runs.store import FILE, Store
+from airflock.search.search import search
+from airflock.search.winner import conclude
+from airflock.support import atomic
 
 RUN, NAMED = versions(), ("result.toml", "best.toml", "study.toml")
 CANDIDATES = "SELECT * FROM candidate"
@@ -61,9 +61,9 @@ def rows(folder):
 
 def certify(folder):
     """A campaign of toy flights, so many in all, and its certificate."""
-    from airflock.certify.campaign import FOLDER, Campaign
-    from airflock.certify.run import run
-    from airflock.limits.limit import read_all
+    from airflock.certificates.campaign import FOLDER, Campaign
+    from airflock.certificates.limit import read_all
+    from airflock.certificates.run import run
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_6ms")
@@ -93,10 +93,12 @@ def tune(folder):
 
     from airflock.scenarios.making import make
 
-    tuning = import_module("airflock.tune.run")
+    tuning = import_module("airflock.search.tune.run")
     tuning.rate_of = lambda *_: 300.0
-    import_module("airflock.evolve.run").draw = lambda *_: None
-    import_module("airflock.tune.report").save = lambda found: atomic.write(found.folder / "report.html", repr(found))
+    import_module("airflock.search.run").draw = lambda *_: None
+    import_module("airflock.search.tune.report").save = lambda found: atomic.write(
+        found.folder / "report.html", repr(found)
+    )
     # the limit is shown after its first looks, whatever the time
     resume = (folder / "tune.toml").is_file()
     tuning.tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 20%"], resume=resume)
@@ -104,7 +106,7 @@ def tune(folder):
 
 def of_tuning(folder):
     """All stages; of the certificate what counting showed, because tolerances are looked for as long as time allows."""
-    from airflock.untrusted import read_toml
+    from airflock.support.untrusted import read_toml
 
     told = read_toml(folder / "certificate.toml")
     names = ("tune.toml", "start.toml", "tuned.toml", "hardening.json")
@@ -267,8 +269,8 @@ def under_deaths(what, folder, kills, seed, life):
 
 def workers(folder, kills, seed):
     """Kill workers of dask under studies until so many have died."""
-    from airflock.evolve.run import run
-    from airflock.executors.cluster import Cluster
+    from airflock.runs.executors.cluster import Cluster
+    from airflock.search.run import run
 
     best, space = dict(toys.BEST), toys.SPACE
 
@@ -313,11 +315,11 @@ def sweeps(folder, kills, seed):
 
 def certificates(folder, kills, seed):
     """Kill workers of dask under campaigns of real flights until so many have died."""
-    from airflock.certify.campaign import FOLDER, Campaign
-    from airflock.certify.flights import CampaignTask
-    from airflock.certify.run import run
-    from airflock.executors.cluster import Cluster
-    from airflock.limits.limit import read_all
+    from airflock.certificates.campaign import FOLDER, Campaign
+    from airflock.certificates.flights import CampaignTask
+    from airflock.certificates.limit import read_all
+    from airflock.certificates.run import run
+    from airflock.runs.executors.cluster import Cluster
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_4ms", {"agents": 10, "duration": 300.0})

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from airflock.infer.candidates import Number
-from airflock.infer.likelihood import Model
+from airflock.estimate.infer.candidates import Number
+from airflock.estimate.infer.likelihood import Model
 
 STEPS, NOISE = 400, 0.05
 

@@ -15,19 +15,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body.registry import BODIES as KNOWN_BODIES
 from airflock.core.contract import Model
 from airflock.core.parameters import Choice, Parameters, Quantity, choices, declarations, quantity
 from airflock.core.topology import topology as topology_of_ones_own
-from airflock.errors import ScenarioError
-from airflock.faults.registry import KINDS
-from airflock.radios.registry import RADIOS
+from airflock.parts.bodies.registry import BODIES as KNOWN_BODIES
+from airflock.parts.faults.registry import KINDS
+from airflock.parts.radios.registry import RADIOS
+from airflock.parts.sensors.registry import SENSORS
 from airflock.scenarios.families import Given
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
-from airflock.sensors.registry import SENSORS
+from airflock.support.errors import ScenarioError
 
 # A length (m) at which agents of a law act on each other, the number that carries it, and a speed, m/s
 SCALES = {

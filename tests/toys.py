@@ -4,8 +4,8 @@ import math
 import random
 import time
 
-from airflock.evolve.study import make_study
 from airflock.scenarios.files import load
+from airflock.search.study import make_study
 
 BEST = {"model.r0_rep": 30.0, "model.p_rep": 0.2, "model.v_frict": 1.0}
 SPACE = {

@@ -10,7 +10,7 @@ import ast
 import copy
 import hashlib
 
-from airflock.rules.nodes import walk
+from airflock.core.rules.nodes import walk
 
 TURNS = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move", "overrule")
 STAGES = (

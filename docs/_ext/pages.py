@@ -63,7 +63,7 @@ def models(drawn: bool) -> None:
     for name in MODELS:
         model = find_model(name)
         title, _, rest = model.doc.strip().partition("\n")
-        source = (ROOT / "src/airflock/models" / f"{name}.py").read_text(encoding="utf-8")
+        source = (ROOT / "src/airflock/parts/laws" / f"{name}.py").read_text(encoding="utf-8")
         functions = {
             node.name: ast.get_source_segment(source, node) or ""
             for node in ast.parse(source).body
@@ -74,7 +74,7 @@ def models(drawn: bool) -> None:
         if missing:
             raise ExtensionError(f"equations/{name}.md: no function {', '.join(missing)} in the model")
         pieces = [f"# `{name}`\n\n**{plain(title)}**\n\n{prose(rest)}\n"]
-        pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/models/{name}.py`.\n\n")
+        pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/parts/laws/{name}.py`.\n\n")
         pieces.append(pictures.shown(pictures.OF_MODEL[name], 1, "A picture of it", there=drawn))
         pieces.append("\n## Equations beside code\n")
         for rule, text in written.items():
@@ -113,7 +113,7 @@ def _reproduced(name: str) -> str:
 
 def order_parameters(drawn: bool) -> None:
     """Definition, unit, range, reference and a picture of low and high of every order parameter."""
-    from airflock.metrics import fitness_dimock, fitness_kidger, fitness_vasarhelyi, registry
+    from airflock.parts.metrics import fitness_dimock, fitness_kidger, fitness_vasarhelyi, registry
 
     known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
     homes: dict[str, Any] = {}
@@ -131,7 +131,7 @@ def order_parameters(drawn: bool) -> None:
         homes |= dict.fromkeys(module.REPORTS, module.fitness)
     wrong = sorted(set(units) ^ set(known))
     if wrong:
-        raise ExtensionError(f"order_parameters.toml and metrics/registry.py differ in {', '.join(wrong)}")
+        raise ExtensionError(f"order_parameters.toml and parts/metrics/registry.py differ in {', '.join(wrong)}")
     import sys
 
     pairs = pictures.pairs()
@@ -179,13 +179,13 @@ def robots() -> None:
     """Bodies, sensors, radio, silence and wind: what stands between a command and a motion."""
     import sys
 
-    from airflock.body import wind
-    from airflock.body.registry import BODIES
     from airflock.core import radio as radios
     from airflock.core import silence
-    from airflock.radios.registry import RADIOS
+    from airflock.parts.bodies import wind
+    from airflock.parts.bodies.registry import BODIES
+    from airflock.parts.radios.registry import RADIOS
+    from airflock.parts.sensors.registry import SENSORS
     from airflock.scenarios.keys import keys as keys_of
-    from airflock.sensors.registry import SENSORS
 
     pieces = [
         "# Bodies, sensors, radio, silence, wind\n\nA model commands; a body obeys as far as it can. "
@@ -206,7 +206,7 @@ def robots() -> None:
         pieces.append(key_table(keys_of(name)))
     for name, radio in RADIOS.items():
         kinds = [kind for kind in radios.RULES if getattr(radio, kind) is not None]
-        module = sys.modules[getattr(radio, kinds[0]).__module__ if kinds else f"airflock.radios.{name}"]
+        module = sys.modules[getattr(radio, kinds[0]).__module__ if kinds else f"airflock.parts.radios.{name}"]
         pieces.append(f'\n## radio.kind = "{name}"\n\n{prose(module.__doc__ or "")}\n\n')
         pieces.append(f"{prose(radio.Parameters.__doc__ or '')}\n\n")
         for rule in (getattr(radio, kind) for kind in kinds):

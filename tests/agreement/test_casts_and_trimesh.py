@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from airflock.scenes.tree import boxes, cylinders, scene, triangles
 from airflock.world import bvh
+from airflock.world.scenes.tree import boxes, cylinders, scene, triangles
 from kernels import compiled
 from needed import needed
 

@@ -10,21 +10,21 @@ import warnings
 import pytest
 
 import toys
-from airflock.certify.campaign import FOLDER, Campaign
-from airflock.certify.flights import CampaignTask, measured, score_of
-from airflock.certify.run import run as certified
-from airflock.errors import FlightError, StudyError
-from airflock.evolve.folder import open_folder
-from airflock.evolve.run import run
-from airflock.evolve.store import Store
-from airflock.evolve.task import tasks_of
-from airflock.executors import Flight
-from airflock.executors import cluster as executors_cluster
-from airflock.executors.cluster import Cluster
-from airflock.executors.in_process import InProcess
-from airflock.executors.scores import scores
-from airflock.limits.limit import read_all
+from airflock.certificates.campaign import FOLDER, Campaign
+from airflock.certificates.flights import CampaignTask, measured, score_of
+from airflock.certificates.limit import read_all
+from airflock.certificates.run import run as certified
+from airflock.runs.executors import Flight
+from airflock.runs.executors import cluster as executors_cluster
+from airflock.runs.executors.cluster import Cluster
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.executors.scores import scores
+from airflock.runs.folder import open_folder
+from airflock.runs.store import Store
 from airflock.scenarios.files import load
+from airflock.search.run import run
+from airflock.search.task import tasks_of
+from airflock.support.errors import FlightError, StudyError
 from needed import needed
 
 distributed = needed("distributed")
@@ -156,8 +156,8 @@ def test_workers_with_different_processors_are_named(cluster, monkeypatch):
 
 def test_a_task_flies_the_same_flight_as_this_process():
     from airflock.engine import score_flight
-    from airflock.evolve.space import with_parameters
-    from airflock.evolve.study import load_study
+    from airflock.runs.space import with_parameters
+    from airflock.search.study import load_study
 
     study = load_study("vasarhelyi_2018/4ms", settings={"duration": 2.0, "agents": 10})
     parameters = study.space.parameters([0.5] * 11)
@@ -219,7 +219,7 @@ def test_a_flight_that_goes_wrong_on_a_worker_is_one_line(cluster, monkeypatch):
             (None, f"seed {seed}: agent 0 left the finite numbers", 0.0, "worker") if seed == 3 else ({}, "", 0.0, "")
         )
 
-    monkeypatch.setattr("airflock.executors.cluster.Task", lambda scenario, precision: task)
+    monkeypatch.setattr("airflock.runs.executors.cluster.Task", lambda scenario, precision: task)
     with pytest.raises(FlightError, match="^seed 3: agent 0 left the finite numbers$"):
         scores([load("vicsek_1995/ordered")] * 5, range(5), scheduler=cluster.scheduler_address)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from airflock.engine import plan_of, score_flights
-from airflock.errors import DeviceError
 from airflock.scenarios.files import load
+from airflock.support.errors import DeviceError
 from flocks import scenario
 from inside import cpu, tables
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.aero import descent
 from airflock.core.composition import added
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters as Record
 from airflock.engine import fly
-from airflock.errors import RuleError, ScenarioError
-from airflock.models import reynolds_1987, vasarhelyi_2018
+from airflock.parts.aero import descent
+from airflock.parts.laws import reynolds_1987, vasarhelyi_2018
 from airflock.scenarios.files import load
 from airflock.scenarios.wings import DESCENT
+from airflock.support.errors import RuleError, ScenarioError
 from reference.flight import fly_plainly
 
 SMALL = {"agents": 4, "duration": 1.0, "metrics.kind": "order", "wing.segments": "5", "start.jitter": 0.1}

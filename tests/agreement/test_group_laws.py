@@ -9,10 +9,10 @@ import airflock
 import wary as wary_law
 from against_reference import compared
 from airflock.engine import driver_text, fly, plan_of
-from airflock.errors import ScenarioError
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.scenarios.files import load
 from airflock.scenarios.laws import find_model
+from airflock.support.errors import ScenarioError
 from scenarios_drawn import Draw
 
 PAPER = "vasarhelyi_2018/4ms"
@@ -102,7 +102,7 @@ def test_what_is_shown_of_an_agent_is_of_its_law():
     flight = airflock.open(scenario, 2, device="python").advance(1.0).sense()
     for agent, law in ((0, "vasarhelyi_2018"), (1, "kidger")):
         view = flight.look(agent)
-        assert type(view.sums).__module__ == f"airflock.models.{law}"
+        assert type(view.sums).__module__ == f"airflock.parts.laws.{law}"
         live = [k for k, value in enumerate(view.sums) if value]
         summed = np.sum([term for term in view.terms], axis=0)
         assert live and np.allclose(np.array(view.sums)[live], summed[live])

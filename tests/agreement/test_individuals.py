@@ -8,11 +8,11 @@ import pytest
 
 import airflock
 from airflock.engine import driver_text, fly, plan_of
-from airflock.errors import FlightError, RuleError, ScenarioError
-from airflock.faults.registry import KINDS
+from airflock.parts.faults.registry import KINDS
 from airflock.recordings.flights import recording_of
 from airflock.recordings.scores import measure
 from airflock.scenarios.files import load, presets
+from airflock.support.errors import FlightError, RuleError, ScenarioError
 from inside import course, cpu
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
@@ -598,8 +598,8 @@ def test_a_law_that_solves_for_the_whole_flock_has_one_set_of_numbers():
 
 
 def test_faults_of_a_recording_are_told_where_people_look(tmp_path):
-    from airflock.errors import RecordingError
     from airflock.recordings.attributes import faults, told_faults
+    from airflock.support.errors import RecordingError
 
     recording = airflock.simulate(load(PAPER, {**SMALL, "faults": [{"kind": "fails", **ONCE}]}), 1, device="python")
     assert told_faults(faults(recording)) == "1 fault: fails of agent 2 at 1 s"
@@ -610,7 +610,7 @@ def test_faults_of_a_recording_are_told_where_people_look(tmp_path):
 
 
 def test_groups_are_scored_alone_and_against_each_other():
-    from airflock.errors import RecordingError
+    from airflock.support.errors import RecordingError
 
     groups = [{"name": "left", "agents": 4}, {"name": "right"}]
     start = np.zeros((4, 8))

@@ -8,8 +8,8 @@ import pytest
 
 import airflock
 from airflock.engine import fly, plan_of
-from airflock.errors import FlightError, ScenarioError
 from airflock.scenarios.files import load, presets
+from airflock.support.errors import FlightError, ScenarioError
 
 SMALL = {"agents": 8, "duration": 8.0}
 FLIGHTS = {

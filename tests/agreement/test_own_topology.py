@@ -8,10 +8,10 @@ import pytest
 
 import airflock
 from airflock.engine import fly, plan_of
-from airflock.errors import AirflockError, CardError, RecordingError, RuleError, ScenarioError
-from airflock.fleet.prepare import card_document
+from airflock.fleets.prepare import card_document
 from airflock.recordings.files import fly_again
 from airflock.scenarios.files import load
+from airflock.support.errors import AirflockError, CardError, RecordingError, RuleError, ScenarioError
 from reference.flight import fly_plainly
 
 PAPER = "vasarhelyi_2018/4ms"

@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import airflock
-from airflock.body.registry import BODIES
 from airflock.core.agent import State
 from airflock.core.contract import model
 from airflock.core.hearing import Hearing
@@ -22,11 +21,12 @@ from airflock.core.pilot import Pilot
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import complete, could_be_near, counts, of_standing
 from airflock.core.vocabulary import answer
-from airflock.errors import RuleError
-from airflock.fleet.prepare import plain
-from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
-from airflock.onboard.fields import frozen
-from airflock.radios.registry import RADIOS
+from airflock.drones.onboard.fields import frozen
+from airflock.fleets.prepare import plain
+from airflock.parts.bodies.registry import BODIES
+from airflock.parts.laws import dimock_2003, vasarhelyi_2018, vicsek_1995
+from airflock.parts.radios.registry import RADIOS
+from airflock.support.errors import RuleError
 from airflock.world import arena
 from airflock.world.corners import counter_clockwise, polygon_fault
 from airflock.world.place import Place, Shapes

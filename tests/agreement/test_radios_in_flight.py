@@ -9,9 +9,9 @@ import pytest
 
 import airflock
 from airflock.engine import fly, plan_of
-from airflock.errors import RuleError, ScenarioError
-from airflock.radios.registry import RADIOS
+from airflock.parts.radios.registry import RADIOS
 from airflock.scenarios.files import load
+from airflock.support.errors import RuleError, ScenarioError
 from flocks import ISLANDS
 from inside import no_cuda
 from reference.flight import fly_plainly

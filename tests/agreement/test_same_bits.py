@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from airflock.engine import fly, plan_of
-from airflock.threads import in_threads
+from airflock.support.threads import in_threads
 from flocks import flown, interpreted, scenario
 from inside import cpu, flight_driver, tables
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
-from airflock.display import fly_show, points_of
-from airflock.display.assignment import assign
-from airflock.display.show import ranks, recording_of, scenario_of
+from airflock.displays import fly_show, points_of
+from airflock.displays.assignment import assign
+from airflock.displays.show import ranks, recording_of, scenario_of
 from airflock.engine import plan_of
 from airflock.recordings.flights import simulate
 from airflock.recordings.flown_scenario import scenario_of as of_recording

@@ -9,9 +9,9 @@ import pytest
 
 import airflock
 from airflock.engine import fly
-from airflock.errors import RuleError, ScenarioError
+from airflock.parts.sensors.registry import SENSORS
 from airflock.scenarios.files import load
-from airflock.sensors.registry import SENSORS
+from airflock.support.errors import RuleError, ScenarioError
 from reference.flight import fly_plainly
 
 PAPER = "vasarhelyi_2018/4ms"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.errors import ScenarioError
+from airflock.support.errors import ScenarioError
 from flocks import interpreted
 
 FLOCK = {"agents": 10, "duration": 40.0, "world.side": 120.0, "metrics.period": 0.2, "metrics.kind": "order"}

@@ -11,12 +11,12 @@ import airflock
 from against_reference import interpreted_flight
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters
+from airflock.drones.onboard.card import card_of, hash_of
 from airflock.engine import plan_of
-from airflock.errors import CardError, ScenarioError
-from airflock.evolve.space_table import read_space
-from airflock.onboard.card import card_of, hash_of
 from airflock.scenarios.families import Given
 from airflock.scenarios.files import make
+from airflock.search.space_table import read_space
+from airflock.support.errors import CardError, ScenarioError
 from fleets import document, scenario
 from flocks import ISLANDS, interpreted
 from inside import cpu, no_cuda, tables

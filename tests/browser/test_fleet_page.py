@@ -9,12 +9,12 @@ from pixels import chart, coloured, places, shot
 from test_watch import until
 
 from airflock.core.agent import State
-from airflock.fleet.faults import Fault
-from airflock.fleet.lockstep import STARTED
-from airflock.fleet.observer import Observer
-from airflock.fleet.starting import KEY
-from airflock.fleet.teller import Teller
-from airflock.mavlink.orders import Do
+from airflock.drones.mavlink.orders import Do
+from airflock.fleets.faults import Fault
+from airflock.fleets.lockstep import STARTED
+from airflock.fleets.observer import Observer
+from airflock.fleets.starting import KEY
+from airflock.fleets.teller import Teller
 from airflock.studio.fleet_page import FleetPage
 from airflock.studio.view import View
 from fleets import fleet, scenario

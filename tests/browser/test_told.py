@@ -7,7 +7,7 @@ import pytest
 from pixels import chart, coloured, places, shot
 from test_watch import flying, opened, until
 
-from airflock.stage import shades
+from airflock.view.stage import shades
 
 pytestmark = pytest.mark.browser
 NEAR = {"metrics.r_coll": 8.0}  # m; so that there are many

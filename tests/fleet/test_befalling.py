@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from airflock.core.hearing import EARLY
-from airflock.errors import CardError
-from airflock.faults.registry import KINDS
-from airflock.fleet import compare, realtime, starting
-from airflock.fleet import live as live_
-from airflock.fleet.ailing import Ailing
-from airflock.fleet.befalling import Faults
-from airflock.fleet.lockstep import Fleet
-from airflock.onboard.card import card_of, hash_of
-from airflock.onboard.mission import Phase
+from airflock.drones.onboard.card import card_of, hash_of
+from airflock.drones.onboard.mission import Phase
+from airflock.fleets import compare, realtime, starting
+from airflock.fleets import live as live_
+from airflock.fleets.ailing import Ailing
+from airflock.fleets.befalling import Faults
+from airflock.fleets.lockstep import Fleet
+from airflock.parts.faults.registry import KINDS
 from airflock.recordings.flights import simulate
+from airflock.support.errors import CardError
 from fleets import card, document, scenario
 from flocks import ISLANDS
 

@@ -18,28 +18,28 @@ import pytest
 from airflock.core import random
 from airflock.core.agent import State
 from airflock.core.radio import lost
-from airflock.errors import ScenarioError
-from airflock.fleet import compare
-from airflock.fleet.dice import OuterNoise, PacketDice, SensorDice
-from airflock.fleet.ether import Ether
-from airflock.fleet.faults import KINDS, Fault, read_faults
-from airflock.fleet.holding import GAIN, STOOD
-from airflock.fleet.individuals import sensors_of
-from airflock.fleet.lockstep import KEY
-from airflock.fleet.vehicle import Vehicle
-from airflock.mavlink import dialect
-from airflock.mavlink.autopilots import AUTOPILOTS, Speaker
-from airflock.mavlink.coordinates import Site
-from airflock.mavlink.frames import frames_in
-from airflock.mavlink.orders import Do
-from airflock.onboard.log import replay
-from airflock.onboard.mission import Phase
-from airflock.onboard.ports import open_port
-from airflock.onboard.run import fly as fly_node
-from airflock.radios import jitter, links
-from airflock.radios.registry import RADIOS
+from airflock.drones.mavlink import dialect
+from airflock.drones.mavlink.autopilots import AUTOPILOTS, Speaker
+from airflock.drones.mavlink.frames import frames_in
+from airflock.drones.mavlink.orders import Do
+from airflock.drones.onboard.log import replay
+from airflock.drones.onboard.mission import Phase
+from airflock.drones.onboard.ports import open_port
+from airflock.drones.onboard.run import fly as fly_node
+from airflock.fleets import compare
+from airflock.fleets.dice import OuterNoise, PacketDice, SensorDice
+from airflock.fleets.ether import Ether
+from airflock.fleets.faults import KINDS, Fault, read_faults
+from airflock.fleets.holding import GAIN, STOOD
+from airflock.fleets.individuals import sensors_of
+from airflock.fleets.lockstep import KEY
+from airflock.fleets.vehicle import Vehicle
+from airflock.parts.radios import jitter, links
+from airflock.parts.radios.registry import RADIOS
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import measure
+from airflock.support.coordinates import Site
+from airflock.support.errors import ScenarioError
 from fleets import card, fleet, scenario
 
 
@@ -620,7 +620,7 @@ def test_a_fleet_in_python_is_that_of_the_command(monkeypatch):
 
     import airflock
     from airflock.cli.main import app
-    from airflock.errors import ScenarioError
+    from airflock.support.errors import ScenarioError
 
     # the simulator beside both flies interpreted: tests above have it compiled
     monkeypatch.setattr(compare, "simulate", lambda *given, **named: simulate(*given, **named | {"device": "python"}))

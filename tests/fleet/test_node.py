@@ -11,20 +11,20 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from airflock.core.agent import State
-from airflock.errors import CardError, LinkError
-from airflock.fleet.lockstep import KEY, STARTED
-from airflock.fleet.vehicle import Vehicle
-from airflock.mavlink import dialect, orders, status
-from airflock.mavlink.coordinates import Geodetic
-from airflock.mavlink.frames import Packer, frames_in
-from airflock.mavlink.orders import Do, Order, new_keys
-from airflock.mavlink.signing import Signer
-from airflock.mavlink.status import Status
-from airflock.onboard.card import card_of, hash_of, read_card, write_card
-from airflock.onboard.log import Logged, read_memory, replay
-from airflock.onboard.mission import Phase
-from airflock.onboard.node import Memory, Node
-from airflock.onboard.saying import own_status
+from airflock.drones.mavlink import dialect, orders, status
+from airflock.drones.mavlink.frames import Packer, frames_in
+from airflock.drones.mavlink.orders import Do, Order, new_keys
+from airflock.drones.mavlink.signing import Signer
+from airflock.drones.mavlink.status import Status
+from airflock.drones.onboard.card import card_of, hash_of, read_card, write_card
+from airflock.drones.onboard.log import Logged, read_memory, replay
+from airflock.drones.onboard.mission import Phase
+from airflock.drones.onboard.node import Memory, Node
+from airflock.drones.onboard.saying import own_status
+from airflock.fleets.lockstep import KEY, STARTED
+from airflock.fleets.vehicle import Vehicle
+from airflock.support.coordinates import Geodetic
+from airflock.support.errors import CardError, LinkError
 from fleets import PRIVATE, document, fleet, scenario
 
 common = dialect.common()
@@ -383,11 +383,11 @@ class Refuse:
         if name.partition(".")[0] in {REFUSED}:
             raise ImportError(name + " is not installed on board")
 sys.meta_path.insert(0, Refuse())
-import airflock.onboard, airflock.onboard.run
-from airflock.onboard.run import main
+import airflock.drones.onboard, airflock.drones.onboard.run
+from airflock.drones.onboard.run import main
 assert "cryptography" not in sys.modules, "seals are checked rarely"
 for kind in ("couzin_2002", "kidger", "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995"):
-    __import__("airflock.models." + kind)
+    __import__("airflock.parts.laws." + kind)
 import resource
 peak = [int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmRSS")]
 sys.stdout.write(str(peak[0]) + "\\n")
@@ -396,7 +396,7 @@ sys.exit(main(sys.argv[1:]))
 
 
 def test_a_node_needs_neither_numpy_nor_numba_nor_pydantic_nor_typer(tmp_path):
-    from airflock.mavlink.keys import write_key
+    from airflock.drones.mavlink.keys import write_key
 
     write_card(tmp_path / "m.json", document(SCENARIO, expires=2**39))
     write_key(tmp_path / "m.key", KEY)
@@ -417,7 +417,7 @@ def test_a_node_needs_neither_numpy_nor_numba_nor_pydantic_nor_typer(tmp_path):
 
 
 def test_the_command_tells_all_that_is_wrong_at_once(tmp_path, capsys):
-    from airflock.onboard.run import main
+    from airflock.drones.onboard.run import main
 
     write_card(tmp_path / "m.json", document(SCENARIO))
     code = main([str(tmp_path / "m.json"), "--member", "9", "--autopilot", "tcp:1", "--radio", "udp:127.0.0.1:99999"])

@@ -2,10 +2,10 @@
 
 import pytest
 
-from airflock.fleet.modes import OURS, PILOT
-from airflock.mavlink.orders import Do
-from airflock.onboard.mission import Phase
-from airflock.onboard.node import KILLING
+from airflock.drones.mavlink.orders import Do
+from airflock.drones.onboard.mission import Phase
+from airflock.drones.onboard.node import KILLING
+from airflock.fleets.modes import OURS, PILOT
 from fleets import fleet, scenario
 
 

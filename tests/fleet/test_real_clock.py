@@ -12,14 +12,14 @@ import time
 import numpy as np
 import pytest
 
-from airflock.errors import LinkError, ScenarioError
-from airflock.fleet import compare, live, realtime
-from airflock.fleet.faults import Fault
-from airflock.mavlink.autopilots import AUTOPILOTS, Speaker
-from airflock.mavlink.frames import frames_in
-from airflock.onboard.mission import AIR
-from airflock.onboard.ports import Place, Udp
-from airflock.onboard.resting import Rest
+from airflock.drones.mavlink.autopilots import AUTOPILOTS, Speaker
+from airflock.drones.mavlink.frames import frames_in
+from airflock.drones.onboard.mission import AIR
+from airflock.drones.onboard.ports import Place, Udp
+from airflock.drones.onboard.resting import Rest
+from airflock.fleets import compare, live, realtime
+from airflock.fleets.faults import Fault
+from airflock.support.errors import LinkError, ScenarioError
 from fleets import PRIVATE, card, scenario
 
 SHORT = {"radio.delay": 0.1, "world.side": 120.0}

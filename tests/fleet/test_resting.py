@@ -8,9 +8,9 @@ import time
 
 import pytest
 
-from airflock.onboard import ports as ports_module
-from airflock.onboard.ports import Place, Serial, Udp
-from airflock.onboard.resting import Rest, alone
+from airflock.drones.onboard import ports as ports_module
+from airflock.drones.onboard.ports import Place, Serial, Udp
+from airflock.drones.onboard.resting import Rest, alone
 
 HOST = "127.0.0.1"
 

@@ -12,25 +12,25 @@ from typer.testing import CliRunner
 import airflock
 from airflock.cli.main import app
 from airflock.core.agent import State
-from airflock.errors import AirflockError, CardError, StudioError
-from airflock.fleet import compare, realtime
-from airflock.fleet.befalling import Faults
-from airflock.fleet.faults import KINDS, Fault
-from airflock.fleet.lockstep import STARTED
-from airflock.fleet.observer import Observer
-from airflock.fleet.starting import KEY, Station, write_for_watching
-from airflock.fleet.teller import OF_SCENARIO, Teller
-from airflock.mavlink import witness
-from airflock.mavlink.keys import write_key
-from airflock.mavlink.orders import Do
-from airflock.mavlink.signing import Signer
-from airflock.onboard.card import read_card
-from airflock.onboard.mission import Phase
-from airflock.onboard.peers import FRESH
-from airflock.onboard.ports import Place, Udp
-from airflock.stage.field import field_of
+from airflock.drones.mavlink import witness
+from airflock.drones.mavlink.keys import write_key
+from airflock.drones.mavlink.orders import Do
+from airflock.drones.mavlink.signing import Signer
+from airflock.drones.onboard.card import read_card
+from airflock.drones.onboard.mission import Phase
+from airflock.drones.onboard.peers import FRESH
+from airflock.drones.onboard.ports import Place, Udp
+from airflock.fleets import compare, realtime
+from airflock.fleets.befalling import Faults
+from airflock.fleets.faults import KINDS, Fault
+from airflock.fleets.lockstep import STARTED
+from airflock.fleets.observer import Observer
+from airflock.fleets.starting import KEY, Station, write_for_watching
+from airflock.fleets.teller import OF_SCENARIO, Teller
 from airflock.studio.fleet_tables import about, faults_of, members_table, notes_of, trouble_of
 from airflock.studio.fleet_watch import opened
+from airflock.support.errors import AirflockError, CardError, StudioError
+from airflock.view.stage.field import field_of
 from fleets import PRIVATE, card, fleet, scenario
 
 START = [State(20.0 * i, 0.0, 0.0, 2.0, 0.0, 0.0) for i in range(3)]

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import simulator  # noqa: E402
 
 from airflock.core import random  # noqa: E402
-from airflock.rules.generate import Source  # noqa: E402
+from airflock.engine.text.generate import Source  # noqa: E402
 from inside import Shape, head, load_driver  # noqa: E402
 
 LOOP = """

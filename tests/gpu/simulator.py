@@ -100,7 +100,7 @@ class Block:
 
 def littered():
     """Let memory that a launch asks for hold numbers, so that whoever reads what nobody has written is found out."""
-    from airflock.gpu import runtime
+    from airflock.support.gpu import runtime
 
     cuda = runtime()
     made = cuda.device_array

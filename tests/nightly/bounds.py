@@ -22,7 +22,7 @@ def main(folder: Path) -> int:
     import numba
 
     import airflock
-    from airflock.errors import AirflockError
+    from airflock.support.errors import AirflockError
 
     assert numba.config.BOUNDSCHECK == 1
     table = folder / "bounds.csv"

@@ -27,8 +27,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.fleet import compare  # noqa: E402
-from airflock.fleet.faults import KINDS, Fault  # noqa: E402
+from airflock.fleets import compare  # noqa: E402
+from airflock.fleets.faults import KINDS, Fault  # noqa: E402
 from fleets import scenario  # noqa: E402
 
 HOURS, SECONDS, AGENTS, SIDE = 24.0, 360.0, 10, 120.0

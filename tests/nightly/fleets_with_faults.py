@@ -21,8 +21,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.fleet import compare  # noqa: E402
-from airflock.fleet.faults import Fault  # noqa: E402
+from airflock.fleets import compare  # noqa: E402
+from airflock.fleets.faults import Fault  # noqa: E402
 from fleets import scenario  # noqa: E402
 
 SEEDS = 40

@@ -22,16 +22,17 @@ from typing import Any
 import numpy as np
 
 import airflock
-from airflock import __version__, atomic
-from airflock.errors import ScenarioError, StudyError
-from airflock.evolve.folder import STUDY
-from airflock.evolve.harden import COST, harden
-from airflock.evolve.held import SAFETY, SLACK
-from airflock.evolve.intervals import interval
-from airflock.evolve.steps import Table, flown
+from airflock import __version__
+from airflock.runs.folder import STUDY
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
-from airflock.tune.start import start_of
+from airflock.search.harden import COST, harden
+from airflock.search.held import SAFETY, SLACK
+from airflock.search.intervals import interval
+from airflock.search.steps import Table, flown
+from airflock.search.tune.start import start_of
+from airflock.support import atomic
+from airflock.support.errors import ScenarioError, StudyError
 
 SEEDS = range(20)
 STEP, JUDGED, FIRST = 60, 300, 100_000  # flights of a step, flights of the judge and the first of their seeds

@@ -21,8 +21,8 @@ import numpy as np
 import xarray as xr
 
 import airflock
-from airflock.infer.result import Inferred, between
-from airflock.infer.run import LAWS
+from airflock.estimate.infer.result import Inferred, between
+from airflock.estimate.infer.run import LAWS
 from airflock.scenarios.making import make
 
 NOISE, MISSING = 0.02, 0.02

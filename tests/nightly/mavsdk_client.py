@@ -16,8 +16,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.fleet import compare, live, realtime  # noqa: E402
-from airflock.onboard.ports import Place, Udp  # noqa: E402
+from airflock.drones.onboard.ports import Place, Udp  # noqa: E402
+from airflock.fleets import compare, live, realtime  # noqa: E402
 from fleets import scenario  # noqa: E402
 
 FLIGHT = Path(__file__).with_name("mavsdk_flight.py")

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import airflock
 import airflock_papers
 from airflock.cli.main import app
-from airflock.errors import AirflockError
+from airflock.support.errors import AirflockError
 from airflock_papers import breaks, quick, statistics
 from airflock_papers.claims import Claim, Measured, read_claims
 from airflock_papers.flights import Flights, scenario_keys, with_changes

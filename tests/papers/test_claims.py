@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airflock.errors import AirflockError
+from airflock.support.errors import AirflockError
 from airflock_papers import PAPERS, bounds, statistics
 from airflock_papers.claims import Claim, Measured, judge, read_claims, verdict_of, write_claims
 from airflock_papers.counts import count, headline

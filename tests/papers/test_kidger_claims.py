@@ -10,8 +10,8 @@ import xarray as xr
 
 import airflock
 from airflock.engine import score_flights
-from airflock.errors import AirflockError
-from airflock.evolve.study import load_study
+from airflock.search.study import load_study
+from airflock.support.errors import AirflockError
 from airflock_papers.claims import read_claims
 from airflock_papers.kidger import PAPER, conduct, schemes
 

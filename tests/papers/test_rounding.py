@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airflock.core.maths import FAR
-from airflock.many_tests import holm
+from airflock.support.many_tests import holm
 from airflock_papers import statistics
 from airflock_papers.flights import Flights
 from airflock_papers.vasarhelyi_2018 import program_wall, rounding, rounding_search

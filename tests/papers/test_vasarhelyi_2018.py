@@ -11,8 +11,8 @@ import xarray as xr
 
 import airflock
 from airflock.core.maths import bell, peak, rising
-from airflock.errors import AirflockError
-from airflock.metrics.fitness_vasarhelyi import fitness
+from airflock.parts.metrics.fitness_vasarhelyi import fitness
+from airflock.support.errors import AirflockError
 from airflock_papers import bounds, statistics
 from airflock_papers.claims import Claim, judge, read_claims
 from airflock_papers.flights import Flights, with_changes

@@ -6,11 +6,11 @@ import numba
 import numpy as np
 import pytest
 
-from airflock.body.turning import Parameters as Turning
-from airflock.body.turning import move as turn
 from airflock.core.maths import angle_between, arc_cosine
 from airflock.engine import plan_of, score_flight
-from airflock.models import reynolds_1987 as boids
+from airflock.parts.bodies.turning import Parameters as Turning
+from airflock.parts.bodies.turning import move as turn
+from airflock.parts.laws import reynolds_1987 as boids
 from airflock.scenarios.files import load
 from airflock.world import edges, rays
 from inside import cpu, measuring, tables

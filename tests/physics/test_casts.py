@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airflock.core.maths import FAR
-from airflock.scenes.build import scene_of
-from airflock.scenes.tree import boxes, cylinders, scene, segments, triangles
 from airflock.world import bvh, casts, shapes
 from airflock.world.scenery import Parameters
+from airflock.world.scenes.build import scene_of
+from airflock.world.scenes.tree import boxes, cylinders, scene, segments, triangles
 from kernels import compiled
 
 coordinate = st.floats(-20.0, 20.0, allow_subnormal=False)

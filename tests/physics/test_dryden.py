@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from airflock.body import dryden, wind
 from airflock.engine import fly
+from airflock.parts.bodies import dryden, wind
 from airflock.scenarios.files import load
 from reference.flight import fly_plainly
 

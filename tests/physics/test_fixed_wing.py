@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from airflock.aero.wing import Parameters as Wing
-from airflock.body.fixed_wing import Memory, Parameters, drag_of, move, stall_speed
 from airflock.engine import fly
-from airflock.errors import ScenarioError
+from airflock.parts.aero.wing import Parameters as Wing
+from airflock.parts.bodies.fixed_wing import Memory, Parameters, drag_of, move, stall_speed
 from airflock.scenarios.files import load
+from airflock.support.errors import ScenarioError
 from reference.flight import fly_plainly
 
 WING = Wing(span=3.0, chord=0.3, weight=60.0, cd0=0.02)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.errors import RecordingError
 from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.scores import measure
 from airflock.scenarios.files import load
+from airflock.support.errors import RecordingError
 
 NAMES = ("phi_corr", "n_clust", "n_disc", "r_min", "phi_vel", "phi_wall", "phi_coll")
 

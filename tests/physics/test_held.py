@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airflock.body import held, motion
+from airflock.parts.bodies import held, motion
 
 DT = 0.01
 

@@ -12,8 +12,8 @@ import airflock
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, Percept
 from airflock.engine import score_flights
-from airflock.metrics import fitness_kidger
-from airflock.models import kidger
+from airflock.parts.laws import kidger
+from airflock.parts.metrics import fitness_kidger
 from airflock.world import goals
 from needed import needed
 

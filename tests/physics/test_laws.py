@@ -9,7 +9,7 @@ import pytest
 from airflock.core.agent import Heard, State, decide, meet_neighbours
 from airflock.core.contract import model
 from airflock.core.maths import bell, braking_curve, braking_distance, excess, peak, rising
-from airflock.models import vasarhelyi_2018, viragh_2014
+from airflock.parts.laws import vasarhelyi_2018, viragh_2014
 
 MODELS = [model(vasarhelyi_2018), model(viragh_2014)]
 A, P = [1.0, 3.0, 8.0], [0.3, 1.0, 5.0]
@@ -197,7 +197,7 @@ def test_an_agent_runs_without_arrays_or_compilers():
 
     code = (
         "import sys; import airflock.core.agent, airflock.core.pilot;"
-        "import airflock.models.vasarhelyi_2018, airflock.models.viragh_2014;"
+        "import airflock.parts.laws.vasarhelyi_2018, airflock.parts.laws.viragh_2014;"
         "print([m for m in ('numpy', 'numba', 'xarray', 'pydantic', 'shapely') if m in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

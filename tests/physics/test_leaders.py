@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airflock.engine import fly
-from airflock.models.couzin_2005 import Parameters, neighbour
+from airflock.parts.laws.couzin_2005 import Parameters, neighbour
 from airflock.scenarios.files import load
 
 PRESET = "couzin_2005/informed"

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from airflock.aero import gradients, lifting_line, wing
-from airflock.aero.filaments import leg, leg_slopes
+from airflock.parts.aero import gradients, lifting_line, wing
+from airflock.parts.aero.filaments import leg, leg_slopes
 from formations import (
     FOOT,
     POUND,

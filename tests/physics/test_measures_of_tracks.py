@@ -6,7 +6,6 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airflock.errors import ParameterError
 from airflock.recordings.flights import simulate
 from airflock.recordings.imports.load import load_tracks
 from airflock.recordings.layout import dataset, frames_of
@@ -14,6 +13,7 @@ from airflock.recordings.measures import bursts, correlation, delays, milling, n
 from airflock.recordings.measures.states import states
 from airflock.recordings.scores import score
 from airflock.scenarios.files import load
+from airflock.support.errors import ParameterError
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 

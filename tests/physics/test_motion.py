@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from airflock.body import jostled, motion, wind
 from airflock.core import random
+from airflock.parts.bodies import jostled, motion, wind
+from airflock.parts.sensors import langevin
 from airflock.scenarios.files import load
 from airflock.scenarios.surroundings import Place
-from airflock.sensors import langevin
 from airflock.world import start
 from flocks import flown, from_start, ideal, scenario
 from reference.begin import begin

@@ -9,9 +9,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon
 
-from airflock.errors import ScenarioError
 from airflock.scenarios.surroundings import Place as Seen
-from airflock.stage.scene import prism as drawn_prism
+from airflock.support.errors import ScenarioError
+from airflock.view.stage.scene import prism as drawn_prism
 from airflock.world import arena, polygon
 from airflock.world.place import Place, edge_rows
 from airflock.world.shapes import from_triangle

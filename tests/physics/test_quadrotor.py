@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
-from airflock.body import quadrotor
-from airflock.body.battery import hovering, left
-from airflock.body.quadrotor import Memory, Parameters, move
 from airflock.core.vocabulary import answer
-from airflock.errors import RuleError, ScenarioError
+from airflock.parts.bodies import quadrotor
+from airflock.parts.bodies.battery import hovering, left
+from airflock.parts.bodies.quadrotor import Memory, Parameters, move
 from airflock.scenarios.files import load
+from airflock.support.errors import RuleError, ScenarioError
 
 STILL = (0.0, 0.0, 0.0)
 

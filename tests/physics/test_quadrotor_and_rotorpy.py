@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.body.quadrotor import Memory, Parameters, move, tilted, wanted
+from airflock.parts.bodies.quadrotor import Memory, Parameters, move, tilted, wanted
 
 multirotor = pytest.importorskip("rotorpy.vehicles.multirotor")
 hummingbird = pytest.importorskip("rotorpy.vehicles.hummingbird_params")

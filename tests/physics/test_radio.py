@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from airflock.core.radio import FEW, either, lost, packets
 from airflock.core.reception import unheard
-from airflock.radios.links import Parameters, missed, missed_few, power, received, thrice
-from airflock.radios.registry import RADIOS
+from airflock.parts.radios.links import Parameters, missed, missed_few, power, received, thrice
+from airflock.parts.radios.registry import RADIOS
 
 K = Parameters(loss=0.3)
 

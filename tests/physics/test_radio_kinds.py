@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from airflock.core.radio import packets
 from airflock.core.reception import Reception, share
-from airflock.errors import RecordingError
-from airflock.identify.packets import table_of
-from airflock.radios import bursts, congestion, jitter, links, shadow, table
-from airflock.radios.registry import RADIOS
+from airflock.estimate.identify.packets import table_of
+from airflock.parts.radios import bursts, congestion, jitter, links, shadow, table
+from airflock.parts.radios.registry import RADIOS
+from airflock.support.errors import RecordingError
 
 ENTRIES = [f"received_{n}" for n in range(table.ENTRIES)]
 

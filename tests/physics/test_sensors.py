@@ -8,7 +8,7 @@ import pytest
 import airflock
 from airflock.core.agent import State
 from airflock.core.sensing import Sensing
-from airflock.sensors.registry import SENSORS
+from airflock.parts.sensors.registry import SENSORS
 
 PERIOD = 0.2
 REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -6,12 +6,12 @@ import numba
 import numpy as np
 import pytest
 
-import airflock.display
+import airflock.displays
 from airflock.engine import plan_of
 from airflock.scenarios.files import load
 from inside import EVERY, cpu, slotted, tables
 
-DISPLAY = Path(airflock.display.__file__).parent / "display.toml"
+DISPLAY = Path(airflock.displays.__file__).parent / "display.toml"
 N = 90
 GOALS = [[16.0 * (i % 10) - 80.0, 16.0 * (i // 10) - 80.0, 30.0] for i in range(N)]
 # noise of the body by agent, a goal of its own, over two rearrangements; test_boids has laws that remember or draw

@@ -11,10 +11,10 @@ from scipy.spatial import Delaunay, Voronoi, cKDTree
 
 from airflock.core.agent import Heard, State
 from airflock.core.topology import met_of
-from airflock.topology.parameters import Parameters
-from airflock.topology.ranking import HEARD, kth_least
-from airflock.topology.registry import TOPOLOGIES
-from airflock.topology.strongest import loss
+from airflock.parts.topologies.parameters import Parameters
+from airflock.parts.topologies.ranking import HEARD, kth_least
+from airflock.parts.topologies.registry import TOPOLOGIES
+from airflock.parts.topologies.strongest import loss
 
 HERE = State(0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 SEEDS = st.integers(0, 2**32 - 1)

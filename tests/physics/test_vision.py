@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import airflock
 from airflock.engine import fly, plan_of
-from airflock.radios import vision
-from airflock.radios.vision import Packet, Parameters, gains, lasts, receive, see
+from airflock.parts.radios import vision
+from airflock.parts.radios.vision import Packet, Parameters, gains, lasts, receive, see
 from airflock.scenarios.files import load
 
 PAPER = "vasarhelyi_2018/4ms"

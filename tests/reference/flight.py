@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body import dryden, wind
-from airflock.checking.flock import of_model
+from airflock.check.flock import of_model
 from airflock.core import radio, random
 from airflock.core.agent import State
 from airflock.core.contract import Metric
@@ -22,6 +21,7 @@ from airflock.core.maths import norm
 from airflock.core.parameters import choices
 from airflock.core.pilot import Pilot
 from airflock.core.vocabulary import answer
+from airflock.parts.bodies import dryden, wind
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.surroundings import Course, Place, reach_of_walls
 from airflock.scenarios.timing import clock

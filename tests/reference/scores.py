@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from airflock.checking.flock import Survey, solver
+from airflock.check.flock import Survey, solver
 from airflock.core.agent import START, State, combined, reduced
 from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
 from airflock.core.vocabulary import Mean, answer
-from airflock.rules.probe import shapes_of
+from airflock.engine.text.probe import shapes_of
 from airflock.scenarios.surroundings import Place
 
 Record = Any  # a NamedTuple of floats that a metric declares

@@ -10,8 +10,8 @@ from functools import cache
 
 from mutations import GOLDEN, damage
 
-from airflock import atomic
-from airflock.errors import AirflockError
+from airflock.support import atomic
+from airflock.support.errors import AirflockError
 
 DRIVER = "from numba import njit\n\n\n@njit(cache=True)\ndef fly(x):\n    return x * 0.5 + 1.0\n"
 
@@ -87,9 +87,9 @@ def results():
     """What is written: a recording, figures, tables, documents, a page, a flight of a preset."""
     import pandas as pd
 
-    from airflock.plots.trajectories import trajectories
     from airflock.recordings.files import load_recording
-    from airflock.replays.build import replay
+    from airflock.view.plots.trajectories import trajectories
+    from airflock.view.replays.build import replay
 
     recording = load_recording(GOLDEN / "recording.nc")
     table = pd.DataFrame({"a": range(5000), "b": [0.1] * 5000})
@@ -152,13 +152,13 @@ def _recording(target):
 
 
 def _figure(target):
-    from airflock.plots.save import save_figure
+    from airflock.view.plots.save import save_figure
 
     save_figure(results()[1], target)
 
 
 def _video(target):
-    from airflock.plots.video import video
+    from airflock.view.plots.video import video
 
     video(results()[0], target, fps=5, speed=4.0)
 
@@ -170,7 +170,7 @@ def _export(target):
 
 
 def _document(target):
-    from airflock.evolve.folder import write
+    from airflock.runs.folder import write
 
     write(target, results()[3])
 
@@ -182,8 +182,8 @@ def _certificate(target):
 
 
 def _store(target):
-    from airflock.evolve.store import Batch, Store
-    from airflock.executors import Flight, Landed
+    from airflock.runs.executors import Flight, Landed
+    from airflock.runs.store import Batch, Store
 
     target.mkdir()
     with Store(target) as store:
@@ -207,8 +207,8 @@ def stored():
 
 def _evaluations(target):
     """Tables of all flights of a study."""
-    from airflock.evolve.store import Store
-    from airflock.evolve.tables import export
+    from airflock.runs.store import Store
+    from airflock.search.tables import export
 
     with Store(stored(), write=False) as store:
         export(store, target.parent)

@@ -13,8 +13,8 @@ python tests/security/fuzz.py disks 1000
 Cases run in forked children of one warm process, many in each, so that a hang or a crash costs one child and is told
 with its number. A case is a function of the seed and its number alone: --only NUMBER repeats one with its traceback.
 Exit status 0 if nothing failed. A case fails by an exception that is no AirflockError, by the last resort of
-`untrusted.from_outside`, by a line of more than 2,100 letters, by taking longer than 20 s of a processor or ten times
-as long by the clock (a recording: than its reader may), or by ending the process.
+`support.untrusted.from_outside`, by a line of more than 2,100 letters, by taking longer than 20 s of a processor or ten
+times as long by the clock (a recording: than its reader may), or by ending the process.
 """
 
 import argparse

@@ -13,8 +13,8 @@ from pathlib import Path
 import documents
 import forked
 
-from airflock import untrusted
-from airflock.errors import AirflockError, ScenarioError
+from airflock.support import untrusted
+from airflock.support.errors import AirflockError, ScenarioError
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "0.1"
 LONGEST = 2100  # letters of one line
@@ -180,7 +180,7 @@ def scenarios():
 @cache
 def studies():
     """Documents of all studies and of the golden one, with a preset for its scenario."""
-    from airflock.evolve.study import shipped
+    from airflock.search.study import shipped
 
     found = [untrusted.read_toml(path) for path in (*shipped().values(), GOLDEN / "study.toml")]
     named = [document for document in found if "scenario" in document]
@@ -210,7 +210,7 @@ def scenario(seed, number, folder, tell=False):
 
 def study(seed, number, folder, tell=False):
     """Load a mutated study."""
-    from airflock.evolve.study import load_study
+    from airflock.search.study import load_study
 
     rng, path = random.Random(f"study {seed} {number}"), folder / "mutated.toml"
     _written(rng, studies(), path)
@@ -388,8 +388,8 @@ def commanded(words, folder, tell=False):
 @cache
 def no_flights():
     """Whatever would compile or fly in this process ends there."""
-    from airflock.display import show
-    from airflock.fleet import lockstep
+    from airflock.displays import show
+    from airflock.fleets import lockstep
     from inside import drivers, interpreted, measuring, simulate, store
 
     def flown(*_, **__):
@@ -411,8 +411,6 @@ def warm(what):
         studies()
     elif what == "commands":
         import airflock.cli.main
-        import airflock.evolve.run
-        import airflock.plots.trajectories
         import airflock.recordings.files  # noqa: F401
     elif what == "files":
         import other_files

@@ -15,8 +15,8 @@ import mutations
 import numpy as np
 from mutations import GOLDEN, damage, mutate, toml
 
-from airflock import untrusted
-from airflock.errors import AirflockError
+from airflock.support import untrusted
+from airflock.support.errors import AirflockError
 
 sys.path.insert(0, str(GOLDEN.parents[1]))  # modules that tests share
 
@@ -44,8 +44,8 @@ def sound():
 
 def sound_card():
     """Bytes of a flight card."""
-    from airflock.fleet.prepare import card_document
-    from airflock.onboard.card import hash_of
+    from airflock.drones.onboard.card import hash_of
+    from airflock.fleets.prepare import card_document
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_4ms", {"topology.kind": "nearest", "topology.k": 4})
@@ -58,7 +58,7 @@ def certificate():
     """A certificate of a few flights."""
     import tempfile
 
-    from airflock.certify.run import certify
+    from airflock.certificates.run import certify
     from airflock.scenarios.files import load
 
     with tempfile.TemporaryDirectory() as folder:
@@ -100,8 +100,8 @@ KEY = bytes(range(32))
 
 def _log():
     """Twenty ticks of a node that heard a datagram and its autopilot say nothing that makes sense."""
-    from airflock.onboard.log import Logged
-    from airflock.onboard.node import Memory, Node
+    from airflock.drones.onboard.log import Logged
+    from airflock.drones.onboard.node import Memory, Node
 
     lines = []
     node = Node(_made_card(), 2, KEY, now=0.0, utc=10**15, memory=Memory(), radios=(0.2,))
@@ -115,7 +115,7 @@ def _log():
 
 @cache
 def _made_card():
-    from airflock.onboard.card import card_of
+    from airflock.drones.onboard.card import card_of
 
     return card_of(json.loads(sound_card()))
 
@@ -204,7 +204,7 @@ def _refusal(kind, path):
 
 def _damaged(rng, kind, content):
     if kind == "card" and rng.random() < 0.8:  # sealed again, as somebody would who means harm
-        from airflock.onboard.card import hash_of
+        from airflock.drones.onboard.card import hash_of
 
         document = mutate(rng, {k: v for k, v in json.loads(content).items() if k != "hash"})
         document = _without_dates(document)
@@ -240,8 +240,8 @@ def _tracks_of(path):
 
 
 def _mesh(path):
-    from airflock.scenes.meshes import load_mesh
     from airflock.world.scenery import Parameters
+    from airflock.world.scenes.meshes import load_mesh
 
     load_mesh(Parameters(kind="mesh", file=str(path)), 3)
 
@@ -252,50 +252,50 @@ def _check_certificate(path):
     def flown(*_, **__):
         raise mutations.Flown
 
-    check = import_module("airflock.certify.check")
+    check = import_module("airflock.certificates.check")
     check._flown_again = flown
     check.check(path)
 
 
 def _ground(path):
-    from airflock.scenes.outlines import ground_of
+    from airflock.world.scenes.outlines import ground_of
 
     ground_of(path, simplify=1.0, space=True)
 
 
 def _faults(path):
-    from airflock.fleet.faults import read_faults
+    from airflock.fleets.faults import read_faults
 
     read_faults(path, (1, 2, 3))
 
 
 def _read_card(path):
-    from airflock.onboard.card import read_card
+    from airflock.drones.onboard.card import read_card
 
     read_card(path)
 
 
 def _replay_log(path):
-    from airflock.onboard.log import read_log
+    from airflock.drones.onboard.log import read_log
 
     for _ in read_log(path, _made_card(), KEY):
         pass
 
 
 def _memory(path):
-    from airflock.onboard.log import read_memory
+    from airflock.drones.onboard.log import read_memory
 
     read_memory(path)
 
 
 def _plan(path):
-    from airflock.tune.folder import read_plan
+    from airflock.search.tune.folder import read_plan
 
     read_plan(path)
 
 
 def _hardening(path):
-    from airflock.tune.folder import read_steps
+    from airflock.search.tune.folder import read_steps
 
     read_steps(path)
 

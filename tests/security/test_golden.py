@@ -7,12 +7,12 @@ import pytest
 from mutations import GOLDEN
 
 import airflock
-from airflock.certify.certificate import seal
-from airflock.certify.check import check
-from airflock.errors import CardError, RecordingError, StudyError
-from airflock.evolve.study import load_study
-from airflock.onboard.card import read_card
+from airflock.certificates.certificate import seal
+from airflock.certificates.check import check
+from airflock.drones.onboard.card import read_card
 from airflock.recordings.files import fly_again
+from airflock.search.study import load_study
+from airflock.support.errors import CardError, RecordingError, StudyError
 
 SCORES = json.loads((GOLDEN / "scores.json").read_text())
 

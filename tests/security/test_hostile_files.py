@@ -18,9 +18,9 @@ import pytest
 from damages import Planted
 
 import airflock
-from airflock.errors import AirflockError, ScenarioError
-from airflock.evolve.study import load_study
-from airflock.onboard.card import hash_of, read_card
+from airflock.drones.onboard.card import hash_of, read_card
+from airflock.search.study import load_study
+from airflock.support.errors import AirflockError, ScenarioError
 
 LAW = "from pathlib import Path\nPath(__file__).with_name('mark').touch()\n"
 SCENARIO = 'duration = 1.0\nagents = 3\n[model]\nkind = "evil.py"\n'
@@ -133,7 +133,7 @@ def python(text):
 
 NAMES = {
     "airflock": airflock, "load_study": load_study, "Path": Path, "read_card": read_card,
-    "hardened": import_module("airflock.tune.stages").hardening,
+    "hardened": import_module("airflock.search.tune.stages").hardening,
 }  # fmt: skip
 CONSENT = "would run the code in "
 WAYS = {

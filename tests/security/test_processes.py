@@ -9,7 +9,7 @@ from importlib import import_module
 
 import pytest
 
-from airflock import atomic, cache
+from airflock.support import atomic, cache
 
 
 def child(action):

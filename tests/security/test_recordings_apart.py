@@ -12,9 +12,9 @@ import xarray as xr
 from mutations import GOLDEN
 
 import airflock
-from airflock.errors import RecordingError
 from airflock.recordings.flights import flown_document
 from airflock.recordings.isolated import Opening
+from airflock.support.errors import RecordingError
 
 
 def test_what_another_process_opens_is_what_xarray_opens():

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from airflock.errors import StudyError
-from airflock.evolve import tables
-from airflock.evolve.store import FILE, Batch, Store
-from airflock.executors import Flight, Landed
+from airflock.runs.executors import Flight, Landed
+from airflock.runs.store import FILE, Batch, Store
+from airflock.search import tables
+from airflock.support.errors import StudyError
 
 BATCH = Batch("search", 0, 0)
 

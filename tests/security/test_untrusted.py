@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
-from airflock import untrusted
-from airflock.errors import AirflockError, ScenarioError, bounded
-from airflock.evolve.study import load_study
+from airflock.search.study import load_study
+from airflock.support import untrusted
+from airflock.support.errors import AirflockError, ScenarioError, bounded
 
 
 @pytest.mark.parametrize(

@@ -93,7 +93,7 @@ def _unknown(command: str, verbs: dict[str, Any]) -> list[str]:
     plain = re.sub(r"'[^']*'|\"[^\"]*\"", "QUOTED", command.strip("`"))
     plain = re.split(r"\s[|>;&]|\.\.\.|…", plain)[0]
     if plain.startswith("python"):
-        name, words = "python -m airflock.onboard", plain.split()[3:]
+        name, words = "python -m airflock.drones.onboard", plain.split()[3:]
     else:
         name, words = "airflock", plain.split()[1:]
     while words and f"{name} {words[0]}" in verbs:
@@ -120,7 +120,7 @@ def _page(commands: list[str], verbs: dict[str, Any], files: Path) -> list[dict[
         for command in commands:
             why = next((why for words, why in NOT_RUN.items() if re.search(words, command)), None)
             row: dict[str, Any] = {"command": command}
-            if command.strip("`").startswith(("airflock", "python -m airflock.onboard")):
+            if command.strip("`").startswith(("airflock", "python -m airflock.drones.onboard")):
                 row["unknown"] = _unknown(command, verbs)
             if why is None:
                 ran = _smaller(command)

@@ -11,11 +11,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from airflock.fleet.lockstep import KEY
-from airflock.mavlink.orders import Do
-from airflock.onboard.card import hash_of
-from airflock.onboard.log import Logged
-from airflock.onboard.node import Memory
+from airflock.drones.mavlink.orders import Do
+from airflock.drones.onboard.card import hash_of
+from airflock.drones.onboard.log import Logged
+from airflock.drones.onboard.node import Memory
+from airflock.fleets.lockstep import KEY
 from fleets import card, document, fleet, scenario
 from haswell import airflock
 from snapshots import options

@@ -5,7 +5,7 @@ from typing import Any
 import typer.main
 
 from airflock.cli.main import app
-from airflock.onboard.run import parser
+from airflock.drones.onboard.run import parser
 
 
 def _type_of(kind: Any) -> dict[str, Any]:
@@ -94,4 +94,4 @@ def _node() -> dict[str, Any]:
 
 def take() -> dict[str, Any]:
     """Return the plain data of each verb by its full name, such as `airflock fly prepare`."""
-    return _verbs(typer.main.get_command(app), "airflock") | {"python -m airflock.onboard": _node()}
+    return _verbs(typer.main.get_command(app), "airflock") | {"python -m airflock.drones.onboard": _node()}

@@ -5,10 +5,10 @@ from typing import Any
 
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-from airflock.fleet import compare
-from airflock.fleet.faults import Fault
-from airflock.fleet.lockstep import Fleet
-from airflock.mavlink.orders import Do
+from airflock.drones.mavlink.orders import Do
+from airflock.fleets import compare
+from airflock.fleets.faults import Fault
+from airflock.fleets.lockstep import Fleet
 from fleets import card, scenario
 
 PRIVATE = bytes(range(32))

@@ -6,7 +6,7 @@ import textwrap
 from functools import cache
 from importlib import import_module
 
-from airflock.errors import AirflockError
+from airflock.support.errors import AirflockError
 
 DEEP = 2  # calls that are followed: the public function, what it calls, and what that calls
 

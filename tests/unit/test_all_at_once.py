@@ -5,9 +5,9 @@ import shlex
 import pytest
 from typer.testing import CliRunner
 
-from airflock.asked import WRONG, Asked, or_else
 from airflock.cli.main import app
-from airflock.errors import AirflockError, CardError, ScenarioError
+from airflock.support.asked import WRONG, Asked, or_else
+from airflock.support.errors import AirflockError, CardError, ScenarioError
 
 SET = "vasarhelyi_2018/4ms"
 LIMIT = "--limit 'r_mim<3 at 1%'"

@@ -17,8 +17,8 @@ import pytest
 from raising import raised
 
 import airflock
-from airflock import errors
-from airflock.display import master
+from airflock.displays import master
+from airflock.support import errors
 
 PAGE = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8")
 CALLED = re.findall(r"^\.\. autofunction:: (\S+)$", PAGE, re.M)
@@ -105,9 +105,10 @@ def test_no_two_docstrings_are_equal():
 
 
 QUIET = {  # raise none of ours: neither their source nor their docstring shows one
-    "airflock.presets", "airflock.plots.convergence", "airflock.Scenario.in_flight", "airflock.Scenario.separation",
+    "airflock.presets", "airflock.plots.convergence", "airflock.Scenario.in_flight",
+    "airflock.Scenario.separation",
     "airflock.Flight.scores", "airflock.Flight.snapshot", "airflock.Flight.compile",
-    "airflock.evolve.result.Result.document",
+    "airflock.search.result.Result.document",
 }  # fmt: skip
 
 
@@ -123,7 +124,7 @@ def test_every_error_that_the_source_shows_is_told(name):
 
 
 def the_error(name):
-    """An error of ours by its name, also one of another module than `airflock.errors`."""
+    """An error of ours by its name, also one of another module than `airflock.support.errors`."""
     below = [errors.AirflockError]
     for what in below:
         below += what.__subclasses__()

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airflock.cli.main import app
-from airflock.errors import AirflockError
+from airflock.support.errors import AirflockError
 from inside import cpu, simulate
 
 BEST = "zapotecatl_2016/best"

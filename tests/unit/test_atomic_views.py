@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from airflock import atomic
+from airflock.support import atomic
 
 
 def views(path):

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import airflock
-from airflock.errors import RecordingError
+from airflock.support.errors import RecordingError
 from autopilots import write_dataflash, write_ulog
 
 TIME = 12.0 + 0.1 * np.arange(300)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from airflock.errors import ScenarioError
 from airflock.scenarios.files import load
+from airflock.support.errors import ScenarioError
 
 BAD = {
     "model.r_s": (-0.1, "model.r_s = -0.1 m lies outside [0, 1000] m"),

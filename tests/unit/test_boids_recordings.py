@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from airflock.errors import RecordingError
 from airflock.recordings.layout import dataset
 from airflock.recordings.scores import measure
+from airflock.support.errors import RecordingError
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 

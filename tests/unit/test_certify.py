@@ -9,26 +9,25 @@ import pytest
 import tomlkit
 from typer.testing import CliRunner
 
-from airflock.certify.campaign import FOLDER, Campaign
-from airflock.certify.certificate import NOT_SAID, digest, sealed
-from airflock.certify.check import check
-from airflock.certify.flyer import Flyer
-from airflock.certify.run import certify, run
-from airflock.certify.seeds import COUNT, identity, seed
-from airflock.certify.tolerance import Screen, batch_of
+from airflock.certificates.bounds import look, per_hour
+from airflock.certificates.campaign import FOLDER, Campaign
+from airflock.certificates.certificate import NOT_SAID, digest, sealed
+from airflock.certificates.check import check
+from airflock.certificates.environment import sound_keys, usual_keys
+from airflock.certificates.flyer import Flyer
+from airflock.certificates.limit import read, read_all
+from airflock.certificates.run import certify, run
+from airflock.certificates.seeds import COUNT, identity, seed
+from airflock.certificates.tolerance import Screen, batch_of
 from airflock.cli.main import app
 from airflock.engine import score_flights
-from airflock.errors import AirflockError, ScenarioError, StudyError
-from airflock.evolve.environment import sound_keys, usual_keys
-from airflock.evolve.folder import open_folder
-from airflock.evolve.run import Interrupted
-from airflock.evolve.space import with_parameters
-from airflock.executors import Landed
-from airflock.executors.in_process import InProcess
-from airflock.limits.bounds import look, per_hour
-from airflock.limits.limit import read, read_all
+from airflock.runs.executors import Landed
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.folder import Interrupted, open_folder
+from airflock.runs.space import with_parameters
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
+from airflock.support.errors import AirflockError, ScenarioError, StudyError
 
 LIMIT = "r_min<1 at 2%"
 

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
-from airflock.certify import seeds
-from airflock.certify.hazard import hazard
-from airflock.evolve.study import load_study
-from airflock.limits.bounds import look, lower_bound, needed, per_flight, per_hour, schedule
+from airflock.certificates import seeds
+from airflock.certificates.bounds import look, lower_bound, needed, per_flight, per_hour, schedule
+from airflock.certificates.hazard import hazard
 from airflock.recordings.rare import upper_bound
 from airflock.scenarios.change import remade
 from airflock.scenarios.files import load
+from airflock.search.study import load_study
 
 
 @given(st.integers(1, 3000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))), st.floats(0.5, 0.9999))

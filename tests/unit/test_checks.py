@@ -7,26 +7,26 @@ from typing import NamedTuple
 import pytest
 
 import airflock
-from airflock.body.registry import BODIES
-from airflock.checking.bodies import check_body
-from airflock.checking.metrics import check_metric
-from airflock.checking.models import check_model
-from airflock.checking.radios import check_radio
-from airflock.checking.report import CheckError
-from airflock.checking.sensors import check_sensor
-from airflock.checking.topologies import check_topology
-from airflock.checking.units import Units, factor
+from airflock.check.bodies import check_body
+from airflock.check.metrics import check_metric
+from airflock.check.models import check_model
+from airflock.check.radios import check_radio
+from airflock.check.report import CheckError
+from airflock.check.sensors import check_sensor
+from airflock.check.topologies import check_topology
+from airflock.check.units import Units, factor
 from airflock.core.contract import body, metric, model
 from airflock.core.radio import radio
 from airflock.core.sensor import sensor
 from airflock.core.topology import topology
-from airflock.errors import RuleError, ScenarioError
-from airflock.metrics.registry import METRICS, SETS
-from airflock.models import vasarhelyi_2018, viragh_2014
-from airflock.models.vasarhelyi_2018 import Sums
-from airflock.radios.registry import RADIOS
+from airflock.parts.bodies.registry import BODIES
+from airflock.parts.laws import vasarhelyi_2018, viragh_2014
+from airflock.parts.laws.vasarhelyi_2018 import Sums
+from airflock.parts.metrics.registry import METRICS, SETS
+from airflock.parts.radios.registry import RADIOS
+from airflock.parts.sensors.registry import SENSORS
 from airflock.scenarios.laws import MODELS, find_model
-from airflock.sensors.registry import SENSORS
+from airflock.support.errors import RuleError, ScenarioError
 
 
 @pytest.mark.parametrize("name", [name for name in MODELS if name != "dimock_2003"])

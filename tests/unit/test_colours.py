@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from airflock.stage import colours
+from airflock.view.stage import colours
 
 SEEN = {
     "all cones": np.eye(3),

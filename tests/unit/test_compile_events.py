@@ -3,8 +3,8 @@
 import threading
 import time
 
-from airflock import compile_events
-from airflock.compile_events import COMPILING, told_if_long
+from airflock.engine import compile_events
+from airflock.engine.compile_events import COMPILING, told_if_long
 
 
 def sit_down(monkeypatch):

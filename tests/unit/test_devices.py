@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock import gpu as gpu
 from airflock.engine import picked, plan_of, score_flights
-from airflock.errors import DeviceError, FlightError, ScenarioError
 from airflock.scenarios import cost
 from airflock.scenarios.files import load
+from airflock.support import gpu as gpu
+from airflock.support.errors import DeviceError, FlightError, ScenarioError
 from flocks import scenario
 from gpus import runtime
 from inside import MOST_THREADS, Flown, Shape, shape_of, simulate

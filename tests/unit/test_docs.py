@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from airflock.metrics import registry
+from airflock.parts.metrics import registry
 from airflock.scenarios.laws import MODELS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -75,7 +75,7 @@ def test_code_and_equations_are_no_words(tmp_path, monkeypatch):
 def test_every_model_has_its_equations_beside_functions_that_exist():
     for name in MODELS:
         written = re.findall(r"^## (\w+)$", (DOCS / "equations" / f"{name}.md").read_text(encoding="utf-8"), re.M)
-        source = (DOCS.parent / "src/airflock/models" / f"{name}.py").read_text(encoding="utf-8")
+        source = (DOCS.parent / "src/airflock/parts/laws" / f"{name}.py").read_text(encoding="utf-8")
         functions = {node.name for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
         assert "decide" in written and set(written) <= functions
 

@@ -5,8 +5,8 @@ import pytest
 
 import airflock
 from airflock.engine import fly
-from airflock.errors import ScenarioError
 from airflock.scenarios.files import load
+from airflock.support.errors import ScenarioError
 
 PAPER = "vasarhelyi_2018/4ms"
 SMALL = {"agents": 4, "duration": 3.0, "dt": 0.05, "world.side": 60.0, "start.separation": 5.0}

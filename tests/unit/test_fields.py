@@ -11,14 +11,14 @@ import pytest
 from shapely.geometry import Polygon
 
 import airflock
-from airflock.errors import ScenarioError
-from airflock.mavlink.coordinates import Site
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.scenarios import geometry
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
-from airflock.scenes.outlines import ground_of
-from airflock.untrusted import TextError, xml
+from airflock.support.coordinates import Site
+from airflock.support.errors import ScenarioError
+from airflock.support.untrusted import TextError, xml
+from airflock.world.scenes.outlines import ground_of
 
 FIELDS = Path(__file__).parents[1] / "fields"
 FEW = {"agents": 4, "start.separation": 4.0, "duration": 1.0}

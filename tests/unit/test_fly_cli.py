@@ -33,7 +33,11 @@ def airflock(monkeypatch, capsys, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "the following arguments are required: --autopilot, --radio; python -m airflock.onboard --help lists"),
+        (
+            [],
+            "the following arguments are required: --autopilot, --radio; "
+            "python -m airflock.drones.onboard --help lists",
+        ),
         (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--memeber", "3"], "unrecognized arguments: --memeber 3"),
         (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--member", "x"], "argument --member: invalid int value"),
         (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--i-am"], "unrecognized arguments: --i-am; "),
@@ -177,7 +181,16 @@ def test_a_point_within_the_fence_is_sent_and_a_kill_tells_its_second_step(airfl
 def test_a_node_that_a_service_stops_keeps_its_log_and_its_memory(airflock, tmp_path):
     airflock("fly", "prepare", REAL, *HERE)
     ports = ["--autopilot", "udp:127.0.0.1:39435", "--radio", "udp:127.0.0.1:39436>127.0.0.1:39437"]
-    command = [sys.executable, "-m", "airflock.onboard", "mission.json", "--member", "2", "--i-am-the-pilot", *ports]
+    command = [
+        sys.executable,
+        "-m",
+        "airflock.drones.onboard",
+        "mission.json",
+        "--member",
+        "2",
+        "--i-am-the-pilot",
+        *ports,
+    ]
     node = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 30.0
     while not (tmp_path / "mission-2.memory").exists() and time.monotonic() < until:  # saved at the first tick
@@ -195,7 +208,16 @@ def test_a_node_that_a_service_stops_keeps_its_log_and_its_memory(airflock, tmp_
 def test_a_node_flies_on_when_the_terminal_that_it_was_started_from_has_gone(airflock, tmp_path, hears):
     airflock("fly", "prepare", REAL, *HERE)
     ports = ["--autopilot", "udp:127.0.0.1:39438", "--radio", "udp:127.0.0.1:39439>127.0.0.1:39440"]
-    command = [sys.executable, "-m", "airflock.onboard", "mission.json", "--member", "2", "--i-am-the-pilot", *ports]
+    command = [
+        sys.executable,
+        "-m",
+        "airflock.drones.onboard",
+        "mission.json",
+        "--member",
+        "2",
+        "--i-am-the-pilot",
+        *ports,
+    ]
     if hears == "nobody":
         reads, writes = os.pipe()
         os.close(reads)

@@ -4,9 +4,9 @@ import ast
 
 import pytest
 
-from airflock.errors import RuleError
-from airflock.rules.copies import Copies, Notes
-from airflock.rules.generate import Source
+from airflock.engine.text.copies import Copies, Notes
+from airflock.engine.text.generate import Source
+from airflock.support.errors import RuleError
 
 
 def shape(form, x):

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from airflock import gpu as gpu
 from airflock.cli import main
 from airflock.engine import picked, plan_of
-from airflock.errors import DeviceError
 from airflock.scenarios.files import load
+from airflock.support import gpu as gpu
+from airflock.support.errors import DeviceError
 from flocks import scenario
 from gpus import runtime
 from inside import no_room

@@ -5,11 +5,11 @@ import pytest
 
 import airflock
 from airflock.engine import fly
-from airflock.errors import ScenarioError
 from airflock.scenarios.cost import seconds_of
 from airflock.scenarios.files import load
 from airflock.studio.controls import controls_of, fields
 from airflock.studio.side import value_of
+from airflock.support.errors import ScenarioError
 
 PAPER = "vasarhelyi_2018/4ms"
 SMALL = {"agents": 6, "duration": 1.0, "world.side": 60.0, "start.separation": 5.0}

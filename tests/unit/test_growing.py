@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import toys
-from airflock.errors import ScenarioError
-from airflock.evolve.folder import open_folder
-from airflock.evolve.growing import LONGEST, SHARES, Length
-from airflock.evolve.run import Interrupted, run
-from airflock.evolve.search import averaged
-from airflock.evolve.space import declared
-from airflock.evolve.store import Batch, Store
-from airflock.executors.in_process import InProcess
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.folder import Interrupted, open_folder
+from airflock.runs.space import declared
+from airflock.runs.store import Batch, Store
+from airflock.search.growing import LONGEST, SHARES, Length
+from airflock.search.run import run
+from airflock.search.search import averaged
+from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

@@ -5,16 +5,16 @@ import pytest
 
 import toys
 from airflock.cli import harden as cli_harden
-from airflock.errors import ScenarioError
-from airflock.evolve import harden
-from airflock.evolve.measures import CARRIED, STOPS, measures
-from airflock.evolve.sensitivity import sensitivity
-from airflock.evolve.steps import Measured
-from airflock.evolve.store import Store
-from airflock.executors.in_process import InProcess
-from airflock.radios.links import received
+from airflock.parts.radios.links import received
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.store import Store
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
+from airflock.search import harden
+from airflock.search.measures import CARRIED, STOPS, measures
+from airflock.search.sensitivity import sensitivity
+from airflock.search.steps import Measured
+from airflock.support.errors import ScenarioError
 from inside import simulate
 
 pytestmark = pytest.mark.usefixtures("undrawn")

@@ -6,8 +6,8 @@ from typer.testing import CliRunner
 
 import airflock
 from airflock.cli.usage import at_home
-from airflock.plots.save import save_figure
-from airflock.untrusted import own_path
+from airflock.support.untrusted import own_path
+from airflock.view.plots.save import save_figure
 
 mpl.use("agg")
 SCENARIO = 'extends = "vasarhelyi_2018/4ms"\nagents = 3\nduration = 1.0\n'

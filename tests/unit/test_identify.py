@@ -11,16 +11,16 @@ import pytest
 import airflock
 from airflock.core import random
 from airflock.core.parameters import Quantity, declarations
-from airflock.errors import RecordingError, ScenarioError
-from airflock.identify import body, hills, packets, periods, synthetic
-from airflock.identify import sensors as standing
-from airflock.identify.hills import LINKS
-from airflock.identify.logs import Logs, logs_of_recording
-from airflock.identify.numbers import HARDER, UNITS, Number
-from airflock.identify.plan import flight_card
-from airflock.identify.run import identify, read_heard
-from airflock.radios import links
-from airflock.sensors import langevin
+from airflock.estimate.identify import body, hills, packets, periods, synthetic
+from airflock.estimate.identify import sensors as standing
+from airflock.estimate.identify.hills import LINKS
+from airflock.estimate.identify.logs import Logs, logs_of_recording
+from airflock.estimate.identify.numbers import HARDER, UNITS, Number
+from airflock.estimate.identify.plan import flight_card
+from airflock.estimate.identify.run import identify, read_heard
+from airflock.parts.radios import links
+from airflock.parts.sensors import langevin
+from airflock.support.errors import RecordingError, ScenarioError
 from processes import called
 
 STEP = 0.05

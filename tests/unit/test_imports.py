@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import airflock
-from airflock.errors import RecordingError
 from airflock.recordings.imports import expressions, geodesy, motion
 from airflock.recordings.imports.track import Track
+from airflock.support.errors import RecordingError
 
 RATE = 20.0
 

@@ -9,11 +9,11 @@ import pytest
 import xarray as xr
 
 import airflock
-from airflock.errors import AirflockError, RecordingError
-from airflock.infer import bootstrap, candidates, flights, noise, predictive, ridges, search, select
-from airflock.infer.result import Inferred, Law, verdict_of
-from airflock.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
-from airflock.infer.walk import Gains, Walk
+from airflock.estimate.infer import bootstrap, candidates, flights, noise, predictive, ridges, search, select
+from airflock.estimate.infer.result import Inferred, Law, verdict_of
+from airflock.estimate.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
+from airflock.estimate.infer.walk import Gains, Walk
+from airflock.support.errors import AirflockError, RecordingError
 from processes import called
 
 PERIOD, SIDE, RADIUS, SPEED = 0.1, 5.0, 1.2, 1.0

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airflock.infer.fit import FINE, climb
-from airflock.infer.given_up import taken_back, ways_of
-from airflock.infer.ridges import Ridges
-from airflock.infer.run import _Comparison
+from airflock.estimate.infer.fit import FINE, climb
+from airflock.estimate.infer.given_up import taken_back, ways_of
+from airflock.estimate.infer.ridges import Ridges
+from airflock.estimate.infer.run import _Comparison
 from line_laws import Line, quietly
 
 DROP = 4.0

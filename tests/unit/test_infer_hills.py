@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock.infer.fit import FINE, climb
-from airflock.infer.hills import by_company, distinct, groups, hills, onward, redrawn
-from airflock.infer.ridges import ridges
-from airflock.infer.search import profile
+from airflock.estimate.infer.fit import FINE, climb
+from airflock.estimate.infer.hills import by_company, distinct, groups, hills, onward, redrawn
+from airflock.estimate.infer.ridges import ridges
+from airflock.estimate.infer.search import profile
 from line_laws import Line, quietly
 
 

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airflock.infer import noise as noises
-from airflock.infer import select
-from airflock.infer.candidates import Number
-from airflock.infer.fit import (
+from airflock.estimate.infer import noise as noises
+from airflock.estimate.infer import select
+from airflock.estimate.infer.candidates import Number
+from airflock.estimate.infer.fit import (
     FINE,
     WIDE,
     Fit,
@@ -23,11 +23,11 @@ from airflock.infer.fit import (
     settle,
     spread,
 )
-from airflock.infer.flights import Noise
-from airflock.infer.identifiability import canonical, identifiable, simplify
-from airflock.infer.likelihood import SOFT, deviation, soft
-from airflock.infer.ridges import at_end, ridges
-from airflock.infer.search import drawn, profile, race, usual
+from airflock.estimate.infer.flights import Noise
+from airflock.estimate.infer.identifiability import canonical, identifiable, simplify
+from airflock.estimate.infer.likelihood import SOFT, deviation, soft
+from airflock.estimate.infer.ridges import at_end, ridges
+from airflock.estimate.infer.search import drawn, profile, race, usual
 from line_laws import STEPS, Line, quietly
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from test_infer import PERIOD, SPEED, dataset
 
-from airflock.infer.lack_of_fit import SHELLS, lack_of_fit
-from airflock.infer.likelihood import Model
-from airflock.infer.tracks import scale_of, tracks_of
+from airflock.estimate.infer.lack_of_fit import SHELLS, lack_of_fit
+from airflock.estimate.infer.likelihood import Model
+from airflock.estimate.infer.tracks import scale_of, tracks_of
 
 AGENTS, FRAMES, TURN = 10, 400, 0.15
 

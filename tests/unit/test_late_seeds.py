@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import toys
-from airflock.errors import ScenarioError
-from airflock.evolve.folder import open_folder
-from airflock.evolve.request import study_of
-from airflock.evolve.run import Interrupted, run
-from airflock.evolve.search import search, total_flights, windowed
-from airflock.evolve.store import Batch, Store
-from airflock.executors.in_process import InProcess
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.folder import Interrupted, open_folder
+from airflock.runs.store import Batch, Store
+from airflock.search.request import study_of
+from airflock.search.run import run
+from airflock.search.search import search, total_flights, windowed
+from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -21,7 +21,7 @@ SAFE = 0.288  # where expected() is largest
 
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch):
-    monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
+    monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
 
 
 def courage(parameters):

@@ -12,17 +12,17 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from airflock.body.registry import BODIES
 from airflock.core import maths
 from airflock.core.contract import model
+from airflock.core.rules import law
 from airflock.core.vocabulary import VOCABULARY, asks
 from airflock.core.vocabulary.metrics import METRIC
-from airflock.errors import RuleError
-from airflock.metrics.registry import METRICS
-from airflock.rules import law
-from airflock.rules.generate import Source
-from airflock.rules.probe import probe
+from airflock.engine.text.generate import Source
+from airflock.engine.text.probe import probe
+from airflock.parts.bodies.registry import BODIES
+from airflock.parts.metrics.registry import METRICS
 from airflock.scenarios.laws import MODELS
+from airflock.support.errors import RuleError
 
 RULES = ("reach", "sight", "neighbour", "boundary", "decide", "preferred_speed", "interaction_range")
 
@@ -184,7 +184,7 @@ def test_a_fault_names_file_line_and_reason(rule, said):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_every_shipped_model_is_lawful(name):
-    module = import_module(f"airflock.models.{name}")
+    module = import_module(f"airflock.parts.laws.{name}")
     for kind in RULES:
         if hasattr(module, kind):
             assert law.faults(getattr(module, kind)) == []
@@ -247,7 +247,7 @@ def test_a_model_with_a_part_missing_is_refused(parts, said):
 
 
 def test_rules_of_a_model_are_plain_python():
-    module = import_module("airflock.models.vasarhelyi_2018")
+    module = import_module("airflock.parts.laws.vasarhelyi_2018")
     p = module.Parameters()
     sums = module.neighbour(**{name: 1.0 for name in asks(module.neighbour, "neighbour") if name != "p"}, p=p)
     assert all(isinstance(value, float) and math.isfinite(value) for value in sums)
@@ -255,7 +255,7 @@ def test_rules_of_a_model_are_plain_python():
 
 def test_what_the_compiler_refuses_is_one_line():
     from airflock.engine import score_flight
-    from airflock.models import viragh_2014
+    from airflock.parts.laws import viragh_2014
     from airflock.scenarios.files import load
 
     def decide(own, p):

@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 
 import airflock
-from airflock.errors import RecordingError
-from airflock.metrics.registry import SETS
+from airflock.parts.metrics.registry import SETS
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.lengths import IN_BODIES, in_bodies
 from airflock.recordings.scores import measure, not_told
+from airflock.support.errors import RecordingError
 from processes import called
 
 GIVEN = {

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airflock.errors import LinkError
-from airflock.mavlink import dialect, orders, status
-from airflock.mavlink.autopilots import AUTOPILOTS, Speaker
-from airflock.mavlink.coordinates import FLATTENING, SEMI_MAJOR, Site, turned
-from airflock.mavlink.frames import Packer, Stream, frames_in
-from airflock.mavlink.keys import read_key, write_key
-from airflock.mavlink.signing import EPOCH, LAST_STAMP, Receiver, Signer, stamp_at
-from airflock.mavlink.status import Status
+from airflock.drones.mavlink import dialect, orders, status
+from airflock.drones.mavlink.autopilots import AUTOPILOTS, Speaker
+from airflock.drones.mavlink.frames import Packer, Stream, frames_in
+from airflock.drones.mavlink.keys import read_key, write_key
+from airflock.drones.mavlink.signing import EPOCH, LAST_STAMP, Receiver, Signer, stamp_at
+from airflock.drones.mavlink.status import Status
+from airflock.support.coordinates import FLATTENING, SEMI_MAJOR, Site, turned
+from airflock.support.errors import LinkError
 from attacks import attacks
 
 common = dialect.common()

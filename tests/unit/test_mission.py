@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from airflock.core.agent import State
 from airflock.core.maths import braking_curve
-from airflock.mavlink.orders import Do
-from airflock.onboard.limiter import limit
-from airflock.onboard.mission import FLY, TABLE, Facts, Phase, look
-from airflock.onboard.safety import Safety
+from airflock.drones.mavlink.orders import Do
+from airflock.drones.onboard.limiter import limit
+from airflock.drones.onboard.mission import FLY, TABLE, Facts, Phase, look
+from airflock.drones.onboard.safety import Safety
 
 WELL, SAFE = Facts(), Safety()
 P = Phase

@@ -7,10 +7,10 @@ import pytest
 
 import airflock
 from airflock.core.agent import State
-from airflock.errors import RecordingError
-from airflock.onboard.log import Logged
-from airflock.onboard.mission import Phase
-from airflock.onboard.node import Memory, Node
+from airflock.drones.onboard.log import Logged
+from airflock.drones.onboard.mission import Phase
+from airflock.drones.onboard.node import Memory, Node
+from airflock.support.errors import RecordingError
 from fleets import card
 
 KEY, UTC = bytes(range(32)), 1_767_225_600 * 10**6  # µs

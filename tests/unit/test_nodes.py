@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 import airflock
-from airflock.rules.nodes import walk
+from airflock.core.rules.nodes import walk
 
 LEFT_OUT = ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.alias
 

@@ -10,14 +10,14 @@ import pytest
 
 import airflock
 import toys
-from airflock.errors import ParameterError, RecordingError, ScenarioError
-from airflock.evolve.search import search
-from airflock.evolve.store import Store
-from airflock.evolve.study import load_study
-from airflock.evolve.winner import conclude
-from airflock.executors.in_process import InProcess
-from airflock.metrics import registry
+from airflock.parts.metrics import registry
 from airflock.recordings.measures import milling
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.store import Store
+from airflock.search.search import search
+from airflock.search.study import load_study
+from airflock.search.winner import conclude
+from airflock.support.errors import ParameterError, RecordingError, ScenarioError
 from processes import called
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
@@ -46,7 +46,7 @@ def test_names_and_files_fly_like_the_scenarios_that_they_stand_for(tmp_path):
 
 
 def test_a_law_may_be_given_by_its_name_or_its_file(tmp_path):
-    from airflock.models import viragh_2014
+    from airflock.parts.laws import viragh_2014
 
     by_name = airflock.load(NAME, law="viragh_2014")
     assert by_name.model.name == "viragh_2014" and by_name.document["model"] == {"kind": "viragh_2014"}

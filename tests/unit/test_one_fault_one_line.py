@@ -3,8 +3,8 @@
 import pytest
 
 import airflock
-from airflock.errors import ScenarioError
-from airflock.evolve.study import load_study
+from airflock.search.study import load_study
+from airflock.support.errors import ScenarioError
 
 OWN = "def error(g, s):\n    return g, 0.0\n"
 

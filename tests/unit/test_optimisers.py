@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 import toys
-from airflock.errors import StudyError
-from airflock.evolve.evaluator import Evaluator
-from airflock.evolve.fitness import Objective, losses
-from airflock.evolve.genetic import BinaryGenetic, decode, genetic
-from airflock.evolve.nondominated import front
-from airflock.evolve.optimisers import optimiser
-from airflock.evolve.race import race
-from airflock.evolve.store import Store
-from airflock.executors.in_process import InProcess
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.store import Store
+from airflock.search.evaluator import Evaluator
+from airflock.search.fitness import Objective, losses
+from airflock.search.genetic import BinaryGenetic, decode, genetic
+from airflock.search.nondominated import front
+from airflock.search.optimisers import optimiser
+from airflock.search.race import race
+from airflock.support.errors import StudyError
 
 
 def run(algorithm, f, dimension, objectives, population, generations, seed):

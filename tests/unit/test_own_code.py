@@ -8,10 +8,10 @@ import pytest
 
 import airflock
 from airflock.engine import Flight
-from airflock.errors import RuleError, ScenarioError
 from airflock.scenarios.own_code import own_module
 from airflock.studio.flights import FlightRequest
 from airflock.studio.player import Player
+from airflock.support.errors import RuleError, ScenarioError
 
 
 def test_a_file_that_was_changed_within_a_second_runs_as_it_is(tmp_path, monkeypatch):

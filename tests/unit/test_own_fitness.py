@@ -4,8 +4,8 @@ import pytest
 
 import airflock
 import toys
-from airflock.errors import ScenarioError, StudyError
-from airflock.evolve.study import load_study
+from airflock.search.study import load_study
+from airflock.support.errors import ScenarioError, StudyError
 from processes import called
 
 pytestmark = pytest.mark.usefixtures("undrawn")

@@ -8,12 +8,12 @@ import pytest
 
 import airflock
 from airflock.engine import fly
-from airflock.errors import AirflockError, RuleError, ScenarioError
-from airflock.metrics.registry import SETS, metric_set, reports
+from airflock.parts.metrics.registry import SETS, metric_set, reports
 from airflock.recordings.files import fly_again
 from airflock.recordings.flights import flown_document
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.scenarios.files import load
+from airflock.support.errors import AirflockError, RuleError, ScenarioError
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 

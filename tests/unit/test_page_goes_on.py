@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from airflock import atomic
 from airflock.engine import Flight
 from airflock.studio.flights import FlightRequest
 from airflock.studio.opening import Opening
 from airflock.studio.panel import Panel
 from airflock.studio.player import Player
 from airflock.studio.playing import Playing
+from airflock.support import atomic
 
 PRESET = "vasarhelyi_2018/4ms"
 

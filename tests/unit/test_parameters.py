@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airflock.body.registry import BODIES
 from airflock.core.parameters import (
     Choice,
     Parameters,
@@ -21,13 +20,14 @@ from airflock.core.parameters import (
 )
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import complete
-from airflock.errors import ParameterError, ScenarioError
+from airflock.parts.bodies.registry import BODIES
 from airflock.scenarios.files import load
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.sections import SECTIONS
+from airflock.support.errors import ParameterError, ScenarioError
 
 RECORDS = {
-    **{f"model {name}": import_module(f"airflock.models.{name}").Parameters for name in MODELS},
+    **{f"model {name}": import_module(f"airflock.parts.laws.{name}").Parameters for name in MODELS},
     **SECTIONS,
     **{f"body {name}": body.Parameters for name, body in BODIES.items()},
 }

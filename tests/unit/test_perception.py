@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.errors import FlightError
+from airflock.support.errors import FlightError
 
 BASE = {"agents": 5, "duration": 3.0, "metrics.period": 0.1, "start.separation": 5.0}
 RADIOS = {

@@ -8,8 +8,8 @@ from concurrent.futures import Future
 import pytest
 
 import airflock
-from airflock.errors import FlightError
 from airflock.scenarios.files import load
+from airflock.support.errors import FlightError
 
 FLOWN = {
     "vasarhelyi_2018/faulty": {}, "vasarhelyi_2018/real_gnss": {}, "kidger/city": {}, "zapotecatl_2016/best": {},

@@ -21,30 +21,30 @@ from matplotlib.text import Text
 from typer.testing import CliRunner
 
 import airflock
+from airflock.certificates.bounds import look
 from airflock.cli.main import app
 from airflock.core.maths import bell, braking_curve, excess, peak, rising
-from airflock.errors import AirflockError, RecordingError
-from airflock.limits.bounds import look
-from airflock.models import vasarhelyi_2018
-from airflock.plots import flight as flight_view
-from airflock.plots import style
-from airflock.plots.certificate import certificate, tail
-from airflock.plots.film_stage import Stage
-from airflock.plots.heatmap import heatmap
-from airflock.plots.responses import alignment, allowed_difference, repulsion, wall_response
-from airflock.plots.rules import rules
-from airflock.plots.save import PictureError, save_figure
-from airflock.plots.series import Pen, rotations, series
-from airflock.plots.trajectories import trajectories
-from airflock.plots.transfer import transfer
-from airflock.plots.video import frame_count, video
+from airflock.parts.laws import vasarhelyi_2018
 from airflock.recordings.files import save
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.layout import dataset
 from airflock.recordings.scores import courses
 from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
-from airflock.stage.arrows import vectors
+from airflock.support.errors import AirflockError, RecordingError
+from airflock.view.plots import flight as flight_view
+from airflock.view.plots import style
+from airflock.view.plots.certificate import certificate, tail
+from airflock.view.plots.film_stage import Stage
+from airflock.view.plots.heatmap import heatmap
+from airflock.view.plots.responses import alignment, allowed_difference, repulsion, wall_response
+from airflock.view.plots.rules import rules
+from airflock.view.plots.save import PictureError, save_figure
+from airflock.view.plots.series import Pen, rotations, series
+from airflock.view.plots.trajectories import trajectories
+from airflock.view.plots.transfer import transfer
+from airflock.view.plots.video import frame_count, video
+from airflock.view.stage.arrows import vectors
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 
@@ -520,7 +520,7 @@ def test_pictures_of_one_panel_are_drawn_into_axes_that_are_given():
 
 def test_where_ffmpeg_is_not_installed_the_command_says_so_before_it_flies(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.setattr("airflock.plots.picture.flight_of", lambda *_, **__: pytest.fail("flew"))
+    monkeypatch.setattr("airflock.view.plots.picture.flight_of", lambda *_, **__: pytest.fail("flew"))
     said = CliRunner().invoke(app, ["video", "vasarhelyi_2018/4ms", "--out", str(tmp_path / "a.mp4")])
     assert "videos need imageio-ffmpeg: pip install 'airflock[video]'" in str(said.exception)
     with pytest.raises(PictureError, match="videos need imageio-ffmpeg"):
@@ -543,7 +543,7 @@ def test_a_chart_beside_a_video_moves_with_it():
 
 @pytest.mark.parametrize(("chart", "said"), [("phi_velo", "did you mean phi_vel?"), ("mood", "phi_vel, ")])
 def test_a_chart_of_what_a_flight_does_not_have_is_refused_before_it_is_flown(tmp_path, monkeypatch, chart, said):
-    monkeypatch.setattr("airflock.plots.picture.flight_of", lambda *_, **__: pytest.fail("flew"))
+    monkeypatch.setattr("airflock.view.plots.picture.flight_of", lambda *_, **__: pytest.fail("flew"))
     path = tmp_path / "a.mp4"
     told = CliRunner().invoke(app, ["video", "vasarhelyi_2018/4ms", "--chart", chart, "--out", str(path)])
     assert isinstance(told.exception, RecordingError) and said in str(told.exception) and not path.exists()

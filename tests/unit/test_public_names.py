@@ -16,9 +16,10 @@ from airflock.cli.main import app
 PACKAGES = {"plots", "measures"}
 CLASSES = {"AirflockError", "Scenario", "Flight", "Parameters"}
 HOMES = {
-    "evolve": "airflock.evolve.run", "certify": "airflock.certify.run", "display": "airflock.display.displays",
-    "tune": "airflock.tune.run", "identify": "airflock.identify.run", "infer": "airflock.infer.run",
-    "body": "airflock.core.contract", "fleet": "airflock.fleet.flying",
+    "evolve": "airflock.search.run", "certify": "airflock.certificates.run", "display": "airflock.displays.displays",
+    "tune": "airflock.search.tune.run", "identify": "airflock.estimate.identify.run",
+    "infer": "airflock.estimate.infer.run",
+    "body": "airflock.core.contract", "fleet": "airflock.fleets.flying",
 }  # fmt: skip
 UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "s", "body_length": "m"}
 FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__"} - CLASSES)  # their examples: test_api_page

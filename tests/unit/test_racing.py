@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import toys
-from airflock.errors import ScenarioError
-from airflock.evolve.folder import open_folder
-from airflock.evolve.racing import still_needed
-from airflock.evolve.run import Interrupted, run
-from airflock.executors.in_process import InProcess
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.folder import Interrupted, open_folder
+from airflock.search.racing import still_needed
+from airflock.search.run import run
+from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

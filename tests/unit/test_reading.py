@@ -5,9 +5,9 @@ import math
 
 import pytest
 
+from airflock.core.rules.reading import fields_read
 from airflock.core.vocabulary import Mean
-from airflock.metrics.registry import METRICS
-from airflock.rules.reading import fields_read
+from airflock.parts.metrics.registry import METRICS
 
 RECORDS = {"pair", "shared", "memory", "wing", "q", "agents", "clusters", "members"}
 RULES = [

@@ -6,9 +6,9 @@ import pytest
 
 import airflock
 from airflock.core.radio import lost
-from airflock.errors import RecordingError
-from airflock.plots.reception import received
 from airflock.recordings.reception import reception
+from airflock.support.errors import RecordingError
+from airflock.view.plots.reception import received
 
 FLIGHT = {"agents": 10, "duration": 20.0, "sensors.period": 0.2, "radio.delay": 0.6, "metrics.period": 0.2}
 

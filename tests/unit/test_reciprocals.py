@@ -9,8 +9,8 @@ import pytest
 
 from airflock.core import maths
 from airflock.engine import plan_of
-from airflock.models import vasarhelyi_2018
-from airflock.rules.generate import Source
+from airflock.engine.text.generate import Source
+from airflock.parts.laws import vasarhelyi_2018
 from airflock.scenarios.files import load
 from inside import Forms, shape_of, spelled, with_reciprocals
 from inside import cuda_kernel as kernel

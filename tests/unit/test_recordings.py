@@ -10,10 +10,10 @@ import xarray as xr
 
 import airflock
 from airflock.engine import driver_text, plan_of
-from airflock.errors import AirflockError, RecordingError
 from airflock.recordings.attributes import name_of
 from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.scores import measure, over_time
+from airflock.support.errors import AirflockError, RecordingError
 from inside import drivers, measuring, passes_driver, tables
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
@@ -113,7 +113,7 @@ def test_flight_with_a_law_given_directly_can_still_be_scored(tmp_path):
 
 
 def test_a_recording_of_a_law_of_ones_own_is_scored_anywhere_without_it_and_flown_again_with_it(tmp_path, monkeypatch):
-    from airflock.models import viragh_2014
+    from airflock.parts.laws import viragh_2014
     from airflock.recordings.files import fly_again
 
     (tmp_path / "sub").mkdir()

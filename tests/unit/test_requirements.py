@@ -7,8 +7,8 @@ import pytest
 
 import airflock
 from airflock.engine import State, plan_of
-from airflock.errors import FlightError, ParameterError, ScenarioError
 from airflock.scenarios import cost
+from airflock.support.errors import FlightError, ParameterError, ScenarioError
 from inside import driver_of, needs, tables
 
 

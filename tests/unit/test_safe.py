@@ -13,15 +13,15 @@ from scipy.stats import norm
 from test_harden import flown_by
 
 import toys
-from airflock.errors import ScenarioError
-from airflock.evolve import harden
-from airflock.evolve.run import run
-from airflock.evolve.safe import allowed, excess, flights_that_count, safe_first
-from airflock.evolve.study import make_study
-from airflock.executors.in_process import InProcess
-from airflock.limits.chance import chance, indices
-from airflock.limits.limit import read
+from airflock.certificates.chance import chance, indices
+from airflock.certificates.limit import read
+from airflock.runs.executors.in_process import InProcess
 from airflock.scenarios.files import load
+from airflock.search import harden
+from airflock.search.run import run
+from airflock.search.safe import allowed, excess, flights_that_count, safe_first
+from airflock.search.study import make_study
+from airflock.support.errors import ScenarioError
 
 PAPER = load("vasarhelyi_2018/6ms")
 NEAR = "r_min<3 at 1%"
@@ -56,7 +56,7 @@ def searched(folder, limits=()):
 
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch):
-    monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
+    monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
 
 
 def test_a_search_with_a_limit_finds_the_safe_optimum_and_one_without_leaves_it(tmp_path):

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from airflock.errors import AirflockError, ScenarioError
 from airflock.scenarios.change import variant
 from airflock.scenarios.files import load, presets
 from airflock.scenarios.making import make
+from airflock.support.errors import AirflockError, ScenarioError
 
 DOCUMENTS = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in presets().items()}
 SQUARE = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.display import assignment, fly_show, points_of
-from airflock.errors import AirflockError, FlightError, ScenarioError
-from airflock.scenes import meshes
-from airflock.scenes.build import in_mesh, scene_of
+from airflock.displays import assignment, fly_show, points_of
+from airflock.support.errors import AirflockError, FlightError, ScenarioError
 from airflock.world.scenery import Parameters
+from airflock.world.scenes import meshes
+from airflock.world.scenes.build import in_mesh, scene_of
 from needed import needed
 
 trimesh = needed("trimesh")
@@ -236,7 +236,7 @@ def test_a_file_of_another_kind_is_not_flown_as_text(tmp_path, monkeypatch, shap
 
 @pytest.mark.parametrize("text", ["2.0", "U.S.A", "GO ... NOW", "heart.pgn ", "A" * 300 + "."])
 def test_a_text_with_a_point_in_it_is_still_a_text(monkeypatch, text):
-    from airflock.display import shapes
+    from airflock.displays import shapes
 
     monkeypatch.setattr(shapes, "_pixels_of_text", lambda _: np.ones((50, 50), bool))
     assert points_of(text, 10).shape == (10, 3)

@@ -9,19 +9,19 @@ import pytest
 from matplotlib.collections import LineCollection
 
 import airflock
-from airflock.aero.wing import pitch
 from airflock.cli import tables
-from airflock.errors import RecordingError
-from airflock.plots.film_stage import Stage
-from airflock.plots.flight import paths_of, view_of
-from airflock.plots.flocked import flocked
-from airflock.plots.rays import cast_at, rays
-from airflock.plots.scene_paths import ELEVATION, nearby, outlines_in_space, scenery, through
-from airflock.plots.trajectories import trajectories
-from airflock.plots.video import video
-from airflock.plots.wash import downwash, formation_at, wash
+from airflock.parts.aero.wing import pitch
 from airflock.recordings.flights import plain
 from airflock.recordings.layout import dataset
+from airflock.support.errors import RecordingError
+from airflock.view.plots.film_stage import Stage
+from airflock.view.plots.flight import paths_of, view_of
+from airflock.view.plots.flocked import flocked
+from airflock.view.plots.rays import cast_at, rays
+from airflock.view.plots.scene_paths import ELEVATION, nearby, outlines_in_space, scenery, through
+from airflock.view.plots.trajectories import trajectories
+from airflock.view.plots.video import video
+from airflock.view.plots.wash import downwash, formation_at, wash
 from airflock.world.shapes import BOX, CYLINDER
 
 
@@ -71,7 +71,7 @@ def test_rays_of_an_agent_are_those_that_its_model_casts():
 
 
 def test_share_flocked_is_drawn_with_goals_and_collisions(monkeypatch):
-    module = import_module("airflock.plots.flocked")
+    module = import_module("airflock.view.plots.flocked")
     index = pd.Index(np.arange(40) / 60.0, name="time")
     course = pd.DataFrame({"flocked": 1.0, "polarisation": 0.5, "n_clusters": 1.0, "n_coll": 1.0}, index=index)
     monkeypatch.setattr(module, "measure", lambda *_: ({"time_to_goal": [0.2, np.nan]}, course))

@@ -4,15 +4,15 @@ import pytest
 
 import toys
 from airflock.engine import score_flight
-from airflock.errors import StudyError
-from airflock.evolve.bounds import unread, usual_space
-from airflock.evolve.search import search
-from airflock.evolve.space import declared, with_parameters
-from airflock.evolve.store import Store
-from airflock.evolve.study import load_study, make_study
-from airflock.evolve.winner import conclude
-from airflock.executors.in_process import InProcess
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.space import declared, with_parameters
+from airflock.runs.store import Store
 from airflock.scenarios.files import load, presets
+from airflock.search.bounds import unread, usual_space
+from airflock.search.search import search
+from airflock.search.study import load_study, make_study
+from airflock.search.winner import conclude
+from airflock.support.errors import StudyError
 
 OWN = {"agents": 12, "world.side": 120.0}
 

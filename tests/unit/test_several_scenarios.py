@@ -14,21 +14,21 @@ import airflock
 import toys
 from airflock.cli.harden import _optima
 from airflock.engine import score_flight, score_flights
-from airflock.errors import ScenarioError
-from airflock.evolve import harden
-from airflock.evolve.batched import Batched
-from airflock.evolve.evaluator import Evaluator
-from airflock.evolve.folder import open_folder
-from airflock.evolve.run import Interrupted, executor_for, run
-from airflock.evolve.several import of_scenarios
-from airflock.evolve.space import with_parameters
-from airflock.evolve.store import Batch, Store
-from airflock.evolve.study import load_study, make_study
-from airflock.evolve.task import tasks_of
-from airflock.executors.cluster import rebuild
-from airflock.executors.in_process import InProcess
+from airflock.runs.executors.cluster import rebuild
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.folder import Interrupted, open_folder
+from airflock.runs.space import with_parameters
+from airflock.runs.store import Batch, Store
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
+from airflock.search import harden
+from airflock.search.batched import Batched
+from airflock.search.evaluator import Evaluator
+from airflock.search.run import executor_for, run
+from airflock.search.several import of_scenarios
+from airflock.search.study import load_study, make_study
+from airflock.search.task import tasks_of
+from airflock.support.errors import ScenarioError
 from inside import simulate
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -106,7 +106,7 @@ def test_a_study_of_several_that_is_cut_off_ends_the_same(tmp_path):
         flown(tmp_path / "cut", study, stop)
     assert flown(tmp_path / "cut", study, resume=True).document() == whole.document()
     other = two("worst", generations=8, flights="growing", random_numbers="generation")
-    with pytest.raises(airflock.errors.StudyError, match="over_scenarios = mean there, worst now"):
+    with pytest.raises(airflock.support.errors.StudyError, match="over_scenarios = mean there, worst now"):
         open_folder(tmp_path / "cut", other, resume=True)
 
 

@@ -5,16 +5,16 @@ import re
 import pytest
 
 import airflock
-from airflock.body.registry import BODIES
 from airflock.core import fault
 from airflock.core.parameters import Quantity, declarations
-from airflock.errors import ScenarioError
-from airflock.faults.registry import KINDS
+from airflock.parts.bodies.registry import BODIES
+from airflock.parts.faults.registry import KINDS
+from airflock.parts.sensors.registry import SENSORS
 from airflock.scenarios import groups, keys, making
 from airflock.scenarios.files import load, presets
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.sections import SECTIONS
-from airflock.sensors.registry import SENSORS
+from airflock.support.errors import ScenarioError
 
 NAME = "vasarhelyi_2018/real_6ms"
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.body.falling import GRAVITY, fall
-from airflock.display import fly_show, master, points_of
-from airflock.display.assignment import assign
-from airflock.display.detours import BESIDE, CLEAR, beside, in_the_way, longer
-from airflock.display.show import ranks, recording_of, scenario_of
+from airflock.displays import fly_show, master, points_of
+from airflock.displays.assignment import assign
+from airflock.displays.detours import BESIDE, CLEAR, beside, in_the_way, longer
+from airflock.displays.show import ranks, recording_of, scenario_of
 from airflock.engine import Flight
+from airflock.parts.bodies.falling import GRAVITY, fall
 from airflock.recordings.scores import measure
 from airflock.world.goals import glide
 

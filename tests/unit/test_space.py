@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from airflock.errors import ParameterError
-from airflock.evolve.space import full_space, with_parameters
-from airflock.evolve.space_table import read_space
+from airflock.runs.space import full_space, with_parameters
 from airflock.scenarios.files import load
+from airflock.search.space_table import read_space
+from airflock.support.errors import ParameterError
 
 SCENARIO = load("zapotecatl_2016/best")
 FLOCK = load("vasarhelyi_2018/6ms")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from airflock.certify.branches import LineageFlyer
-from airflock.certify.campaign import Campaign
-from airflock.certify.flyer import Flyer
-from airflock.certify.splitting import Lineage, Particle, Repetition, estimate, repetition
-from airflock.evolve.store import Store
-from airflock.limits.limit import read_all
+from airflock.certificates.branches import LineageFlyer
+from airflock.certificates.campaign import Campaign
+from airflock.certificates.flyer import Flyer
+from airflock.certificates.limit import read_all
+from airflock.certificates.splitting import Lineage, Particle, Repetition, estimate, repetition
+from airflock.runs.store import Store
 from airflock.scenarios.files import load
 
 STEPS, HEIGHT = 100, 100.0
@@ -75,7 +75,9 @@ def test_a_branch_changes_nothing_before_it():
 
 def test_splitting_that_goes_on_after_more_flights_takes_no_flight_of_the_one_before_for_its_own(tmp_path, monkeypatch):
     """It starts from other flights then, so that flights of the same number are other ones."""
-    monkeypatch.setattr("airflock.certify.branches.falls", lambda _, lineage, *rest: [list(f) for f in walk(lineage)])
+    monkeypatch.setattr(
+        "airflock.certificates.branches.falls", lambda _, lineage, *rest: [list(f) for f in walk(lineage)]
+    )
     scenario = load("vasarhelyi_2018/real_6ms")
     with Store(tmp_path) as store:
         flyer = Flyer(Campaign(scenario, read_all(["r_min<1 at 1e-3/h"], scenario)), store, None)

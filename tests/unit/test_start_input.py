@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from airflock.engine import driver_text, fly, plan_of
-from airflock.errors import FlightError, ScenarioError
 from airflock.scenarios.files import load
+from airflock.support.errors import FlightError, ScenarioError
 from flocks import scenario
 
 BOUNCE = {"world__edges": "bounce", "world__side": 20.0, "duration": 0.2}

@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 
 import airflock
-from airflock.errors import RecordingError
-from airflock.plots.trajectories import trajectories
+from airflock.support.errors import RecordingError
+from airflock.view.plots.trajectories import trajectories
 
 TIMES = np.arange(40) * 0.5
 

@@ -14,16 +14,16 @@ import pytest
 
 import airflock
 import toys
-from airflock.errors import ScenarioError, StudyError
-from airflock.evolve.batched import Batched
-from airflock.evolve.folder import open_folder
-from airflock.evolve.request import asked_for, sound_device, study_of
-from airflock.evolve.run import Interrupted, run, score_of
-from airflock.evolve.space import with_parameters
-from airflock.evolve.store import FILE, Batch, Store
-from airflock.evolve.study import differences, load_study, shipped
-from airflock.executors import Flight
-from airflock.executors.in_process import InProcess
+from airflock.runs.executors import Flight
+from airflock.runs.executors.in_process import InProcess
+from airflock.runs.folder import Interrupted, differences, open_folder
+from airflock.runs.space import with_parameters
+from airflock.runs.store import FILE, Batch, Store
+from airflock.search.batched import Batched
+from airflock.search.request import asked_for, sound_device, study_of
+from airflock.search.run import run, score_of
+from airflock.search.study import load_study, shipped
+from airflock.support.errors import ScenarioError, StudyError
 from airflock_papers.dimock_2003.units import gains
 from airflock_papers.vasarhelyi_2018.published import SPEEDS, optimum
 from processes import called
@@ -127,7 +127,7 @@ def test_overlapping_writers_are_refused_and_readers_are_not(tmp_path):
 
 
 def test_flights_are_on_disk_as_soon_as_they_land_and_count_once(tmp_path):
-    from airflock.executors import Flight, Landed
+    from airflock.runs.executors import Flight, Landed
 
     batch = Batch("search", 0, 0)
     with Store(tmp_path) as store:
@@ -333,7 +333,7 @@ def test_the_study_of_dimock_2003_searches_the_bounds_of_the_paper_with_cohesion
 
 
 def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monkeypatch):
-    from airflock.errors import FlightError
+    from airflock.support.errors import FlightError
     from inside import simulate
 
     study = load_study("vasarhelyi_2018/4ms", settings={"duration": 2.0, "agents": 10})

@@ -18,16 +18,11 @@ import airflock
 from airflock.core.contract import model
 from airflock.core.parameters import Quantity, declarations, quantity
 from airflock.engine import Flight
-from airflock.errors import ParameterError, RuleError, ScenarioError, StudioError
-from airflock.evolve.bounds import studied
-from airflock.evolve.study import load_study
-from airflock.models import vasarhelyi_2018
+from airflock.parts.laws import vasarhelyi_2018
 from airflock.recordings.files import load_recording
 from airflock.scenarios.files import presets
-from airflock.stage import colours, shades
-from airflock.stage.clusters import clusters
-from airflock.stage.scene import dart, stage_of, turned
-from airflock.stage.shades import Shade
+from airflock.search.bounds import studied
+from airflock.search.study import load_study
 from airflock.studio import charts, door, measures
 from airflock.studio.collisions import BOTH, Collisions
 from airflock.studio.controls import controls_of, controls_of_faults, span
@@ -44,6 +39,11 @@ from airflock.studio.shading import Shading, together, ways
 from airflock.studio.side import Side, value_of
 from airflock.studio.trails import PIECE, Trails
 from airflock.studio.tuning import EXAMPLE, pair
+from airflock.support.errors import ParameterError, RuleError, ScenarioError, StudioError
+from airflock.view.stage import colours, shades
+from airflock.view.stage.clusters import clusters
+from airflock.view.stage.scene import dart, stage_of, turned
+from airflock.view.stage.shades import Shade
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}

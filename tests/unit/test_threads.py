@@ -6,11 +6,11 @@ import time
 
 import pytest
 
-from airflock.threads import in_background, in_threads
+from airflock.support.threads import in_background, in_threads
 
 INTERRUPTED = """
 import faulthandler, random, signal, time
-from airflock.threads import in_threads
+from airflock.support.threads import in_threads
 
 faulthandler.dump_traceback_later(60, exit=True)
 signal.signal(signal.SIGALRM, signal.default_int_handler)

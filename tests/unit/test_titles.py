@@ -10,10 +10,10 @@ from typer.testing import CliRunner
 
 import airflock
 from airflock.cli.main import app
-from airflock.errors import RecordingError
-from airflock.plots.convergence import convergence
-from airflock.plots.series import series
-from airflock.plots.trajectories import trajectories
+from airflock.support.errors import RecordingError
+from airflock.view.plots.convergence import convergence
+from airflock.view.plots.series import series
+from airflock.view.plots.trajectories import trajectories
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 

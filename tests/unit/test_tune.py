@@ -13,25 +13,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
-from airflock.certify.request import campaign_of
-from airflock.certify.seeds import identity
+from airflock.certificates.request import campaign_of
+from airflock.certificates.seeds import identity
 from airflock.cli.options import time_of
 from airflock.engine import score_flights
-from airflock.errors import RecordingError, ScenarioError, StudyError
-from airflock.evolve.race import ROUNDS
-from airflock.evolve.run import Interrupted
-from airflock.evolve.store import Store
+from airflock.runs.folder import Interrupted
+from airflock.runs.store import Store
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
-from airflock.tune import run as tuning
-from airflock.tune.assumed import defaults
-from airflock.tune.feasible import infeasible
-from airflock.tune.folder import MOST_SEEDS, read_plan
-from airflock.tune.next_flight import replays
-from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
-from airflock.tune.request import usual_limits
-from airflock.tune.run import tune
-from airflock.tune.start import start_of
+from airflock.search.race import ROUNDS
+from airflock.search.tune import run as tuning
+from airflock.search.tune.assumed import defaults
+from airflock.search.tune.feasible import infeasible
+from airflock.search.tune.folder import MOST_SEEDS, read_plan
+from airflock.search.tune.next_flight import replays
+from airflock.search.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
+from airflock.search.tune.request import usual_limits
+from airflock.search.tune.run import tune
+from airflock.search.tune.start import start_of
+from airflock.support.errors import RecordingError, ScenarioError, StudyError
 
 SEEDS = "SELECT seed FROM flight WHERE stage=?"
 MINE = {
@@ -101,8 +101,8 @@ def done(tmp_path_factory, seen):
     folder = tmp_path_factory.mktemp("tuned") / "out"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tuning, "rate_of", lambda *_: 300.0)
-        patch.setattr("airflock.evolve.run.draw", lambda *_: None)  # the study's own pictures
-        patch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay", "agents"))  # one driver
+        patch.setattr("airflock.search.run.draw", lambda *_: None)  # the study's own pictures
+        patch.setattr("airflock.certificates.environment.usual_keys", lambda _: ("radio.delay", "agents"))  # one driver
         return tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"], watch=seen.append), folder
 
 
@@ -164,8 +164,8 @@ def test_numbers_of_groups_are_assumed():
 def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch):
     found, folder = done
     monkeypatch.setattr(tuning, "rate_of", lambda *_: pytest.fail("the plan is kept"))
-    monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay", "agents"))
+    monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
+    monkeypatch.setattr("airflock.certificates.environment.usual_keys", lambda _: ("radio.delay", "agents"))
     with pytest.raises(StudyError, match="holds a tuning already; continue it with --resume"):
         tune(make(MINE, "mine"), folder)
     with pytest.raises(StudyError, match="holds the tuning of another scenario"):
@@ -211,8 +211,8 @@ def test_a_plan_with_margins_of_an_earlier_version_is_refused_in_one_line(done, 
 
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
-    monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay",))
+    monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
+    monkeypatch.setattr("airflock.certificates.environment.usual_keys", lambda _: ("radio.delay",))
     how = {"like": make(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
     found = tune([logs], tmp_path / "a", **how)
     tau = load(tmp_path / "a" / "identified.toml").body.tau
@@ -223,7 +223,7 @@ def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs,
     page = (tmp_path / "a" / "report.html").read_text()
     for text in ("What was identified", "body.tau", told["radio.delay"]["reason"], "log.csv"):
         assert text in page
-    monkeypatch.setattr("airflock.tune.logs.identify", lambda *_, **__: pytest.fail("identified already"))
+    monkeypatch.setattr("airflock.search.tune.logs.identify", lambda *_, **__: pytest.fail("identified already"))
     again = tune([logs], tmp_path / "a", resume=True, **how)
     assert again.identified == found.identified and identity(again.scenario) == identity(found.scenario)
     other = tmp_path / "log.csv"
@@ -249,7 +249,7 @@ def test_the_worst_flight_of_each_limit_is_played(tmp_path, monkeypatch):
     monkeypatch.setattr("airflock.recordings.flights.simulate", lambda _, seed: seed)
     shows = []
     monkeypatch.setattr(
-        "airflock.replays.build.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed))
+        "airflock.view.replays.build.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed))
     )
     worst = [{"limit": limit, "seed": seed} for limit, seeds in (("a", (1, 2, 3)), ("b", (4, 1))) for seed in seeds]
     made = SimpleNamespace(worst=worst, campaign=SimpleNamespace(parameters=lambda _: {}))

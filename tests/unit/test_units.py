@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airflock.errors import ScenarioError
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.scenarios.units import SPELLINGS, UNITS, factor
+from airflock.support.errors import ScenarioError
 
 NAME = "vasarhelyi_2018/4ms"
 BASE = {

@@ -11,10 +11,10 @@ from typer.main import get_command
 import airflock
 from airflock.cli.main import app, main
 from airflock.cli.sweep import alike
-from airflock.errors import AirflockError
-from airflock.plots.picture import KINDS
 from airflock.recordings.sweeps import shown
 from airflock.scenarios.files import load
+from airflock.support.errors import AirflockError
+from airflock.view.plots.picture import KINDS
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 import airflock
 from airflock.cli.main import app
-from airflock.errors import AirflockError, ScenarioError
+from airflock.support.errors import AirflockError, ScenarioError
 
 STUDY = Path(airflock.__file__).parent / "studies" / "zapotecatl_2016" / "best.toml"
 

@@ -11,12 +11,12 @@ import airflock
 import several_terms
 from airflock.core.parameters import declarations, number_names
 from airflock.engine import driver_text, fly
-from airflock.errors import ParameterError, RuleError, ScenarioError
-from airflock.evolve.space import full_space
-from airflock.rules.generate import Source
+from airflock.engine.text.generate import Source
+from airflock.runs.space import full_space
 from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.studio.controls import controls_of
+from airflock.support.errors import ParameterError, RuleError, ScenarioError
 from flocks import interpreted
 from reference.flight import fly_plainly
 

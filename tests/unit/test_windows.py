@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from airflock import locks
+from airflock.support import locks
 
 # The modules of others are imported first: they, too, ask for msvcrt to know Windows.
 AS_ON_WINDOWS = """
@@ -67,7 +67,7 @@ print(*sorted(set(os.listdir(".")) - {".cache"}))
 def test_one_writer_at_a_time_opens_a_store(tmp_path):
     code = """
 import os
-from airflock.errors import StudyError
+from airflock.support.errors import StudyError
 from airflock.evolve import store
 from pathlib import Path
 handle = store._lock(Path("."))
@@ -90,7 +90,7 @@ import airflock
 from airflock import cache
 from pathlib import Path
 print(cache.cache_trouble(Path("kept")) == "" and Path("kept/drivers").is_dir())
-from airflock.evolve.store import Store
+from airflock.runs.store import Store
 Path("study").mkdir()
 with Store(Path("study"), write=True) as kept:
     print(Path("study/evaluations.sqlite").exists())
@@ -102,8 +102,8 @@ def test_what_was_left_of_a_file_is_removed_and_a_serial_line_is_refused_in_one_
     code = """
 import os
 from airflock import atomic
-from airflock.errors import LinkError
-from airflock.onboard.ports import open_port
+from airflock.support.errors import LinkError
+from airflock.drones.onboard.ports import open_port
 left = ".a.airflock-12345678.txt"
 open(left, "w").close()
 os.utime(left, (0, 0))

@@ -2,8 +2,8 @@
 
 import pytest
 
-from airflock.errors import ScenarioError
 from airflock.scenarios.files import load
+from airflock.support.errors import ScenarioError
 
 BAD = {
     "wing.span": (0.0, "wing.span = 0 m lies outside [0.01, 100] m"),

@@ -20,10 +20,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock import atomic
-from airflock.errors import AirflockError
-from airflock.machine import kind
-from airflock.untrusted import TextError, json_object, read_text
+from airflock.support import atomic
+from airflock.support.errors import AirflockError
+from airflock.support.machine import kind
+from airflock.support.untrusted import TextError, json_object, read_text
 from airflock_papers import committed as tables
 from airflock_papers.catalogue import find
 from airflock_papers.claims import VERDICTS, Measured, judge

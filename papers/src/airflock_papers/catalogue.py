@@ -2,8 +2,8 @@
 
 from importlib import import_module
 
-from airflock.errors import AirflockError
-from airflock.spelling import meant
+from airflock.support.errors import AirflockError
+from airflock.support.spelling import meant
 from airflock_papers import PAPERS
 from airflock_papers.paper import Paper
 

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from airflock import atomic
-from airflock.errors import AirflockError
+from airflock.support import atomic
+from airflock.support.errors import AirflockError
 from airflock_papers import bounds
 from airflock_papers.counts import headline
 from airflock_papers.statements import Statement

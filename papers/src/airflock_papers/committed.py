@@ -7,8 +7,8 @@ from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
-from airflock import atomic
-from airflock.errors import AirflockError
+from airflock.support import atomic
+from airflock.support.errors import AirflockError
 
 
 def read(name: str, command: str) -> list[dict[str, str]]:

@@ -11,7 +11,7 @@ from airflock.recordings.flights import simulate
 from airflock.recordings.scores import over_time
 from airflock.scenarios.change import remade
 from airflock.scenarios.scenario import Scenario
-from airflock.threads import in_threads
+from airflock.support.threads import in_threads
 from airflock_papers.progress import Progress
 
 

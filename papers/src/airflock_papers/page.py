@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from airflock import atomic
+from airflock.support import atomic
 from airflock_papers import claims as records
 from airflock_papers.claims import SEEDS, Claim
 from airflock_papers.counts import headline

@@ -6,7 +6,7 @@
 import sys
 from pathlib import Path
 
-from airflock import atomic
+from airflock.support import atomic
 from airflock_papers import claims as records
 
 PROGRAMS = {

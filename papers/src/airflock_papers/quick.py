@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from airflock import atomic
-from airflock.machine import kind
-from airflock.untrusted import TextError, json_object, read_text
+from airflock.support import atomic
+from airflock.support.machine import kind
+from airflock.support.untrusted import TextError, json_object, read_text
 from airflock_papers import PAPERS
 from airflock_papers import committed as tables
 from airflock_papers.catalogue import find

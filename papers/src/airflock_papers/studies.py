@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from airflock.cache import cache_folder
-from airflock.evolve.folder import STUDY, open_folder
-from airflock.evolve.result import Result
-from airflock.evolve.run import executor_for, run
-from airflock.evolve.search import Progress
-from airflock.evolve.study import load_study
+from airflock.runs.folder import STUDY, open_folder
+from airflock.search.result import Result
+from airflock.search.run import executor_for, run
+from airflock.search.search import Progress
+from airflock.search.study import load_study
+from airflock.support.cache import cache_folder
 from airflock_papers.flights import Flights
 
 QUICK = {"population": 12, "generations": 4, "pool": 24, "top": 4, "final_seeds": 10}

@@ -5,10 +5,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-FOLDERS = (
-    "core", "models", "body", "sensors", "faults", "topology", "aero", "world", "scenes", "metrics", "engine",
-    "scenarios", "presets",
-)  # fmt: skip
+FOLDERS = ("core", "parts", "world", "engine", "scenarios")
 
 
 @cache

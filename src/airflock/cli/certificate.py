@@ -35,7 +35,7 @@ def _verdicts(console: Any, certificate: Any) -> None:
     from rich import box
     from rich.table import Table
 
-    from airflock.certify.certificate import bound
+    from airflock.certificates.certificate import bound
 
     campaign = certificate.campaign
     sure = f"{100.0 * campaign.confidence:g} %"

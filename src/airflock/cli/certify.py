@@ -10,7 +10,7 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.cli.progress import counted, line
-from airflock.suffixes import PICTURES, SCENARIOS
+from airflock.support.suffixes import PICTURES, SCENARIOS
 
 Where = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset or a scenario file; with --check a certificate.")
@@ -110,9 +110,9 @@ def certify(
         options.refuse([f"--check: flies again what the certificate holds; leave out {left_out}"] if left_out else [])
         _check(scenario, threads, trust, as_json)
         return
-    from airflock.certify import request
-    from airflock.certify.branches import sound_split
-    from airflock.certify.maps import sound_axes
+    from airflock.certificates import request
+    from airflock.certificates.branches import sound_split
+    from airflock.certificates.maps import sound_axes
     from airflock.cli.sweep import axis
 
     asked.read(options.writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
@@ -149,10 +149,10 @@ def _flown(
 
     flying : scheduler, threads and timeout; also: what is asked for besides counting
     """
-    from airflock.certify.campaign import FOLDER
-    from airflock.certify.executing import executor_for, folder_of, planned
-    from airflock.certify.run import run
-    from airflock.evolve.folder import open_folder
+    from airflock.certificates.campaign import FOLDER
+    from airflock.certificates.executing import executor_for, folder_of, planned
+    from airflock.certificates.run import run
+    from airflock.runs.folder import open_folder
 
     with folder_of(None if out is None else out.parent / f"{out.stem}_flights") as folder:
         executor = executor_for(campaign, **flying)
@@ -174,8 +174,8 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
         result.save(out)
         tables.say(f"saved {out}")
     if plot is not None:
-        from airflock.plots.certificate import certificate
-        from airflock.plots.save import save_figure
+        from airflock.view.plots.certificate import certificate
+        from airflock.view.plots.save import save_figure
 
         save_figure(certificate(result), plot)
         tables.say(f"saved {plot}")
@@ -203,7 +203,7 @@ def counting(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[str
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
     """Check a certificate; status 1 where it does not hold."""
-    from airflock.certify.check import check
+    from airflock.certificates.check import check
 
     with counted(f"{path}: flights again", quiet=as_json) as done:
         result = check(path, threads=threads, trust=trust, done=done)

@@ -63,16 +63,16 @@ COUNTERPARTS: dict[str, Counterpart] = {
         {
             "scenario": "scenario", **SEEDS, "cost": "cost", "limit": "limit", "threads": "threads", **TABLE,
             "changes": LOADED["changes"],
-            "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.evolve.harden.document",
+            "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.search.harden.document",
         },
     ),
     "certify": Counterpart(
         'airflock.certify("mine.toml", "r_min<1 at 1e-3/h")', "certify",
         {
-            "scenario": "scenario", "limit": "limit", "out": "airflock.certify.certificate.Certificate.save",
-            "tolerance_of": "tolerance", "check": "airflock.certify.check.check", "changes": "settings", **CODE,
+            "scenario": "scenario", "limit": "limit", "out": "airflock.certificates.certificate.Certificate.save",
+            "tolerance_of": "tolerance", "check": "airflock.certificates.check.check", "changes": "settings", **CODE,
             "agents": 'settings["agents"]', "duration": 'settings["duration"]', **TABLE,
-            "plot": "airflock.plots.certificate.certificate",
+            "plot": "airflock.view.plots.certificate.certificate",
             **{
                 name: name
                 for name in (
@@ -114,7 +114,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "replay": Counterpart(
         "airflock.replay(recording)", "replay",
         {
-            "what": "recording", "page": "airflock.replays.Replay.save", "seed": "airflock.simulate", "rate": "rate",
+            "what": "recording", "page": "airflock.view.replays.Replay.save", "seed": "airflock.simulate", "rate": "rate",
             "colour": "colour", **LOADED,
         },
     ),
@@ -123,7 +123,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         {
             "shapes": "shapes", "drones": "drones", "failing": "failing", "failure": "failure", "points": "points",
             "spacing": "spacing", "seed": "seed", "changes": "settings", **TABLE,
-            "save": "airflock.display.show.recording_of", "plot": "airflock.plots.stood",
+            "save": "airflock.displays.show.recording_of", "plot": "airflock.plots.stood",
         },
     ),
     "import": Counterpart(
@@ -149,10 +149,10 @@ COUNTERPARTS: dict[str, Counterpart] = {
             "files": "what", "like": "like", "heard": "heard", "standing": "standing", "same_clock": "same_clock",
             "begin": "begin", "end": "end",
             "accept": "accept", "changes": "airflock.load", **TABLE,
-            "out": "airflock.identify.run.Identified.document",
-            **dict.fromkeys(("conservative", "uncertain"), "airflock.identify.run.Identified.document"),
-            "plot": "airflock.plots.identified.identified", "plan": "airflock.identify.plan.flight_card",
-            "flights": "airflock.identify.check.posterior",
+            "out": "airflock.estimate.identify.run.Identified.document",
+            **dict.fromkeys(("conservative", "uncertain"), "airflock.estimate.identify.run.Identified.document"),
+            "plot": "airflock.view.plots.identified.identified", "plan": "airflock.estimate.identify.plan.flight_card",
+            "flights": "airflock.estimate.identify.check.posterior",
             **dict.fromkeys(("map", "unit", "time_unit", "axes", "decimal", "delimiter"), "options"),
         },
     ),
@@ -160,8 +160,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.infer(recording, ["couzin_2002", "vicsek_1995"])', "infer",
         {
             "tracks": "tracks", "models": "models", "changes": "settings", "flights": "check", "seed": "seed",
-            "trust": "trust", **TABLE, "out": "airflock.infer.result.Inferred.document",
-            "plot": "airflock.plots.inferred.inferred",
+            "trust": "trust", **TABLE, "out": "airflock.estimate.infer.result.Inferred.document",
+            "plot": "airflock.view.plots.inferred.inferred",
         },
     ),
     "fleet": Counterpart(
@@ -189,7 +189,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings", **CODE, **TABLE}
     ),
     "types": Counterpart('airflock.check_types("mine.py")', "check_types", {"files": "files", "out": "out", **TABLE}),
-    "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.cache.clear_cache"}),
+    "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.support.cache.clear_cache"}),
 }  # fmt: skip
 # public functions that no command needs: they are what a program does between two of them
 LIBRARY = (

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import gathering
-from airflock.suffixes import PICTURES, RECORDINGS
+from airflock.support.errors import gathering
+from airflock.support.suffixes import PICTURES, RECORDINGS
 
 
 def display(
@@ -32,8 +32,8 @@ def display(
 
     Example: airflock display AIR FLOCK heart.png --failing 0.1 --plot show.png
     """
-    from airflock.display.displays import plan
-    from airflock.display.show import fly_show
+    from airflock.displays.displays import plan
+    from airflock.displays.show import fly_show
 
     faults: list[str] = []
     with gathering(faults):
@@ -48,13 +48,13 @@ def display(
     show = fly_show(layouts, drones, failing, failure, seed, settings)
     rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.formed, strict=True)]
     if save is not None:
-        from airflock.display.show import recording_of
+        from airflock.displays.show import recording_of
         from airflock.recordings.files import save as save_recording
 
         tables.say(f"saved {save_recording(recording_of(show), save)}")
     if plot is not None:
-        from airflock.plots.display import stood
-        from airflock.plots.save import save_figure
+        from airflock.view.plots.display import stood
+        from airflock.view.plots.save import save_figure
 
         save_figure(stood(show, shapes), plot)
         tables.say(f"saved {plot}")

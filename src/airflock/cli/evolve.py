@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import WRONG, or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import searching
+from airflock.support.asked import WRONG, or_else
 
 
 def evolve(
@@ -88,10 +88,10 @@ def evolve(
 
     Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
     """
-    from airflock.evolve.folder import open_folder
-    from airflock.evolve.request import asked_for, sound_device, sound_method
-    from airflock.evolve.run import executor_for, on_device, run
-    from airflock.executors.cluster import sound_timeout
+    from airflock.runs.executors.cluster import sound_timeout
+    from airflock.runs.folder import open_folder
+    from airflock.search.request import asked_for, sound_device, sound_method
+    from airflock.search.run import executor_for, on_device, run
 
     asked = options.asked(ctx)
     given = {
@@ -144,7 +144,7 @@ def _print(result: Any) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from airflock.evolve.safe import told
+    from airflock.search.safe import told
 
     title = f"{result.scenario.name}: {result.fitness:.4f} ± {result.sd:.2g} on {result.seeds} fresh seeds"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")

@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
-from airflock.spelling import meant
-from airflock.suffixes import RECORDINGS
+from airflock.support.asked import or_else
+from airflock.support.spelling import meant
+from airflock.support.suffixes import RECORDINGS
 
 SYSTEMS = tuple(range(1, 251))  # ids that drones may have
 
@@ -85,8 +85,8 @@ def fleet(
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 300 --mode processes --card fleet.json,
     and beside it airflock watch fleet.json
     """
-    from airflock.fleet import compare, flying
-    from airflock.fleet.starting import READY_TIME
+    from airflock.fleets import compare, flying
+    from airflock.fleets.starting import READY_TIME
 
     asked, live = options.asked(ctx), mode != flying.LOCKSTEP
     asked.read(options.writable, (save, RECORDINGS), (card_file, (".json",)))
@@ -115,8 +115,8 @@ def fleet(
 
 def _broken(file: Path | None, members: tuple[int, ...], live: bool) -> Sequence[Any]:
     """Faults of a file, if there is one, that such a fleet can suffer."""
-    from airflock.fleet import realtime
-    from airflock.fleet.faults import read_faults
+    from airflock.fleets import realtime
+    from airflock.fleets.faults import read_faults
 
     found = () if file is None else read_faults(file, members)
     options.refuse(realtime.refused(found) if live else [])
@@ -131,8 +131,8 @@ def _one_card(file: Path | None, scenario: Any, seeds: Sequence[int]) -> None:
 
 def _option_faults(vehicle: str, body: str | None, mode: str, card_file: Path | None, against: str | None) -> list[str]:
     """What is wrong with options that do not concern the scenario."""
-    from airflock.fleet.flying import BODIES, VEHICLES
-    from airflock.fleet.realtime import MODES
+    from airflock.fleets.flying import BODIES, VEHICLES
+    from airflock.fleets.realtime import MODES
 
     faults = [
         f"{option} {word} is none of {', '.join(known)}{meant(word, known, lead='; ')}"
@@ -159,7 +159,7 @@ def _imports_kept() -> Iterator[None]:
 def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:
     if save is None:
         return
-    from airflock.fleet.compare import recording
+    from airflock.fleets.compare import recording
     from airflock.recordings.files import save as save_recording
 
     path = save if seeds == 1 else save.with_name(f"{save.stem}-seed{seed}{save.suffix}")
@@ -168,7 +168,7 @@ def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:
 
 def _tell(series: Any, as_json: bool) -> None:
     """Print what was flown."""
-    from airflock.metrics.registry import reports
+    from airflock.parts.metrics.registry import reports
 
     scenario, lines, seeds = series.scenario, series.comparison, len(series.runs)
     if as_json:

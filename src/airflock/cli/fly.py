@@ -8,8 +8,8 @@ from typer.core import TyperGroup
 
 from airflock.cli import fly_order, fly_prepare, options, tables
 from airflock.cli.verb import Verb
-from airflock.errors import ScenarioError
-from airflock.untrusted import is_file
+from airflock.support.errors import ScenarioError
+from airflock.support.untrusted import is_file
 
 
 class Fly(TyperGroup):
@@ -36,8 +36,8 @@ app = typer.Typer(
     "card", context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
 )
 def card(ctx: typer.Context) -> None:
-    """Run a node: the same as python -m airflock.onboard CARD ...; `airflock fly card --help` lists its options."""
-    from airflock.onboard.run import main
+    """Run a node, as python -m airflock.drones.onboard CARD ... does; `airflock fly card --help` lists its options."""
+    from airflock.drones.onboard.run import main
 
     raise typer.Exit(main(ctx.args))
 
@@ -56,9 +56,9 @@ def replay(
 
     Example: airflock fly replay mission.json mission-3-20270115T101500Z.log
     """
-    from airflock.mavlink.keys import read_key
-    from airflock.onboard.card import read_card
-    from airflock.onboard.log import read_log
+    from airflock.drones.mavlink.keys import read_key
+    from airflock.drones.onboard.card import read_card
+    from airflock.drones.onboard.log import read_log
 
     card, key = read_card(card_file), read_key(card_file.with_suffix(".key"))
     ticks, different, notes = 0, [], []

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import Asked
 from airflock.cli import options, tables
-from airflock.errors import CardError
+from airflock.support.asked import Asked
+from airflock.support.errors import CardError
 
 KILL = "; the motors stop when kill --confirm follows within 5 s"
 
@@ -30,11 +30,11 @@ def order(
 
     Example: airflock fly order mission.json start --radio 'udp:0.0.0.0:14601>192.168.1.255:14600'
     """
-    from airflock.mavlink import orders
-    from airflock.mavlink.keys import read_key
-    from airflock.mavlink.signing import Signer
-    from airflock.onboard.card import read_card
-    from airflock.onboard.ports import sound_port
+    from airflock.drones.mavlink import orders
+    from airflock.drones.mavlink.keys import read_key
+    from airflock.drones.mavlink.signing import Signer
+    from airflock.drones.onboard.card import read_card
+    from airflock.drones.onboard.ports import sound_port
 
     asked = Asked()
     what = orders.Do.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
@@ -62,7 +62,7 @@ def order(
 
 def _send(radio: str, message: Any, sign: Any) -> None:
     """Send an order five times; raises CardError where the port cannot."""
-    from airflock.onboard.ports import open_port
+    from airflock.drones.onboard.ports import open_port
 
     port = open_port(radio)
     try:

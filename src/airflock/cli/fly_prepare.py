@@ -7,10 +7,10 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from airflock.asked import WRONG, Asked, or_else
 from airflock.cli import options, tables
-from airflock.errors import CardError
-from airflock.spelling import meant
+from airflock.support.asked import WRONG, Asked, or_else
+from airflock.support.errors import CardError
+from airflock.support.spelling import meant
 
 DATAGRAM = 95  # bytes of a signed status packet
 OVERHEAD = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64
@@ -53,9 +53,9 @@ def prepare(
     """
     import secrets
 
-    from airflock.fleet.prepare import MARGIN, beside_the_scenario, card_document, left_off
-    from airflock.mavlink.orders import new_keys
-    from airflock.onboard.card import card_of, hash_of
+    from airflock.drones.mavlink.orders import new_keys
+    from airflock.drones.onboard.card import card_of, hash_of
+    from airflock.fleets.prepare import MARGIN, beside_the_scenario, card_document, left_off
 
     asked = options.asked(ctx)
     where, systems = asked.read(options.place_on_earth, "--site", site), asked.read(_members, members)
@@ -135,8 +135,8 @@ def _airtimes(systems: list[int], document: dict[str, Any], fast: float, slow: f
 def _limits(given: list[str] | None, scenario: Any, asked: Asked) -> dict[str, Any]:
     """Limits of the card that --limit changes; what is wrong is noted, and left out."""
     from airflock.core.parameters import declarations
-    from airflock.fleet.prepare import limits_of
-    from airflock.onboard.safety import Safety
+    from airflock.drones.onboard.safety import Safety
+    from airflock.fleets.prepare import limits_of
 
     known = [name for name, _, _ in declarations(Safety)]
     safety = or_else(asked.read(options.settings, given, option="--limit"), {})
@@ -151,8 +151,8 @@ def _write_mission(files: Files, document: dict[str, Any], private: bytes) -> An
     """Write card and keys, all of them or none; private: the operator's key. The card that was written."""
     import secrets
 
-    from airflock.mavlink.keys import write_key
-    from airflock.onboard.card import write_card
+    from airflock.drones.mavlink.keys import write_key
+    from airflock.drones.onboard.card import write_card
 
     try:
         card = write_card(files.card, document)

@@ -5,11 +5,11 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import if_right, or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
-from airflock.errors import ScenarioError
-from airflock.suffixes import SCENARIOS
+from airflock.support.asked import if_right, or_else
+from airflock.support.errors import ScenarioError
+from airflock.support.suffixes import SCENARIOS
 
 NUMBER = 6  # columns that a number takes: a narrow terminal must not cut it off
 
@@ -46,8 +46,8 @@ def harden(
 
     Example: airflock harden study --out flyable.toml
     """
-    from airflock.evolve.folder import write
-    from airflock.evolve.harden import MOST, asked_for, document, harden
+    from airflock.runs.folder import write
+    from airflock.search.harden import MOST, asked_for, document, harden
 
     asked = options.asked(ctx)
     settings = asked.read(options.settings, changes, None, duration)
@@ -80,8 +80,8 @@ def _places(out: Path, optima: int, where: str) -> list[Path]:
 
 def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
     """The optimum, or that of each scenario of a study's folder."""
-    from airflock.evolve.result import BEST, further_best
     from airflock.scenarios.files import load
+    from airflock.search.result import BEST, further_best
 
     folder = Path(where)
     if folder.is_dir() and not (folder / BEST).is_file():

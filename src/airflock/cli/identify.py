@@ -7,8 +7,8 @@ import typer
 
 from airflock.cli import imports, options, tables
 from airflock.cli.progress import counted
-from airflock.errors import AirflockError, gathering
-from airflock.suffixes import PICTURES, SCENARIOS
+from airflock.support.errors import AirflockError, gathering
+from airflock.support.suffixes import PICTURES, SCENARIOS
 
 
 def identify(
@@ -53,8 +53,8 @@ def identify(
 
     Example: airflock identify logs/*.ulg --heard heard.csv --like vasarhelyi_2018/real_6ms --out mine.toml
     """
-    from airflock.identify.run import identify as find
-    from airflock.identify.run import read_heard
+    from airflock.estimate.identify.run import identify as find
+    from airflock.estimate.identify.run import read_heard
     from airflock.recordings.imports.track import Options
     from airflock.scenarios.files import load
 
@@ -86,13 +86,13 @@ def identify(
         )
     check = _checked(result, flights, as_json)
     if out is not None:
-        from airflock.evolve.folder import write
+        from airflock.runs.folder import write
 
         write(out, result.document(conservative, uncertain=uncertain))
         tables.say(f"saved {out}")
     if plot is not None:
-        from airflock.plots.identified import identified
-        from airflock.plots.save import save_figure
+        from airflock.view.plots.identified import identified
+        from airflock.view.plots.save import save_figure
 
         save_figure(identified(result, check), plot)
         tables.say(f"saved {plot}")
@@ -123,7 +123,7 @@ def _span(text: str) -> tuple[float, float] | None:
 
 def _checked(result: Any, flights: int, quiet: bool) -> Any:
     """Posterior check, if there is something to check."""
-    from airflock.identify.check import posterior
+    from airflock.estimate.identify.check import posterior
 
     if not flights or not result.settings():
         return None
@@ -134,7 +134,7 @@ def _checked(result: Any, flights: int, quiet: bool) -> Any:
 def _table(result: Any) -> None:
     from rich.console import Console
 
-    from airflock.identify.numbers import NEVER_TOLD
+    from airflock.estimate.identify.numbers import NEVER_TOLD
 
     console = Console()
     if result.settings():
@@ -164,7 +164,7 @@ def _numbers_table(result: Any) -> Any:
     from rich import box
     from rich.table import Table
 
-    from airflock.identify.numbers import UNITS
+    from airflock.estimate.identify.numbers import UNITS
 
     table = Table(
         title=f"{result.logs.drones} drones, like {result.like.name}", box=box.SIMPLE_HEAD, title_justify="left"
@@ -198,7 +198,7 @@ def _verdicts(check: Any, result: Any, flights: int) -> None:
 def _card(result: Any) -> None:
     from rich.console import Console
 
-    from airflock.identify.plan import flight_card
+    from airflock.estimate.identify.plan import flight_card
 
     console = Console()
     card = flight_card(result.like)
@@ -211,7 +211,7 @@ def _card(result: Any) -> None:
 
 
 def _plain(result: Any, check: Any) -> dict[str, Any]:
-    from airflock.identify.plan import flight_card
+    from airflock.estimate.identify.plan import flight_card
 
     numbers = {
         key: {"like": n.like, "from": n.origin, "reason": n.reason}

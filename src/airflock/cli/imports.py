@@ -8,8 +8,8 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
-from airflock.errors import RecordingError, gathering
-from airflock.suffixes import RECORDINGS
+from airflock.support.errors import RecordingError, gathering
+from airflock.support.suffixes import RECORDINGS
 
 Files = Annotated[
     list[Path],

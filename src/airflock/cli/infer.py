@@ -9,8 +9,8 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.cli.progress import line
-from airflock.errors import AirflockError, gathering
-from airflock.suffixes import PICTURES, SCENARIOS
+from airflock.support.errors import AirflockError, gathering
+from airflock.support.suffixes import PICTURES, SCENARIOS
 
 LAWS = "couzin_2002,reynolds_1987,vicsek_1995,vasarhelyi_2018"
 Tracks = Annotated[
@@ -51,7 +51,7 @@ def infer(
 
     Example: airflock infer fish.nc --models couzin_2002,reynolds_1987,vicsek_1995 --out best.toml --plot forces.png
     """
-    from airflock.infer.run import infer as find
+    from airflock.estimate.infer.run import infer as find
 
     faults: list[str] = []
     with gathering(faults):
@@ -67,13 +67,13 @@ def infer(
     with _telling(as_json) as done:
         result = find(tracks, laws, settings=settings, check=flights, seed=seed, trust=trust, done=done)
     if plot is not None:
-        from airflock.plots.inferred import inferred
-        from airflock.plots.save import save_figure
+        from airflock.view.plots.inferred import inferred
+        from airflock.view.plots.save import save_figure
 
         save_figure(inferred(result), plot)
         tables.say(f"saved {plot}")
     if out is not None and result.best is not None:
-        from airflock.evolve.folder import write
+        from airflock.runs.folder import write
 
         write(out, result.document())
         tables.say(f"saved {out}")
@@ -131,7 +131,7 @@ def _numbers(result: Any) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from airflock.infer.result import between
+    from airflock.estimate.infer.result import between
 
     table = Table(title=f"numbers of {result.best.name}", box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("number", "value", "unit", "95 % for it alone", "95 % for all together"):

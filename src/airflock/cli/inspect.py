@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import AirflockError, gathering
-from airflock.untrusted import from_outside, is_file, read_text
+from airflock.support.errors import AirflockError, gathering
+from airflock.support.untrusted import from_outside, is_file, read_text
 
 
 def presets(
@@ -90,7 +90,7 @@ def validate(
 
 def _checked(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> dict[str, Any]:
     """Verdict, notes and faults of one file; each fault begins with its name."""
-    from airflock.evolve.validation import Valid, validate
+    from airflock.search.validation import Valid, validate
 
     found: list[str] = []
     valid: Valid | None = None
@@ -114,7 +114,7 @@ def doctor(
     Example: airflock doctor
     """
     if clear:
-        from airflock.cache import clear_cache, usual_folder
+        from airflock.support.cache import clear_cache, usual_folder
 
         count, size = clear_cache()
         if as_json:

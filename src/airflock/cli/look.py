@@ -8,7 +8,7 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
-from airflock.suffixes import PAGES, PICTURES, VIDEOS
+from airflock.support.suffixes import PAGES, PICTURES, VIDEOS
 
 
 class Kind(StrEnum):
@@ -53,9 +53,9 @@ def plot(
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """
     options.writable((out, PICTURES))
-    from airflock.plots.picture import plot as picture
-    from airflock.plots.save import save_figure
     from airflock.scenarios.files import load
+    from airflock.view.plots.picture import plot as picture
+    from airflock.view.plots.save import save_figure
 
     settings = options.settings(changes, agents, duration)
     window: dict[str, Any] = {"start": begin, "stop": end}
@@ -98,12 +98,12 @@ def video(
     Example: airflock video kidger/city --duration 60 --speed 2 --space --chart flocked --out flight.mp4
     """
     options.writable((out, VIDEOS))
-    from airflock.plots.film_stage import check_chart
-    from airflock.plots.picture import flight_of, named
-    from airflock.plots.video import ffmpeg, frame_count
-    from airflock.plots.video import video as make_video
     from airflock.recordings.scores import courses
     from airflock.scenarios.files import load
+    from airflock.view.plots.film_stage import check_chart
+    from airflock.view.plots.picture import flight_of, named
+    from airflock.view.plots.video import ffmpeg, frame_count
+    from airflock.view.plots.video import video as make_video
 
     settings = options.settings(changes, agents, duration)
     ffmpeg()  # before anything flies, as all that can be refused
@@ -141,10 +141,10 @@ def replay(
     Example: airflock replay flight.nc --html show.html --colour cluster
     """
     options.writable((page, PAGES))
-    from airflock.plots.picture import flight_of, named
-    from airflock.replays import check_colour
-    from airflock.replays import replay as make_replay
     from airflock.scenarios.files import load
+    from airflock.view.plots.picture import flight_of, named
+    from airflock.view.replays import check_colour
+    from airflock.view.replays import replay as make_replay
 
     settings = options.settings(changes, agents, duration)
     if what.lower().endswith(".nc"):

@@ -39,7 +39,7 @@ from airflock.cli import (
 )
 from airflock.cli.usage import at_home, usage_fault
 from airflock.cli.verb import Verb
-from airflock.errors import AirflockError, bounded, bounded_lines, printable, reason
+from airflock.support.errors import AirflockError, bounded, bounded_lines, printable, reason
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
 

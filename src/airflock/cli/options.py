@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import Asked, if_right, or_else
 from airflock.cli.verb import FAULTS
-from airflock.errors import ScenarioError, gathering
-from airflock.suffixes import suffix_fault
-from airflock.untrusted import from_outside, is_file, toml_value
+from airflock.support.asked import Asked, if_right, or_else
+from airflock.support.errors import ScenarioError, gathering
+from airflock.support.suffixes import suffix_fault
+from airflock.support.untrusted import from_outside, is_file, toml_value
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 Where = Annotated[
@@ -142,7 +142,7 @@ def tell_time(scenarios: Sequence[Any], threads: int | None, device: str) -> Non
     """Tell beforehand about how long flights on the processor will take, where that is more than a minute."""
     from airflock.cli.tables import say
     from airflock.scenarios.cost import time_note
-    from airflock.threads import cores
+    from airflock.support.threads import cores
 
     note = time_note(scenarios, threads or cores()) if device == "cpu" else ""
     if note:
@@ -180,8 +180,8 @@ def seeds_of(first: int, count: int) -> list[int]:
 
 def sound_flying(device: str, precision: int, scheduler: str | None = None) -> None:
     """Refuse a device that nobody knows, a number of bits that is none, and workers with another device than a cpu."""
-    from airflock.executors.cluster import fly_on_their_cpu
-    from airflock.hardware import sound_device, sound_precision
+    from airflock.runs.executors.cluster import fly_on_their_cpu
+    from airflock.support.hardware import sound_device, sound_precision
 
     together = Asked()
     together.read(sound_device, device)

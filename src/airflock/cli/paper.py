@@ -41,7 +41,7 @@ def paper(
     if breaks:
         _breaks(name, only, seeds, threads, as_json)
         return
-    from airflock.papers import paper as recompute
+    from airflock.cli.papers import paper as recompute
 
     claims = recompute(name, only=only, quick=quick, seeds=seeds, threads=threads)
     if as_json:
@@ -56,9 +56,9 @@ def _all(
     quick: bool, breaks: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]
 ) -> None:
     """Every paper: in its small form, or every claim under its change, against what is committed."""
-    from airflock.cache import cache_folder
-    from airflock.errors import AirflockError
-    from airflock.papers import installed
+    from airflock.cli.papers import installed
+    from airflock.support.cache import cache_folder
+    from airflock.support.errors import AirflockError
 
     installed()
     from airflock_papers import quick as tier
@@ -110,7 +110,7 @@ def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
 
 def _breaks(name: str, only: str | None, seeds: int | None, threads: int | None, as_json: bool) -> None:
     """Each claim under the change that must break it."""
-    from airflock.papers import find
+    from airflock.cli.papers import find
 
     paper = find(name)
     from airflock_papers import breaks

@@ -152,7 +152,7 @@ def counted(label: str, total: int | None = None, quiet: bool = False) -> Iterat
 @contextmanager
 def searching(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[bool], None]]]:
     """Progress of a search: generation, best, mean, flights per second; then of the finalists."""
-    from airflock.evolve.race import ROUNDS
+    from airflock.search.race import ROUNDS
 
     finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
     finals += round(sum(share * seeds for share, seeds in ROUNDS) * study.whole("pool"))

@@ -8,7 +8,7 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
-from airflock.suffixes import PICTURES, RECORDINGS, TABLES
+from airflock.support.suffixes import PICTURES, RECORDINGS, TABLES
 
 Scores = Mapping[str, Any]  # order parameters, or keys with their values, by name
 
@@ -36,7 +36,7 @@ def run(
     Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
     """
     from airflock.engine import picked
-    from airflock.executors.scores import scores
+    from airflock.runs.executors.scores import scores
 
     asked = options.asked(ctx)
     asked.read(options.writable, (save, RECORDINGS), (plot, PICTURES))
@@ -61,7 +61,7 @@ def run(
 
 def _tell(scenario: Any, numbers: Sequence[int], rows: Sequence[Scores], changed: Scores, as_json: bool) -> None:
     """Print what flights came to, beside the paper's figures; changed : keys that are not as in the file."""
-    from airflock.metrics.registry import reports
+    from airflock.parts.metrics.registry import reports
     from airflock.recordings.rare import remarks, upper_bound
 
     seeds = len(numbers)
@@ -96,8 +96,8 @@ def _record(
             path = save.with_name(f"{save.stem}-seed{seed}{save.suffix}") if many else save
             tables.say(f"saved {save_recording(recording, path)}")
         if plot and seed == numbers[0]:
-            from airflock.plots.save import save_figure
-            from airflock.plots.trajectories import trajectories
+            from airflock.view.plots.save import save_figure
+            from airflock.view.plots.trajectories import trajectories
 
             save_figure(trajectories(recording), plot)
             tables.say(f"saved {plot}")
@@ -157,7 +157,7 @@ def score(
 
 def _tell_groups(what: Sequence[Any], files: Sequence[Path], changed: Scores, trust: bool, as_json: bool) -> None:
     """Measure the groups of recordings, and print what was found."""
-    from airflock.metrics.registry import reports
+    from airflock.parts.metrics.registry import reports
     from airflock.recordings.files import load_recording
     from airflock.recordings.flown_scenario import scenario_of
     from airflock.recordings.groups import BETWEEN, group_scores
@@ -195,7 +195,7 @@ class Measured(NamedTuple):
 
 def _measured(source: Any, path: Path, changed: Scores, trust: bool, aero: bool) -> Measured:
     """Measure a recording; source : its path, or the Opening that reads it; changed : keys of how it is measured."""
-    from airflock.metrics.registry import reports
+    from airflock.parts.metrics.registry import reports
     from airflock.recordings.attributes import faults
     from airflock.recordings.files import load_recording
     from airflock.recordings.flown_scenario import aero_settings, scenario_of
@@ -215,7 +215,7 @@ def _save_series(measured: Sequence[Measured], path: Path) -> None:
 
     import pandas as pd
 
-    from airflock import atomic
+    from airflock.support import atomic
 
     text = io.StringIO()
     pd.concat([each.course.assign(file=str(each.path)) for each in measured]).to_csv(text)

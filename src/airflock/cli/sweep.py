@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import WRONG, Asked, if_right, or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import counted
-from airflock.errors import ScenarioError
-from airflock.suffixes import PICTURES, TABLES
+from airflock.support.asked import WRONG, Asked, if_right, or_else
+from airflock.support.errors import ScenarioError
+from airflock.support.suffixes import PICTURES, TABLES
 
 MOST_VALUES = 100_000  # of one key, and points of a whole grid
 
@@ -98,13 +98,13 @@ def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
 def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | None, plot: Path | None) -> None:
     """Write the table and the picture that were asked for."""
     if table is not None:
-        from airflock import atomic
+        from airflock.support import atomic
 
         atomic.write(table, tidy.to_csv(index=False))
         tables.say(f"saved {table}")
     if plot is not None:
-        from airflock.plots.heatmap import heatmap
-        from airflock.plots.save import save_figure
+        from airflock.view.plots.heatmap import heatmap
+        from airflock.view.plots.save import save_figure
 
         save_figure(heatmap(tidy, keys, show, scenario=scenario), plot)
         tables.say(f"saved {plot}")

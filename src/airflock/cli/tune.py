@@ -5,10 +5,10 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.asked import or_else
 from airflock.cli import options, tables
 from airflock.cli.progress import line
-from airflock.errors import ScenarioError
+from airflock.support.asked import or_else
+from airflock.support.errors import ScenarioError
 
 
 def tune(
@@ -65,10 +65,10 @@ def tune(
 
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
-    from airflock.certify.request import sound_confidence
-    from airflock.tune.folder import kept_plan
-    from airflock.tune.request import request_of
-    from airflock.tune.run import tune
+    from airflock.certificates.request import sound_confidence
+    from airflock.search.tune.folder import kept_plan
+    from airflock.search.tune.request import request_of
+    from airflock.search.tune.run import tune
 
     asked = options.asked(ctx)
     seconds = asked.read(options.time_of, budget)
@@ -118,7 +118,7 @@ def _named(scenario: list[str], like: str | None, heard: Path | None) -> str:
 
 def _as_it_will_fly(base: Any, like: str | None) -> Any:
     """The scenario from which tuning starts; with logs it is not known yet, but takes the same limits."""
-    from airflock.tune.start import start_of
+    from airflock.search.tune.start import start_of
 
     return base if like is not None else start_of(base)[0]
 
@@ -127,7 +127,7 @@ def _print(tuning: Any, shown: list[str]) -> None:
     """What was found, and those notes that were not told while it was sought."""
     from rich.console import Console
 
-    from airflock.evolve.safe import told
+    from airflock.search.safe import told
 
     console = Console()
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from airflock.spelling import meant
+from airflock.support.spelling import meant
 
 PLACES = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
 ALIKE = 0.75  # of options, as in `spelling.meant`: both begin with --, and --budget is not --quiet

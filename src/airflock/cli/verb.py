@@ -7,11 +7,11 @@ from typing import Any
 import typer
 from typer.core import TyperCommand
 
-from airflock.asked import WRONG
 from airflock.cli.usage import infinite, usage_fault
-from airflock.errors import AirflockError
+from airflock.support.asked import WRONG
+from airflock.support.errors import AirflockError
 
-FAULTS = "airflock.faults"  # of a command line, in the context of its verb
+FAULTS = "airflock.parts.faults"  # of a command line, in the context of its verb
 VALUES = ("BadParameter", "MissingParameter")  # faults of one option alone
 NUMBERS = ("IntParamType", "FloatParamType", "IntRange", "FloatRange")  # kinds of options
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import StudioError
+from airflock.support.errors import StudioError
 
 
 def watch(

@@ -8,7 +8,7 @@ from dataclasses import replace
 from inspect import signature
 
 from airflock.core.contract import Model
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 OWN = ("p", "sums", "walls", "memory")  # what only the first law can have: there is one record of each
 RULES = ("neighbour", "boundary", "Memory", "reach", "sight", "wall_reach")

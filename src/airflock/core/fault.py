@@ -15,7 +15,7 @@ from typing import Any
 from airflock.core.contract import names_of
 from airflock.core.parameters import Parameters, choices, number_names
 from airflock.core.vocabulary import answer, asks
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 # rule → how many numbers it returns, and what they are
 RULES: Mapping[str, tuple[int, str]] = {

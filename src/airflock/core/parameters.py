@@ -12,8 +12,8 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from airflock.core.vectors import MOST, Vector, Vectors
-from airflock.errors import ParameterError
-from airflock.numeric import is_number
+from airflock.support.errors import ParameterError
+from airflock.support.numeric import is_number
 
 
 def with_unit(text: str, unit: str) -> str:
@@ -118,7 +118,7 @@ def quantity(
     0.2
     >>> Gains(push=9.0)
     Traceback (most recent call last):
-    airflock.errors.ParameterError: Gains.push = 9 1/s lies outside [0, 5] 1/s
+    airflock.support.errors.ParameterError: Gains.push = 9 1/s lies outside [0, 5] 1/s
     >>> @dataclass(frozen=True, kw_only=True)
     ... class Weights(airflock.Parameters):
     ...     w: tuple[float, ...] = airflock.quantity(0.5, "1", size=3, low=0.0, high=1.0, meaning="weights")

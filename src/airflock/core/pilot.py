@@ -16,7 +16,7 @@ from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import back, complete, could_be_near, counts, of_standing, stands_until
 from airflock.core.topology import Topology, met_of
 from airflock.core.vocabulary import Percept, answer, asks
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 
 def level(state: State) -> State:

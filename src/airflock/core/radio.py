@@ -16,7 +16,7 @@ from airflock.core.contract.own_records import beginnings_of, check_memory, para
 from airflock.core.parameters import Parameters, number_names, quantity
 from airflock.core.vocabulary import asks
 from airflock.core.vocabulary.radios import RULES
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 S5 = "Vásárhelyi et al. 2018, Table S5"
 FEW = 3  # packets of each rate in a decision, up to which `missed_few` serves

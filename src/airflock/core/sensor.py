@@ -13,7 +13,7 @@ from airflock.core.contract import names_of
 from airflock.core.contract.own_records import beginnings_of, check_memory, parameters_with
 from airflock.core.parameters import Parameters, quantity
 from airflock.core.vocabulary import answer, asks
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 FIRST = 8  # draw of the stream SENSOR for g0 to g3; then g4 to g7, g8 to g11, u0 to u3. Before it: errors along axes
 COMPONENTS = ("x", "y", "z", "vx", "vy", "vz")  # what `measure` returns, before its Memory

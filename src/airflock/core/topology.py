@@ -9,7 +9,7 @@ from airflock.core.contract import names_of
 from airflock.core.maths import FAR, TINY
 from airflock.core.parameters import Choice, Parameters, declarations
 from airflock.core.vocabulary import answer, asks
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from airflock.errors import ParameterError
+from airflock.support.errors import ParameterError
 
 MOST = 64  # components of one vector; a driver's text holds a line for each
 

@@ -20,11 +20,14 @@ if TYPE_CHECKING:
     from airflock.engine.simulate import score_flights as score_flights
     from airflock.engine.snapshots import Snapshot as Snapshot
     from airflock.engine.state import State as State
+    from airflock.engine.text.generate import Source as Source
+    from airflock.engine.text.probe import shapes_of as shapes_of
 
 _WHERE = {
     "Flight": "flight",
     "Plan": "plan",
     "Snapshot": "snapshots",
+    "Source": "text.generate",
     "State": "state",
     "compile_for": "simulate",
     "driver_text": "simulate",
@@ -34,6 +37,7 @@ _WHERE = {
     "plan_of": "planning",
     "score_flight": "simulate",
     "score_flights": "simulate",
+    "shapes_of": "text.probe",
 }
 __all__ = [*_WHERE]
 

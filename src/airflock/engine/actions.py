@@ -8,11 +8,11 @@ import numpy as np
 from airflock.core.contract.declared import COMMANDS
 from airflock.engine.presence import join, leave
 from airflock.engine.readings import Readings
-from airflock.errors import FlightError
 from airflock.scenarios.change import changed, named
 from airflock.scenarios.document import keyed
 from airflock.scenarios.events import Event, agent_number, are_several, vector, vectors
 from airflock.scenarios.places import spot_fault, start_in_box
+from airflock.support.errors import FlightError
 
 FARTHEST = 1e6  # m from the centre: the largest arena; beyond it single precision does not hold a step of motion
 FASTEST = 1e3  # m/s; our choice: faster than anything that these bodies are made for

@@ -14,9 +14,9 @@ from typing import Any
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import trigger_event
 
-from airflock import locks
 from airflock.engine.compile_shortcuts import implementations, seldom_collected
 from airflock.engine.thread_waiting import waiting_briefly
+from airflock.support import locks
 
 NAME = "lock"
 LOOK = 0.05  # s from one try to the next

@@ -19,7 +19,7 @@ from numba.core.untyped_passes import InlineClosureLikes
 
 from airflock.engine.compile_shortcuts import sparing
 from airflock.engine.libraries import SPREAD, DriverLibrary, InlinedLibrary
-from airflock.machine import vector_bits
+from airflock.support.machine import vector_bits
 
 LATER = ("make_function", "build_list", "build_set", "build_map")  # what closures and arrays out of lists begin with
 ARRAY_VALUED = ("unary", "binop", "inplace_binop", "call")  # what is rewritten where its value is a whole array

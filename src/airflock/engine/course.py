@@ -17,13 +17,13 @@ from airflock.engine.handover import carry
 from airflock.engine.simulate import opened, to_fly
 from airflock.engine.snapshots import Snapshot, Window, sendable
 from airflock.engine.state import State
-from airflock.errors import FlightError
 from airflock.scenarios.change import begun
 from airflock.scenarios.events import Event
 from airflock.scenarios.onsets import Onset, going_on, onsets
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
-from airflock.threads import in_background
+from airflock.support.errors import FlightError
+from airflock.support.threads import in_background
 
 
 class Course:

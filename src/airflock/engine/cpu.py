@@ -11,7 +11,7 @@ from airflock.engine.drivers import driver_of, flying
 from airflock.engine.plan import Plan
 from airflock.engine.state import State
 from airflock.engine.tables import Tables
-from airflock.threads import heed
+from airflock.support.threads import heed
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,11 @@ from airflock.engine.cpu import Flown
 from airflock.engine.passes.flock import owners
 from airflock.engine.plan import Plan
 from airflock.engine.tables import tables
-from airflock.errors import DeviceError
-from airflock.hardware import sound_device
 from airflock.scenarios.cost import seconds_of, total_seconds
 from airflock.scenarios.scenario import Scenario
-from airflock.threads import cores
+from airflock.support.errors import DeviceError
+from airflock.support.hardware import sound_device
+from airflock.support.threads import cores
 
 MOST_TOGETHER = 20_000  # agents whose pairs one block of a GPU can look at in reasonable time
 WORTH = 5.0  # s of work on all cores from which a GPU is worth its start
@@ -48,7 +48,7 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
     sound_device(device)
     if device != "cuda" and device != "auto":
         return Choice(device)
-    from airflock.gpu import required, trouble
+    from airflock.support.gpu import required, trouble
 
     largest: dict[Plan, Scenario] = {}
     for scenario, plan in zip(scenarios, plans, strict=True):
@@ -83,7 +83,7 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
 
 def seconds_on_gpu(scenarios: Sequence[Scenario], plans: Sequence[Plan]) -> float:
     """Seconds that a GPU takes for these flights, about: one flock as slowly as its law lets it, many side by side."""
-    from airflock.gpu import multiprocessors
+    from airflock.support.gpu import multiprocessors
 
     kinds = {id(scenario): (scenario, plan) for scenario, plan in zip(scenarios, plans, strict=True)}
     counts = Counter(map(id, scenarios))

@@ -11,7 +11,7 @@ from airflock.engine import interpreted
 from airflock.engine.passes.driver import flight
 from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 
 def flight_text(plan: Plan) -> str:
@@ -69,7 +69,7 @@ def compiling(model: str) -> Iterator[None]:
     from numba.core.errors import NumbaError
     from numba.core.event import install_listener
 
-    from airflock.compile_events import Heeding, told_if_long
+    from airflock.engine.compile_events import Heeding, told_if_long
 
     try:
         with install_listener("numba:run_pass", Heeding()), told_if_long():

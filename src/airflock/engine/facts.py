@@ -4,15 +4,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Metric, Model
 from airflock.core.fault import Fault
 from airflock.core.radio import Radio
 from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
-from airflock.radios.registry import RADIOS
-from airflock.radios.registry import USUAL as USUAL_RADIO
-from airflock.sensors.registry import SENSORS, USUAL
+from airflock.parts.bodies.registry import BODIES
+from airflock.parts.radios.registry import RADIOS
+from airflock.parts.radios.registry import USUAL as USUAL_RADIO
+from airflock.parts.sensors.registry import SENSORS, USUAL
 from airflock.world import arena, rays
 
 

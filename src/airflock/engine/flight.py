@@ -10,10 +10,10 @@ from airflock.engine import failure, notebook
 from airflock.engine.actions import Actions
 from airflock.engine.course import Course
 from airflock.engine.snapshots import Snapshot
-from airflock.errors import FlightError
 from airflock.scenarios.events import Event, events_of
 from airflock.scenarios.files import loaded
 from airflock.scenarios.seeds import sound_seed
+from airflock.support.errors import FlightError
 
 
 class Flight(Actions):

@@ -16,7 +16,7 @@ from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.stages.approach import BEGUN, ENDED, GAP
 from airflock.engine.stages.state import own_row
 from airflock.engine.tables import Tables
-from airflock.scenes.tree import AWAY
+from airflock.world.scenes.tree import AWAY
 
 AGENTS, RING = WHOLE.index("agents"), WHOLE.index("ring")
 

@@ -3,7 +3,7 @@
 from html import escape
 from typing import TYPE_CHECKING
 
-from airflock.metrics.registry import reports
+from airflock.parts.metrics.registry import reports
 from airflock.scenarios.portrait import number, table
 
 if TYPE_CHECKING:

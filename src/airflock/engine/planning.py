@@ -10,11 +10,11 @@ from airflock.core.radio import FEW
 from airflock.core.vocabulary import asks
 from airflock.engine.facts import Build, OwnLaw
 from airflock.engine.plan import Plan
-from airflock.hardware import sound_precision
-from airflock.rules.probe import probe, probe_body, probe_fault, probe_radio, probe_sensor, probe_topology
+from airflock.engine.text.probe import probe, probe_body, probe_fault, probe_radio, probe_sensor, probe_topology
 from airflock.scenarios.cells import by_cells, has_room, measured_by_cells, takes_all_cores
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
+from airflock.support.hardware import sound_precision
 from airflock.world import arena
 from airflock.world.place import obstacle_rule, raised
 from airflock.world.surfaces import EDGES, arena_ray, arena_surfaces

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from airflock.engine.fault_columns import kept_rows
 from airflock.engine.initial_rows import first_memories, memories, of_pairs
-from airflock.scenes.tree import AWAY
+from airflock.world.scenes.tree import AWAY
 
 if TYPE_CHECKING:
     from airflock.engine.state import State

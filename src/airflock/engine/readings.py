@@ -11,10 +11,10 @@ from airflock.engine.look import view
 from airflock.engine.plan import NEVER
 from airflock.engine.snapshots import Window
 from airflock.engine.state import State
-from airflock.errors import FlightError
 from airflock.scenarios.events import Event, agent_number, agent_numbers
 from airflock.scenarios.onsets import told
 from airflock.scenarios.scenario import Scenario
+from airflock.support.errors import FlightError
 
 
 class Readings:

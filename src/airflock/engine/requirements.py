@@ -7,12 +7,12 @@ the radio keeps them, the grid, and the frames of a recording; and looks at pair
 from airflock.engine.layout import lanes
 from airflock.engine.plan import Plan
 from airflock.engine.stages.cells import CELLS, CHUNKS, SPARE
-from airflock.errors import FlightError
-from airflock.machine import free_memory
 from airflock.scenarios import cost
 from airflock.scenarios.cost import most_below
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
+from airflock.support.errors import FlightError
+from airflock.support.machine import free_memory
 
 SMALL = 2**28  # bytes that are not worth a look at what is free
 SHARE = 0.9  # of the free memory that one flight may take

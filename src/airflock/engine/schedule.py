@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan
-from airflock.rules.rewrite import law_mark
+from airflock.engine.text.rewrite import law_mark
 
 
 @dataclass(frozen=True)

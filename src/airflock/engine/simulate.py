@@ -12,13 +12,13 @@ from airflock.engine.drivers import flight_driver, flight_text, is_loaded
 from airflock.engine.plan import Plan
 from airflock.engine.planning import plan_of
 from airflock.engine.state import State
-from airflock.errors import FlightError
 from airflock.scenarios.cells import takes_all_cores
 from airflock.scenarios.places import start_fault, start_in_box
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 from airflock.scenarios.timing import clock
-from airflock.threads import in_threads
+from airflock.support.errors import FlightError
+from airflock.support.threads import in_threads
 
 
 def driver_text(scenario: Scenario, *, precision: int = 32) -> str:

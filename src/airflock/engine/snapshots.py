@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.state import State
-from airflock.errors import FlightError
 from airflock.scenarios.events import Event
 from airflock.scenarios.onsets import Onset
 from airflock.scenarios.scenario import Scenario
+from airflock.support.errors import FlightError
 
 
 @dataclass(frozen=True)

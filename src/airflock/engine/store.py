@@ -2,7 +2,7 @@
 
 The hash covers the whole driver text (all rules, ours and the user's, are inside), the versions of the compiler, our
 own passes of it and the processor. What runs is always the text that was generated, never a file's; compiled code is
-loaded only under a seal (`engine.checksums`), from a folder that belongs to the user alone (`airflock.cache`).
+loaded only under a seal (`engine.checksums`), from a folder that belongs to the user alone (`airflock.support.cache`).
 """
 
 import hashlib
@@ -13,10 +13,10 @@ from pathlib import Path
 from threading import Lock
 from types import ModuleType
 
-from airflock import atomic
-from airflock.cache import DRIVERS, cache_folder, shrink, spare
 from airflock.engine.never_collected import never_collected
-from airflock.machine import toolchain
+from airflock.support import atomic
+from airflock.support.cache import DRIVERS, cache_folder, shrink, spare
+from airflock.support.machine import toolchain
 
 SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
 

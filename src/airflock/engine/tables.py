@@ -6,17 +6,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body import dryden, wind
 from airflock.engine.landing import Landing, landing_of
 from airflock.engine.plan import WHOLE, Plan
+from airflock.parts.bodies import dryden, wind
 from airflock.scenarios.onsets import Onset, onsets
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER, Clock, Geometry
 from airflock.scenarios.timing import clock
-from airflock.scenes.tree import scene as make_scene
-from airflock.scenes.tree import unbuilt
 from airflock.world.arena import heights_of
 from airflock.world.place import edge_rows, half_sizes
+from airflock.world.scenes.tree import scene as make_scene
+from airflock.world.scenes.tree import unbuilt
 from airflock.world.surfaces import faces
 
 EMPTY = make_scene([])
@@ -33,7 +33,7 @@ class Tables:
     edges : (edge, 4) ax ay bx by of polygons, m: the arena's first, then the obstacles', with heights behind them where
             there are any (`world.place.edge_rows`)
     spans : (obstacle, 2) first and last edge of each obstacle
-    shapes, nodes, links : what stands in the scene, as in `scenes.tree`
+    shapes, nodes, links : what stands in the scene, as in `world.scenes.tree`
     later : (shape, 8) bounds (m), time (s) and number of each shape that appears while flying
     goals : (goal, 3) points in their order, m
     own   : (number, agent) what differs among agents, in the plan's order

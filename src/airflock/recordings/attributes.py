@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock.errors import RecordingError, bounded
-from airflock.faults.registry import KINDS
+from airflock.parts.faults.registry import KINDS
 from airflock.recordings.layout import EAST_NORTH_UP, FRAME, check_dataset
 from airflock.scenarios.laws import MODELS
-from airflock.untrusted import from_outside, json_object
+from airflock.support.errors import RecordingError, bounded
+from airflock.support.untrusted import from_outside, json_object
 
 FORMAT = 2
 FORMAT_KEY, CHECKSUM, LAW = "airflock_format", "airflock_checksum", "airflock_law"

@@ -9,9 +9,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock import atomic
-from airflock.errors import RecordingError
-from airflock.machine import processor
 from airflock.recordings import attributes
 from airflock.recordings.flights import provenance, simulate
 from airflock.recordings.isolated import Opening
@@ -22,8 +19,11 @@ from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.own_code import law_hash
 from airflock.scenarios.scenario import Scenario
-from airflock.suffixes import RECORDINGS, suffix_fault
-from airflock.untrusted import from_outside, path_of
+from airflock.support import atomic
+from airflock.support.errors import RecordingError
+from airflock.support.machine import processor
+from airflock.support.suffixes import RECORDINGS, suffix_fault
+from airflock.support.untrusted import from_outside, path_of
 
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
@@ -105,7 +105,7 @@ def load_recording(path: str | os.PathLike[str] | Opening) -> xr.Dataset:
     >>> import airflock
     >>> airflock.load_recording("nowhere.nc")
     Traceback (most recent call last):
-    airflock.errors.RecordingError: nowhere.nc: no such file
+    airflock.support.errors.RecordingError: nowhere.nc: no such file
     """
     opening = path if isinstance(path, Opening) else Opening(path)
     recording: xr.Dataset = opening.answer()

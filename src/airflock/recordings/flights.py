@@ -13,8 +13,6 @@ import xarray as xr
 
 from airflock import __version__
 from airflock.engine import Flight, driver_text, fly, picked
-from airflock.errors import FlightError
-from airflock.machine import processor, toolchain
 from airflock.recordings.attributes import FAULTS
 from airflock.recordings.layout import dataset
 from airflock.recordings.perception import finish_keeping, sound
@@ -26,6 +24,8 @@ from airflock.scenarios.own_code import law_hash
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 from airflock.scenarios.timing import clock
+from airflock.support.errors import FlightError
+from airflock.support.machine import processor, toolchain
 
 
 def simulate(

@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock.aero import descent
 from airflock.core.contract import Model
 from airflock.core.parameters import Parameters, declarations, number_names
 from airflock.core.radio import Packets
 from airflock.core.vocabulary import Own, asks
-from airflock.errors import RecordingError
-from airflock.metrics.registry import POWER, SETS
+from airflock.parts.aero import descent
+from airflock.parts.metrics.registry import POWER, SETS
 from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
 from airflock.recordings.own_kinds import missing_kinds, with_files
@@ -21,7 +20,8 @@ from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS
-from airflock.untrusted import from_outside
+from airflock.support.errors import RecordingError
+from airflock.support.untrusted import from_outside
 
 
 class _Nothing(Parameters):

@@ -9,11 +9,11 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
 from airflock.recordings import images
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.layout import frames_of
 from airflock.recordings.scores import measure
+from airflock.support.errors import RecordingError
 
 BETWEEN = {
     "r_centres": ("m", "mean distance between the centres of two groups; nan in a periodic world"),

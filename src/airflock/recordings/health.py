@@ -7,13 +7,13 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from airflock import __version__
-from airflock import gpu as gpu
-from airflock.cache import cache_folder, cache_trouble, drivers, usual_folder
 from airflock.engine import score_flight, score_flights
-from airflock.machine import processor
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
-from airflock.threads import cores
+from airflock.support import gpu as gpu
+from airflock.support.cache import cache_folder, cache_trouble, drivers, usual_folder
+from airflock.support.machine import processor
+from airflock.support.threads import cores
 
 PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "typer", "matplotlib", "cma")
 EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  # of extras: cuda, scenes, evolve, ...

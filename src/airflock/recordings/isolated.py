@@ -21,9 +21,9 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
-from airflock.errors import RecordingError
 from airflock.recordings.packed import refuse_packed, refuse_pickle
-from airflock.untrusted import from_outside, is_file, path_of
+from airflock.support.errors import RecordingError
+from airflock.support.untrusted import from_outside, is_file, path_of
 
 LEAST_TIME = 15.0  # s of a processor that a file of any size may take
 WAIT = 4.0  # time by the clock over that of a processor, for machines that are busy with other things

@@ -13,8 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.core.contract.declared import COMMANDS
-from airflock.errors import RecordingError
 from airflock.recordings.differences import velocities
+from airflock.support.errors import RecordingError
 
 DIMENSIONS = ("time", "space", "keypoint", "individual")
 SHORTEST = 1e-6  # s between frames: the shortest motion step there is

@@ -8,8 +8,8 @@ nobody said out of what, nor a rotation where nobody said about which point: the
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from airflock.errors import RecordingError
-from airflock.numeric import is_number
+from airflock.support.errors import RecordingError
+from airflock.support.numeric import is_number
 
 FITNESS = "r_cluster", "r_coll", "r_comm", "v_flock"
 # Order parameter: keys of `metrics` that it depends on.

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.errors import RecordingError
 from airflock.scenarios.families import FAMILIES
+from airflock.support.errors import RecordingError
 
 
 def own_kinds(document: Mapping[str, Any]) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from airflock.errors import RecordingError
+from airflock.support.errors import RecordingError
 
 ARCHIVES = (".zip", ".gz", ".7z", ".tar", ".rar", ".xz", ".bz2")
 STARTS = {b"PK\x03\x04": "a zip archive; unpack it first: unzip", b"\x1f\x8b": "compressed; unpack it first: gunzip"}

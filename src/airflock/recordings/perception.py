@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from airflock.core import radio, random
 from airflock.engine import Flight
-from airflock.errors import FlightError
 from airflock.recordings.layout import DIMENSIONS, UNITS
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
+from airflock.support.errors import FlightError
 from airflock.world.place import half_sizes
 
 Array = NDArray[Any]

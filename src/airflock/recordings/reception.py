@@ -7,10 +7,10 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
 from airflock.recordings import images
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.layout import frames_of
+from airflock.support.errors import RecordingError
 
 BINS = 24
 LEVELS = {"q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95}

@@ -11,19 +11,19 @@ import xarray as xr
 
 from airflock.core.maths import FAR
 from airflock.engine import measure_frames, plan_of
-from airflock.errors import RecordingError
-from airflock.executors.scores import scores
-from airflock.metrics import nearest
-from airflock.metrics.registry import reports
+from airflock.parts.metrics import nearest
+from airflock.parts.metrics.registry import reports
 from airflock.recordings.attributes import scenario_document
 from airflock.recordings.flown_scenario import aero_settings, scenario_of
 from airflock.recordings.layout import frames_of
 from airflock.recordings.lengths import in_bodies, unsaid
 from airflock.recordings.score_table import described
+from airflock.runs.executors.scores import scores
 from airflock.scenarios.change import variant
 from airflock.scenarios.document import keyed
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seeds
+from airflock.support.errors import RecordingError
 
 
 def score(
@@ -89,7 +89,8 @@ def score(
 
     Notes
     -----
-    Which order parameters there are is the key `metrics.kind`; their sources stand beside them in `airflock.metrics`.
+    Which order parameters there are is the key `metrics.kind`; their sources stand beside them in
+    `airflock.parts.metrics`.
 
     Examples
     --------

@@ -7,15 +7,15 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.errors import ScenarioError, gathering
-from airflock.executors.scores import scores
-from airflock.metrics.registry import numbers_of, reports
+from airflock.parts.metrics.registry import numbers_of, reports
 from airflock.recordings.score_table import described
+from airflock.runs.executors.scores import scores
 from airflock.scenarios import short_keys
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seeds
-from airflock.spelling import meant
+from airflock.support.errors import ScenarioError, gathering
+from airflock.support.spelling import meant
 
 ORDER = "polarisation"  # shown where nothing judges flights: the first that a set reports may be a constant speed
 

@@ -1,7 +1,7 @@
 """Notes on scenarios that are valid but hardly meant; nothing here stops a flight."""
 
 from airflock.core.parameters import Quantity, declarations
-from airflock.metrics.registry import METRICS
+from airflock.parts.metrics.registry import METRICS
 from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.scenario import Scenario
 from airflock.world.place import edge_rows

@@ -6,7 +6,7 @@ And whether order parameters look at pairs by cells.
 import math
 from dataclasses import replace
 
-from airflock.rules.reading import fields_read
+from airflock.core.rules.reading import fields_read
 from airflock.scenarios.group_laws import Law
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock

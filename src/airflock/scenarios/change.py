@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from airflock.core.contract import Model
-from airflock.errors import ScenarioError
 from airflock.scenarios.families import FAMILIES, Given
 from airflock.scenarios.files import load, loaded
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
+from airflock.support.errors import ScenarioError
 
 LASTING = {"agents": "the number of agents", "dt": "the motion step"}  # keys at the top that a flight cannot change
 

@@ -4,10 +4,10 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from airflock.errors import FlightError
 from airflock.scenarios.cells import takes_all_cores
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
+from airflock.support.errors import FlightError
 
 TIMES = (("days", 86400.0), ("h", 3600.0), ("min", 60.0))
 LONGEST = 30 * 86400.0  # s of a processor that one flight may take; nobody waits longer for one

@@ -5,11 +5,11 @@ from typing import Any
 
 from airflock.core.parameters import declarations
 from airflock.core.vectors import expanded, overruled
-from airflock.errors import ScenarioError
 from airflock.scenarios.families import FAMILIES
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.sections import SECTIONS
-from airflock.spelling import meant
+from airflock.support.errors import ScenarioError
+from airflock.support.spelling import meant
 
 TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
 

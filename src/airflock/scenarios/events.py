@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from airflock.errors import FlightError
+from airflock.support.errors import FlightError
 
 
 @dataclass(frozen=True)

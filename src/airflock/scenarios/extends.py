@@ -7,9 +7,9 @@ from typing import Any
 from airflock.core.parameters import number_names
 from airflock.core.radio import Packets
 from airflock.core.vectors import overruled
-from airflock.errors import ScenarioError
 from airflock.scenarios.schema import value_of
-from airflock.untrusted import is_file, own_path
+from airflock.support.errors import ScenarioError
+from airflock.support.untrusted import is_file, own_path
 
 OF_ITS_OWN = ("published", "title")  # what a paper published of a file and what the file is called: not of another
 LONGEST = 10  # files in a chain of extends

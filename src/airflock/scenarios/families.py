@@ -9,25 +9,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from airflock.body.registry import BODIES
 from airflock.core.contract import Body, MetricSet, Model, body
 from airflock.core.fault import Fault
 from airflock.core.parameters import number_names
 from airflock.core.radio import Packets, Radio, radio
 from airflock.core.sensor import Sensor, sensor
 from airflock.core.topology import Topology, topology
-from airflock.errors import AirflockError
-from airflock.metrics.registry import SETS, as_set, metric_set
-from airflock.metrics.registry import USUAL as USUAL_SET
-from airflock.radios.registry import RADIOS
-from airflock.radios.registry import USUAL as USUAL_RADIO
+from airflock.parts.bodies.registry import BODIES
+from airflock.parts.metrics.registry import SETS, as_set, metric_set
+from airflock.parts.metrics.registry import USUAL as USUAL_SET
+from airflock.parts.radios.registry import RADIOS
+from airflock.parts.radios.registry import USUAL as USUAL_RADIO
+from airflock.parts.sensors.registry import SENSORS
+from airflock.parts.sensors.registry import USUAL as USUAL_SENSOR
+from airflock.parts.topologies.registry import TOPOLOGIES
+from airflock.parts.topologies.registry import USUAL as USUAL_TOPOLOGY
 from airflock.scenarios.own_code import made_of
 from airflock.scenarios.schema import value_of
-from airflock.sensors.registry import SENSORS
-from airflock.sensors.registry import USUAL as USUAL_SENSOR
-from airflock.spelling import meant
-from airflock.topology.registry import TOPOLOGIES
-from airflock.topology.registry import USUAL as USUAL_TOPOLOGY
+from airflock.support.errors import AirflockError
+from airflock.support.spelling import meant
 
 T = TypeVar("T")
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from airflock.core.parameters import Declaration, declarations
 from airflock.scenarios.schema import value_of
-from airflock.spelling import as_name, meant
+from airflock.support.spelling import as_name, meant
 
 FIRST = "faults."
 FORM = "write faults.KIND.KEY or faults.NUMBER.KEY, for instance faults.motor.share"

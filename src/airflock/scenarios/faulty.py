@@ -9,12 +9,12 @@ from typing import Any
 from airflock.core.fault import KEYS, Fault, fault
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import quantity
-from airflock.errors import AirflockError
-from airflock.faults.registry import KINDS
+from airflock.parts.faults.registry import KINDS
 from airflock.scenarios import schema, units
 from airflock.scenarios.groups import Group, members
 from airflock.scenarios.own_code import made_of
-from airflock.spelling import meant
+from airflock.support.errors import AirflockError
+from airflock.support.spelling import meant
 
 PERCEPTION = {"sense", "tell", "radio", "clock"}  # rules that disturb what agents know of each other
 MOST = 255  # entries of a file: each draws by a number of its own

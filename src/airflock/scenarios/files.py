@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from airflock.core.fault import Fault, fault
-from airflock.errors import ScenarioError
 from airflock.scenarios import formats
 from airflock.scenarios.document import keyed
 from airflock.scenarios.extends import extended
@@ -18,8 +17,9 @@ from airflock.scenarios.ground import with_ground
 from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
-from airflock.spelling import meant
-from airflock.untrusted import FormatError, from_outside, is_file, own_path, read_toml
+from airflock.support.errors import ScenarioError
+from airflock.support.spelling import meant
+from airflock.support.untrusted import FormatError, from_outside, is_file, own_path, read_toml
 
 IMPORTED = "not a scenario; airflock import makes a recording of it (in Python: airflock.load_tracks)"
 NO_SCENARIO = {  # files that stand beside scenarios, by their ending: what they are, and what takes them
@@ -52,7 +52,7 @@ def presets() -> dict[str, Path]:
 @cache
 def _shipped() -> tuple[tuple[str, Path], ...]:
     """Name and file of every preset: what is installed does not change while a process runs."""
-    root = Path(str(resources.files("airflock"))) / "presets"
+    root = Path(str(resources.files("airflock"))) / "scenarios" / "presets"
     return tuple((str(path.relative_to(root).with_suffix("")), path) for path in sorted(root.rglob("*.toml")))
 
 
@@ -124,7 +124,7 @@ def load(
     (0.4, 30)
     >>> airflock.load("vasarhelyi_2018/4ms", {"radio.delay": 60.0})
     Traceback (most recent call last):
-    airflock.errors.ScenarioError: vasarhelyi_2018/4ms: radio.delay = 60 s lies outside [0, 30] s
+    airflock.support.errors.ScenarioError: vasarhelyi_2018/4ms: radio.delay = 60 s lies outside [0, 30] s
     """
     text = str(name)
     where = text if text in presets() else str(own_path(text))

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 from airflock.core.contract import Model
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import complete
-from airflock.metrics.parameters import Parameters as MetricParameters
+from airflock.parts.metrics.parameters import Parameters as MetricParameters
 from airflock.scenarios.geometry import largest_extension
 from airflock.world import arena, start
 

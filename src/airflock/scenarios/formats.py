@@ -7,7 +7,7 @@ older file mean something else raises the number and adds a step to MIGRATIONS; 
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from airflock.errors import ScenarioError
+from airflock.support.errors import ScenarioError
 
 KEY = "format"
 FORMAT = 1  # of scenarios and studies

@@ -4,17 +4,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from airflock.body.registry import BODIES, body_for
 from airflock.core.contract import Body, MetricSet, Model
 from airflock.core.radio import Packets, Radio
 from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
-from airflock.errors import AirflockError
+from airflock.parts.bodies.registry import BODIES, body_for
 from airflock.scenarios import wings
 from airflock.scenarios.document import model_table, understood
 from airflock.scenarios.families import BODY, METRICS, RADIO, SENSOR, TOPOLOGY, Family, Given
 from airflock.scenarios.laws import find_model
 from airflock.scenarios.sections import SECTIONS
+from airflock.support.errors import AirflockError
 
 T = TypeVar("T")
 

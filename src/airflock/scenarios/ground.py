@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from airflock.errors import ScenarioError
 from airflock.scenarios import schema, units
 from airflock.scenarios.schema import value_of
-from airflock.scenes.outlines import ground_of
-from airflock.untrusted import is_file, own_path
+from airflock.support.errors import ScenarioError
+from airflock.support.untrusted import is_file, own_path
 from airflock.world import arena
+from airflock.world.scenes.outlines import ground_of
 
 FROM_FILE = ("world.file", "world.simplify")
 GIVEN = ("corners", "obstacles", "heights")  # what the file says, and the scenario cannot say as well

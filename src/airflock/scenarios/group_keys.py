@@ -9,7 +9,7 @@ from typing import Any
 
 from airflock.core.parameters import Declaration, declarations
 from airflock.scenarios.groups import LETTERS
-from airflock.spelling import meant
+from airflock.support.spelling import meant
 
 FIRST, SPREAD = "groups.", "spread"
 FORM = "write groups.NAME.SECTION.KEY, for instance groups.heavy.body.tau"

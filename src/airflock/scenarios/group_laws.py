@@ -9,9 +9,9 @@ from airflock.core.contract import Body, Model
 from airflock.core.parameters import Choice, Quantity, choices, declarations
 from airflock.core.sensor import Sensor
 from airflock.core.vocabulary import asks
-from airflock.errors import AirflockError
 from airflock.scenarios import checks, schema
 from airflock.scenarios.laws import find_model
+from airflock.support.errors import AirflockError
 
 if TYPE_CHECKING:
     from airflock.scenarios.groups import Group

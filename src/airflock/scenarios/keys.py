@@ -5,17 +5,17 @@ from difflib import get_close_matches
 from functools import cache
 from typing import Any, NamedTuple
 
-from airflock.body.registry import BODIES
 from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, number_names, with_unit
 from airflock.core.radio import Packets
-from airflock.errors import ScenarioError
-from airflock.faults.registry import KINDS
-from airflock.radios.registry import RADIOS
+from airflock.parts.bodies.registry import BODIES
+from airflock.parts.faults.registry import KINDS
+from airflock.parts.radios.registry import RADIOS
+from airflock.parts.sensors.registry import SENSORS
 from airflock.scenarios.faulty import Timing
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.scenarios.whole_keys import WHOLE_KEYS
-from airflock.sensors.registry import SENSORS
+from airflock.support.errors import ScenarioError
 
 TOP = "top"  # the keys before the first section
 FAMILIES = {"model": MODELS, "body": BODIES, "sensors": SENSORS, "faults": KINDS}  # sections with records by kind

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from airflock.core.contract import Model, model
-from airflock.errors import ScenarioError, bounded
 from airflock.scenarios.own_code import made_of
-from airflock.spelling import meant
+from airflock.support.errors import ScenarioError, bounded
+from airflock.support.spelling import meant
 
 MODELS = (
     "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
@@ -27,7 +27,7 @@ def find_model(kind: Any, folder: Path | None = None, *, told: str = "model.kind
     if not isinstance(kind, str):
         raise ScenarioError([f"{told} = {bounded(repr(kind), 80)} is not a name; known: {', '.join(MODELS)}"])
     if kind in MODELS:
-        return model(import_module(f"airflock.models.{kind}"), kind)
+        return model(import_module(f"airflock.parts.laws.{kind}"), kind)
     if kind.endswith(".py"):
         return made_of(model, told, kind, folder, trust=trust)
     hint = meant(kind, MODELS, f"known: {', '.join(MODELS)}, or a file that ends in .py", cutoff=0.4)

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from airflock.errors import ParameterError, ScenarioError
 from airflock.scenarios import (
     checks,
     fault_keys,
@@ -31,7 +30,8 @@ from airflock.scenarios.gathering import Gathered, gathered
 from airflock.scenarios.ground import file_faults
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
-from airflock.untrusted import is_file
+from airflock.support.errors import ParameterError, ScenarioError
+from airflock.support.untrusted import is_file
 
 
 def make(

@@ -16,12 +16,12 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TypeVar
 
-from airflock.cache import cache_folder
 from airflock.core.contract import Model
 from airflock.core.parameters import declarations
-from airflock.errors import ParameterError, RuleError, ScenarioError, bounded
-from airflock.spelling import as_name, raised
-from airflock.untrusted import is_file, own_path
+from airflock.support.cache import cache_folder
+from airflock.support.errors import ParameterError, RuleError, ScenarioError, bounded
+from airflock.support.spelling import as_name, raised
+from airflock.support.untrusted import is_file, own_path
 
 T = TypeVar("T")
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.errors import SceneError
 from airflock.scenarios.scenario import Scenario
-from airflock.scenes.build import Scene, clearance, in_mesh, scene_of
+from airflock.support.errors import SceneError
 from airflock.world import scenery, start
 from airflock.world.edges import wrap
 from airflock.world.place import half_sizes
+from airflock.world.scenes.build import Scene, clearance, in_mesh, scene_of
 
 CROWDED = 0.9  # share of a start region inside obstacles that is worth a word; less is redrawn in silence
 DRAWN = 64  # positions at which a start region is looked at

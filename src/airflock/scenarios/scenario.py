@@ -5,9 +5,6 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
-from airflock.aero import descent
-from airflock.aero import wing as wings
-from airflock.body import wind
 from airflock.core import random
 from airflock.core.contract import Body, Metric, MetricSet, Model
 from airflock.core.fault import Fault
@@ -16,17 +13,20 @@ from airflock.core.radio import Packets, Radio
 from airflock.core.sensor import Sensor
 from airflock.core.silence import Parameters as Silence
 from airflock.core.topology import Topology
-from airflock.metrics import parameters as metric_parameters
+from airflock.parts.aero import descent
+from airflock.parts.aero import wing as wings
+from airflock.parts.bodies import wind
+from airflock.parts.metrics import parameters as metric_parameters
+from airflock.parts.sensors.registry import SENSORS
+from airflock.parts.topologies.registry import TOPOLOGIES
 from airflock.scenarios import filled_in
 from airflock.scenarios.faulty import Entry
 from airflock.scenarios.group_laws import Law, laws_of
 from airflock.scenarios.groups import Group, own_numbers, varied
 from airflock.scenarios.portrait import html, sentence
 from airflock.scenarios.sections import ORDER, Flight
-from airflock.scenes.build import Scene, scene_of, waypoints
-from airflock.sensors.registry import SENSORS
-from airflock.topology.registry import TOPOLOGIES
 from airflock.world import arena, goals, scenery, start
+from airflock.world.scenes.build import Scene, scene_of, waypoints
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from airflock.core.parameters import (
     quantity_fault,
     with_unit,
 )
-from airflock.spelling import meant
+from airflock.support.spelling import meant
 
 LONG_FORM = {"value", "unit", "source", "note", "interval"}
 

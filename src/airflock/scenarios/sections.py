@@ -7,15 +7,15 @@ handed and the columns of the row that a driver reads are all made from `ORDER`,
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from airflock.aero import descent, wing
-from airflock.body import dryden, motion, wind
 from airflock.core import silence
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
-from airflock.metrics import parameters as metrics
-from airflock.radios import links
-from airflock.sensors import langevin
-from airflock.topology import parameters as topology
+from airflock.parts.aero import descent, wing
+from airflock.parts.bodies import dryden, motion, wind
+from airflock.parts.metrics import parameters as metrics
+from airflock.parts.radios import links
+from airflock.parts.sensors import langevin
+from airflock.parts.topologies import parameters as topology
 from airflock.world import arena, goals, scenery, start
 
 

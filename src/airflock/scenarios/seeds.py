@@ -4,7 +4,7 @@ import operator
 from collections.abc import Iterable
 from typing import Any
 
-from airflock.errors import ParameterError
+from airflock.support.errors import ParameterError
 
 LARGEST = 2**64 - 1
 MOST = 10_000_000  # flights at a time

@@ -8,11 +8,11 @@ from airflock.core.contract import Model
 from airflock.core.maths import FAR
 from airflock.core.vocabulary import answer
 from airflock.scenarios.scenario import Scenario
-from airflock.scenes.tree import unbuilt
 from airflock.world import bvh, goals
 from airflock.world.inside import inside
 from airflock.world.place import Place as Map
 from airflock.world.place import Shapes
+from airflock.world.scenes.tree import unbuilt
 from airflock.world.surfaces import EDGES
 
 

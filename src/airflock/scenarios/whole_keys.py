@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from airflock.body.registry import BODIES
-from airflock.faults.registry import KINDS
+from airflock.parts.bodies.registry import BODIES
+from airflock.parts.faults.registry import KINDS
+from airflock.parts.sensors.registry import SENSORS
 from airflock.scenarios.laws import MODELS
-from airflock.sensors.registry import SENSORS
 
 OWN = "FILE.py"
 

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from airflock.aero import descent
-from airflock.aero import wing as wings
 from airflock.core.composition import added
 from airflock.core.composition import faults as misfits
 from airflock.core.contract import Metric, MetricSet, Model, model
 from airflock.core.vocabulary import asks
+from airflock.parts.aero import descent
+from airflock.parts.aero import wing as wings
 from airflock.world import start
 
 Place = Callable[[int, float, float, float], tuple[float, float, float]]

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 
 from airflock.core.radio import Radio
 from airflock.core.reception import share
-from airflock.metrics.registry import numbers_of
-from airflock.stage import colours
-from airflock.stage.scene import Lines, Solid, Stage, stage_of, turned
+from airflock.parts.metrics.registry import numbers_of
 from airflock.studio import measures
 from airflock.studio.collisions import Collisions
 from airflock.studio.player import Player
@@ -18,6 +16,8 @@ from airflock.studio.shading import Shading
 from airflock.studio.side import BELOW, Side
 from airflock.studio.trails import Trails
 from airflock.studio.view import View
+from airflock.view.stage import colours
+from airflock.view.stage.scene import Lines, Solid, Stage, stage_of, turned
 
 OPEN = 8.0  # s; half of what is seen of an open world is at least the way flown in this time
 MARGIN = 20.0  # a dart of a flock of a hundred is so many times smaller than half the picture

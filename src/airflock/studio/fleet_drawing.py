@@ -3,17 +3,17 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.fleet.observer import Observer, on_ground
-from airflock.onboard.mission import Phase
-from airflock.onboard.peers import FRESH
-from airflock.stage import colours, shades
-from airflock.stage.field import field_of
-from airflock.stage.scene import turned
-from airflock.stage.shades import Shade
+from airflock.drones.onboard.mission import Phase
+from airflock.drones.onboard.peers import FRESH
+from airflock.fleets.observer import Observer, on_ground
 from airflock.studio import measures
 from airflock.studio.side import BELOW, SPACED
 from airflock.studio.trails import Trails
 from airflock.studio.view import View
+from airflock.view.stage import colours, shades
+from airflock.view.stage.field import field_of
+from airflock.view.stage.scene import turned
+from airflock.view.stage.shades import Shade
 
 # phases in the air, in the order of their colours; on the ground a drone is grey
 PHASES = (

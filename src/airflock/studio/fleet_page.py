@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.fleet.observer import Observer
+from airflock.fleets.observer import Observer
 from airflock.studio.fleet_drawing import FOLLOWED, LINKS, WAYS, FleetDrawing
 from airflock.studio.fleet_tables import about, faults_of, members_table, notes_of, trouble_of
 from airflock.studio.measures import KEPT, Pairs

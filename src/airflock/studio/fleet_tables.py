@@ -2,11 +2,11 @@
 
 import html
 
-from airflock.faults.registry import KINDS as OURS
-from airflock.fleet.faults import KINDS
-from airflock.fleet.observer import Observer
-from airflock.fleet.teller import OF_SCENARIO
-from airflock.onboard.peers import FRESH, Peer
+from airflock.drones.onboard.peers import FRESH, Peer
+from airflock.fleets.faults import KINDS
+from airflock.fleets.observer import Observer
+from airflock.fleets.teller import OF_SCENARIO
+from airflock.parts.faults.registry import KINDS as OURS
 from airflock.studio.room import note
 
 SHOWN = 14  # notes

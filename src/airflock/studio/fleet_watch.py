@@ -5,14 +5,14 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from airflock.errors import CardError, gathering
-from airflock.fleet.observer import Observer
-from airflock.fleet.teller import WATCHED
-from airflock.mavlink.frames import Stream
-from airflock.mavlink.keys import read_key
-from airflock.onboard.card import Card, read_card
-from airflock.onboard.ports import Port, Serial, open_port
-from airflock.untrusted import own_path
+from airflock.drones.mavlink.frames import Stream
+from airflock.drones.mavlink.keys import read_key
+from airflock.drones.onboard.card import Card, read_card
+from airflock.drones.onboard.ports import Port, Serial, open_port
+from airflock.fleets.observer import Observer
+from airflock.fleets.teller import WATCHED
+from airflock.support.errors import CardError, gathering
+from airflock.support.untrusted import own_path
 
 RADIOS = (f"udp:{WATCHED[0]}:{WATCHED[1]}",)  # where fleets in software are heard
 

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock import atomic
 from airflock.engine import Flight, Snapshot
-from airflock.errors import StudioError
 from airflock.recordings.files import save
-from airflock.replays import replay
 from airflock.scenarios.scenario import Scenario
 from airflock.studio.origin import Origin
 from airflock.studio.saving import flown_again, toml_of
 from airflock.studio.side import Side
+from airflock.support import atomic
+from airflock.support.errors import StudioError
+from airflock.view.replays import replay
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,12 @@
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING
 
-from airflock import atomic
-from airflock.errors import StudioError, printable
 from airflock.scenarios.files import presets
 from airflock.studio.room import Room, note
 from airflock.studio.saving import free
-from airflock.untrusted import MOST_BYTES, FormatError, TextError, toml
+from airflock.support import atomic
+from airflock.support.errors import StudioError, printable
+from airflock.support.untrusted import MOST_BYTES, FormatError, TextError, toml
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page

@@ -7,12 +7,12 @@ from typing import Any
 import xarray as xr
 
 from airflock.engine import Flight
-from airflock.errors import RecordingError
 from airflock.recordings import attributes
 from airflock.recordings.files import load_recording
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.support.errors import RecordingError
 
 LONGEST = 1e6  # s; an open page has no end of its own
 

@@ -7,9 +7,9 @@ import numpy as np
 import viser
 from viser import uplot
 
-from airflock.stage import colours
 from airflock.studio.charts import Chart
 from airflock.studio.controls import Control
+from airflock.view.stage import colours
 
 TONES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
 

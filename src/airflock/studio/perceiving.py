@@ -13,10 +13,10 @@ from airflock.core.vocabulary import asks
 from airflock.engine import State as Memory
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.surroundings import Course, Place
-from airflock.stage import colours
-from airflock.stage.arrows import arrow, values, word_of
-from airflock.stage.rays import cast_rays
 from airflock.studio.side import Side
+from airflock.view.stage import colours
+from airflock.view.stage.arrows import arrow, values, word_of
+from airflock.view.stage.rays import cast_rays
 
 NONE = np.zeros((0, 2, 3))
 WAKE = 6.0  # spans of a wake that are drawn
@@ -26,7 +26,7 @@ FREE, HIT = colours.GREEN, colours.RED
 
 
 class Drawn(NamedTuple):
-    """Lines about one agent by kind (`stage.colours.LINES`): segments (segment, 2, 3) m and their colours; and words.
+    """Lines about one agent by kind (`view.stage.colours.LINES`): segments (segment, 2, 3) m, their colours, and words.
 
     Kinds that are not named show nothing.
     """

@@ -4,13 +4,13 @@ from collections.abc import Callable
 from time import perf_counter
 
 from airflock.engine import Snapshot
-from airflock.errors import AirflockError, reason
 from airflock.scenarios.own_code import raised_there
-from airflock.spelling import raised
 from airflock.studio.flights import FlightRequest, Flights
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
 from airflock.studio.requests import Asked
+from airflock.support.errors import AirflockError, reason
+from airflock.support.spelling import raised
 
 MOST_BUSY = 0.05  # s of real time flown at most before the page is answered again
 

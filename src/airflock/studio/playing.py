@@ -3,11 +3,11 @@
 import math
 from typing import TYPE_CHECKING
 
-from airflock.errors import AirflockError, StudioError
 from airflock.studio.collisions import BOTH, Collision
 from airflock.studio.drawing import FOLLOWED, LINKS, NAMES
 from airflock.studio.room import Room, note
 from airflock.studio.shading import ways
+from airflock.support.errors import AirflockError, StudioError
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page

@@ -10,11 +10,11 @@ import tomlkit
 import xarray as xr
 
 from airflock.engine import Flight
-from airflock.errors import FlightError
 from airflock.recordings.flights import simulate
 from airflock.scenarios.fault_keys import fault_of, is_fault_key
 from airflock.scenarios.files import presets
 from airflock.scenarios.group_keys import is_group_key, kept, parts_of
+from airflock.support.errors import FlightError
 
 
 def toml_of(

@@ -7,7 +7,7 @@ from typing import Any
 
 from airflock.core.parameters import Quantity, declarations, with_unit
 from airflock.engine import Flight
-from airflock.metrics.registry import reports
+from airflock.parts.metrics.registry import reports
 from airflock.scenarios.scenario import Scenario
 
 COLUMN = "text-align:right;padding-left:0.8em"

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.faults.registry import KINDS as KINDS_OF_FAULT
-from airflock.stage import colours
+from airflock.parts.faults.registry import KINDS as KINDS_OF_FAULT
 from airflock.studio.drawing import NAMES
 from airflock.studio.perceiving import Drawn, Perceiving
 from airflock.studio.room import Room, note
+from airflock.view.stage import colours
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page

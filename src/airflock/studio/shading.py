@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.stage import shades
-from airflock.stage.clusters import clusters, reach_of
-from airflock.stage.shades import MOTION, Shade, own_numbers
+from airflock.view.stage import shades
+from airflock.view.stage.clusters import clusters, reach_of
+from airflock.view.stage.shades import MOTION, Shade, own_numbers
 
 if TYPE_CHECKING:
     from airflock.studio.drawing import Flock

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine import Flight, Snapshot
-from airflock.errors import StudioError
 from airflock.scenarios.events import Event
 from airflock.scenarios.fault_keys import has_fault, is_fault_key, value_in_fault
 from airflock.scenarios.group_keys import is_group_key, value_in_group
 from airflock.scenarios.scenario import Scenario
 from airflock.studio.controls import fields
 from airflock.studio.origin import Origin
-from airflock.threads import in_background
+from airflock.support.errors import StudioError
+from airflock.support.threads import in_background
 
 BELOW, SPACED = -1e7, 1e4  # m; where agents that have left are shown: nowhere
 MOST_AT_ONCE = 400  # agents; of more, one interpreted step holds a page up

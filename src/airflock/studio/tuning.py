@@ -5,20 +5,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airflock.errors import AirflockError, ScenarioError
-from airflock.evolve.bounds import studied
 from airflock.scenarios.change import LASTING
 from airflock.scenarios.document import TOP
 from airflock.scenarios.fault_keys import is_fault_key
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.short_keys import whole_keys
+from airflock.search.bounds import studied
 from airflock.studio.controls import Control, controls_of, controls_of_faults
 from airflock.studio.drawing import NAMES
 from airflock.studio.player import Player
 from airflock.studio.room import Room, note
 from airflock.studio.saving import free
 from airflock.studio.side import value_of
-from airflock.untrusted import from_outside, toml_value
+from airflock.support.errors import AirflockError, ScenarioError
+from airflock.support.untrusted import from_outside, toml_value
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page

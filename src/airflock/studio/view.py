@@ -12,10 +12,10 @@ import rich
 import viser
 from numpy.typing import NDArray
 
-from airflock.errors import StudioError
-from airflock.stage.scene import Lines, Solid, dart
 from airflock.studio.door import guarded
 from airflock.studio.panel import Panel
+from airflock.support.errors import StudioError
+from airflock.view.stage.scene import Lines, Solid, dart
 
 TRAILS = 40  # nodes, rewritten in turn: a trail is so many frames long
 NARROW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera

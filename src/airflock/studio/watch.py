@@ -4,9 +4,9 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from airflock.errors import StudioError
 from airflock.studio.flights import FlightRequest
 from airflock.studio.player import Player
+from airflock.support.errors import StudioError
 
 
 def watch(

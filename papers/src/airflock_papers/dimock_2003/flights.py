@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine import compile_for, fly
-from airflock.errors import FlightError
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
-from airflock.threads import in_threads
+from airflock.support.errors import FlightError
+from airflock.support.threads import in_threads
 from airflock_papers.dimock_2003.units import FOOT, SPAN, Gains
 from airflock_papers.flights import with_changes
 from airflock_papers.progress import Progress

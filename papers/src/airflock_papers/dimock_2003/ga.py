@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.evolve.cmaes import CMAES
-from airflock.evolve.genetic import decode, genetic
+from airflock.search.cmaes import CMAES
+from airflock.search.genetic import decode, genetic
 from airflock_papers.dimock_2003.flights import Birds, Flight, Start, Task, in_row
 from airflock_papers.dimock_2003.units import Gains, gains
 

@@ -1,6 +1,6 @@
 """Formations that stand still: what the model's numbers can mean, and the benchmarks that the paper lacks.
 
-Dense solutions of any number of segments, by the rules of `aero.filaments`; powers in W per bird.
+Dense solutions of any number of segments, by the rules of `parts.aero.filaments`; powers in W per bird.
 """
 
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.aero import wing as wings
-from airflock.aero.filaments import influences
+from airflock.parts.aero import wing as wings
+from airflock.parts.aero.filaments import influences
 from airflock.scenarios.files import load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured

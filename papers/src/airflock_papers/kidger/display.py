@@ -5,8 +5,8 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.display import fly_show, points_of
-from airflock.threads import in_threads
+from airflock.displays import fly_show, points_of
+from airflock.support.threads import in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

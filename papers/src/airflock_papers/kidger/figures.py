@@ -15,10 +15,10 @@ FLIGHT = {"duration": 30.0}
 
 def draw(folder: Path, tuning: pd.DataFrame) -> None:
     """Draw them all into a folder."""
-    from airflock.plots.flocked import flocked
-    from airflock.plots.rays import rays
-    from airflock.plots.save import save_figure
-    from airflock.plots.scene_paths import through
+    from airflock.view.plots.flocked import flocked
+    from airflock.view.plots.rays import rays
+    from airflock.view.plots.save import save_figure
+    from airflock.view.plots.scene_paths import through
 
     city = simulate(load("kidger/city", FLIGHT), 0)
     save_figure(through(city), folder / "city.png")

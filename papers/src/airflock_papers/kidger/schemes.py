@@ -10,7 +10,7 @@ from airflock.core.agent import Heard, State, decide, meet_neighbours
 from airflock.core.maths import norm
 from airflock.core.senses import Senses
 from airflock.core.vocabulary import Own
-from airflock.models import kidger
+from airflock.parts.laws import kidger
 from airflock.recordings.flights import simulate
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario

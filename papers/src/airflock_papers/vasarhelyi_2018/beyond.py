@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from airflock import atomic
-from airflock.evolve.space import with_parameters
-from airflock.evolve.study import load_study
+from airflock.runs.space import with_parameters
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.search.study import load_study
+from airflock.support import atomic
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from airflock import atomic
+from airflock.support import atomic
 from airflock_papers import page
 from airflock_papers.claims import Claim, judge
 from airflock_papers.flights import Flights

@@ -15,7 +15,7 @@ from xarray import Dataset
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import over_time
 from airflock.scenarios.scenario import Scenario
-from airflock.threads import in_threads
+from airflock.support.threads import in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

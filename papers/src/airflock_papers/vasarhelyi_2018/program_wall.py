@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from airflock.core.maths import FAR, bell
-from airflock.metrics import fitness_vasarhelyi
-from airflock.metrics.parameters import Parameters
+from airflock.parts.metrics import fitness_vasarhelyi
+from airflock.parts.metrics.parameters import Parameters
 
 METRICS = ("speed", "correlation", "nearest", "collisions", "excursion")
 REPORTS = {

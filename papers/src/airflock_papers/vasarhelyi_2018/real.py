@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 from xarray import Dataset
 
-from airflock.models import vasarhelyi_2018 as law
+from airflock.parts.laws import vasarhelyi_2018 as law
 from airflock.recordings.flights import simulate
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
-from airflock.threads import in_threads
+from airflock.support.threads import in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

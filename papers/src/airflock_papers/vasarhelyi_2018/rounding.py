@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from airflock.many_tests import holm
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.support.many_tests import holm
 from airflock_papers.vasarhelyi_2018 import program_wall
 from airflock_papers.vasarhelyi_2018.published import COLUMNS, EVALUATIONS, SPEEDS, optimum
 

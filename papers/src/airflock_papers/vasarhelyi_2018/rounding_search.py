@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from airflock import atomic
-from airflock.cache import cache_folder
 from airflock.engine import score_flights
-from airflock.errors import AirflockError
 from airflock.recordings.flights import provenance
-from airflock.untrusted import read_text
+from airflock.support import atomic
+from airflock.support.cache import cache_folder
+from airflock.support.errors import AirflockError
+from airflock.support.untrusted import read_text
 from airflock_papers.flights import Flights
 from airflock_papers.vasarhelyi_2018.published import COLUMNS, EVALUATIONS
 from airflock_papers.vasarhelyi_2018.rounding import NAMES, SURE, TARGETS, Target, box, measured_as, row_p, scenario

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from airflock import atomic
-from airflock.evolve.result import Result
+from airflock.search.result import Result
+from airflock.support import atomic
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

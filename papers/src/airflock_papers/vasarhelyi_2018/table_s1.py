@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from airflock.evolve.result import Result
-from airflock.evolve.space import with_parameters
-from airflock.many_tests import holm
+from airflock.runs.space import with_parameters
+from airflock.search.result import Result
+from airflock.support.many_tests import holm
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

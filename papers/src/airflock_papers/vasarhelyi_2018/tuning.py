@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 from xarray import Dataset
 
-from airflock import atomic
-from airflock.cache import cache_folder
 from airflock.engine import score_flights
 from airflock.recordings.flights import provenance, simulate
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
-from airflock.threads import in_threads
+from airflock.support import atomic
+from airflock.support.cache import cache_folder
+from airflock.support.threads import in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from airflock.evolve.result import Result
-from airflock.evolve.space import with_parameters
+from airflock.runs.space import with_parameters
 from airflock.scenarios.files import load
+from airflock.search.result import Result
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

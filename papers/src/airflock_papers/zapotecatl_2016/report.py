@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from airflock import atomic
+from airflock.support import atomic
 from airflock_papers import page
 from airflock_papers.claims import Claim
 from airflock_papers.page import Section

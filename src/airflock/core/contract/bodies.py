@@ -10,7 +10,7 @@ from airflock.core.contract.namespaces import names_of
 from airflock.core.contract.own_records import beginnings_of, check_memory
 from airflock.core.parameters import Parameters
 from airflock.core.vocabulary import answer, asks
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 
 @dataclass(frozen=True)

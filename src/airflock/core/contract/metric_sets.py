@@ -6,7 +6,7 @@ from typing import Any
 
 from airflock.core.contract.metrics import Metric
 from airflock.core.vocabulary import answer, asks
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 
 @dataclass(frozen=True)

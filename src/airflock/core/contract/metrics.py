@@ -8,7 +8,7 @@ from airflock.core.contract.declared import CLOCKS, OVER_TIME, REDUCTIONS
 from airflock.core.contract.namespaces import names_of
 from airflock.core.vocabulary import asks
 from airflock.core.vocabulary.metrics import METRIC
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 ABSENCE = {  # by how instants combine, `vocabulary.OVER_TIME`
     "mean": "mean over instants, each as that of a flock of those who are there",

@@ -9,7 +9,7 @@ from airflock.core.contract.namespaces import names_of
 from airflock.core.parameters import declarations
 from airflock.core.vocabulary import asks
 from airflock.core.vocabulary.laws import RULES
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 NEEDED = {  # what each law brings, and what it is
     "Parameters": "a record of its numbers, derived from airflock.Parameters",

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.errors import RuleError, bounded
+from airflock.support.errors import RuleError, bounded
 
 
 def names_of(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:

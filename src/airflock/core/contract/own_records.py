@@ -5,7 +5,7 @@ from dataclasses import make_dataclass
 from typing import Any
 
 from airflock.core.parameters import Parameters, number_names
-from airflock.errors import RuleError
+from airflock.support.errors import RuleError
 
 
 def parameters_with(common: type, record: Any, owner: str) -> type:

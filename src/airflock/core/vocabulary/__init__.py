@@ -10,8 +10,8 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from airflock.core.vocabulary import bodies, faults, laws, metrics, radios, sensors, topologies
-from airflock.errors import RuleError
-from airflock.spelling import meant
+from airflock.support.errors import RuleError
+from airflock.support.spelling import meant
 
 VOCABULARY: dict[str, dict[str, str]] = {
     **laws.RULES,

@@ -17,7 +17,7 @@ from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import JIT, Builder, branch, in_place
 from airflock.engine.plan import Plan
 from airflock.engine.replace import must_replace
-from airflock.rules.rewrite import law_mark
+from airflock.engine.text.rewrite import law_mark
 
 STAGES = (
     "snapshot", "perceive", "tune", "neighbours", "boundaries", "flock", "decide", "stop", "overrule", "move", "aim_",

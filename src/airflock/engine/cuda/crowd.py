@@ -20,11 +20,11 @@ from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables, tables
 from airflock.engine.totals import combined
-from airflock.errors import DeviceError
-from airflock.gpu import free_memory, required, runtime, simulating
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 from airflock.scenarios.wings import FORMATIONS
+from airflock.support.errors import DeviceError
+from airflock.support.gpu import free_memory, required, runtime, simulating
 
 CELLS = 4  # at most so many cells per agent, as on the CPU
 PAIRED = 20_000  # agents from which order parameters that look at all pairs are refused

@@ -22,8 +22,8 @@ from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
 from airflock.engine.totals import combined, goals_reached
-from airflock.errors import DeviceError
-from airflock.gpu import free_memory, multiprocessors, required, runtime, simulating
+from airflock.support.errors import DeviceError
+from airflock.support.gpu import free_memory, multiprocessors, required, runtime, simulating
 
 AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress
 

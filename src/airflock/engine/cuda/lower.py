@@ -12,12 +12,12 @@ The passes of `engine.passes` are the only text of a stage. Here its syntax tree
 import ast
 import re
 
+from airflock.core.rules.nodes import walk
 from airflock.engine.cuda.rows import Across, Bound, Context, Everyone, Halves, Numbers, Others, Registers, parse
 from airflock.engine.cuda.shape import UNROLL
 from airflock.engine.replace import ReplacementError
 from airflock.engine.specialise.dead import read, written
 from airflock.engine.stages.words import START
-from airflock.rules.nodes import walk
 
 NEUTRAL = {how: start.spelled for how, start in START.items()}
 TOTAL = {"sum": "{a} += {b}", "min": "{a} = least({a}, {b})", "max": "{a} = most({a}, {b})"}

@@ -11,8 +11,8 @@ import ast
 from collections.abc import Callable, Iterable
 from copy import deepcopy
 
+from airflock.core.rules.nodes import walk
 from airflock.engine.specialise.dead import written
-from airflock.rules.nodes import walk
 
 PREFIX = "per_"
 

@@ -12,8 +12,8 @@ from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
 from airflock.engine.specialise.values import Function
 from airflock.engine.stages.state import FAULT, NUMBER, SCENE
-from airflock.rules.generate import Source
-from airflock.rules.rewrite import law_mark
+from airflock.engine.text.generate import Source
+from airflock.engine.text.rewrite import law_mark
 
 JIT = "@njit(**JIT)"
 ONCE = "@njit(**ONCE)"

@@ -13,7 +13,7 @@ from airflock.core.vectors import names_of, vectors_of
 from airflock.core.vocabulary import asks
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import Plan
-from airflock.rules.probe import shapes_of
+from airflock.engine.text.probe import shapes_of
 
 
 class Owner(NamedTuple):

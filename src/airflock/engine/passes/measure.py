@@ -3,6 +3,7 @@
 from typing import Any
 
 from airflock.core.contract import Metric
+from airflock.core.rules.reading import fields_read
 from airflock.core.vocabulary import Mean
 from airflock.engine.passes import flock, grid
 from airflock.engine.passes.build import Builder, in_place
@@ -15,7 +16,6 @@ from airflock.engine.stages.links import clusters_by_cells
 from airflock.engine.stages.measure import Measured, measured
 from airflock.engine.stages.near import SURE, pairs_by_cells
 from airflock.engine.stages.words import wants
-from airflock.rules.reading import fields_read
 
 AVERAGED = {"x": {"x", "y", "z"}, "v": {"vx", "vy", "vz"}, "h": {"hx", "hy", "hz"}}  # fields of a mean
 BY_CELLS = "n, row, whole, work, cells"  # what a search by cells is called with

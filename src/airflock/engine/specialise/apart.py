@@ -10,8 +10,8 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from airflock.core.rules.nodes import walk
 from airflock.engine.specialise.values import Text, kind_of
-from airflock.rules.nodes import walk
 
 TABLES = frozenset({"work", "row", "whole", "words", "store", "scene", "scratch"})  # what bindings of a driver read
 MARK = re.compile(r"@(\d+)")

@@ -3,7 +3,7 @@
 import ast
 from collections.abc import Iterable
 
-from airflock.rules.nodes import walk
+from airflock.core.rules.nodes import walk
 
 
 def read(nodes: Iterable[ast.AST]) -> set[str]:

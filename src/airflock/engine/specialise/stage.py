@@ -4,12 +4,12 @@ import ast
 from collections.abc import Callable
 from typing import Any
 
+from airflock.core.rules.nodes import walk
 from airflock.engine.passes.build import Builder
 from airflock.engine.specialise.dead import read, without_dead
 from airflock.engine.specialise.statements import TABLES, Statements
 from airflock.engine.specialise.text import Specialised
 from airflock.engine.specialise.values import Components, StageError, kind_of
-from airflock.rules.nodes import walk
 
 
 def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> Specialised:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+from airflock.core.rules.nodes import walk
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import WHOLE
 from airflock.engine.specialise.apart import Owners, renamed, shares
@@ -26,7 +27,6 @@ from airflock.engine.stages import words
 from airflock.engine.stages.records import Cells, Surroundings
 from airflock.engine.stages.state import SCENE, Flock, own_row
 from airflock.engine.stages.words import Itself, Named
-from airflock.rules.nodes import walk
 
 TABLES = {"u": "words", "packet": "store"}  # rows of other tables than that of states, by what their names begin with
 CELLS = ("starts", "whose", "packed", "flat", "count")  # what a driver calls what it has sorted

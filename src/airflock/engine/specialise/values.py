@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import Any
 
+from airflock.core.rules.nodes import walk
 from airflock.engine.stages.words import NOTHING, ZERO
-from airflock.rules.nodes import walk
 
 LOAD, STORE = ast.Load(), ast.Store()
 

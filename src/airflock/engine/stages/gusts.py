@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from airflock.body import dryden, wind
 from airflock.core import random
 from airflock.engine.plan import Plan
+from airflock.parts.bodies import dryden, wind
 
 GUST = random.GUST
 MORE = random.GUST + 256  # a second draw of the same step

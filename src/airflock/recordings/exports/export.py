@@ -5,11 +5,11 @@ from pathlib import Path
 
 import xarray as xr
 
-from airflock.errors import RecordingError
 from airflock.recordings.exports.movement import write_movement
 from airflock.recordings.exports.tables import write_csv, write_parquet
-from airflock.suffixes import suffix_fault
-from airflock.untrusted import path_of
+from airflock.support.errors import RecordingError
+from airflock.support.suffixes import suffix_fault
+from airflock.support.untrusted import path_of
 
 ENDINGS = (".csv", ".parquet", ".nc")
 LAYOUTS = ("movement", "movement-0.16", "px4")

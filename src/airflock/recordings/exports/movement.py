@@ -5,8 +5,8 @@ from pathlib import Path
 
 import xarray as xr
 
-from airflock import atomic
 from airflock.recordings.layout import DIMENSIONS, check
+from airflock.support import atomic
 
 STATES = ("position", "velocity", "command")
 PLURAL = {"keypoint": "keypoints", "individual": "individuals"}

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock import atomic
-from airflock.errors import RecordingError
 from airflock.recordings.layout import check
+from airflock.support import atomic
+from airflock.support.errors import RecordingError
 
 COLUMNS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "command": ("cx", "cy", "cz")}
 

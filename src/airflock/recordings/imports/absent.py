@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
 from airflock.recordings.imports.track import COMMAND, GEODETIC, POSITION, VELOCITY, Findings, Track
+from airflock.support.errors import RecordingError
 
 PLACES = (*POSITION[:2], *GEODETIC[:2])
 Lacking = dict[str, list[tuple[NDArray[np.int64], int]]]  # column → of each individual the rows, and how many are inf

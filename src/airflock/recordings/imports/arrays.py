@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock.errors import RecordingError, gathering
 from airflock.recordings.imports import headers
 from airflock.recordings.imports.track import POSITION, Findings, Options, Track
+from airflock.support.errors import RecordingError, gathering
 
 PLAIN = "idtrackerai_format SESSION --formats h5 writes plain numbers; or, if you trust the file, python -c "
 COMMAND = "\"import numpy as np; np.save('plain.npy', np.load('FILE', allow_pickle=True).item()['trajectories'])\""

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError, gathering
 from airflock.recordings.imports import expressions, headers, px4
 from airflock.recordings.imports.track import COMMAND, POSITION, TARGETS, VELOCITY, Options
-from airflock.spelling import meant
+from airflock.support.errors import RecordingError, gathering
+from airflock.support.spelling import meant
 
 MOST_COLUMNS = 2000
 OF_A_TRACKER = ("probability", "likelihood", "score", "confidence")

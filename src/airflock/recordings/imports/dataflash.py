@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from airflock.errors import RecordingError
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
 from airflock.recordings.isolated import Contents, Opening, Share
+from airflock.support.errors import RecordingError
 
 PARTS = ("PSCN", "PSCE", "PSCD")  # position control: north, east, down
 PACE = 1e5  # bytes per second; read by Python, row by row

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
-from airflock.spelling import meant
+from airflock.support.errors import RecordingError
+from airflock.support.spelling import meant
 
 LONGEST = 300  # characters; nothing that a column needs is longer
 OPERATIONS = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}

@@ -6,12 +6,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
-from airflock.memory import give_back_memory
 from airflock.recordings.differences import gradient
 from airflock.recordings.imports.checks import period_of
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Track
 from airflock.recordings.layout import DIMENSIONS, UNITS
+from airflock.support.errors import RecordingError
+from airflock.support.memory import give_back_memory
 
 MOST = 2_000_000_000  # numbers of one recording
 NORMAL = 1.5  # times the usual step: longer is a gap

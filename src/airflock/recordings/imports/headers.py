@@ -3,8 +3,8 @@
 import re
 from typing import NamedTuple
 
-from airflock.errors import RecordingError
 from airflock.recordings.imports.track import COMMAND, GEODETIC, POSITION, VELOCITY, Options
+from airflock.support.errors import RecordingError
 
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048, "in": 0.0254}
 TIMES = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}

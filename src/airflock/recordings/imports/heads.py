@@ -5,9 +5,9 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-from airflock.errors import RecordingError
 from airflock.recordings.imports.columns import MOST_COLUMNS, layout
 from airflock.recordings.imports.track import Options
+from airflock.support.errors import RecordingError
 
 DELIMITERS = (",", ";", "\t", "|")
 BLANKS = r"\s+"  # where nothing else separates columns, as NumPy writes tables

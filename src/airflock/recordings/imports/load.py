@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.errors import RecordingError
 from airflock.recordings.imports import (
     absent,
     arrays,
@@ -34,7 +33,8 @@ from airflock.recordings.imports.track import (
     nothing,
 )
 from airflock.recordings.layout import EAST_NORTH_UP, FRAME
-from airflock.untrusted import own_path
+from airflock.support.errors import RecordingError
+from airflock.support.untrusted import own_path
 
 
 def load_tracks(

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock.errors import RecordingError, gathering
 from airflock.recordings.imports import headers
 from airflock.recordings.imports.arrays import read_idtracker
 from airflock.recordings.imports.track import COMMAND, VELOCITY, Findings, Options, Track
 from airflock.recordings.isolated import Opening, hdf5, netcdf
+from airflock.support.errors import RecordingError, gathering
 
 OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from airflock.errors import LinkError, RecordingError
-from airflock.onboard.log import read_ticks
-from airflock.onboard.mission import AIR, FLY
+from airflock.drones.onboard.log import read_ticks
+from airflock.drones.onboard.mission import AIR, FLY
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
+from airflock.support.errors import LinkError, RecordingError
 
 OTHERS = "of ArduPilot give the .bin that it was made from"  # whose text logs end in .log, too
 

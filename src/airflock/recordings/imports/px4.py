@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from airflock.errors import RecordingError
 from airflock.recordings.imports import headers
 from airflock.recordings.imports.track import POSITION, VELOCITY, Options
+from airflock.support.errors import RecordingError
 
 FIELDS = {"timestamp", *POSITION, *VELOCITY}
 # fields of vehicle_local_position that no other table has; source: PX4, msg/VehicleLocalPosition.msg

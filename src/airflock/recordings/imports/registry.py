@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from airflock.errors import RecordingError
 from airflock.recordings.imports import arrays, dataflash, movement, node_log, tables, ulog
 from airflock.recordings.imports.track import Findings, Options, Track
 from airflock.recordings.packed import refuse_packed, refuse_pickle
-from airflock.untrusted import from_outside
+from airflock.support.errors import RecordingError
+from airflock.support.untrusted import from_outside
 
 Reader = Callable[[Path, Options, Findings], list[Track]]
 READERS: dict[str, tuple[str, Reader]] = {

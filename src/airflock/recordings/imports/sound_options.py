@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from airflock.numeric import is_number
 from airflock.recordings.imports import headers
 from airflock.recordings.imports.track import ACCEPTED, Findings, Options
+from airflock.support.numeric import is_number
 
 
 def check_options(

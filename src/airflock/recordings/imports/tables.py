@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from airflock.errors import RecordingError
-from airflock.memory import give_back_memory
 from airflock.recordings.imports import expressions, headers, px4
 from airflock.recordings.imports.absent import PLACES
 from airflock.recordings.imports.columns import Layout, layout
 from airflock.recordings.imports.heads import head_of
 from airflock.recordings.imports.track import GEODETIC, POSITION, Findings, Options, Track
 from airflock.recordings.imports.wide import first_of, pieces, wide_of
+from airflock.support.errors import RecordingError
+from airflock.support.memory import give_back_memory
 
 CLOCK = r"\d+:[0-5]\d:[0-5]\d(\.\d+)?"  # hours, minutes, seconds
 CHUNK = 250_000  # rows that are read at a time, so that an hour of thirty drones fits

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
+from airflock.support.errors import RecordingError
 
 POSITION, VELOCITY, COMMAND = ("x", "y", "z"), ("vx", "vy", "vz"), ("cx", "cy", "cz")
 GEODETIC = ("lat", "lon", "alt")

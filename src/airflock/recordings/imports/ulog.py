@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from airflock.errors import RecordingError
 from airflock.recordings.imports.px4 import invalid_note, origin_of
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
+from airflock.support.errors import RecordingError
 
 LOCAL, SETPOINT = "vehicle_local_position", "trajectory_setpoint"
 TOPICS = [LOCAL, SETPOINT, "vehicle_gps_position", "vehicle_land_detected"]

@@ -5,8 +5,8 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.errors import ParameterError
 from airflock.recordings.measures.states import sound, states
+from airflock.support.errors import ParameterError
 
 
 def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:

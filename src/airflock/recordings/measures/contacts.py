@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.errors import ParameterError
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.measures.states import sound, states
+from airflock.support.errors import ParameterError
 from airflock.world.place import Place, Shapes
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.errors import ParameterError
 from airflock.recordings import images
 from airflock.recordings.measures.states import sound, states
+from airflock.support.errors import ParameterError
 
 NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of recordings in single precision
 

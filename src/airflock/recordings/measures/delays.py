@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.errors import ParameterError
 from airflock.recordings.measures.states import headings, sound, states
+from airflock.support.errors import ParameterError
 
 ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordings have single precision
 

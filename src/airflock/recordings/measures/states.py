@@ -6,13 +6,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.errors import ParameterError, RecordingError
-from airflock.numeric import is_number
 from airflock.recordings import images
 from airflock.recordings.attributes import scenario_document
 from airflock.recordings.differences import velocities
 from airflock.recordings.flown_scenario import scenario_of
 from airflock.recordings.layout import check
+from airflock.support.errors import ParameterError, RecordingError
+from airflock.support.numeric import is_number
 
 Array = NDArray[Any]
 

@@ -3,9 +3,9 @@
 import numpy as np
 import xarray as xr
 
-from airflock.errors import ParameterError
 from airflock.recordings import images
 from airflock.recordings.measures.states import headings, sound, states
+from airflock.support.errors import ParameterError
 
 
 def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: float = 0.0) -> xr.DataArray:

@@ -1,0 +1,81 @@
+# What a type checker, an editor and `lazy_loader` read: each public name stands here once.
+from .certificates.run import certify as certify
+from .check.bodies import check_body as check_body
+from .check.metrics import check_metric as check_metric
+from .check.models import check_model as check_model
+from .check.radios import check_radio as check_radio
+from .check.sensors import check_sensor as check_sensor
+from .check.topologies import check_topology as check_topology
+from .check.types import check_types as check_types
+from .cli.papers import paper as paper
+from .core.contract import (
+    body as body,
+)
+from .core.contract import (
+    metric as metric,
+)
+from .core.contract import (
+    model as model,
+)
+from .core.fault import fault as fault
+from .core.parameters import (
+    Parameters as Parameters,
+)
+from .core.parameters import (
+    choice as choice,
+)
+from .core.parameters import (
+    quantity as quantity,
+)
+from .core.radio import radio as radio
+from .core.sensor import sensor as sensor
+from .displays.displays import display as display
+from .engine import Flight as Flight
+from .estimate.identify.run import identify as identify
+from .estimate.infer.run import infer as infer
+from .fleets.flying import fleet as fleet
+from .parts.metrics.registry import metric_set as metric_set
+from .plots.picture import plot as plot
+from .plots.video import video as video
+from .recordings import measures as measures
+from .recordings.exports.export import export as export
+from .recordings.files import (
+    load_recording as load_recording,
+)
+from .recordings.files import (
+    save as save,
+)
+from .recordings.flights import (
+    recording_of as recording_of,
+)
+from .recordings.flights import (
+    simulate as simulate,
+)
+from .recordings.health import doctor as doctor
+from .recordings.imports.load import load_tracks as load_tracks
+from .recordings.scores import (
+    over_time as over_time,
+)
+from .recordings.scores import (
+    score as score,
+)
+from .recordings.sweeps import sweep as sweep
+from .scenarios.files import (
+    load as load,
+)
+from .scenarios.files import (
+    presets as presets,
+)
+from .scenarios.keys import keys as keys
+from .scenarios.scaling import starting_set as starting_set
+from .scenarios.scenario import Scenario as Scenario
+from .search.harden import harden as harden
+from .search.run import evolve as evolve
+from .search.tune.run import tune as tune
+from .search.validation import validate as validate
+from .studio.watch import watch as watch
+from .support.errors import AirflockError as AirflockError
+from .view import plots as plots
+from .view.replays import replay as replay
+
+__version__: str

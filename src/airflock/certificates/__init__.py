@@ -1,0 +1,1 @@
+"""Certificates: what flights show of a limit, and checks of what was shown."""

@@ -1,0 +1,219 @@
+"""Counting: fly until a limit is shown, is refuted, or time is over; each look spends part of the error."""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
+
+from airflock.certificates.bounds import Look, look, needed, schedule, share
+from airflock.certificates.campaign import Campaign
+from airflock.certificates.flyer import Flyer
+from airflock.certificates.limit import Limit
+from airflock.certificates.seeds import COUNT, seed
+from airflock.runs.executors import Flight
+from airflock.runs.store import Batch, Store
+from airflock.support.errors import StudyError
+
+BATCH = Batch("count", 0, 0)
+CHUNK = 2.0  # s of flights that are handed out together
+FIRST = 16  # flights before the first guess of how many there will be time for
+MARGIN = 1.5  # a limit is given up beforehand only if it needs so many times the flights that there is time for
+
+
+@dataclass
+class Verdict:
+    """What counting says of one limit.
+
+    probability : the limit per flight; None: it is only to be bounded
+    looks    : in their order; all their bounds hold together
+    needs    : flights without an event that would show it, where there is no time for so many; else 0
+    could    : the limit that there was time to show instead
+    """
+
+    limit: Limit
+    probability: float | None
+    looks: list[Look] = field(default_factory=list)
+    needs: int = 0
+    could: float = 1.0
+
+    @property
+    def low(self) -> float:
+        """Lower bound of the probability per flight."""
+        return max((found.low for found in self.looks), default=0.0)
+
+    @property
+    def high(self) -> float:
+        """Upper bound of the probability per flight."""
+        return min((found.high for found in self.looks), default=1.0)
+
+    @property
+    def shown(self) -> bool:
+        """Whether the limit is shown; without a rate, whether it has been bounded."""
+        return self.high < 1.0 if self.probability is None else self.high <= self.probability
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the opposite is shown: the event happens more often."""
+        return self.probability is not None and not self.shown and self.low > self.probability
+
+    @property
+    def flights(self) -> int:
+        """Flights at the last look."""
+        return self.looks[-1].flights if self.looks else 0
+
+    @property
+    def events(self) -> int:
+        """Events among them."""
+        return self.looks[-1].events if self.looks else 0
+
+
+@dataclass
+class Count:
+    """Flights that were counted.
+
+    rows  : scores of flight 0, 1, 2, ...; seconds : of this process; rate : flights per second, 0 where unknown
+    """
+
+    verdicts: list[Verdict]
+    rows: list[Mapping[str, Any]]
+    seconds: float = 0.0
+    rate: float = 0.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far counting is: flights (those of the store included), flights that decide, events of each limit so far."""
+
+    done: int
+    total: int
+    events: tuple[int, ...]
+    rate: float
+
+
+Watch = Callable[[Progress], None]
+
+
+def count(flyer: Flyer, watch: Watch | None = None) -> Count:
+    """Count events over the seeds of a campaign, in their order, until its time is over.
+
+    Raises StudyError for a flight that fails: a certificate leaves none out.
+    """
+    counting = _Counting(flyer, watch)
+    while counting.goes_on():
+        counting.fly()
+    counting.told.seconds = time.monotonic() - counting.began
+    return counting.told
+
+
+class _Counting:
+    """Counting under way.
+
+    scores : of flights by number, in whatever order they landed; only a prefix without holes counts
+    """
+
+    def __init__(self, flyer: Flyer, watch: Watch | None):
+        self.flyer, self.watch = flyer, watch
+        self.campaign = campaign = flyer.campaign
+        self.began, self.fresh, self.chunk = time.monotonic(), 0, FIRST
+        self.scores: dict[int, Mapping[str, Any]] = {}
+        for (_, number), values in flyer.store.flown(BATCH).items():
+            if values is None:
+                raise StudyError(f"{flyer.store.path}: {_failure(campaign, number, _reason(flyer.store, number))}")
+            self.scores[number] = values
+        self.events = [0] * len(campaign.limits)
+        self.told = Count([Verdict(limit, campaign.probability(limit)) for limit in campaign.limits], [])
+        self.aims: list[int] = []
+
+    def goes_on(self) -> bool:
+        """Count the flights that have landed; whether more can decide anything, and there is time for them."""
+        rows, verdicts = self.told.rows, self.told.verdicts
+        while len(rows) in self.scores:
+            rows.append(self.scores[len(rows)])
+            for i, verdict in enumerate(verdicts):
+                self.events[i] += verdict.limit.happened(rows[-1])
+                coming = _next(self.campaign, verdict)
+                if coming is not None and coming[0] == len(rows):
+                    verdict.looks.append(look(len(rows), self.events[i], *coming[1:]))
+        still = [verdict for verdict in verdicts if _open(self.campaign, verdict)]
+        self.aims = [coming[0] for verdict in still if (coming := _next(self.campaign, verdict))]
+        self._note()
+        left = self.flyer.left
+        if not still or left <= 0.0:
+            return False
+        if self.fresh < FIRST or math.isinf(left):
+            self.chunk = max(FIRST, math.ceil(CHUNK * self.told.rate))
+            return True
+        able = len(rows) + left * self.told.rate
+        for verdict in still:
+            first = self._first(verdict)  # a limit with an event may yet be refuted
+            hopeless = first > MARGIN * able and not self.events[verdicts.index(verdict)]
+            verdict.needs, verdict.could = (first, smallest(able, self.campaign.alpha)) if hopeless else (0, 1.0)
+        self.chunk = max(FIRST, math.ceil(min(CHUNK, left) * self.told.rate))
+        return not all(verdict.needs for verdict in still)
+
+    def _first(self, verdict: Verdict) -> int:
+        """Flights without an event that would show a limit; 0 where there is an upper bound already."""
+        return 0 if verdict.high < 1.0 else least(self.campaign, verdict.limit)
+
+    def fly(self) -> None:
+        """Fly the next few flights that the store does not hold."""
+        done = len(self.told.rows)
+        flights = []
+        for number in range(done, min(max(self.aims), done + self.chunk)):
+            if number not in self.scores:
+                own = seed(self.campaign.hash, COUNT, number)
+                flights.append(Flight(0, number, self.campaign.parameters(own), own))
+        for landed in self.flyer.fly(BATCH, flights):
+            if landed.values is None:
+                raise StudyError(_failure(self.campaign, landed.flight.repeat, landed.reason))
+            self.scores[landed.flight.repeat], self.fresh = landed.values, self.fresh + 1
+            self.told.rate = self.fresh / max(time.monotonic() - self.began, 1e-9)
+            self._note()
+
+    def _note(self) -> None:
+        if self.watch:
+            total = max([*self.aims, len(self.scores)])
+            self.watch(Progress(len(self.scores), total, tuple(self.events), self.told.rate))
+
+
+def _open(campaign: Campaign, verdict: Verdict) -> bool:
+    """Whether further flights could decide."""
+    if campaign.flights:
+        return not verdict.looks
+    return not verdict.shown and not verdict.refuted
+
+
+def due(campaign: Campaign, limit: Limit) -> Iterator[tuple[int, float, float]]:
+    """All looks at a limit: flights, and the error probabilities spent on the upper and on the lower bound."""
+    probability = campaign.probability(limit)
+    if campaign.flights:
+        yield campaign.flights, campaign.alpha, campaign.alpha
+    elif probability is not None:  # `planned` gives every campaign without a rate a number of flights
+        yield from schedule(probability, campaign.alpha)
+
+
+def _next(campaign: Campaign, verdict: Verdict) -> tuple[int, float, float] | None:
+    """The next look."""
+    return next(islice(due(campaign, verdict.limit), len(verdict.looks), None), None)
+
+
+def least(campaign: Campaign, limit: Limit) -> int:
+    """Flights without an event that would show a limit; 0 for one that is only to be bounded."""
+    probability = campaign.probability(limit)
+    return 0 if probability is None else needed(probability, campaign.alpha * share(1))
+
+
+def smallest(flights: float, alpha: float) -> float:
+    """Smallest limit per flight that so many flights without an event show at the first look."""
+    return -math.expm1(math.log(alpha * share(1)) / max(flights, 1.0))
+
+
+def _reason(store: Store, number: int) -> str:
+    reasons = store.rows("SELECT reason FROM flight WHERE stage=? AND repeat=?", (BATCH.stage, number))
+    return str(reasons[0][0]) if reasons else ""
+
+
+def _failure(campaign: Campaign, number: int, reason: str) -> str:
+    return f"{campaign.scenario.name}: flight {number}, seed {seed(campaign.hash, COUNT, number)}, failed: {reason}"

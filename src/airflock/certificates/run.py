@@ -1,0 +1,203 @@
+"""The public door: a scenario and limits in, a certificate out; begun or continued in a folder of flights."""
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from airflock.certificates.branches import sound_split
+from airflock.certificates.campaign import FOLDER, Campaign
+from airflock.certificates.certificate import Certificate
+from airflock.certificates.counting import Count, Watch, count
+from airflock.certificates.executing import executor_for, folder_of, planned
+from airflock.certificates.flyer import Flyer
+from airflock.certificates.hazard import Hazard, hazard
+from airflock.certificates.maps import bounds_over, sound_axes
+from airflock.certificates.request import campaign_of, sound_budget, sound_workers, tolerance_keys
+from airflock.runs.executors import Executor
+from airflock.runs.folder import Interrupted, open_folder, remove_unfinished, versions, write
+from airflock.runs.store import Store
+from airflock.scenarios import formats
+from airflock.scenarios.change import variant
+from airflock.scenarios.scenario import Scenario
+from airflock.support.asked import Asked
+
+COUNTED = 2.0 / 3.0  # share of the budget that counting may take where tolerance is asked for
+
+
+def certify(
+    scenario: Scenario | str | os.PathLike[str],
+    limit: str | Sequence[str],
+    *,
+    confidence: float = 0.95,
+    budget: float = 600.0,
+    flights: int | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    settings: Mapping[str, Any] | None = None,
+    law: Any = None,
+    uncertain: bool = False,
+    tolerance: bool | Sequence[str] = False,
+    split: bool = False,
+    over: Mapping[str, Sequence[float]] | None = None,
+    precision: int = 32,
+    device: str = "cpu",
+    scheduler: str | None = None,
+    threads: int | None = None,
+    timeout: float | None = None,
+    watch: Watch | None = None,
+    trust: bool = False,
+) -> Certificate:
+    """Show by counting that an event is rare: exact bounds that hold over all looks, seeds fixed by the scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path
+        What is flown.
+    limit : str or list of str
+        "r_min<1 at 1e-3/h", "n_coll>=1 at 1e-2/drone-h", "clearance<0 at 1%", "phi_vel>=3 in 99%"; without a rate the
+        event is bounded as well as the flights allow. All limits hold together.
+    confidence : float
+        Of all that is shown, in (0, 1).
+    budget : float
+        Time that may be spent, s.
+    flights : int, optional
+        Fly so many, whatever the time, and look once.
+    folder : str or path, optional
+        Folder that keeps every flight, so that what was interrupted can be continued.
+    resume : bool
+        Continue the campaign in the folder.
+    settings : mapping, optional
+        Keys of the scenario to change.
+    law : optional
+        A flocking law of your own, as `airflock.load` takes it.
+    uncertain : bool
+        Each flight draws its numbers from the intervals in the scenario file (`airflock identify --uncertain`).
+    tolerance : bool or list of str
+        Also find how far each number of the environment may move; or only the keys that are named.
+    split : bool
+        Also estimate limits on r_min by splitting, which finds and ranks rare flights but shows nothing.
+    over : mapping, optional
+        Two keys with their values, {"radio.delay": [0.5, 1.0], "body.noise": [0.2, 0.4]}: also bounds over this grid.
+    precision : int
+        Bits per number: 32 or 64.
+    device : str
+        cpu, or python (no compiler, double precision).
+    scheduler : str, optional
+        Address of a dask scheduler; by default flights fly in this process.
+    threads : int, optional
+        Flights side by side; by default one per core.
+    timeout : float, optional
+        Time that a flight may take on a dask worker, s.
+    watch : callable, optional
+        Called with a Progress now and then.
+    trust : bool
+        Whether code that files name may run.
+
+    Returns
+    -------
+    Certificate
+        Verdicts, bounds, worst flights; `save` writes certificate.toml, `check` flies one flight in a hundred again.
+
+    Raises
+    ------
+    ScenarioError, StudyError
+        If the scenario, a limit or the folder cannot be used, or a flight fails.
+    Interrupted
+        At Ctrl-C.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 3, "duration": 1.0})
+    >>> found = airflock.certify(short, "r_min<0.01 at 20%", flights=14)
+    >>> found.shown, found.verdicts[0].events
+    (True, 0)
+    """
+    found = variant(scenario, settings, law, trust=trust)
+    asked = Asked()
+    chosen: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
+    campaign = asked.read(campaign_of, found, limit, confidence, flights, **chosen)
+    if split:
+        asked.read(sound_split, campaign)
+    keys = asked.read(tolerance_keys, found, tolerance)
+    axes = asked.read(sound_axes, found, over) if over else {}
+    asked.read(sound_budget, budget)
+    asked.read(sound_workers, timeout, scheduler, device)
+    asked.refuse()
+    with folder_of(folder) as path:
+        executor = executor_for(campaign, scheduler, threads, timeout)
+        try:
+            campaign = planned(campaign, executor, budget, path, resume)
+            open_folder(path, campaign, resume=resume, kind=FOLDER)
+            return run(
+                campaign, path, executor, budget, watch, keys=keys, split=split, axes=axes, threads=threads,
+                kept=folder is not None,
+            )  # fmt: skip
+        finally:
+            executor.close()
+
+
+def run(
+    campaign: Campaign,
+    folder: Path,
+    executor: Executor,
+    budget: float,
+    watch: Watch | None = None,
+    *,
+    keys: Sequence[str] = (),
+    split: bool = False,
+    axes: Mapping[str, Sequence[float]] | None = None,
+    threads: int | None = None,
+    note: Callable[[str], None] | None = None,
+    kept: bool = True,
+) -> Certificate:
+    """Count, find tolerances of `keys`, split, and map over `axes`, in a folder that `open_folder` has accepted.
+
+    note : told in a few words what begins; kept: whether the folder stays
+    """
+    began = time.monotonic()
+    where = str(folder / "scenario.toml") if kept else campaign.scenario.name
+
+    def left(share: float = 1.0) -> float:
+        return share * (budget if campaign.flights else max(0.0, budget - (time.monotonic() - began)))
+
+    with Store(folder) as store:
+        store.begin(versions())
+        remove_unfinished(folder)
+        write(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
+        flyer = Flyer(campaign, store, executor, note=note)
+        try:
+            part = COUNTED if keys or split or axes else 1.0
+            counted = count(flyer if campaign.flights else flyer.with_budget(budget * part), watch)
+            rare: Mapping[str, Any] = {}
+            tolerances: Mapping[str, Any] = {}
+            if split:
+                from airflock.certificates.branches import split as splitting
+
+                rare = splitting(flyer.with_budget(left(0.5 if keys else 1.0)), counted, threads, where)
+            if keys:
+                from airflock.certificates.tolerance import tolerance
+
+                tolerances = tolerance(flyer.with_budget(left(0.5 if axes else 1.0)), counted, keys)
+            cells = bounds_over(flyer.with_budget(left()), axes) if axes else {}
+        except KeyboardInterrupt as stop:
+            done = f"interrupted: {store.count('count'):,} flights"
+            if kept:
+                raise Interrupted(f"{done} are stored in {folder}; continue with --resume") from stop
+            raise Interrupted(f"{done} are not kept; with --out (in Python: folder=) they are, for --resume") from stop
+    return Certificate(
+        campaign, tuple(counted.verdicts), hazards(campaign, counted), counted.rows, versions(),
+        time.monotonic() - began, counted.rate, tolerances, rare, cells, where,
+    )  # fmt: skip
+
+
+def hazards(campaign: Campaign, counted: Count) -> dict[int, Hazard]:
+    """Whether events came evenly over a flight, for each limit whose event has a moment."""
+    found = {}
+    timed = [i for i, limit in enumerate(campaign.limits) if limit.timed]
+    for place, i in enumerate(timed):
+        times = [row["first"][place] for row in counted.rows if row.get("first") and row["first"][place] is not None]
+        found[i] = hazard(times, len(counted.rows), campaign.scenario.flight.duration)
+    return found

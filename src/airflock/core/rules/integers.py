@@ -1,0 +1,150 @@
+"""Which names of a rule are integers, judged by how they are used, whatever they are called.
+
+An integer counts a loop over a range, is an index, is given to `range`, to a shift or to a function that takes an
+integer there, is divided by a whole number with `//`, or is made of such. All other numbers of a rule are floats.
+"""
+
+import ast
+import inspect
+import textwrap
+import types
+from collections.abc import Callable, Iterator
+from functools import cache, lru_cache
+from typing import Any
+
+from airflock.core.rules.nodes import walk
+from airflock.support.errors import RuleError
+
+BITWISE = (ast.LShift, ast.RShift, ast.BitAnd, ast.BitOr, ast.BitXor)
+KEEPING = {"min", "max", "abs"}  # integers of integers
+MAKING = {"int", "len"}
+
+
+@lru_cache(maxsize=4096)
+def _source(rule: Callable[..., Any]) -> str:
+    """Text of a rule; finding its end in its file takes longer than all else that is done with it."""
+    return textwrap.dedent(inspect.getsource(rule))
+
+
+def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
+    """Syntax tree of a rule from its own source file or notebook cell."""
+    try:
+        text = _source(rule)
+    except (OSError, TypeError) as fault:
+        raise RuleError(f"the source of rule {rule.__name__} is not available: {fault}") from fault
+    node = ast.parse(text).body[0]
+    if not isinstance(node, ast.FunctionDef):
+        raise RuleError(f"rule {getattr(rule, '__name__', rule)} is no plain function")
+    return node
+
+
+@cache
+def integers_of(rule: Callable[..., Any]) -> frozenset[str]:
+    """Names in a rule that hold integers: its variables, and integers of its module."""
+    node = tree_of(rule)
+    found = {name for name, value in rule.__globals__.items() if type(value) is int}
+    found -= set(rule.__code__.co_varnames)
+    while True:
+        known = len(found)
+        for item in walk(node):
+            for used in _integer_places(item, rule):
+                found |= set(_terms(used))
+            if isinstance(item, ast.For) and _called(item.iter) == "range":
+                found |= set(_terms(item.target))
+            if isinstance(item, ast.Assign):
+                for target, value in _pairs(item):
+                    if is_integer(value, found, rule):
+                        found |= set(_terms(target))
+        if len(found) == known:
+            return frozenset(found)
+
+
+def is_integer(node: ast.expr, integers: set[str] | frozenset[str], rule: Callable[..., Any]) -> bool:
+    """Whether an expression is an integer, given the names that are."""
+    if isinstance(node, ast.Constant):
+        return type(node.value) is int
+    if isinstance(node, ast.Name):
+        return node.id in integers
+    if isinstance(node, ast.UnaryOp):
+        return is_integer(node.operand, integers, rule)
+    if isinstance(node, ast.IfExp):
+        return is_integer(node.body, integers, rule) and is_integer(node.orelse, integers, rule)
+    if isinstance(node, ast.BinOp):
+        if isinstance(node.op, BITWISE):
+            return True
+        sides = is_integer(node.left, integers, rule) and is_integer(node.right, integers, rule)
+        return sides and not isinstance(node.op, (ast.Div, ast.Pow))
+    if isinstance(node, ast.Call):
+        name = _called(node)
+        if name in KEEPING:
+            return all(is_integer(argument, integers, rule) for argument in node.args)
+        return name in MAKING or _gives_integer(plain_function(name, rule))
+    return False
+
+
+def _integer_places(item: ast.AST, rule: Callable[..., Any]) -> Iterator[ast.expr]:
+    """Expressions that can only be integers, because of where they stand."""
+    if isinstance(item, ast.Subscript):
+        yield from item.slice.elts if isinstance(item.slice, ast.Tuple) else [item.slice]
+    elif isinstance(item, ast.BinOp) and isinstance(item.op, BITWISE):
+        yield from (item.left, item.right)
+    elif isinstance(item, ast.BinOp) and isinstance(item.op, ast.FloorDiv) and isinstance(item.right, ast.Constant):
+        yield from [item.left] if type(item.right.value) is int else []
+    elif isinstance(item, ast.Call):
+        called = plain_function(_called(item), rule)
+        if _called(item) == "range":
+            yield from item.args
+        elif called is not None:
+            names = called.__code__.co_varnames[: called.__code__.co_argcount]
+            integers = integers_of(called)
+            yield from (given for name, given in zip(names, item.args, strict=False) if name in integers)
+
+
+def _terms(node: ast.AST) -> Iterator[str]:
+    """Names of which a sum, a product or a tuple is made; not those inside calls, subscripts and attributes."""
+    if isinstance(node, ast.Name):
+        yield node.id
+    elif isinstance(node, ast.BinOp):
+        yield from _terms(node.left)
+        yield from _terms(node.right)
+    elif isinstance(node, ast.UnaryOp):
+        yield from _terms(node.operand)
+    elif isinstance(node, ast.Tuple):
+        for part in node.elts:
+            yield from _terms(part)
+
+
+def _pairs(item: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
+    """What is assigned to what, tuples taken apart."""
+    for target in item.targets:
+        if isinstance(target, ast.Tuple) and isinstance(item.value, ast.Tuple):
+            yield from zip(target.elts, item.value.elts, strict=False)
+        elif not isinstance(target, ast.Tuple):
+            yield target, item.value
+
+
+def _called(node: ast.AST) -> str:
+    """Name of what a call calls."""
+    return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+
+
+def free(name: str, rule: Callable[..., Any]) -> Any:
+    """What a free name of a rule stands for; None if for nothing."""
+    closure = dict(zip(rule.__code__.co_freevars, rule.__closure__ or (), strict=True))
+    return rule.__globals__.get(name, closure[name].cell_contents if name in closure else None)
+
+
+def plain_function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] | None:
+    """The plain function that a rule calls by this name; None for itself."""
+    found = free(name, rule)
+    return found if isinstance(found, types.FunctionType) and found is not rule else None
+
+
+@cache
+def _gives_integer(rule: Callable[..., Any] | None) -> bool:
+    """Whether every value that a function returns is an integer."""
+    if rule is None:
+        return False
+    node = tree_of(rule)
+    returned = [item.value for item in walk(node) if isinstance(item, ast.Return) and item.value is not None]
+    return bool(returned) and all(is_integer(value, integers_of(rule), rule) for value in returned)

@@ -1,0 +1,89 @@
+"""A show: drones fly from shape to shape in one flight, of which it keeps what was flown and how well."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock.displays.master import Formed, Frames, Master
+from airflock.engine import Flight
+from airflock.recordings.flights import recording_of as recorded
+from airflock.scenarios.files import load
+from airflock.scenarios.scenario import Scenario
+from airflock.support.errors import AirflockError
+
+FILE = Path(__file__).parent / "display.toml"
+FAILURES = ("fall", "hover", "both")
+
+
+@dataclass
+class Show:
+    """What was flown: each shape's figures; frames (time, 6, drone; nan once failed), the time between them, s, and the
+    last frame of each shape; the scenario, the seed, and the flight, which is one from the first shape to the last.
+    """
+
+    formed: list[Formed]
+    frames: Frames
+    period: float
+    ends: list[int]
+    scenario: Scenario
+    seed: int
+    flight: Flight
+
+
+def recording_of(show: Show) -> xr.Dataset:
+    """A show as a recording with its events; drones that failed are missing from then on."""
+    return recorded(show.flight)
+
+
+def scenario_of(drones: int, settings: dict[str, Any] | None = None) -> Scenario:
+    """Scenario of a display, with keys changed."""
+    there = [[3.0 * i, 0.0, 10.0] for i in range(drones)]
+    return load(FILE, {"agents": drones, "goals.points": there, **(settings or {})})
+
+
+def ranks(count: int, spacing: float = 3.0, height: float = 10.0) -> Frames:
+    """Where drones wait before the first shape: points (count, 3) of a level square, m."""
+    side = int(np.ceil(np.sqrt(count)))
+    number = np.arange(count)
+    x, y = (number % side - 0.5 * (side - 1)) * spacing, (number // side - 0.5 * (side - 1)) * spacing
+    return np.column_stack([x, y, np.full(count, height)])
+
+
+def fly_show(
+    shapes: list[NDArray[np.float64]],
+    drones: int,
+    failing: float = 0.0,
+    failure: str = "both",
+    seed: int = 0,
+    settings: dict[str, Any] | None = None,
+) -> Show:
+    """Fly a display and measure it.
+
+    shapes  : points (point, 3) of each, m; failing : share of the drones that fail on the way, evenly over the shapes
+    failure : "fall" out of the sky, "hover" where it is and hear nothing more, or "both" in turns
+    settings : keys of the scenario, for instance {"wind.gust": 2.0}
+
+    Raises AirflockError where a shape has fewer points than there are drones.
+    """
+    if failure not in FAILURES:
+        raise AirflockError(f"failure = {failure!r} is none of {', '.join(FAILURES)}")
+    if not 0.0 <= failing < 1.0:
+        raise AirflockError(f"failing = {failing:g} lies outside [0, 1)")
+    for number, points in enumerate(shapes):
+        if len(points) < drones:
+            raise AirflockError(f"shape {number + 1} has {len(points)} points, fewer than {drones} drones")
+    rng = np.random.default_rng([seed, 3])
+    doomed = rng.permutation(drones)[: round(failing * drones)]
+    legs = np.array_split(doomed, len(shapes))
+    kinds = {int(who): FAILURES[i % 2] if failure == "both" else failure for i, who in enumerate(doomed)}
+    scenario = scenario_of(drones, settings)
+    show = Master(scenario, ranks(drones), shapes[0], seed, failing=bool(len(doomed)))
+    ends = []
+    for points, failures in zip(shapes, legs, strict=True):
+        show.form(points, [(int(who), kinds[int(who)], float(rng.uniform())) for who in failures])
+        ends.append(round(show.flight.time / show.period))
+    return Show(show.closed(), show.flight.frames[:, :6], show.period, ends, show.scenario, seed, show.flight)

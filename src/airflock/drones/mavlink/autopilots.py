@@ -1,0 +1,191 @@
+"""Autopilots: what PX4 and ArduPilot call their modes, how they are told to fly, and which parameters keep us safe.
+
+Sources: PX4 user guide, pages Offboard Mode and Parameter Reference; ArduPilot Copter, pages Guided Mode, Copter
+Commands in Guided Mode and Complete Parameter List. Numbers of commands and messages: MAVLink common.xml.
+"""
+
+import struct
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from airflock.drones.mavlink import dialect
+from airflock.drones.mavlink.frames import Packer
+from airflock.support.coordinates import turned
+
+ARM = 400
+DO_SET_MODE = 176
+REQUEST_MESSAGE = 512
+MESSAGE_INTERVAL = 511
+TAKE_OFF = 22
+CUSTOM_MODE = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, first parameter of DO_SET_MODE
+FORCE_DISARM = 21196.0  # second parameter of ARM: also in the air
+ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED in HEARTBEAT.base_mode
+VELOCITY_ONLY = 0x0DC7  # type mask of a setpoint: velocity counts; position, acceleration, yaw and its rate do not
+LOCAL_NED = 1  # MAV_FRAME
+INT32 = 6  # MAV_PARAM_TYPE
+STREAMS = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message → rate that a node asks for, 1/s
+
+
+class Guard(NamedTuple):
+    """A parameter of the autopilot that must lie between two values before anything arms, and why.
+
+    but    : a value between them that is not safe either
+    own    : it must be the autopilot's own system id instead
+    silent : a time-out, s, until which the drone flies on; `reason` says how far
+    """
+
+    name: str
+    low: float
+    high: float
+    why: str
+    own: bool = False
+    silent: float = 0.0
+    but: float | None = None
+
+    def range(self, member: int) -> tuple[float, float]:
+        """Least and largest value that is safe for a member of a flock."""
+        return (float(member), float(member)) if self.own else (self.low, self.high)
+
+    def told(self, member: int | None = None) -> str:
+        """The values that are safe, in words; without a member those of all."""
+        if self.own and member is None:
+            return "to the own system id"
+        low, high = self.range(member or 0)
+        return f"within [{low:g}, {high:g}]" + ("" if self.but is None else f", not {self.but:g}")
+
+    def safe(self, value: float, member: int) -> bool:
+        """Whether a value is safe for a member of a flock."""
+        low, high = self.range(member)
+        return low <= value <= high and value != self.but
+
+    def reason(self, speed: float, response: float) -> str:
+        """Why, for a drone of a largest speed (m/s) that gets slower with a relaxation time (s)."""
+        if not self.silent:
+            return self.why
+        way = speed * (self.silent + response)
+        return f"{self.why}: {way:.3g} m at the limit of {speed:g} m/s with {self.silent:g} s"
+
+
+@dataclass(frozen=True)
+class Autopilot:
+    """What a node has to know of one kind of autopilot.
+
+    number    : MAV_AUTOPILOT in its HEARTBEAT
+    ours      : custom mode in which it obeys velocity setpoints; land, hold: modes it goes to by itself
+    climbs    : whether it takes off by setpoints; else by the command TAKE_OFF once armed
+    bytewise  : whether integers travel as their bytes in PARAM_VALUE (PX4), not as a converted float
+    guards    : parameters that are checked
+    """
+
+    name: str
+    number: int
+    ours: int
+    land: int
+    hold: int
+    climbs: bool
+    bytewise: bool
+    guards: tuple[Guard, ...]
+
+    def mode_parameters(self, mode: int) -> tuple[float, ...]:
+        """Parameters of DO_SET_MODE for a custom mode."""
+        if self.name == "px4":
+            return CUSTOM_MODE, float(mode >> 16 & 0xFF), float(mode >> 24 & 0xFF)
+        return CUSTOM_MODE, float(mode)
+
+    def parameter(self, value: float, type_: int) -> float:
+        """Value of a PARAM_VALUE, whose integers may travel as their bytes."""
+        if self.bytewise and type_ == INT32:
+            return float(struct.unpack("<i", struct.pack("<f", value))[0])
+        return value
+
+
+def px4_mode(main: int, sub: int = 0) -> int:
+    """Custom mode of PX4 from its main mode and sub mode."""
+    return main << 16 | sub << 24
+
+
+AUTOPILOTS = {
+    "px4": Autopilot(
+        "px4", number=12, ours=px4_mode(6), land=px4_mode(4, 6), hold=px4_mode(4, 3), climbs=True, bytewise=True,
+        guards=(
+            Guard("COM_OF_LOSS_T", 0.0, 1.0, "s after the last setpoint until it acts", silent=1.0),
+            Guard("COM_OBL_RC_ACT", 4.0, 4.0, "on lost setpoints: 4 land; one that hovers is hit by one that flies on"),
+            Guard("GF_ACTION", 2.0, 5.0, "its own fence acts: 2 hold, 3 return, 5 land; 4 cuts the motors", but=4.0),
+        ),
+    ),
+    "ardupilot": Autopilot(
+        "ardupilot", number=3, ours=4, land=9, hold=17, climbs=False, bytewise=False,
+        guards=(
+            Guard("GUID_TIMEOUT", 0.1, 1.0, "s after the last setpoint until it brakes", silent=3.0),
+            Guard("FENCE_ENABLE", 1.0, 1.0, "its own fence is on"),
+            Guard("FENCE_ACTION", 1.0, 5.0, "and acts; 0 reports only"),
+            Guard("FS_GCS_ENABLE", 5.0, 5.0, "when heartbeats end: 5 land; a drone that hovers is hit in the end"),
+            Guard("FS_GCS_TIMEOUT", 2.0, 5.0, "s after the last heartbeat until it lands"),
+            Guard("SYSID_MYGCS", 1.0, 250.0, "whose heartbeats count: those of the node, of the same system", own=True),
+        ),
+    ),
+}  # fmt: skip
+
+
+class Speaker:
+    """Packs what a node says to its autopilot.
+
+    system : of the autopilot; the node is another component of the same system
+    """
+
+    def __init__(self, autopilot: Autopilot, system: int, component: int = 191):
+        self.autopilot, self.system, self._pack = autopilot, system, Packer(system, component)
+
+    def heartbeat(self) -> bytes:
+        """A sign of life of an onboard computer (MAV_TYPE 18)."""
+        return self._pack(dialect.common().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+
+    def velocity(self, velocity: tuple[float, float, float], boot_ms: int) -> bytes:
+        """A setpoint: velocity east, north, up, m/s."""
+        vx, vy, vz = turned(*velocity)
+        return self._pack(
+            dialect.common().MAVLink_set_position_target_local_ned_message(
+                boot_ms & 0xFFFFFFFF,
+                self.system,
+                1,
+                LOCAL_NED,
+                VELOCITY_ONLY,
+                0.0,
+                0.0,
+                0.0,
+                vx,
+                vy,
+                vz,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            )  # fmt: skip
+        )
+
+    def command(self, number: int, *parameters: float) -> bytes:
+        """A command with up to seven parameters."""
+        seven = (*parameters, *(0.0,) * (7 - len(parameters)))
+        return self._pack(dialect.common().MAVLink_command_long_message(self.system, 1, number, 0, *seven))
+
+    def set_mode(self, mode: int) -> bytes:
+        """Ask for a custom mode."""
+        return self.command(DO_SET_MODE, *self.autopilot.mode_parameters(mode))
+
+    def arm(self, yes: bool, force: bool = False) -> bytes:
+        """Ask to arm or to disarm; force cuts the motors in the air."""
+        return self.command(ARM, float(yes), FORCE_DISARM if force else 0.0)
+
+    def request_parameter(self, name: str) -> bytes:
+        """Ask for the value of one parameter."""
+        kind: Any = dialect.common().MAVLink_param_request_read_message
+        return self._pack(kind(self.system, 1, name.encode("ascii"), -1))
+
+    def request_message(self, number: int) -> bytes:
+        """Ask for one message once."""
+        return self.command(REQUEST_MESSAGE, float(number))
+
+    def request_streams(self) -> list[bytes]:
+        """Ask for all messages that a node flies by, at their rates."""
+        return [self.command(MESSAGE_INTERVAL, float(number), 1e6 / rate) for number, rate in STREAMS.items()]

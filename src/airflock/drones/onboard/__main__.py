@@ -1,0 +1,7 @@
+"""`python -m airflock.drones.onboard CARD ...`: run a node."""
+
+import sys
+
+from airflock.drones.onboard.run import main
+
+sys.exit(main())

@@ -1,0 +1,51 @@
+"""Numba's passes as they begin, to hear Ctrl-C; and what is said to whoever waits for the compiler."""
+
+import multiprocessing
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from numba.core.event import Event, Listener
+
+from airflock.support.threads import heed
+
+COMPILING = "compiling … (only once for this kind of flight; later flights start at once)"
+PATIENCE = 1.0  # s
+
+
+class Heeding(Listener):  # type: ignore[misc]  # Numba has no types
+    """Each thread that compiles hears of its own passes."""
+
+    def on_start(self, event: Event) -> None:
+        """Give up the work of this thread if it was interrupted. Raises GivenUp."""
+        heed()
+
+    def on_end(self, event: Event) -> None:
+        """Nothing; the next pass is asked."""
+
+
+@contextmanager
+def told_if_long() -> Iterator[None]:
+    """Say once that something is compiled, if it takes longer than PATIENCE, to a person who waits for it."""
+    if not _watched():
+        yield
+        return
+    told = threading.Timer(PATIENCE, _say)
+    told.daemon = True
+    told.start()
+    try:
+        yield
+    finally:
+        told.cancel()
+
+
+def _watched() -> bool:
+    """Whether a person sees what this thread says: at a terminal or in a notebook, and not of one of many workers."""
+    main = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
+    return main and ("ipykernel" in sys.modules or sys.stderr.isatty())
+
+
+def _say() -> None:
+    sys.stderr.write(f"{COMPILING}\n")
+    sys.stderr.flush()

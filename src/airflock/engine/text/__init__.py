@@ -1,0 +1,1 @@
+"""Rules as text of a driver: their first call as plain Python, and their copies."""

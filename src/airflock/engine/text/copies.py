@@ -1,0 +1,105 @@
+"""Copies: the text that a rule had in an earlier driver, for one that would write the same.
+
+To write it anew takes half of the time that the text of a driver takes. What a copy depended on is asked again, in the
+same order: what names of the rule stand for, choices and vectors of its records, and the names of what it calls, which
+come along.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping
+from threading import Lock
+from typing import Any, NamedTuple, Protocol
+
+from airflock.core.rules.integers import free
+
+
+class Asked(Protocol):
+    """What a rule's text is written for: a `generate.Source`."""
+
+    constants: Mapping[str, Mapping[str, str | float]]
+    vectors: Mapping[str, Mapping[str, int]]
+
+    def name(self, item: Any, chosen: Mapping[str, str]) -> str:
+        """Name in the driver of what a rule calls."""
+
+
+class Question(NamedTuple):
+    """One question about a rule: its kind, what it is about, and the answer."""
+
+    kind: str
+    about: tuple[Any, ...]
+    answer: Any
+
+
+class Notes:
+    """What is asked about one rule while it is copied; all of it is kept."""
+
+    def __init__(self, rule: Callable[..., Any], source: Asked):
+        self.rule, self.source = rule, source
+        self.asked: list[Question] = []
+
+    def choice(self, record: str, field: str) -> Any:
+        """The choice or the usual number that a field of a record is; None if it is neither."""
+        return self._kept("choice", record, field)
+
+    def size(self, record: str, field: str) -> int:
+        """How many components a field of a record has; 0 if it is no vector."""
+        return int(self._kept("size", record, field))
+
+    def free(self, name: str) -> Any:
+        """What a free name of the rule stands for; None if for nothing."""
+        return self._kept("free", name)
+
+    def name(self, item: Any, chosen: Mapping[str, str]) -> str:
+        """Name in the driver of what the rule calls."""
+        return str(self._kept("name", item, tuple(chosen.items())))
+
+    def hold(self, copied: list[Question]) -> bool:
+        """Whether all answers of another time are those of now; what the rule calls comes along."""
+        return all(_same(each.answer, self._answer(each.kind, *each.about)) for each in copied)
+
+    def _kept(self, kind: str, *about: Any) -> Any:
+        answer = self._answer(kind, *about)
+        self.asked.append(Question(kind, about, answer))
+        return answer
+
+    def _answer(self, kind: str, *about: Any) -> Any:
+        if kind == "choice":
+            return self.source.constants.get(about[0], {}).get(about[1])
+        if kind == "size":
+            return self.source.vectors.get(about[0], {}).get(about[1], 0)
+        if kind == "free":
+            return free(about[0], self.rule)
+        return self.source.name(about[0], dict(about[1]))
+
+
+def _same(known: Any, found: Any) -> bool:
+    """Whether an answer is what it was: the same object, or an equal text or number of the same type."""
+    return known is found or (type(known) is type(found) and isinstance(known, (str, int, float)) and known == found)
+
+
+class Copies:
+    """Texts that were written for rules, each with the questions that it depends on; the last that were asked for.
+
+    most : rules, each under one name and under all else that its text depends on; each : texts of one of them
+    """
+
+    def __init__(self, most: int = 4096, each: int = 256):
+        self._most, self._each, self._lock = most, each, Lock()
+        self._kept: OrderedDict[Hashable, tuple[tuple[list[Question], str], ...]] = OrderedDict()
+
+    def text(self, of: Hashable, notes: Notes) -> str | None:
+        """The text that was written where all answers were those of now; None if none was."""
+        with self._lock:
+            known = self._kept.get(of, ())
+            if known:
+                self._kept.move_to_end(of)
+        return next((text for asked, text in known if notes.hold(asked)), None)
+
+    def keep(self, of: Hashable, notes: Notes, text: str) -> None:
+        """Keep a text, with what was asked while it was written."""
+        with self._lock:
+            self._kept[of] = (*self._kept.get(of, ())[-self._each + 1 :], (notes.asked, text))
+            self._kept.move_to_end(of)
+            while len(self._kept) > self._most:
+                self._kept.popitem(last=False)

@@ -1,0 +1,161 @@
+"""From plain rules to the text of one driver module.
+
+The text of each rule is copied, global constants are inlined, float literals are cast to `real`, choices of a parameter
+record become constants, and every plain function that a rule calls comes along; one that is handed a choice comes in a
+text of its own for each. The engine writes the loops around it (`passes`); the result is one file that depends on
+nothing but Numba.
+"""
+
+import ast
+import inspect
+from collections.abc import Callable, Mapping
+from copy import copy
+from typing import Any
+
+from airflock.core import random as random_streams
+from airflock.core.rules import law
+from airflock.core.rules.integers import tree_of
+from airflock.core.rules.nodes import walk
+from airflock.engine.text.copies import Copies, Notes
+from airflock.engine.text.rewrite import NOTHING, Rewrite
+from airflock.support.spelling import as_name
+
+# A solver is called from several places and would be compiled as often: minutes instead of seconds.
+ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True, **INNER)'
+NONE: Mapping[str, Mapping[str, int]] = {}
+COPIES = Copies()  # of this process
+INLINED = '@njit(inline="always", **JIT)'
+
+
+class Source:
+    """Collects functions and records, each once, as text in the order in which they are needed.
+
+    decorator : line put above each function
+    constants : for each record name (p, b, q, ...) its choices and usual numbers, inlined as constants
+    vectors   : for each record name its vectors, with how many components each has
+    rows      : fields of each record that is made of a row of numbers, by its name
+    lenient   : whether rules may call what only plain Python has, such as breakpoint() and print()
+    """
+
+    lenient = False
+
+    def __init__(
+        self,
+        decorator: str,
+        constants: Mapping[str, Mapping[str, str | float]],
+        vectors: Mapping[str, Mapping[str, int]] = NONE,
+    ):
+        self.decorator = decorator
+        self.constants = constants
+        self.vectors = vectors
+        self.law = 0
+        self.blocks: list[str] = []
+        self.rows: dict[str, tuple[str, ...]] = {}
+        self._names: dict[Any, str] = {}
+        self._taken: set[str] = set()
+        self._originals: dict[str, Any] = {}
+        self._apart = False
+
+    def of(
+        self, law: int, constants: Mapping[str, Mapping[str, str | float]], vectors: Mapping[str, Mapping[str, int]]
+    ) -> "Source":
+        """The same text, for rules of another law of the flock: what they read of its records is its own."""
+        other = copy(self)
+        other.constants, other.vectors, other.law = constants, vectors, law
+        return other
+
+    def name(self, item: Any, chosen: Mapping[str, str] = NOTHING) -> str:
+        """Name in the driver of a plain function or a NamedTuple class; adds its text on first use.
+
+        chosen : arguments of the function that are choices, by name; they become constants of its text
+        """
+        key = (item, *chosen.items()) if chosen else item
+        if self.law and inspect.isfunction(item) and {"p", "percept"} & set(item.__code__.co_varnames):
+            key = (self.law, key)
+        if key in self._names:
+            return self._names[key]
+        drawn = inspect.isfunction(item) and item.__module__ == random_streams.__name__
+        if drawn and item.__name__ in random_streams.PRIMITIVES:
+            return str(item.__name__)  # bound by the device
+        module = str(getattr(item, "__module__", "")).rpartition(".")[2].strip("_")
+        said = [text for text in chosen.values() if text.isidentifier()]
+        name = base = as_name("_".join([module, item.__name__, *said]))
+        count = 1
+        while name in self._taken:
+            count += 1
+            name = f"{base}{count}"
+        self._names[key] = name
+        self._taken.add(name)
+        if not chosen:
+            self._originals[name] = item
+        if isinstance(item, type):
+            self.blocks.append(f"{name} = namedtuple({name!r}, {list(getattr(item, '_fields', ()))!r})")
+        else:
+            self.blocks.append(self._function(random_streams.COMPILED.get(item, item), name, chosen))
+        return name
+
+    def names(self) -> set[str]:
+        """Names in the driver of all that has come so far."""
+        return self._taken
+
+    def originals(self) -> dict[str, Any]:
+        """What was copied, by its name in the driver: plain functions and NamedTuple classes of their authors."""
+        return dict(self._originals)
+
+    def solver(self, rule: Callable[..., Any]) -> str:
+        """Name of an array-valued rule: its loops are its own, so neither it nor what it calls is inlined as text."""
+        self._apart = True
+        name = self.name(rule)
+        self._apart = False
+        return name
+
+    def record(self, name: str, fields: tuple[str, ...]) -> str:
+        """A record of numbers under a name of its own (the columns of a parameter row)."""
+        if name not in self._taken:
+            self._names[name] = name
+            self._taken.add(name)
+            self.rows[name] = fields
+            self.blocks.append(f"{name} = namedtuple({name!r}, {list(fields)!r})")
+        return name
+
+    def _function(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str]) -> str:
+        law.check(rule)
+        notes = Notes(rule, self)
+        of = rule, name, *chosen.items(), self.decorator, self.law, self.lenient, self._apart
+        text = COPIES.text(of, notes)
+        if text is None:
+            text = self._copied(rule, name, chosen, notes)
+            COPIES.keep(of, notes, text)
+        return text
+
+    def _copied(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str], notes: Notes) -> str:
+        node = tree_of(rule)
+        node.name = name
+        node.returns = None
+        node.args.defaults = []
+        node.args.args = [argument for argument in node.args.args if argument.arg not in chosen]
+        for argument in node.args.args:
+            argument.annotation = None
+        if isinstance(node.body[0], ast.Expr) and isinstance(node.body[0].value, ast.Constant):
+            node.body.pop(0)
+        rewritten = Rewrite(rule, self, chosen, notes).visit(node)
+        _end_at_return(rewritten)
+        # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
+        # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
+        loops = any(isinstance(item, (ast.For, ast.While)) for item in walk(node))
+        decorator = INLINED if loops and self.decorator and not self._apart else self.decorator
+        if self._apart and (_depth(node) > 2 or "work" in {argument.arg for argument in node.args.args}):
+            decorator = ALONE
+        return f"{decorator}\n{ast.unparse(rewritten)}"
+
+
+def _depth(node: ast.AST) -> int:
+    """How many loops of a function lie inside each other."""
+    inner = max((_depth(child) for child in ast.iter_child_nodes(node)), default=0)
+    return inner + isinstance(node, (ast.For, ast.While))
+
+
+def _end_at_return(node: ast.FunctionDef) -> None:
+    """Drop what a choice has made unreachable, so that nothing in it counts as read."""
+    ends = [k for k, statement in enumerate(node.body) if isinstance(statement, ast.Return)]
+    del node.body[ends[0] + 1 if ends else len(node.body) :]

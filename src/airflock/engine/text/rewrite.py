@@ -1,0 +1,194 @@
+"""Rewrite: the tree of one rule as a driver holds it.
+
+Free names are bound, float literals are cast to `real`, choices become constants and leave one branch, vectors are
+written out, and what the rule calls is named as the driver names it.
+"""
+
+import ast
+import builtins
+import math
+import types
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from airflock.core.rules import law
+from airflock.engine.text.copies import Notes
+from airflock.engine.text.unrolled import Unrolled
+from airflock.support.errors import RuleError
+
+GIVEN = law.ALLOWED_CALLS | {law.TAKEN, *law.RESERVED.values()}  # what every driver has
+NOTHING: Mapping[str, str] = {}
+
+
+class Driver(Protocol):
+    """What a rule is written for: a `generate.Source`."""
+
+    law: int
+    lenient: bool
+    vectors: Mapping[str, Mapping[str, int]]
+
+    def names(self) -> set[str]:
+        """Names in the driver of all that has come so far."""
+
+
+def law_mark(law: int | None) -> str:
+    """What names of a driver end in that are of one law of several."""
+    return f"_{law}" if law else ""
+
+
+class Rewrite(Unrolled):
+    """Bind the free names of one rule and cast its literals; arguments that are chosen become constants."""
+
+    def __init__(self, rule: Callable[..., Any], source: Driver, chosen: Mapping[str, str], notes: Notes):
+        self.rule = rule
+        self.source = source
+        self.chosen = chosen
+        self.notes = notes
+        self.local = set(rule.__code__.co_varnames) - set(chosen)
+        super().__init__(rule, source.vectors)
+
+    def size(self, node: ast.AST) -> int:
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            return self.notes.size(node.value.id, node.attr)
+        return 0
+
+    def _real(self, node: ast.expr) -> ast.expr:
+        return ast.Call(ast.Name("real", ast.Load()), [node], [])
+
+    def visit_Constant(self, node: ast.Constant) -> ast.expr:
+        return self._real(node) if type(node.value) is float else node
+
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.expr:
+        if self.source.lenient:
+            return node
+        place = law.place_of(self.rule, node.lineno - 1)
+        raise RuleError(
+            f"{place}: rule {self.rule.__name__} makes a text; it does not compile; the device python flies it"
+        )
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        if isinstance(node.value, ast.Name):
+            if node.value.id == "math" and isinstance(getattr(math, node.attr, None), float):
+                return self._real(ast.Constant(getattr(math, node.attr)))
+            value = self.notes.choice(node.value.id, node.attr)
+            if value is not None:
+                return ast.Constant(value) if isinstance(value, str) else self._real(ast.Constant(value))
+            if self.size(node):
+                return ast.Tuple([self.visit(part) for part in self.components(node)], ast.Load())
+        self.generic_visit(node)
+        return node
+
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
+        self.generic_visit(node)
+        sides = [node.left, *node.comparators]
+        if all(isinstance(s, ast.Constant) and isinstance(s.value, str) for s in sides) and len(sides) == 2:
+            equal = node.left.value == node.comparators[0].value  # type: ignore[attr-defined]
+            return ast.Constant(equal if isinstance(node.ops[0], ast.Eq) else not equal)
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        node.test = self.visit(node.test)
+        if isinstance(node.test, ast.Constant):
+            kept: ast.expr = self.visit(node.body if node.test.value else node.orelse)
+            return kept
+        node.body = self.visit(node.body)
+        node.orelse = self.visit(node.orelse)
+        return node
+
+    def visit_If(self, node: ast.If) -> Any:
+        node.test = self.visit(node.test)
+        if isinstance(node.test, ast.Constant):
+            kept: list[ast.stmt] = []
+            for statement in node.body if node.test.value else node.orelse:
+                found = self.visit(statement)
+                kept += found if isinstance(found, list) else [found]
+            return kept or ast.Pass()
+        self.generic_visit(node)
+        return node
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        if self.counts(node):
+            return ast.Constant(self.size(node.args[0]))
+        self._hand_on(node)
+        self.generic_visit(node)
+        method = node.func
+        if isinstance(method, ast.Attribute) and isinstance(method.value, ast.Name) and method.value.id == "percept":
+            node.func = ast.Name(f"percept_{method.attr}{law_mark(self.source.law)}", ast.Load())  # bound by the driver
+            node.args.insert(0, method.value)
+        if isinstance(node.func, ast.Name) and node.func.id == "float":
+            node.func.id = "real"
+        if isinstance(node.func, ast.Name) and node.func.id in ("min", "max"):
+            name = ast.Name("least" if node.func.id == "min" else "most", ast.Load())
+            folded = node.args[0]
+            for argument in node.args[1:]:
+                folded = ast.Call(name, [folded, argument], [])
+            return folded
+        return node
+
+    def _hand_on(self, node: ast.Call) -> None:
+        """Name all arguments of a call; a plain function that is handed a choice is called by its text for this one."""
+        called = self.notes.free(node.func.id) if isinstance(node.func, ast.Name) else None
+        if isinstance(called, types.FunctionType) and not node.keywords:  # a driver knows no defaults
+            usual = called.__defaults__ or ()
+            missing = called.__code__.co_argcount - len(node.args)
+            node.args += [ast.Constant(value) for value in usual[max(0, len(usual) - missing) :]] if missing > 0 else []
+        texts = [self._text(argument) for argument in node.args]
+        if isinstance(called, types.FunctionType) and any(text is not None for text in texts):
+            names = called.__code__.co_varnames
+            chosen = {name: text for name, text in zip(names, texts, strict=False) if text is not None}
+            node.func = ast.Name(self.notes.name(called, chosen), ast.Load())
+            node.args = [argument for argument, text in zip(node.args, texts, strict=True) if text is None]
+
+    def _text(self, node: ast.expr) -> str | None:
+        """The choice that an expression is, if it is one."""
+        value: object = None
+        if isinstance(node, ast.Constant):
+            value = node.value
+        elif isinstance(node, ast.Name):
+            value = self.chosen.get(node.id)
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            value = self.notes.choice(node.value.id, node.attr)
+        return value if isinstance(value, str) else None
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        if (part := self.component(node)) is not None:
+            return self.visit(part)  # type: ignore[no-any-return]
+        self.generic_visit(node)
+        inner = node.value
+        if isinstance(inner, ast.Subscript) and isinstance(inner.value, (ast.Name, ast.Attribute)):  # a[i][j] → a[i, j]
+            pair = ast.Tuple([inner.slice, node.slice], ast.Load())
+            return ast.Subscript(inner.value, pair, node.ctx)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id in self.local:
+            return node
+        if node.id in self.chosen:
+            if isinstance(node.ctx, ast.Store):
+                raise RuleError(
+                    f"{self.rule.__code__.co_filename}: rule {self.rule.__name__} sets {node.id}, a choice that it is "
+                    "handed; give the variable another name"
+                )
+            return ast.Constant(self.chosen[node.id])
+        if node.id in GIVEN or node.id in self.source.names() or node.id.startswith("percept_"):
+            return node
+        value = self.notes.free(node.id)
+        if isinstance(value, bool):
+            return ast.Constant(value)
+        if isinstance(value, float):
+            return self._real(ast.Constant(value))
+        if isinstance(value, int):
+            return ast.Constant(value)
+        if isinstance(value, types.FunctionType) or (isinstance(value, type) and issubclass(value, tuple)):
+            return ast.Name(self.notes.name(value, NOTHING), node.ctx)
+        if isinstance(value, types.ModuleType) or (self.source.lenient and hasattr(builtins, node.id)):
+            return node
+        why = (
+            "; it does not compile; the device python flies it" if hasattr(builtins, node.id) else "; it is not defined"
+        )
+        if value is not None:
+            why = f"; write math.{node.id}" if callable(value) and hasattr(math, node.id) else ""
+        raise RuleError(
+            f"{law.place_of(self.rule, node.lineno - 1)}: rule {self.rule.__name__} uses {node.id}, which is neither a "
+            f"number, a plain function nor a NamedTuple{why}"
+        )

@@ -1,0 +1,1 @@
+"""Estimate: numbers and laws from logs and tracks."""

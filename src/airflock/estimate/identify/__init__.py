@@ -1,0 +1,1 @@
+"""Identify: the numbers of a scenario from flight logs."""

@@ -1,0 +1,1 @@
+"""Infer: the law that explains tracks, with intervals and held-out parts."""

@@ -1,0 +1,1 @@
+"""Fleets: many nodes with vehicles and a radio channel in software, on a virtual clock or the real one."""

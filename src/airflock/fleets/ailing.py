@@ -1,0 +1,59 @@
+"""Ailing: a node of a fleet in software whom faults of the scenario befall."""
+
+from collections.abc import Callable
+
+from airflock.drones.onboard.node import Node, Out
+from airflock.fleets.befalling import Faults
+from airflock.fleets.rogue import retold
+from airflock.support.coordinates import Site
+
+
+class Ailing:
+    """A node with the faults that befall it, used like the node itself.
+
+    It sends what they tell, and its clock is as far ahead as they say; all else is left to the node.
+
+    node  : gives the node; asked each time, so that it may be exchanged for one that keeps a log
+    place : of the drone among the members
+    time  : of the flight (s) at a time of the node's own clock
+    """
+
+    def __init__(
+        self,
+        node: Callable[[], Node],
+        faults: Faults,
+        place: int,
+        site: Site,
+        time: Callable[[float], float] = lambda now: now,
+    ):
+        self._node, self._faults, self._place, self._site, self._time = node, faults, place, site, time
+        self._ahead = 0
+
+    def autopilot(self, data: bytes, now: float) -> None:
+        """Take bytes that came from the autopilot."""
+        self._node().autopilot(data, now)
+
+    def radio(self, datagram: bytes, now: float) -> None:
+        """Take a datagram that came by radio."""
+        self._node().radio(datagram, now)
+
+    def tick(self, now: float) -> Out:
+        """Let the node decide."""
+        at = self._time(now)
+        self.set_clock(at)
+        out = self._node().tick(now)
+        radios = tuple([self.told(datagram, at) for datagram in sent] for sent in out.radios)
+        return out._replace(radios=radios)
+
+    def set_clock(self, time: float) -> None:
+        """Set the node's clock as its faults say at a time of the flight, s."""
+        ahead = round(1e6 * self._faults.ahead(self._place, time))
+        if ahead != self._ahead:
+            self._node().set_clock(ahead - self._ahead)
+            self._ahead = ahead
+
+    def told(self, datagram: bytes, time: float) -> bytes:
+        """What is sent in place of a packet of the node at a time of the flight, s."""
+        if not self._faults.lies:
+            return datagram
+        return retold(datagram, self._site, lambda state: self._faults.told(self._place, time, state))

@@ -1,0 +1,228 @@
+"""A fleet in software over several seeds: the loop behind `airflock fleet` and `airflock.fleet`."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import xarray as xr
+
+from airflock.drones.onboard.card import Card
+from airflock.fleets import compare, realtime
+from airflock.fleets.faults import Fault, read_faults
+from airflock.fleets.starting import write_for_watching
+from airflock.fleets.teller import WATCHED
+from airflock.parts.metrics.registry import reports
+from airflock.recordings.score_table import described
+from airflock.recordings.scores import measure
+from airflock.scenarios.change import variant
+from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seeds
+from airflock.support.errors import ScenarioError, gathering
+from airflock.support.spelling import meant
+from airflock.support.untrusted import own_path
+
+VEHICLES = ("px4", "ardupilot")
+BODIES = ("multirotor", "quadrotor")
+LOCKSTEP = realtime.MODES[0]
+CALL = 14540  # port where the first vehicle contacts a client
+
+
+@dataclass
+class Fleets:
+    """What a fleet flew, seed after seed.
+
+    scenario   : what was flown; vehicle: the autopilot that the vehicles imitated
+    measured   : order parameters of each flight
+    simulated  : those of the simulator beside it, where it was asked for
+    runs       : what is told of each flight: seed, digest, phases, notes, order parameters; on the real clock its load
+    recordings : of each flight (time, space, keypoint, individual), position m and velocity m/s, where they are kept
+    departure  : how fast the first flight leaves the simulated one, m, where a fleet follows it
+    """
+
+    scenario: Scenario
+    vehicle: str
+    measured: list[dict[str, Any]] = field(default_factory=list)
+    simulated: list[dict[str, Any]] = field(default_factory=list)
+    runs: list[dict[str, Any]] = field(default_factory=list)
+    recordings: list[xr.Dataset] = field(default_factory=list)
+    departure: compare.Departure | None = None
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """Order parameters, one row per flight by its seed; `attrs` say units and meanings as those of `score` do."""
+        index = pd.Index([run["seed"] for run in self.runs], name="seed")
+        return described(pd.DataFrame(self.measured, index=index), dict(reports(self.scenario.measures)))
+
+    @property
+    def comparison(self) -> list[compare.Line]:
+        """Of each order parameter the means of both, z and p after Holm's correction; none of fewer than two seeds."""
+        return compare.table(self.simulated, self.measured) if len(self.simulated) > 1 else []
+
+    def add(self, flown: Any, *, beside: bool, follows: bool) -> None:
+        """Measure a flight, and fly the simulator beside it where asked.
+
+        follows : whether both start alike, on one clock
+        """
+        if beside:
+            simulated, measured = compare.both(flown.scenario, flown)
+            self.simulated.append(simulated)
+            if follows and self.departure is None:
+                self.departure = compare.departure(flown)
+        else:
+            measured = measure(compare.recording(flown))[0]
+        self.measured.append(measured)
+        phases = [phase.name for phase in flown.phases()]
+        run = {"seed": flown.seed, "sha256": flown.digest(), "phases": phases, "notes": flown.log, **measured}
+        load = getattr(flown, "load", None)
+        self.runs.append(run if load is None else run | {"load": load._asdict()})
+
+
+def fleet(
+    scenario: Scenario | str | os.PathLike[str],
+    seeds: int | Iterable[int] = 1,
+    *,
+    settings: Mapping[str, Any] | None = None,
+    trust: bool = False,
+    vehicle: str = "px4",
+    body: str | None = None,
+    mode: str = LOCKSTEP,
+    join: int = CALL,
+    faults: str | os.PathLike[str] | None = None,
+    beside: bool = False,
+    silence: bool | None = None,
+    ground: bool = False,
+    card: str | os.PathLike[str] | None = None,
+    done: Callable[[], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Fleets:
+    """Fly a fleet in software: one node and one MAVLink vehicle per drone, in lock-step or on the real clock.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path
+        A scenario, or the name of a preset or scenario file.
+    seeds : int or iterable of int
+        A number of flights, with seeds 0, 1, 2, ..., or the seeds themselves.
+    settings : mapping, optional
+        Keys of the scenario to change, such as {"agents": 5, "duration": 60.0}.
+    trust : bool
+        Whether code that the file names may run.
+    vehicle : str
+        Autopilot that the vehicles imitate: px4 or ardupilot.
+    body : str, optional
+        How the vehicles move: multirotor or quadrotor; by default as the scenario says.
+    mode : str
+        lockstep: on a virtual clock, the same bits each time. tasks, processes: on the real clock over UDP on this
+        computer, in one process or with a process for each node and each vehicle.
+    join : int
+        On the real clock: port where the first vehicle contacts MAVSDK, MAVProxy or QGroundControl; the others use
+        the next ones.
+    faults : str or path, optional
+        A TOML file of faults to inject, tables [[fault]].
+    beside : bool
+        Fly the simulator beside it, and compare.
+    silence : bool, optional
+        Whether a drone stops while a neighbour that is lost could be near; by default yes, but beside the simulator
+        as its silence.rule says.
+    ground : bool
+        Take off, gather, flock, return and land, instead of starting in the air.
+    card : str or path, optional
+        On the real clock: file (.json) for the flight card, its key beside it; `airflock.watch` of it shows the fleet.
+    done : callable, optional
+        Called after each second that is flown.
+    say : callable, optional
+        Told when the card is written, before the first flight.
+
+    Returns
+    -------
+    Fleets
+        `table`, one row per flight; `runs`, what is told of each; `recordings` (time, space, keypoint, individual);
+        beside the simulator `comparison` and `departure`.
+
+    Raises
+    ------
+    ScenarioError, ParameterError, CardError, LinkError
+        If scenario, seeds or faults cannot be flown by a fleet, a card would be lost, or a port is in use.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> small = {"agents": 3, "duration": 2.0}
+    >>> found = airflock.fleet("vasarhelyi_2018/real_4ms", seeds=2, settings=small)
+    >>> found.table.index.tolist(), dict(found.recordings[0].position.sizes)["individual"]
+    ([0, 1], 3)
+    """
+    numbers = sound_seeds(seeds)
+    mistakes = [
+        f"{name} = {word!r} is none of {', '.join(known)}{meant(word, known, lead='; ')}"
+        for name, word, known in (
+            ("vehicle", vehicle, VEHICLES),
+            ("body", body, BODIES),
+            ("mode", mode, realtime.MODES),
+        )
+        if word is not None and word not in known
+    ]
+    if card is not None and mode == LOCKSTEP:
+        mistakes.append("card: in lock-step it flies too fast to watch; give mode = 'tasks' or 'processes'")
+    known: Scenario | None = None
+    injected: tuple[Fault, ...] = ()
+    with gathering(mistakes):
+        keys = {**(settings or {}), **({"body.kind": body} if body in BODIES else {})}
+        found = variant(scenario, keys, trust=trust)
+        known = compare.sampled(found, found.sensors.period or found.flight.dt)
+        if faults is not None:
+            injected = read_faults(own_path(faults), tuple(range(1, known.agents + 1)))
+        mistakes += realtime.refused(injected) if mode != LOCKSTEP else []
+    if card is not None and known is not None and known.varied and len(numbers) > 1:
+        mistakes.append(f"card = {card}: with tolerances each seed has its own card; give one seed")
+    if mistakes or known is None:
+        raise ScenarioError(mistakes)
+    stops = True if silence is None and not beside else silence
+    flights = Fleets(known, vehicle)
+    how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "silent": stops, "ground": ground, "join": join}
+    if card is not None:
+        how["card_file"] = own_path(card)
+    for flown in in_turn(known, numbers, faults=injected, done=done, say=say, **how):
+        flights.add(flown, beside=beside, follows=not ground and mode == LOCKSTEP)
+        flights.recordings.append(compare.recording(flown))
+    return flights
+
+
+def in_turn(
+    scenario: Scenario, seeds: Sequence[int], *, vehicle: str, mode: str, silent: bool | None, ground: bool, join: int,
+    faults: Sequence[Fault] = (), card_file: Path | None = None, done: Callable[[], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Iterator[Any]:  # fmt: skip
+    """Fly a scenario that fleets can fly, one seed after another; what each flew.
+
+    silent    : whether the rule of silence stops a drone; None: where the scenario says so
+    ground    : from the ground by orders of an operator, whose keys are made here
+    card_file : where the card is written before the first flight, so that `airflock watch` can show it; say: told so
+    """
+    private, public = b"", b""
+    if ground:
+        from airflock.drones.mavlink.orders import new_keys
+
+        private, public = new_keys()
+    live = mode != LOCKSTEP
+
+    def card_of(seed: int) -> Card:
+        return compare.software_card(scenario, vehicle=vehicle, operator=public, silent=silent, live=live, seed=seed)
+
+    card = card_of(seeds[0])
+    if card_file is not None:
+        write_for_watching(card_file, card)
+        if say is not None:
+            say(f"wrote {card_file} and its key; airflock watch {card_file} shows the fleet")
+    for seed in seeds:
+        card = card_of(seed) if scenario.varied else card
+        common: dict[str, Any] = {"faults": faults, "operator": private, "done": done}
+        if live:
+            start = None if ground else compare.first_states(scenario, seed)
+            calls, watcher = (realtime.JOIN[0], join), WATCHED if card_file else None
+            yield realtime.fly(scenario, card, seed, mode, start=start, join=calls, watcher=watcher, **common)
+        else:
+            yield compare.fly(scenario, card, seed, ground=ground, **common)

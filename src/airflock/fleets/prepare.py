@@ -1,0 +1,213 @@
+"""From a scenario to a flight card: the law, its world and its limits as the numbers that a drone carries."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+from shapely.geometry import Polygon
+
+from airflock.core.parameters import Parameters
+from airflock.core.radio import forward
+from airflock.core.silence import complete
+from airflock.drones.onboard.card import VERSION
+from airflock.drones.onboard.safety import Safety
+from airflock.fleets.individuals import records_of
+from airflock.parts.bodies.motion import Parameters as Multirotor
+from airflock.scenarios.scenario import Scenario
+from airflock.support.errors import CardError
+from airflock.world import arena
+from airflock.world.place import inward
+
+HEIGHT = 20.0  # m; our choice: above trees and people, below most limits
+MARGIN = 30.0  # m; our choice: a flock turns some metres beyond the law's soft walls
+SPARE = 10.0  # m between the highest layer and the fence
+CIRCLE = 16  # sides of the polygon around a circular arena
+
+
+def card_document(
+    scenario: Scenario, *, site: tuple[float, float, float], members: Sequence[int], mission: int, expires: int,
+    operator: bytes = b"", autopilot: str = "px4", height: float | None = None, margin: float = MARGIN,
+    as_simulated: bool = False, seed: int | None = None, safety: Mapping[str, Any] | None = None,
+    silent: bool | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Document of a flight card, without its hash.
+
+    site         : latitude and longitude (degrees), altitude (m) of the arena's centre on the ground
+    height       : at which the flock flies, m above the site; in space, of the arena's centre
+    margin       : of the fence around the law's walls, m
+    as_simulated : treat neighbours' data as the scenario's radio does; else they are carried forward and kept for 5 s
+    seed         : of the tolerances of manufacture that groups have; None: real drones bring their own
+    safety       : limits that differ from those that follow from the scenario
+    silent       : whether the rule of silence stops a drone, whatever the scenario says; by default it does, and as
+                   simulated where the scenario says so
+
+    Raises CardError where the scenario has no walls, or where neighbours are seen instead of heard, or where its law
+    or its topology is not in the package.
+    """
+    _refuse_unflyable(scenario)
+    limits = replace(limits_of(scenario), **(safety or {}))
+    low, high = arena.heights_of(scenario.world) if scenario.dimensions == 3 else (0.0, 0.0)
+    height = max(HEIGHT, limits.base - low) if height is None else height
+    top = limits.base + limits.layer * (len(members) - 1)
+    stands = scenario.stands()
+    held = not scenario.transceiver.keeps
+    silent = not as_simulated or scenario.silence.rule == "stop" if silent is None else silent
+    silence = complete(scenario.silence, _speed(scenario), scenario.radio.delay, "stop" if silent else "fly_on")
+    return {
+        "airflock_card": VERSION,
+        "name": scenario.name,
+        "mission": mission,
+        "expires": expires,
+        "site": dict(zip(("latitude", "longitude", "altitude"), site, strict=True)),
+        "members": list(members),
+        "operator": operator.hex(),
+        "autopilot": autopilot,
+        "law": {"kind": scenario.model.name, **plain(scenario.parameters)},
+        "body": {"kind": scenario.vehicle.name, **plain(scenario.body)},
+        "own": _own(scenario, records_of(scenario, len(members), seed)),
+        **_groups(scenario, len(members)),
+        "world": plain(scenario.world),
+        "shapes": {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()},
+        "radio": {
+            "delay": scenario.radio.delay,
+            "extrapolate": not as_simulated or scenario.transceiver.carry is forward,
+            "forget": 5.0,
+            **({"once": held, "any_stamp": True} if as_simulated else {}),
+        },
+        "silence": plain(silence),
+        **({"topology": plain(scenario.topology)} if scenario.meets is not None else {}),
+        "safety": plain(limits),
+        "fence": {
+            "corners": outline(scenario.world, margin),
+            "low": min(2.0, 0.5 * limits.base),
+            "high": max(height + high, top) + SPARE,
+        },
+        "height": height,
+        "period": scenario.sensors.period or scenario.flight.dt,
+        "seed": 0,
+    }
+
+
+def left_off(scenario: Scenario) -> list[str]:
+    """What of a scenario no card holds, in a line for each: real drones bring their own."""
+    kinds = ", ".join(dict.fromkeys(entry.fault.name for entry in scenario.faults))
+    spread = ", ".join(dict.fromkeys(key for group in scenario.groups for _, key in group.spread))
+    said = {"faults": kinds, "tolerances of groups": spread}
+    return [f"the card leaves off the scenario's {what}: {names}" for what, names in said.items() if names]
+
+
+def beside_the_scenario(scenario: Scenario, safety: Safety, members: int) -> list[str]:
+    """What of a card the scenario did not fly, in a line for each: its scores and certificates do not speak of it."""
+    told = []
+    if members != scenario.agents:
+        told.append(
+            f"the card is for {members} drones, the scenario flies {scenario.agents}: scores and certificates of it do "
+            f"not speak of {members}"
+        )
+    likely = limits_of(scenario)
+    if safety.response < likely.response:
+        told.append(
+            f"response = {safety.response:g} s is shorter than what the scenario gives a card, {likely.response:g} s: "
+            "distances to stop are told too short, unless the drones are as quick"
+        )
+    for name in ("accel", "brake"):
+        if getattr(safety, name) > likely.accel:
+            told.append(
+                f"{name} = {getattr(safety, name):g} m/s^2 is more than what the scenario gives a card, "
+                f"{likely.accel:g} m/s^2: distances to stop are told too short, unless the drones are as quick"
+            )
+    return told
+
+
+def _refuse_unflyable(scenario: Scenario) -> None:
+    """Raise a CardError where a scenario has what no card can hold."""
+    fault = ""
+    others = [
+        law.model.name for law in scenario.laws if not law.model.decide.__module__.startswith("airflock.parts.laws.")
+    ]
+    if scenario.world.arena == "none":
+        fault = "world.arena = 'none': a card needs walls, and a fence around them"
+    elif scenario.own_topology is not None:
+        fault = f"the topology {scenario.own_topology.name} is not in the package; a card names ours"
+    elif scenario.transceiver.see is not None:
+        fault = (
+            f"radio.kind = {scenario.transceiver.name!r}: nodes hear each other by radio; "
+            "set radio.kind = 'constant' or another one by which they send"
+        )
+    elif others:
+        fault = f"the law {others[0]} is not in the package; a card names laws only"
+    if fault:
+        raise CardError([f"{scenario.name}: {fault}"])
+
+
+def _own(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:
+    """Of each member the numbers of law and body in which it differs from the flock; none where all are alike."""
+    base = {"law": plain(scenario.parameters), "body": plain(scenario.body)}
+    if not scenario.varied and len(scenario.laws) == 1:
+        return []
+    rows = [
+        {
+            part: {k: v for k, v in plain(record).items() if v != base[part].get(k)}
+            for part, record in zip(base, own, strict=True)
+        }
+        for own in records
+    ]
+    for agent, ((p, _), row) in enumerate(zip(records, rows, strict=True)):
+        law = scenario.law_of(agent).model
+        if law.name != scenario.model.name:
+            row["law"] = {"kind": law.name, **plain(p)}
+    return rows
+
+
+def _groups(scenario: Scenario, count: int) -> dict[str, list[int]]:
+    """Of each member the number of its group, where a law asks for it."""
+    asked = scenario.groups and any(law.asks_for_groups for law in scenario.laws)
+    return {"groups": list(scenario.group_numbers[:count])} if asked else {}
+
+
+def limits_of(scenario: Scenario) -> Safety:
+    """Limits that follow from a scenario: half as fast again as its law prefers, as agile as its body."""
+    body = scenario.body if isinstance(scenario.body, Multirotor) else Multirotor()
+    return Safety(
+        speed_max=min(1.5 * _speed(scenario), 60.0),
+        accel=min(body.a_max, 50.0),
+        response=body.tau,
+        mission_time=min(max(scenario.flight.duration, 1.0), 36000.0),
+    )
+
+
+def _speed(scenario: Scenario) -> float:
+    preferred = scenario.model.preferred_speed
+    return float(preferred(scenario.parameters)) if preferred else 4.0
+
+
+def outline(world: arena.Parameters, margin: float) -> list[list[float]]:
+    """Corners of a fence around an arena, margin (m) outside its walls."""
+    if world.arena == "circle":
+        reach = (world.radius + margin) / math.cos(math.pi / CIRCLE)
+        angles = [2.0 * math.pi * k / CIRCLE for k in range(CIRCLE)]
+        return [[reach * math.cos(a), reach * math.sin(a)] for a in angles]
+    if world.arena == "polygon":
+        wider = Polygon(world.corners).buffer(margin, join_style="mitre")
+        return [[x, y] for x, y in wider.exterior.coords[:-1]]
+    h = 0.5 * world.side
+    ring = [(-h, -h), (h, -h), (h, h), (-h, h)]
+    sides = [inward(a, b) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
+    corners = []
+    for one, two in zip([sides[-1], *sides[:-1]], sides, strict=True):  # each corner moves with its two sides
+        a, b, _, d = one
+        p, q, _, e = two
+        det = a * q - b * p
+        d, e = d + margin, e + margin
+        corners.append([(b * e - q * d) / det, (p * d - a * e) / det])
+    return corners
+
+
+def plain(record: Parameters) -> dict[str, Any]:
+    """A record as a table for JSON; numbers that were left to the scenario are left out."""
+    return {key: _listed(value) for key, value in asdict(record).items() if value is not None}
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(v) for v in value] if isinstance(value, (list, tuple)) else value

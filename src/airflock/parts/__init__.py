@@ -1,0 +1,1 @@
+"""Parts: plain scalar rules with their numbers, one folder a kind."""

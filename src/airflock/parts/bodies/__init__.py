@@ -1,0 +1,1 @@
+"""Bodies and wind: what lies between a command and a motion."""

@@ -1,0 +1,227 @@
+"""The order parameters that flights are scored with: metric sets by the key metrics.kind, ours and a user's."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import is_dataclass, make_dataclass
+from types import ModuleType
+from typing import Any
+
+from airflock.core.contract import Metric, MetricSet, metric, names_of
+from airflock.core.parameters import Parameters as Record
+from airflock.parts.metrics import (
+    avoidance,
+    collisions,
+    contacts,
+    correlation,
+    environment,
+    excursion,
+    fitness_dimock,
+    fitness_kidger,
+    fitness_vasarhelyi,
+    flocked,
+    groups,
+    marks,
+    milling,
+    nearest,
+    parameters,
+    polarisation,
+    power,
+    quality,
+    rotation,
+    shape,
+    speed,
+    steadiness,
+    swarms,
+)
+from airflock.support.errors import RuleError
+
+METRICS: dict[str, Metric] = {
+    found.name: found
+    for found in map(
+        metric,
+        (
+            avoidance, collisions, contacts, correlation, environment, excursion, flocked, groups, marks, milling,
+            nearest, polarisation, power, quality, rotation, shape, speed, steadiness, swarms,
+        ),
+    )
+}  # fmt: skip
+
+
+def _named(*names: str) -> tuple[Metric, ...]:
+    return tuple(METRICS[name] for name in names)
+
+
+def _counted(found: tuple[Metric, ...], q: Any) -> tuple[Metric, ...]:
+    """Metrics of a set whose collisions the key metrics.count counts: each agent, or as the authors' program does."""
+    return tuple(METRICS["marks"] if q.count == "program" and m.name == "quality" else m for m in found)
+
+
+QUALITY = _named("quality", "polarisation")
+GROUPS = (*QUALITY, *_named("groups", "shape"))
+
+
+def _quality(q: Any) -> tuple[Metric, ...]:
+    return _counted(QUALITY, q)
+
+
+def _groups(q: Any) -> tuple[Metric, ...]:
+    return _counted(GROUPS, q)
+
+
+SETS: dict[str, MetricSet] = {
+    found.name: found
+    for found in (
+        MetricSet(
+            "vasarhelyi",
+            _named("speed", "correlation", "nearest", "collisions", "excursion", "rotation", "polarisation"),
+            parameters.Parameters,
+            fitness=fitness_vasarhelyi.fitness,
+            reports=fitness_vasarhelyi.REPORTS,
+            best="fitness",
+        ),
+        MetricSet(
+            "zapotecatl", QUALITY, parameters.Parameters, _quality, best="quality", faults=quality.faults
+        ),
+        MetricSet("groups", GROUPS, parameters.Parameters, _groups, best="quality", faults=quality.faults),
+        MetricSet(
+            "contacts",
+            _named("speed", "polarisation", "nearest", "collisions", "contacts", "excursion"),
+            parameters.Parameters,
+        ),
+        MetricSet("order", _named("speed", "polarisation", "milling", "shape"), parameters.Parameters),
+        MetricSet(
+            "kidger",
+            _named(
+                "flocked", "swarms", "polarisation", "nearest", "collisions", "environment", "avoidance", "speed"
+            ),
+            parameters.Parameters,
+            fitness=fitness_kidger.fitness,
+            reports=fitness_kidger.REPORTS,
+            violates=fitness_kidger.VIOLATES,
+            best="fitness",
+        ),
+        MetricSet(
+            "dimock",
+            _named("power", "steadiness", "collisions"),
+            parameters.Parameters,
+            fitness=fitness_dimock.fitness,
+            reports=fitness_dimock.REPORTS,
+            violates=fitness_dimock.VIOLATES,
+            best="fitness",
+        ),
+    )
+}  # fmt: skip
+USUAL = "vasarhelyi"  # the set of a scenario without metrics.kind
+POWER = {"metrics.kind": "dimock", "metrics.fitness": "sound"}  # settings that measure the power of wings
+
+# what the engine itself keeps of a flight with goals
+GOALS = {
+    "goals_reached": ("", "goals reached by the flock's centre"),
+    "goals": ("", "goals given"),
+    "time_to_goal": ("s", "time at which each was reached"),
+}
+
+
+def metric_set(namespace: Any, name: str = "") -> MetricSet:
+    """Gather a metric set from a module, a class or a mapping of names such as globals().
+
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds METRICS, a list of metrics (names of ours, or what `airflock.metric` gives), or the rules of one metric,
+        or both; if it likes, Parameters (keys of its own beside ours), `fitness` with REPORTS of what it gives, and
+        BEST, the order parameter that is larger in a better flight.
+    name : str, optional
+        How the set is called; by default the namespace's.
+
+    Returns
+    -------
+    MetricSet
+        To be given to `airflock.load(..., metrics=...)`.
+
+    Raises
+    ------
+    RuleError
+        If it measures nothing, or a rule asks for what there is not.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> class Fast:
+    ...     METRICS = ["speed", "polarisation"]
+    ...     def fitness(values):
+    ...         return {"fitness": values["phi_vel"]}
+    >>> airflock.metric_set(Fast).best
+    'fitness'
+    """
+    found, name = names_of(namespace, name)
+    metrics = [_metric(item, name) for item in found.get("METRICS", ())]
+    if "sample" in found:
+        metrics.append(metric(found, name))
+    if not metrics:
+        raise RuleError(f"metric set {name} measures nothing; give METRICS = [...], or a rule sample")
+    fitness = found.get("fitness")
+    told = found.get("REPORTS", {}) if fitness else {}
+    reports = {key: about for key, about in told.items() if "sample" not in found or key.startswith(("f_", "fitness"))}
+    if fitness and "fitness" not in reports:
+        reports["fitness"] = ("", (fitness.__doc__ or "fitness").partition("\n")[0])
+    best = str(found.get("BEST") or ("fitness" if "fitness" in reports else ""))
+    record = _parameters(found.get("Parameters"), name)
+    violates = dict(found.get("VIOLATES", {}))
+    return MetricSet(name, tuple(metrics), record, None, fitness, reports, best, found.get("faults"), violates)
+
+
+def as_set(what: Any) -> MetricSet:
+    """A metric set from a set, its name, a metric, several of them, or a namespace."""
+    if isinstance(what, MetricSet):
+        return what
+    if isinstance(what, Metric):
+        return MetricSet(what.name, (what,), parameters.Parameters)
+    if isinstance(what, str) and what in SETS:
+        return SETS[what]
+    if isinstance(what, Sequence) and not isinstance(what, str):
+        return metric_set({"METRICS": what}, "own")
+    if isinstance(what, Mapping) or hasattr(what, "__dict__"):
+        return metric_set(what)
+    raise RuleError(
+        f"metrics = {what!r} is not a metric set; give a metric, a list of them, or one of {', '.join(SETS)}"
+    )
+
+
+def _metric(item: Any, owner: str) -> Metric:
+    if isinstance(item, Metric):
+        return item
+    if isinstance(item, ModuleType):
+        return metric(item)
+    if isinstance(item, str) and item in METRICS:
+        return METRICS[item]
+    raise RuleError(f"metric set {owner}: {item!r} is not a metric; known: {', '.join(METRICS)}")
+
+
+def _parameters(record: Any, owner: str) -> type:
+    """Record of a set's own parameters with those that every set has."""
+    if record is None:
+        return parameters.Parameters
+    if not (isinstance(record, type) and issubclass(record, Record) and is_dataclass(record)):
+        raise RuleError(f"metric set {owner}: Parameters is not a frozen dataclass derived from airflock.Parameters")
+    if issubclass(record, parameters.Parameters):
+        return record
+    return make_dataclass("Parameters", [], bases=(parameters.Parameters, record), frozen=True, kw_only=True)
+
+
+def numbers_of(found: MetricSet, q: Any, goals: bool = False) -> tuple[str, ...]:
+    """Names of the order parameters that are one number, of flights scored by a set, with goals or not.
+
+    Partial fitnesses and fitness come last; time_to_goal, one number for each goal, is left out.
+    """
+    own = [name for each in found.of(q) for name in each.reports]
+    own += [name for name in GOALS if goals and name != "time_to_goal"]
+    return tuple(dict.fromkeys((*own, *found.reports)))
+
+
+PRESENCE = {"present": ("", "share of all individuals and instants for which the recording has data")}
+
+
+def reports(found: MetricSet) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of every order parameter that flights scored by a set report."""
+    own = {name: about for each in found.metrics for name, about in each.reports.items()}
+    return own | dict(found.reports) | GOALS | PRESENCE

@@ -1,0 +1,1 @@
+"""Runs: many flights for one purpose in one folder: store, resume, executors."""

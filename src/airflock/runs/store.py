@@ -1,0 +1,232 @@
+"""Store: every flight of a study, on disk as soon as it has landed, in one SQLite file in WAL mode.
+
+The unit is a flight: its row is committed when it lands, so that a process that is killed loses only flights in the
+air. Nothing depends on the order in which flights land. Readers may look on while a study runs; a second writer is
+refused by a lock that the system gives back however the first one ends.
+"""
+
+import json
+import math
+import os
+import platform
+import sqlite3
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from airflock.runs.executors import Landed
+from airflock.support import locks
+from airflock.support.errors import StudyError
+from airflock.support.untrusted import FormatError, from_outside, json_object, json_value
+
+FILE, LOCK = "evaluations.sqlite", "writer.lock"
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS session (
+  session INTEGER PRIMARY KEY, began TEXT, host TEXT, versions TEXT
+);
+CREATE TABLE IF NOT EXISTS candidate (
+  stage TEXT, run INTEGER, generation INTEGER, candidate INTEGER,
+  point TEXT, parameters TEXT, fitness TEXT,
+  PRIMARY KEY (stage, run, generation, candidate)
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS flight (
+  stage TEXT, run INTEGER, generation INTEGER, candidate INTEGER, repeat INTEGER,
+  seed INTEGER, scores TEXT, reason TEXT, duration REAL, worker TEXT, session INTEGER,
+  PRIMARY KEY (stage, run, generation, candidate, repeat)
+) WITHOUT ROWID;
+"""
+WALL = ("duration", "worker", "session")  # columns that tell of the machine and not of the study
+
+
+class Batch(NamedTuple):
+    """Which candidates: of the search's generations, or of what comes after it."""
+
+    stage: str
+    run: int
+    generation: int
+
+
+class Store:
+    """The evaluations of one study folder. Use as a context; `write=False` only looks."""
+
+    def __init__(self, folder: Path, *, write: bool = True):
+        """Open or create; raises StudyError where another process is writing, or where the file is no store."""
+        self.path, self.lock, self.session = folder / FILE, -1, 0
+        if not write and not self.path.is_file():
+            raise StudyError(f"{folder}: holds no study ({FILE} is missing)")
+        if write:
+            self.lock = _lock(folder)
+        try:
+            with plain_faults(self.path):
+                uri = f"{self.path.absolute().as_uri()}?mode={'rwc' if write else 'ro'}"
+                self.connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=10.0)
+                if write:
+                    # NORMAL: what is committed survives the end of the process at any moment
+                    self.connection.execute("PRAGMA journal_mode = WAL")
+                    self.connection.execute("PRAGMA synchronous = NORMAL")
+                    self.connection.executescript(SCHEMA)
+                else:
+                    self.connection.execute("SELECT count(*) FROM flight")
+        except BaseException:
+            self._unlock()
+            raise
+
+    def __enter__(self) -> "Store":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Fold the journal into the file and give the lock back."""
+        self.connection.close()
+        self._unlock()
+
+    def _unlock(self) -> None:
+        if self.lock >= 0:
+            os.close(self.lock)
+            self.lock = -1
+
+    def begin(self, versions: Mapping[str, str]) -> None:
+        """Note that a process begins to write: when, where, with which versions."""
+        row = (time.strftime("%Y-%m-%dT%H:%M:%S%z"), platform.node(), json.dumps(dict(versions)))
+        with plain_faults(self.path):
+            cursor = self.connection.execute("INSERT INTO session (began, host, versions) VALUES (?, ?, ?)", row)
+            self.session = int(cursor.lastrowid or 0)
+
+    def asked(self, batch: Batch) -> list[list[float]]:
+        """Points of a batch's candidates that the store already holds, in their order."""
+        found = self.rows(
+            "SELECT point FROM candidate WHERE stage=? AND run=? AND generation=? ORDER BY candidate", batch
+        )
+        with from_outside(f"{self.path}: a point of {' '.join(map(str, batch))}", StudyError):
+            points = [_point(point) for (point,) in found]
+            if len({len(point) for point in points}) > 1:
+                raise FormatError("has another number of parameters than the others")
+        return points
+
+    def ask(self, batch: Batch, points: Sequence[Sequence[float]], parameters: Sequence[Mapping[str, float]]) -> None:
+        """Store candidates, all of a batch at once; a candidate that is there already stays."""
+        rows = [
+            (*batch, i, _encode([float(x) for x in point]), _encode(dict(values)))
+            for i, (point, values) in enumerate(zip(points, parameters, strict=True))
+        ]
+        self._many(
+            "INSERT OR IGNORE INTO candidate (stage, run, generation, candidate, point, parameters) "
+            "VALUES (?, ?, ?, ?, ?, ?)",
+            rows,
+        )
+
+    def land(self, batch: Batch, landed: Landed) -> None:
+        """Store one flight, at once; one that is there already stays, so that nothing counts twice."""
+        f = landed.flight
+        scores = None if landed.values is None else _text(landed.values)
+        row = (
+            *batch,
+            f.candidate,
+            f.repeat,
+            f.seed,
+            scores,
+            landed.reason,
+            landed.duration,
+            landed.worker,
+            self.session,
+        )
+        with plain_faults(self.path):
+            self.connection.execute("INSERT OR IGNORE INTO flight VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+
+    def flown(self, batch: Batch) -> dict[tuple[int, int], Mapping[str, Any] | None]:
+        """(candidate, repeat) → order parameters of the flights that the store holds, None of those that failed."""
+        found = self.rows(
+            "SELECT candidate, repeat, scores FROM flight WHERE stage=? AND run=? AND generation=?", batch
+        )
+        with from_outside(f"{self.path}: scores of {' '.join(map(str, batch))}", StudyError):
+            return {(c, r): None if scores is None else values_of(scores) for c, r, scores in found}
+
+    def tell(self, batch: Batch, fitness: Sequence[Sequence[float | None]]) -> None:
+        """Store the fitness of all candidates of a batch, one number for each objective."""
+        rows = [(json.dumps(list(values)), *batch, i) for i, values in enumerate(fitness)]
+        self._many("UPDATE candidate SET fitness=? WHERE stage=? AND run=? AND generation=? AND candidate=?", rows)
+
+    def count(self, stage: str = "search") -> int:
+        """Flights of a stage."""
+        with plain_faults(self.path):
+            return int(self.connection.execute("SELECT count(*) FROM flight WHERE stage=?", (stage,)).fetchone()[0])
+
+    def rows(self, sql: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
+        """All rows of a query."""
+        with plain_faults(self.path):
+            return self.connection.execute(sql, tuple(values)).fetchall()
+
+    def _many(self, sql: str, rows: Sequence[Sequence[Any]]) -> None:
+        """Many rows in one transaction."""
+        with plain_faults(self.path):
+            self.connection.execute("BEGIN IMMEDIATE")
+            try:
+                self.connection.executemany(sql, rows)
+                self.connection.execute("COMMIT")
+            except BaseException:
+                if self.connection.in_transaction:  # a full disk has ended it already
+                    self.connection.execute("ROLLBACK")
+                raise
+
+
+def _lock(folder: Path) -> int:
+    """Handle of the lock that one writer at a time holds; it names its process for others to read."""
+    path = folder / LOCK
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        locks.lock(handle)
+    except OSError as fault:
+        holder = os.read(handle, 200).decode(errors="replace").strip()
+        os.close(handle)
+        raise StudyError(f"{folder}: another process ({holder or 'unknown'}) is writing this study") from fault
+    os.ftruncate(handle, 0)
+    os.write(handle, f"process {os.getpid()} on {platform.node()}\n".encode())
+    return handle
+
+
+@contextmanager
+def plain_faults(path: Path) -> Iterator[None]:
+    """SQLite's complaints as one line that names the file."""
+    try:
+        yield
+    except sqlite3.DatabaseError as fault:
+        lost = "file is not a database" in str(fault)
+        kept = "its flights cannot be read" if lost else "what was stored before is kept"
+        raise StudyError(f"{path}: {fault}; {kept}") from fault
+
+
+_encode = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
+
+
+def _text(values: Mapping[str, Any]) -> str:
+    try:
+        return _encode(values)
+    except (ValueError, TypeError):  # not finite, or no plain number
+        return _encode(_finite(values))
+
+
+def _finite(value: Any) -> Any:
+    """Plain values that JSON knows: what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, (int, str)) or value is None:
+        return value
+    return float(value) if math.isfinite(value) else None
+
+
+def values_of(text: Any) -> dict[str, Any]:
+    """Values by name of a row's JSON, nan for null; raises FormatError where a row was tampered with."""
+    return {key: math.nan if value is None else value for key, value in json_object(text).items()}
+
+
+def _point(text: Any) -> list[float]:
+    found = json_value(text)
+    if not isinstance(found, list) or not all(isinstance(x, (int, float)) and math.isfinite(x) for x in found):
+        raise FormatError("is not a list of finite numbers")
+    return [float(x) for x in found]

@@ -1,0 +1,1 @@
+"""Search: evolve, harden and tune the numbers of a flock."""

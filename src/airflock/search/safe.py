@@ -1,0 +1,102 @@
+"""Limits of a search: candidates that keep them come before all that do not, whatever their fitness (Deb 2000).
+
+Of two candidates that keep all limits the fitter is better; of two that do not, the one that breaks them less. By how
+much is counted in standard deviations that are missing to the reliability index of the limit, so that limits of any
+score add up.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.certificates.chance import Row, chance, index_of, indices
+from airflock.certificates.limit import Limit
+from airflock.runs.store import Batch, Store
+from airflock.scenarios.scenario import Scenario
+from airflock.search.study import Study
+
+TIE = 1e-6  # by which fitness orders those who break limits equally
+FARTHEST = 1e6  # standard deviations; where all flights are alike there is none
+
+
+def allowed(limit: Limit, scenario: Scenario, share: float = 1.0) -> float:
+    """Probability of the event that a limit with a rate allows per flight of a share of the scenario's duration."""
+    found = limit.probability(share * scenario.flight.duration / 3600.0, scenario.agents)
+    assert found is not None, "limits without a rate are refused where they are read"
+    return found
+
+
+def excess(
+    limits: Sequence[Limit], scenario: Scenario, flights: Sequence[Sequence[Row]], reserve: float, share: float = 1.0
+) -> NDArray[np.float64]:
+    """How far candidates are from keeping all limits (candidate,): standard deviations, added up; 0 keeps them.
+
+    flights : of each candidate in the scenario; reserve : how many times rarer than allowed an event is to look
+    """
+    found = np.zeros(len(flights))
+    for limit in limits:
+        short = index_of(allowed(limit, scenario, share) / reserve) - indices(limit, flights)
+        found += np.clip(short, 0.0, FARTHEST)
+    return found
+
+
+def excess_of(study: Study, store: Store, batch: Batch, share: float = 1.0) -> NDArray[np.float64]:
+    """The excess of each candidate of a batch that has flown (candidate,), added up over the study's scenarios."""
+    flown: dict[int, dict[int, Row]] = {}
+    for (candidate, repeat), row in store.flown(batch).items():
+        flown.setdefault(candidate, {})[repeat] = row
+    n, total = len(study.scenarios), np.zeros(len(flown))
+    for place, scenario in enumerate(study.scenarios):
+        flights = [[flown[i][r] for r in sorted(flown[i]) if r % n == place] for i in sorted(flown)]
+        total += excess(study.limits, scenario, flights, study.search.reserve, share)
+    return total
+
+
+def safe_first(losses: NDArray[np.float64], excess: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Losses (candidate, objective) in which each that breaks limits is worse than all that keep them."""
+    worst = losses.max(axis=0)
+    broken = worst + excess[:, None] + TIE * (losses - worst) / np.maximum(np.ptp(losses, axis=0), TIE)
+    return np.where(excess[:, None] > 0.0, broken, losses)
+
+
+def kept(study: Study, flights: Sequence[Row]) -> list[dict[str, Any]]:
+    """What flights of one candidate say of each limit, one entry a limit and scenario, as plain values."""
+    n = len(study.scenarios)
+    found = []
+    for place, (label, scenario) in enumerate(zip(study.labels, study.scenarios, strict=True)):
+        rows = flights[place::n]
+        for limit in study.limits:
+            events = sum(row is None or limit.happened(row) for row in rows)
+            likely, most = chance(limit, rows), allowed(limit, scenario)
+            found.append(
+                {
+                    **({"scenario": label} if n > 1 else {}),
+                    "limit": limit.text, "events": events, "flights": len(rows), "estimated": likely,
+                    "allowed": most, "keeps": likely <= most,
+                }
+            )  # fmt: skip
+    return found
+
+
+def told(entry: Mapping[str, Any]) -> str:
+    """One entry of `kept` in words."""
+    where = f" in {entry['scenario']}" if "scenario" in entry else ""
+    verdict = "looks kept" if entry["keeps"] else "looks broken"
+    near = ", by how near they came" if entry["estimated"] > entry["events"] / entry["flights"] else ""
+    return (
+        f"{entry['limit']}{where}: {verdict}: {entry['events']} events in {entry['flights']} fresh flights, about "
+        f"{entry['estimated']:.2g} per flight{near}; allowed are {entry['allowed']:.2g}"
+    )
+
+
+def rarest(limits: Sequence[Limit], scenario: Scenario) -> float:
+    """The smallest probability per flight that a limit allows; 1 without limits."""
+    return min((allowed(limit, scenario) for limit in limits), default=1.0)
+
+
+def flights_that_count(limits: Sequence[Limit], scenario: Scenario) -> int:
+    """Flights among which one event of the rarest limit is to be expected where it is just kept."""
+    return math.ceil(1.0 / rarest(limits, scenario))

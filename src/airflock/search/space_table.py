@@ -1,0 +1,150 @@
+"""The table [space] of a study file: reading it, and everything that can be wrong with it, all faults at once."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from airflock.core.parameters import Quantity, with_unit
+from airflock.runs.space import Axis, Space, Tie, declared, usual_scale
+from airflock.scenarios.scenario import Scenario
+from airflock.support.spelling import meant
+
+ENTRY = ("low", "high", "unit", "scale", "integer", "above", "fixed", "tied", "factor", "offset", "source", "note")
+
+
+def read_space(table: Any, scenario: Scenario) -> tuple[Space | None, list[str]]:
+    """Space from the table [space] of a study file, or None; and all faults in it. Only what is listed varies."""
+    known = declared(scenario)
+    entries, faults = _entries(table)
+    axes: list[Axis] = []
+    fixed: dict[str, float] = {}
+    tied: dict[str, Tie] = {}
+    for key, entry in entries.items():
+        if key not in known:
+            hint = meant(key, known, lead="; ", prefix="space.")
+            if key.startswith("aero.") and not scenario.descends:
+                hint = f", which has no section [aero]; --set {key}=VALUE adds drag descent to it"
+            faults.append(f"space.{key} is not a number of {scenario.name}{hint}")
+            continue
+        more = _entry_faults(key, entry, known[key][0], known)
+        faults += more
+        if more:
+            continue
+        if "fixed" in entry:
+            fixed[key] = float(entry["fixed"])
+        elif "tied" in entry:
+            tied[key] = Tie(str(entry["tied"]), float(entry.get("factor", 1.0)), float(entry.get("offset", 0.0)))
+        else:
+            axes.append(_axis(key, entry, known[key][0]))
+    for axis in axes:  # a number that another one must stay above takes part even if it does not vary
+        other = axis.above
+        if other in known and other not in {a.key for a in axes} | set(fixed) and known[other][1] is not None:
+            fixed[other] = float(known[other][1] or 0.0)
+    space = Space(tuple(axes), fixed, tied)
+    faults += _faults_between(space, known, bool(faults))
+    return (None if faults else space), faults
+
+
+def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> Axis:
+    low, high = float(entry.get("low", how.low)), float(entry.get("high", how.high))
+    scale = str(entry.get("scale", usual_scale(low, high)))
+    return Axis(
+        key, how.unit, low, high, scale, how.whole or bool(entry.get("integer", False)), str(entry.get("above", ""))
+    )
+
+
+def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
+    """Key → entry, from sections or dotted keys."""
+    found: dict[str, Mapping[str, Any]] = {}
+    faults = []
+    if not isinstance(table, Mapping):
+        return {}, [f"space = {table!r} is not a table of keys"]
+    for section, entries in table.items():
+        if not isinstance(entries, Mapping):
+            faults.append(f"space.{section} = {entries!r} is not a table; write {{ low = ..., high = ... }}")
+        elif "." in section or (entries and set(entries) <= set(ENTRY)):
+            found[section] = entries
+        else:
+            for name, entry in entries.items():
+                if isinstance(entry, Mapping):
+                    found[f"{section}.{name}"] = entry
+                else:
+                    faults.append(
+                        f"space.{section}.{name} = {entry!r} is not a table; write {{ low = ..., high = ... }}"
+                    )
+    return found, faults
+
+
+def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapping[str, Any]) -> list[str]:
+    """What is wrong with one entry by itself."""
+    faults = []
+    for name, value in entry.items():
+        numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if name not in ENTRY:
+            faults.append(f"space.{key}.{name}: unknown key; {meant(name, ENTRY, ', '.join(ENTRY))}")
+        elif name in ("low", "high", "fixed", "factor", "offset") and not numeric:
+            faults.append(f"space.{key}.{name} = {value!r} is not a number; give {how.span}")
+        elif name in ("low", "high", "fixed") and not how.low <= value <= how.high:
+            faults.append(
+                f"space.{key}.{name} = {with_unit(f'{value:g}', how.unit)} lies outside the declared {how.span}"
+            )
+        elif name == "unit" and value != how.unit:
+            faults.append(f"space.{key}.unit = {value!r}: the unit is {how.unit}")
+        elif name == "scale" and value not in ("linear", "log"):
+            faults.append(f"space.{key}.scale = {value!r} is none of linear, log")
+        elif name == "integer" and not isinstance(value, bool):
+            faults.append(f"space.{key}.integer = {value!r} is none of true, false")
+        elif how.whole and (name == "tied" or (name == "integer" and not value)):
+            faults.append(f"space.{key}.{name} = {str(value).lower()}: only whole numbers make sense")
+        elif how.whole and name == "fixed" and value != int(value):
+            faults.append(f"space.{key}.fixed = {value:g} is not a whole number")
+        elif name in ("above", "tied") and not (isinstance(value, str) and value in known):
+            faults.append(f"space.{key}.{name} = {value!r} is not a number{meant(value, known, lead='; ')}")
+    if faults or "fixed" in entry or "tied" in entry:
+        return faults
+    return _range_faults(_axis(key, entry, how))
+
+
+def _range_faults(axis: Axis) -> list[str]:
+    where, span = f"space.{axis.key}", with_unit(f"[{axis.low:g}, {axis.high:g}]", axis.unit)
+    if not axis.low < axis.high:
+        word = "empty" if axis.low == axis.high else "inverted"
+        return [f"{where}: the range {span} is {word}; low must lie below high"]
+    if axis.scale == "log" and axis.low <= 0.0:
+        return [f"{where}: low = {with_unit(f'{axis.low:g}', axis.unit)} must be above 0 on a logarithmic scale"]
+    if axis.integer and math.floor(axis.high) < math.ceil(axis.low):
+        return [f"{where}: the range {span} holds no whole number"]
+    return []
+
+
+def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | None]], told: bool) -> list[str]:
+    """Ties and orders that cannot hold."""
+    faults = []
+    axes = {axis.key: axis for axis in space.axes}
+    for axis in space.axes:
+        chain = [axis.key]
+        while axes.get(chain[-1]) and axes[chain[-1]].above:
+            chain.append(axes[chain[-1]].above)
+            if chain[-1] in chain[:-1]:
+                faults.append(f"space.{axis.key}: above runs in a circle: {' > '.join(chain)}")
+                break
+        if axis.above and axis.above not in axes and axis.above not in space.fixed:
+            faults.append(f"space.{axis.key}.above = {axis.above!r} neither varies nor is fixed")
+        lower = axes[axis.above].high if axis.above in axes else space.fixed.get(axis.above, axis.low)
+        if axis.above and lower > axis.high:
+            high = with_unit(f"{axis.high:g}", axis.unit)
+            faults.append(f"space.{axis.key}.high = {high} lies below {axis.above} = {lower:g}")
+    for key, tie in space.tied.items():
+        if tie.of not in axes and tie.of not in space.fixed:
+            faults.append(f"space.{key}.tied = {tie.of!r} neither varies nor is fixed")
+            continue
+        ends = (axes[tie.of].low, axes[tie.of].high) if tie.of in axes else (space.fixed[tie.of],)
+        how = known[key][0]
+        for end in ends:
+            value = tie.factor * end + tie.offset
+            if not how.low <= value <= how.high:
+                reached = with_unit(f"{value:g}", how.unit)
+                faults.append(f"space.{key} = {reached} at {tie.of} = {end:g} lies outside {how.span}")
+    if not space.axes and not told:
+        faults.append("space: nothing varies; give at least one key low and high")
+    return faults

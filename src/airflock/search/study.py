@@ -1,0 +1,239 @@
+"""Study: an optimisation as data: a scenario, a space, what is better, and how to search; from a file or by name."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from airflock import __version__
+from airflock.certificates.limit import Limit
+from airflock.runs.folder import fingerprint
+from airflock.runs.space import Space
+from airflock.scenarios import formats, schema
+from airflock.scenarios.files import presets, tells_of_study
+from airflock.scenarios.scenario import Scenario
+from airflock.search import portrait
+from airflock.search.fitness import Objective
+from airflock.search.objective_table import read_limits, read_objectives
+from airflock.search.search_table import ALONE, SEED_BITS, Search, search_faults
+from airflock.search.several import common_space, distinct, faults_together, read_scenarios
+from airflock.search.space_table import read_space
+from airflock.support.errors import ScenarioError
+from airflock.support.spelling import meant
+from airflock.support.untrusted import TextError, from_outside, is_file, own_path, read_toml
+
+KEYS = ("title", "scenario", "scenarios", "over_scenarios", "set", "space", "objective", "search")
+LAYOUT = 1  # of the study folder; raised whenever an older folder could not be continued
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything that decides the result of an optimisation.
+
+    others : further scenarios in which each candidate flies; over_scenarios: mean or worst of them all
+    labels : what to call each scenario, the first included
+    limits : what may happen how rarely; who keeps them comes before all who do not
+    """
+
+    scenario: Scenario
+    space: Space
+    objectives: tuple[Objective, ...]
+    search: Search
+    title: str = ""
+    device: str = "cpu"  # cpu or cuda: they agree to rounding, and a study's identity is to the bit
+    notes: tuple[str, ...] = ()  # where its bounds come from, for a person to read
+    others: tuple[Scenario, ...] = ()
+    over_scenarios: str = "mean"
+    labels: tuple[str, ...] = ()
+    limits: tuple[Limit, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<{portrait.study_sentence(self)}>"
+
+    def _repr_html_(self) -> str:
+        """A table of what varies, for a notebook."""
+        return portrait.study_html(self)
+
+    @property
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """All scenarios in which each candidate flies."""
+        return (self.scenario, *self.others)
+
+    def whole(self, name: str) -> int:
+        """A whole number of the search."""
+        return int(getattr(self.search, name))
+
+    def population(self, run: int) -> int:
+        """Candidates of a generation in a run: restarts may enlarge it."""
+        return round(self.search.population * self.search.growth**run)
+
+    def seeds(self, generation: int) -> int:
+        """Flights of a candidate in a generation of the search: from `seeds` up to `late_seeds` in equal ratios."""
+        first, last = self.search.seeds, self.search.late_seeds
+        begin, end = ALONE * self.search.generations, max(1.0, self.search.generations - 1.0)
+        grown = min(max(0.0, (generation - begin) / max(end - begin, 1.0)), 1.0)
+        return round(float(first * (max(first, last) / first) ** grown))
+
+    def seed(self, part: int, number: int) -> int:
+        """Seed of a flight: `part` 0 searches, others are further parts; unlike any seed 0, 1, 2, ... given by hand."""
+        return ((self.whole("seed") + 1) << SEED_BITS) + (part << (SEED_BITS - 4)) + number
+
+    def document(self) -> dict[str, Any]:
+        """The study as plain values: what study.toml holds, and what a resumed study is compared with."""
+        q = self.search
+        return {
+            "layout": LAYOUT,
+            "airflock": __version__,
+            "rules": " ".join(fingerprint(scenario, int(q.precision)) for scenario in self.scenarios),
+            "device": self.device,
+            "title": self.title,
+            "name": self.scenario.name,
+            "search": {
+                name: int(value) if isinstance(value, float) and value.is_integer() else value
+                for name, value in ((n, getattr(q, n)) for n in q.__dataclass_fields__)
+                if name != "reserve" or self.limits
+            },
+            "objective": [
+                {
+                    "name": o.name,
+                    "maximise": o.maximise,
+                    "over_seeds": o.over_seeds,
+                    "quantile": o.quantile,
+                    **({"own": o.text} if o.own else {}),
+                }
+                for o in self.objectives
+            ],
+            **({"limits": [limit.text for limit in self.limits]} if self.limits else {}),
+            "space": self.space.document(),
+            "scenario": _unpublished(self.scenario),
+            **self._several(),
+        }
+
+    def _several(self) -> dict[str, Any]:
+        """What a study of several scenarios adds to its document."""
+        if not self.others:
+            return {}
+        found = {f"scenario_{i}": _unpublished(scenario) for i, scenario in enumerate(self.others, 2)}
+        return {"over_scenarios": self.over_scenarios, "labels": list(self.labels), **found}
+
+
+def _unpublished(scenario: Scenario) -> dict[str, Any]:
+    return {key: value for key, value in scenario.document.items() if key != "published"}
+
+
+def shipped() -> dict[str, Path]:
+    """Name → file of every study shipped with the package; a study for a preset bears the preset's name."""
+    root = Path(str(resources.files("airflock"))) / "scenarios" / "studies"
+    return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
+
+
+def is_study(name: str | os.PathLike[str]) -> bool:
+    """Whether a name is that of a study, rather than of a scenario; a preset's name is the preset's."""
+    path = own_path(name)
+    if str(name) in shipped() and str(name) not in presets():
+        return True
+    if path.suffix != ".toml" or not is_file(path):
+        return False
+    try:
+        return tells_of_study(read_toml(path))
+    except (TextError, OSError):  # the next reader says what is wrong
+        return False
+
+
+def load_study(
+    name: str | os.PathLike[str],
+    *,
+    settings: Mapping[str, Any] | None = None,
+    search: Mapping[str, Any] | None = None,
+    tables: Mapping[str, Any] | None = None,
+    limits: Sequence[str] = (),
+    trust: bool = False,
+) -> Study:
+    """Study from a file, from a shipped study's name, or of a scenario as it is, between bounds of its own.
+
+    settings : keys of the scenario to change, such as "duration"
+    search   : keys of the table [search] to change, such as "population"
+    tables   : tables "space" or "objective" that replace the file's
+    limits   : what may happen how rarely, in place of what the file says
+    trust    : whether code that the files name may run: a law, fitness functions
+    Raises ScenarioError with one line per fault.
+    """
+    known = shipped()
+    text = str(name)
+    path = known.get(text) or own_path(text)
+    document: Mapping[str, Any] = {}
+    with from_outside(path):
+        if path.suffix == ".toml" and is_file(path):
+            document = read_toml(path)
+        if not tells_of_study(document):
+            document = {"scenario": text, **(tables or {})}
+            return make_study(document, text, settings=settings, search=search, limits=limits, trust=trust)
+        where = text if text in known else str(path)
+        document = {**document, **(tables or {})}
+        return make_study(
+            document, where, settings=settings, search=search, folder=path.parent, limits=limits, trust=trust
+        )
+
+
+def _once(where: str, fault: str) -> str:
+    """A fault that begins with the name it is of, but not twice."""
+    return fault if fault.startswith(f"{where}: ") else f"{where}: {fault}"
+
+
+def make_study(
+    document: Mapping[str, Any],
+    where: str = "study",
+    *,
+    settings: Mapping[str, Any] | None = None,
+    search: Mapping[str, Any] | None = None,
+    folder: Path | None = None,
+    scenario: Scenario | Sequence[Scenario] | None = None,
+    limits: Sequence[str] = (),
+    trust: bool = False,
+) -> Study:
+    """Study from a nested dict; `trust` lets code run that it names.
+
+    scenario : in place of its key of that name; or several, in place of `scenarios`
+    limits   : in place of those of its objective; each candidate then flies twice at least, unless `search` has seeds
+    """
+    document, faults = formats.current(document, where), []
+    for key in document:
+        if key not in KEYS:
+            of_search = key in {field.name for field in fields(Search)}
+            hint = f"did you mean search.{key}?" if of_search else meant(key, KEYS, f"known: {', '.join(KEYS)}")
+            faults.append(f"{key}: unknown key; {hint}")
+    table = document.get("search", {})
+    found, more = schema.check("search", {**table, **(search or {})} if isinstance(table, Mapping) else table, Search)
+    faults += more
+    if scenario is None:
+        scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
+        if more or not scenarios:
+            named = [*(f"{where}: {fault}" for fault in faults), *(_once(where, fault) for fault in more)]
+            raise ScenarioError(named)
+    else:
+        scenarios = (scenario,) if isinstance(scenario, Scenario) else tuple(scenario)
+        labels = distinct([each.name for each in scenarios])
+    space: Space | None
+    notes: list[str] = []
+    if "space" in document:
+        space, more = read_space(document["space"], scenarios[0])
+        faults += more
+    else:
+        space, notes = common_space(scenarios)
+    over = document.get("over_scenarios", "mean")
+    faults += faults_together(scenarios, labels, space, over)
+    objectives, more = read_objectives(document.get("objective", {}), scenarios[0], folder, trust=trust)
+    kept, of_limits = read_limits({"limits": list(limits)} if limits else document.get("objective", {}), scenarios)
+    faults += more + of_limits
+    if found is not None:
+        if limits and "seeds" not in (search or {}) and found.seeds < 2.0:
+            found = replace(found, seeds=2.0)
+        faults += search_faults(found, objectives, space, str(over), limits=bool(kept))
+    if faults or space is None or found is None:
+        raise ScenarioError([f"{where}: {fault}" for fault in faults])
+    return Study(
+        scenarios[0], space, objectives, found, str(document.get("title", "")), notes=tuple(notes),
+        others=scenarios[1:], over_scenarios=str(over), labels=labels, limits=kept,
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Support: errors, files, locks, cache, threads, spelling, the machine. Knows nothing of flocks."""

@@ -1,0 +1,116 @@
+"""Files that are complete or not there at all: a temporary name in the same folder, then a rename.
+
+A process that is killed leaves its temporary file. It held a lock on it, which the system has given back: so the
+next process that writes beside it knows that nobody needs it, and removes it.
+"""
+
+import os
+import stat
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
+from functools import cache
+from pathlib import Path
+
+from airflock.support import locks
+
+MARK = ".airflock-"  # in the name of every temporary file
+FRESH = 60.0  # s in which a temporary file may not be locked yet
+FOUND = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # how what was found is opened
+
+
+@contextmanager
+def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a temporary path with the same ending to write to; it takes the final name only if the block succeeds.
+
+    A link is followed: the file that it names is replaced, not the link. Raises OSError, which names the path, where it
+    is that of something else than a file, such as a named pipe, and for whatever goes wrong while it is written.
+    """
+    target = Path(os.path.realpath(path))
+    if target.exists() and not stat.S_ISREG(target.stat().st_mode):
+        raise OSError(0, "is there and is not a regular file", str(path))
+    swept(target.parent)
+    try:
+        with _beside(target) as temporary:
+            yield temporary
+    except OSError as fault:
+        raise OSError(fault.errno, fault.strerror or str(fault), str(path)) from fault
+
+
+@contextmanager
+def _beside(target: Path) -> Iterator[Path]:
+    """A temporary file beside a target, which it replaces at the end; nothing of it is left otherwise."""
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem[:100]}{MARK}", suffix=target.suffix)
+    temporary = Path(name)
+    try:
+        with suppress(OSError):  # some file systems know no locks; then nothing is swept
+            locks.lock(handle)
+        yield temporary
+        temporary.chmod(0o666 & ~_umask())
+        handle = _let_go(handle)
+        temporary.replace(target)
+    except BaseException:
+        handle = _let_go(handle)
+        temporary.unlink(missing_ok=True)
+        raise
+    finally:
+        if handle >= 0:
+            os.close(handle)
+
+
+def _let_go(handle: int) -> int:
+    """Close a file, so that it can be renamed or removed, where the system does that to no open file; else keep it."""
+    if locks.MOVES_OPEN_FILES or handle < 0:
+        return handle
+    os.close(handle)
+    return -1
+
+
+def write(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
+    """Write text (UTF-8) or bytes; an OSError, which names the path, leaves the old file, or none, in place.
+
+    A memoryview is released in any case: Python 3.12 crashes where an error holds one of a BytesIO that has gone.
+    """
+    with content if isinstance(content, memoryview) else nullcontext(), atomic(path) as temporary:
+        if isinstance(content, memoryview):
+            with open(temporary, "wb") as file:  # Path.write_bytes makes another view, which an error would hold
+                file.write(content)
+        else:
+            temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+@cache
+def swept(folder: Path) -> int:
+    """Remove what processes that were killed had begun to write into a folder, once a process; how many files."""
+    count = 0
+    with suppress(OSError):
+        for path in folder.glob(f".*{MARK}????????*"):
+            count += _remove(path)
+    return count
+
+
+def _remove(path: Path) -> bool:
+    """Remove a temporary file that no process holds."""
+    try:
+        handle = os.open(path, FOUND)
+    except OSError:
+        return False
+    try:
+        if time.time() - os.fstat(handle).st_mtime < FRESH:
+            return False
+        locks.lock(handle)
+        handle = _let_go(handle)
+        path.unlink()
+    except OSError:  # somebody is writing it, or it is not ours
+        return False
+    finally:
+        if handle >= 0:
+            os.close(handle)
+    return True
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

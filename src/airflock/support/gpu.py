@@ -1,0 +1,96 @@
+"""Device: whether there is a GPU that can be used, what it is, and what is missing where there is none."""
+
+import os
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from airflock.support.errors import DeviceError
+
+INSTALL = "pip install 'airflock[cuda]'"
+
+
+def runtime() -> Any:
+    """numba-cuda's runtime interface."""
+    return import_module("numba.cuda")
+
+
+@cache
+def trouble() -> str | None:
+    """Why no GPU can be used here, as one line; None if one can."""
+    try:
+        import_module("numba_cuda")
+        cuda = runtime()
+    except ImportError as fault:
+        missing = isinstance(fault, ModuleNotFoundError) and fault.name == "numba_cuda"
+        return f"numba-cuda is not installed; {INSTALL}" if missing else f"numba-cuda: {_first_line(fault)}"
+    if simulating():
+        return "the CUDA simulator is on (NUMBA_ENABLE_CUDASIM); it is only for tests"
+    try:
+        if not cuda.is_available():
+            return f"no GPU can be used: {_driver_fault()}"
+        cuda.get_current_device()
+    except Exception as fault:  # the driver's own faults come in many types
+        return f"the GPU cannot be used: {_first_line(fault)}"
+    return None
+
+
+def _driver_fault() -> str:
+    """What the driver says."""
+    fault = runtime().cuda_error()
+    return _first_line(fault) if fault else "no device found"
+
+
+def _first_line(fault: BaseException | str) -> str:
+    lines = [line.strip(" .:-") for line in str(fault).splitlines() if line.strip(" .:-")]
+    return lines[0] if lines else type(fault).__name__
+
+
+def simulating() -> bool:
+    """Whether Numba's CUDA simulator stands for a GPU."""
+    return os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
+
+
+def available() -> bool:
+    """Whether a GPU can be used."""
+    return trouble() is None
+
+
+def required(simulated: bool = False) -> None:
+    """Raise DeviceError with the reason if no GPU can be used."""
+    if simulated and simulating():
+        return
+    fault = trouble()
+    if fault is not None:
+        raise DeviceError(f"device = cuda: {fault}; choose device = cpu or auto")
+
+
+def free_memory() -> int:
+    """Free bytes in the GPU's memory."""
+    return int(runtime().current_context().get_memory_info().free)
+
+
+def multiprocessors() -> int:
+    """Multiprocessors of the GPU."""
+    return int(runtime().get_current_device().MULTIPROCESSOR_COUNT)
+
+
+def describe() -> list[dict[str, Any]]:
+    """Every GPU: name, compute capability, multiprocessors, memory in GB."""
+    if not available():
+        return []
+    cuda, found = runtime(), []
+    for device in cuda.gpus:
+        with device:
+            memory = cuda.current_context().get_memory_info()
+            name = device.name.decode() if isinstance(device.name, bytes) else str(device.name)
+            found.append(
+                {
+                    "name": name,
+                    "compute_capability": ".".join(map(str, device.compute_capability)),
+                    "multiprocessors": int(device.MULTIPROCESSOR_COUNT),
+                    "memory_gb": round(memory.total / 1e9, 1),
+                    "free_gb": round(memory.free / 1e9, 1),
+                }
+            )
+    return found

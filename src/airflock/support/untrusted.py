@@ -1,0 +1,270 @@
+"""The one door for text from outside: files, attributes, rows and options are measured before they are parsed.
+
+A stranger's text may be too large, nested too deeply, or of numbers without end; parsers then take minutes, gigabytes,
+or raise whatever they happen to. Here the size, the nesting (dotted keys count, too) and the digits are bounded first,
+and `from_outside` turns everything that goes wrong behind the door into one line that names where the text came from.
+"""
+
+import json
+import os
+import re
+import stat
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.parsers import expat
+
+from airflock.support.errors import AirflockError, CardError, RecordingError, ScenarioError, bounded, reason
+from airflock.support.spelling import raised
+
+MOST_BYTES = 5_000_000  # of one text; a polygon of 100,000 corners takes some 4 MB
+MOST_DEPTH = 32  # tables and lists inside each other
+MOST_DOTS = 16  # parts of one dotted key; the standard parser takes quadratic time and memory over them
+MOST_VALUES = 1_000_000
+MOST_KEYS = 10_000
+MOST_KEY = 200  # letters of one key
+MOST_SHORT = 4000  # letters of a JSON text that needs no measuring: a store has very many of them
+MOST_ELEMENTS = 100_000  # of an XML text
+MOST_DIGITS = 400  # of one number, in any base
+MOST_WHOLE = 2**64  # whole numbers lie below it on both sides: seeds are the largest
+
+_TOKEN = re.compile(
+    r'"""(?:[^"\\]|\\.|"(?!""))*"{3,5}'  # strings of all four kinds: what is inside does not count
+    r"|'''(?:[^']|'(?!''))*'{3,5}"
+    r'|"(?:[^"\\\n]|\\.)*"'
+    r"|'[^'\n]*'"
+    r"|#[^\n]*"
+    r"|[\[{\]}.=,\n]"
+    rf"|[0-9a-zA-Z_]{{{MOST_DIGITS + 1},}}"
+    r"|[\"']",  # a string without an end: a parser stops here as well
+    re.DOTALL,
+)
+
+_UNQUOTED = re.compile(r"\s*([\w.-]+)\s*=\s*([-+]?[\d.]+ ?[a-zA-Zµ°%][\w/^°%]*)\s*(?:#.*)?")  # v_flock = 6 m/s
+
+
+class TextError(AirflockError):
+    """A text from outside is too large, nested too deeply, or no text at all; says what, not where."""
+
+
+class FormatError(TextError):
+    """A text from outside that is not of the format that it should have."""
+
+
+@contextmanager
+def from_outside(where: object, kind: type[AirflockError] = ScenarioError) -> Iterator[None]:
+    """Whatever is raised while a text from outside is read or used becomes a `kind` of one line that begins `where`.
+
+    An AirflockError of another kind has its line already. The cause is kept for `AIRFLOCK_DEBUG=1`.
+    """
+    try:
+        yield
+    except AirflockError as fault:
+        if not isinstance(fault, TextError):
+            raise
+        raise _one(kind, f"{where}: {fault}") from fault
+    except OSError as fault:
+        raise _one(kind, f"{where}: {reason(fault)}") from fault
+    except RecursionError as fault:
+        raise _one(kind, f"{where}: is nested too deeply") from fault
+    except MemoryError as fault:
+        raise _one(kind, f"{where}: needs more memory than there is") from fault
+    except Exception as fault:  # the last resort: a stranger's text must not end in a traceback
+        raise _one(kind, f"{where}: cannot be used: {raised(fault)}") from fault
+
+
+def _one(kind: type[AirflockError], line: str) -> AirflockError:
+    line = bounded(" ".join(line.split()))
+    return kind([line]) if issubclass(kind, (ScenarioError, CardError)) else kind(line)
+
+
+def path_of(path: Any) -> Path:
+    """The name of a file as a path. Raises RecordingError for what is no name."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise RecordingError(f"{bounded(repr(path), 80)} is not a name of a file; give a text or a Path")
+    return own_path(path)
+
+
+def own_path(name: str | os.PathLike[str]) -> Path:
+    """A path as a person writes it: ~ is the home folder, also where no shell has put it in."""
+    return Path(os.path.expanduser(name))
+
+
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a path from outside is that of a file; a path that cannot be one (too long, a NUL inside) is not."""
+    try:
+        return stat.S_ISREG(own_path(path).stat().st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
+    """Text of a regular file in UTF-8, with or without a byte order mark; raises TextError or OSError."""
+    source = own_path(path)
+    if not stat.S_ISREG(source.stat().st_mode):  # a named pipe would wait for ever
+        raise TextError("is not a regular file")
+    with source.open("rb") as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise TextError(f"is larger than {most / 1e6:g} MB, more than any file of this kind needs")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as fault:
+        raise FormatError(f"is not text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}") from fault
+
+
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """A TOML file as a dict; raises TextError or OSError."""
+    return toml(read_text(path))
+
+
+def toml(text: str) -> dict[str, Any]:
+    """A TOML text as a dict; raises FormatError where it is none and TextError where it is beyond bounds."""
+    _measure(text)
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as fault:
+        raise FormatError(f"{fault}{_quotes(text, str(fault))}") from fault
+    _walk(document)
+    return document
+
+
+def _quotes(text: str, said: str) -> str:
+    """What to write where the line that a parser stopped at holds a number with a unit."""
+    place = re.search(r"at line (\d+)", said)
+    line = text.splitlines()[int(place[1]) - 1] if place else ""
+    with_unit = _UNQUOTED.fullmatch(line[:MOST_KEY])
+    return f'; a number with its unit stands in quotes: {with_unit[1]} = "{with_unit[2]}"' if with_unit else ""
+
+
+def toml_value(text: str) -> Any:
+    """A value as TOML writes it, or the text itself where it is none; raises TextError where it is more than one."""
+    try:
+        document = toml(f"value = {text}")
+    except FormatError:
+        return text.strip()
+    if list(document) != ["value"]:
+        raise TextError("holds more than one value; give each key one of its own")
+    return document["value"]
+
+
+def json_object(text: Any) -> dict[str, Any]:
+    """A JSON text as a dict; raises FormatError where it is none and TextError where it is beyond bounds."""
+    found = json_value(text)
+    if not isinstance(found, dict):
+        raise FormatError(f"holds {type(found).__name__} {bounded(repr(found), 40)}, not an object of keys")
+    return found
+
+
+def json_value(text: Any) -> Any:
+    """A JSON text as plain values; raises FormatError where it is none and TextError where it is beyond bounds."""
+    if not isinstance(text, str):
+        raise FormatError(f"is {type(text).__name__}, no text")
+    if len(text) > MOST_SHORT or text.count("[") + text.count("{") > MOST_DEPTH:
+        _measure(text)
+    try:
+        found = json.loads(text)
+    except ValueError as fault:
+        raise FormatError(f"is not JSON: {fault}") from fault
+    _walk(found)
+    return found
+
+
+class Element(NamedTuple):
+    """An element of an XML text: its tag without a namespace, its own text, the elements in it, its attribute name."""
+
+    tag: str
+    text: str
+    children: list["Element"]
+    name: str = ""
+
+
+def xml(text: str) -> Element:
+    """An XML text as its outermost element; raises FormatError where it is none, TextError where it is beyond bounds.
+
+    A document type is refused before anything of it is read, so that no entity is ever defined, expanded or fetched.
+    """
+    if len(text) > MOST_BYTES:
+        raise TextError(f"is larger than {MOST_BYTES / 1e6:g} MB, more than any text of this kind needs")
+    around: list[tuple[str, str, list[str], list[Element]]] = [("", "", [], [])]
+    count = 0
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if count > MOST_ELEMENTS:
+            raise TextError(f"has more than {MOST_ELEMENTS} elements")
+        if len(around) > MOST_DEPTH:
+            raise TextError(f"is nested more than {MOST_DEPTH} deep")
+        around.append((tag.rpartition(" ")[2], attributes.get("name", ""), [], []))
+
+    def end(_: str) -> None:
+        tag, name, parts, children = around.pop()
+        around[-1][3].append(Element(tag, "".join(parts).strip(), children, name))
+
+    def refuse(*_: Any) -> Any:
+        raise FormatError("has a document type or entities, which no file of this kind needs")
+
+    parser = expat.ParserCreate("utf-8", namespace_separator=" ")
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.CharacterDataHandler = lambda part: around[-1][2].append(part)
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
+    try:
+        parser.Parse(text.encode("utf-8"), True)
+    except expat.ExpatError as fault:
+        raise FormatError(f"is not XML: {fault}") from fault
+    return around[0][3][0]
+
+
+def _measure(text: str) -> None:
+    """Refuse a text beyond bounds before it is parsed, in one pass over it."""
+    if len(text) > MOST_BYTES:
+        raise TextError(f"is larger than {MOST_BYTES / 1e6:g} MB, more than any text of this kind needs")
+    depth = dots = values = 0
+    for token in _TOKEN.finditer(text):
+        kind = token.group()
+        if kind == ".":
+            dots += 1
+            if dots >= MOST_DOTS:
+                raise TextError(f"line {_line(text, token)}: a key of more than {MOST_DOTS} parts")
+        elif kind in "[{":
+            depth, dots = depth + 1, 0
+            if depth > MOST_DEPTH:
+                raise TextError(f"line {_line(text, token)}: nested more than {MOST_DEPTH} deep")
+        elif kind in "]}":
+            depth, dots = max(depth - 1, 0), 0
+        elif kind in "=,\n":
+            values, dots = values + (kind == ","), 0
+            if values > MOST_VALUES:
+                raise TextError(f"line {_line(text, token)}: more than {MOST_VALUES} values")
+        elif kind in "\"'":
+            return
+        elif kind[0] not in "\"'#":
+            raise TextError(f"line {_line(text, token)}: a number or a name of more than {MOST_DIGITS} letters")
+
+
+def _line(text: str, token: re.Match[str]) -> int:
+    return text.count("\n", 0, token.start()) + 1
+
+
+def _walk(document: Any) -> None:
+    """Refuse what a parser made of a text, where it is beyond bounds."""
+    keys, left = 0, [(document, 0, "")]
+    while left:
+        value, depth, name = left.pop()
+        if isinstance(value, dict):
+            keys += len(value)
+            if keys > MOST_KEYS:
+                raise TextError(f"has more than {MOST_KEYS} keys")
+            for key, entry in value.items():
+                if len(key) > MOST_KEY:
+                    raise TextError(f"the key {bounded(key, 40)} has {len(key)} letters, more than {MOST_KEY}")
+                left.append((entry, depth + 1, f"{name}.{key}" if name else key))
+        elif isinstance(value, list):
+            left += [(entry, depth + 1, name) for entry in value]
+        elif isinstance(value, int) and not -MOST_WHOLE < value < MOST_WHOLE:
+            raise TextError(f"{name} = {bounded(f'{value:x}', 20)} (hexadecimal) is beyond 2^64")
+        if depth > MOST_DEPTH:
+            raise TextError(f"{bounded(name, 80)} is nested more than {MOST_DEPTH} deep")

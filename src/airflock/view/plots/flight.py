@@ -1,0 +1,208 @@
+"""What every picture of a flight needs: paths in a window of time, the world's outlines, a view onto a plane."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock.recordings import attributes
+from airflock.recordings.differences import velocities
+from airflock.recordings.flown_scenario import scenario_of
+from airflock.recordings.layout import DIMENSIONS, check
+from airflock.scenarios.geometry import ground_plan
+from airflock.scenarios.scenario import Scenario
+from airflock.support.errors import RecordingError
+from airflock.world import arena
+from airflock.world.place import half_sizes
+
+Array = NDArray[Any]
+
+
+class Paths(NamedTuple):
+    """Trajectories in a window of time; missing positions are nan.
+
+    times    : (time,) s
+    position : (time, axis, agent) m, two or three axes
+    velocity : the same, m/s
+    """
+
+    times: Array
+    position: Array
+    velocity: Array
+
+    @property
+    def speed(self) -> Array:
+        """(time, agent) m/s."""
+        return np.asarray(np.sqrt((self.velocity**2).sum(1)))
+
+    @property
+    def agents(self) -> int:
+        """Number of agents."""
+        return int(self.position.shape[2])
+
+
+def paths_of(
+    recording: xr.Dataset, start: float | None = None, stop: float | None = None, *, last: float | None = None
+) -> Paths:
+    """Trajectories from start to stop, s; without a start, the `last` seconds, or all of them.
+
+    Raises a RecordingError when the window holds no frame.
+    """
+    check(recording)
+    times = recording["time"].values.astype(float)
+    begin, end = window(times, start, stop, last)
+    chosen = (times >= begin - 1e-9) & (times <= end + 1e-9)
+    if not chosen.any():
+        raise RecordingError(
+            f"recording: has no frame from {begin:g} to {end:g} s; it reaches from {times[0]:g} to {times[-1]:g} s"
+        )
+    shown = recording.isel(time=np.flatnonzero(chosen), keypoint=0)
+    order = tuple(name for name in DIMENSIONS if name != "keypoint")
+    position = shown["position"].transpose(*order).values.astype(float)
+    if "velocity" in shown:
+        velocity = shown["velocity"].transpose(*order).values.astype(float)
+    elif chosen.sum() > 1:
+        velocity = velocities(position, times[chosen])
+    else:
+        velocity = np.zeros_like(position)
+    return Paths(times[chosen], position, velocity)
+
+
+def window(times: Array, start: float | None, stop: float | None, last: float | None = None) -> tuple[float, float]:
+    """First and last instant shown, s."""
+    end = float(times[-1]) if stop is None else float(stop)
+    if start is not None:
+        begin = float(start)
+    else:
+        begin = float(times[0]) if last is None else max(float(times[0]), min(end, float(times[-1])) - last)
+    if begin > end:
+        raise RecordingError(f"recording: the window from {begin:g} to {end:g} s ends before it starts")
+    return begin, end
+
+
+def flown_with(recording: xr.Dataset) -> Scenario | None:
+    """Scenario that a recording was flown with; None for tracks."""
+    check(recording)
+    return scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
+
+
+def world_of(recording: xr.Dataset) -> arena.Parameters:
+    """World of a recording; open for tracks."""
+    scenario = flown_with(recording)
+    return scenario.world if scenario else arena.Parameters(arena="none")
+
+
+def name_of(what: xr.Dataset | Scenario) -> str:
+    """Short name of a scenario or recording: that of the preset or file, or of the file of its tracks."""
+    name = what.name if isinstance(what, Scenario) else attributes.name_of(what)
+    return Path(name).stem if name.endswith((".toml", ".nc")) else name
+
+
+def details_of(recording: xr.Dataset, shown: Paths | None = None) -> str:
+    """What else a title says: number of agents, seed, and the window of time that is shown."""
+    agents = recording.sizes["individual"]
+    parts = [f"{agents} agent{'s' if agents > 1 else ''}"]
+    if "airflock_seed" in recording.attrs:
+        parts.append(f"seed {recording.attrs['airflock_seed']}")
+    if shown is not None:
+        parts.append(f"{shown.times[0]:.4g} to {shown.times[-1]:.4g} s")
+    return " · ".join(parts)
+
+
+class Outline(NamedTuple):
+    """Corners (corner, axis) in m of a closed polygon, and whether it is an obstacle."""
+
+    corners: Array
+    obstacle: bool
+
+
+def _ends(world: arena.Parameters) -> list[tuple[float, float]]:
+    """Lowest and highest height of each outline of a 3-D arena, m."""
+    whole = arena.heights_of(world)
+    found = [] if world.arena == "none" else [whole]
+    return found + [(h[0], h[1]) for h in world.heights or [whole] * len(world.obstacles)]
+
+
+def outlines(world: arena.Parameters) -> list[Outline]:
+    """Ground plans of the arena (first, if there is one) and of the obstacles, as closed polygons in the plane."""
+    plan = ground_plan(world)
+    found = [] if plan is None else [Outline(np.array(plan.exterior.coords), False)]
+    for corners in world.obstacles:
+        found.append(Outline(np.array([*corners, corners[0]]), True))
+    return found
+
+
+def walls(world: arena.Parameters) -> list[Outline]:
+    """Faces and edges to draw: in the plane the outlines, in space floor, ceiling and uprights of each."""
+    if world.dimensions == "2":
+        return outlines(world)
+    found = []
+    for (corners, obstacle), (low, high) in zip(outlines(world), _ends(world), strict=True):
+        found += [Outline(_raised(corners, z), obstacle) for z in (low, high)]
+        step = max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1  # a circle gets eight uprights
+        found += [Outline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
+    return found
+
+
+def _raised(corners: Array, z: float) -> Array:
+    return np.column_stack([corners, np.full(len(corners), z)])
+
+
+def through_face(segments: Array, world: arena.Parameters) -> Array:
+    """Which segments (segment, end, axis), m, lead through a face of a periodic world to the opposite one."""
+    if world.edges != "periodic":
+        return np.zeros(len(segments), bool)
+    halves = np.array(half_sizes(world)[: segments.shape[2]])
+    return np.asarray((np.abs(segments[:, 1] - segments[:, 0]) > halves).any(axis=1))
+
+
+class View(NamedTuple):
+    """Parallel projection onto the picture: `right` and `up` are unit vectors (axis,)."""
+
+    right: Array
+    up: Array
+
+    def __call__(self, points: Array, axis: int = 1) -> tuple[Array, Array]:
+        """Picture coordinates of points whose given axis holds their components; both m. A plane lies at height 0."""
+        moved = np.moveaxis(points, axis, -1)
+        known = min(moved.shape[-1], len(self.right))
+        moved = moved[..., :known]
+        return moved @ self.right[:known], moved @ self.up[:known]
+
+
+def view_of(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.0) -> View:
+    """From above in the plane; in space from the given direction."""
+    if axes == 2:
+        return View(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+    a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
+    right = np.array([-math.sin(a), math.cos(a), 0.0])
+    up = np.array([-math.cos(a) * math.sin(e), -math.sin(a) * math.sin(e), math.cos(e)])
+    return View(right, up)
+
+
+def extent(
+    shown: Paths, world: arena.Parameters, view: View, margin: float = 0.04, around: Sequence[Array] = ()
+) -> tuple[float, float, float, float]:
+    """Left, right, bottom and top of a picture that holds the arena, every path and the lines `around` it, m."""
+    xs, ys = view(shown.position)
+    points = [(xs.ravel(), ys.ravel())] + [view(line) for line in (*(wall.corners for wall in walls(world)), *around)]
+    x, y = np.concatenate([p[0] for p in points]), np.concatenate([p[1] for p in points])
+    if not np.isfinite(x).any():
+        raise RecordingError("recording: every position in this window is missing")
+    left, right, bottom, top = (float(v) for v in (np.nanmin(x), np.nanmax(x), np.nanmin(y), np.nanmax(y)))
+    edge = margin * max(right - left, top - bottom, 1.0)
+    return left - edge, right + edge, bottom - edge, top + edge
+
+
+def speed_range(shown: Paths) -> tuple[float, float]:
+    """Ends of a colour bar, m/s: what all but a few percent lie between, rounded outwards."""
+    speed = shown.speed[np.isfinite(shown.speed)]
+    if not speed.size:
+        return 0.0, 1.0
+    slow, fast = (max(float(v), 1e-3) for v in np.quantile(speed, (0.01, 0.999)))
+    step = 10.0 ** math.floor(math.log10(fast)) / 2.0
+    return step * math.floor(slow / step), step * math.ceil(fast / step)

@@ -1,0 +1,155 @@
+"""A model's own rules drawn against distance (Vásárhelyi et al. 2018, Fig. 6), in the words of the law.
+
+A law whose neighbours act through several terms (TERMS, or several vectors among its Sums) gets a panel for each.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from airflock.core.contract import Model
+from airflock.core.contract.declared import COMMANDS
+from airflock.core.vocabulary import asks
+from airflock.scenarios.scenario import Scenario
+from airflock.support.errors import RuleError
+from airflock.view.plots import style
+from airflock.view.plots.flight import name_of
+from airflock.view.plots.responses import FASTEST, Array, alignment, allowed_difference, repulsion, wall_response
+from airflock.view.plots.save import positive
+from airflock.view.stage.arrows import vectors, word_of
+
+POINTS = 400
+SHARES = (0.5, 1.0, 2.0)  # of the velocity difference, in the panel of alignment
+
+
+def rules(
+    scenario: Scenario, *, difference: float | None = None, speed: float | None = None, farthest: float | None = None,
+    ax: Axes | None = None,
+) -> Figure:  # fmt: skip
+    """Repulsion, largest allowed velocity difference and alignment, or each term of the law by its own word; walls.
+
+    scenario   : whose law is drawn, with its numbers
+    difference : velocity difference of the pair, m/s; by default the model's preferred speed
+    speed      : at which an agent flies towards a wall, m/s; by default the same
+    farthest   : largest distance drawn, m; by default a quarter beyond the interaction range
+    ax         : axes of a grid, whose place the panels take, instead of a new figure
+    The picture is that of Vásárhelyi et al. 2018, Fig. 6.
+
+    Raises RuleError for a law without a rule of distance, and AirflockError for an `ax` that is none of a grid.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> len(airflock.plots.rules(airflock.load("vasarhelyi_2018/4ms")).axes)
+    3
+    """
+    model, p = scenario.model, scenario.parameters
+    if model.neighbour is None and model.boundary is None:
+        raise RuleError(f"model {model.name} has neither neighbour nor boundary; there is no rule of distance to draw")
+    preferred = model.preferred_speed(p) if model.preferred_speed else 1.0
+    dv = float(preferred if difference is None else difference)
+    v = float(preferred if speed is None else speed)
+    reach = float(farthest if farthest is not None else _farthest(scenario))
+    positive(difference=dv, speed=v, farthest=reach)
+    r = np.linspace(reach / POINTS, reach, POINTS)
+    unit = COMMANDS[model.command].replace("^2", "²")
+    draws: list[tuple[str, Callable[[Axes], None]]] = []
+    if model.neighbour is not None and (model.terms or len(vectors(model.Sums)) > 1):
+        for stem in vectors(model.Sums):
+            draws.append((word_of(model, stem)[0], partial(_term_panel, model=model, p=p, r=r, dv=dv, stem=stem)))
+    elif model.neighbour is not None:
+        draws.append(("one neighbour", partial(_pair_panel, model=model, p=p, r=r, dv=dv, unit=unit)))
+        draws.append(("alignment", partial(_alignment_panel, model=model, p=p, r=r, dv=dv, unit=unit)))
+    if model.boundary is not None:
+        draws.append(("one wall", partial(_wall_panel, model=model, p=p, r=r, v=v, unit=unit)))
+    figure, panels = style.panels(ax, 1, len(draws), 3.4 * len(draws) + 0.4, 3.1)
+    for axes, (title, draw), name in zip(panels[0], draws, "ABCDEFGH", strict=False):
+        draw(axes)
+        style.letter(axes, f"{name}  {title}")
+    style.overall(figure, name_of(scenario), f"rules of {model.name} against distance")
+    return style.root(figure)
+
+
+def _farthest(scenario: Scenario) -> float:
+    known = scenario.model.interaction_range or scenario.model.reach
+    span = float(known(scenario.parameters)) if known else scenario.radio.range
+    return 1.25 * (span if span < 1e4 else min(scenario.radio.range, 100.0))
+
+
+def _term_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, stem: str) -> None:
+    """One term of a law: what a neighbour at rest adds to it, and what its motion adds, up to the law's own reach."""
+    word, unit = word_of(model, stem)
+    assert model.neighbour is not None
+    by_velocity = bool({"dvx", "dvy", "dv"} & set(asks(model.neighbour, "neighbour", model.name)))
+    inside = r < float(model.reach(p)) if model.reach else np.full(len(r), True)
+    place = list(vectors(model.Sums)).index(stem)
+    away = np.where(inside, repulsion(model, p, r)[place].values, 0.0)
+    if away.any():
+        towards = away.max() <= 0.0
+        label = "towards it" if towards else "away from it"
+        axes.plot(r, -away if towards else away, color=style.BLUE, linewidth=1.8, label=label)
+    for share, color in zip(SHARES if by_velocity else (1.0,), (style.ORANGE, style.RED, style.PURPLE), strict=False):
+        along = np.where(inside, alignment(model, p, r, share * dv)[place].values, 0.0)
+        if along.any():
+            label = f"$\\Delta v$ = {share * dv:.3g} m/s" if by_velocity else "along its heading"
+            axes.plot(r, along, color=color, linewidth=1.8, label=label)
+    axes.axhline(0.0, color=style.GREY, linewidth=0.6, zorder=0)
+    style.dress(axes, "distance (m)", f"{word} ({unit})" if unit else word)
+    axes.set_xlim(0.0, float(r[-1]))
+    style.legend(axes)
+
+
+def _pair_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
+    """Fig. 6 itself: repulsion, largest allowed difference, and the difference at hand."""
+    pushes = repulsion(model, p, r)
+    allowed = allowed_difference(model, p, r)
+    shared = unit == "m/s"  # one axis serves both
+    for line, push in zip((style.BLUE, style.SKY, style.PURPLE), pushes, strict=False):
+        axes.plot(r, push.values, color=line, linewidth=1.8, label=_named("repulsion", push.name))
+    other = axes if shared else style.second_axis(axes, "velocity difference (m/s)", style.GREEN)
+    other.plot(r, allowed, color=style.GREEN, linewidth=1.8, label="largest allowed\nvelocity difference")
+    other.axhline(dv, color=style.RED, linewidth=1.2, linestyle=(0, (5, 3)), label="actual difference")
+    beyond = np.nan_to_num(allowed, nan=FASTEST) < dv
+    other.fill_between(r, allowed, dv, where=beyond.tolist(), color=style.RED, alpha=0.08, linewidth=0.0)
+    style.dress(axes, "distance (m)", f"speed ({unit})" if shared else f"repulsion ({unit})")
+    lines = axes.get_legend_handles_labels()[0] + ([] if shared else other.get_legend_handles_labels()[0])
+    highest = max([2.0 * dv] + ([float(push.values.max()) for push in pushes] if shared else []))
+    other.set_ylim(min(0.0, axes.get_ylim()[0] if shared else 0.0), 1.25 * highest)
+    axes.set_xlim(0.0, float(r[-1]))
+    style.legend(axes, lines)
+
+
+def _alignment_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
+    for share, color in zip(SHARES, (style.ORANGE, style.RED, style.PURPLE), strict=True):
+        for number, term in enumerate(alignment(model, p, r, share * dv)):
+            dashes = ("-", "--", ":")[number % 3]
+            label = _named(f"$\\Delta v$ = {share * dv:.3g} m/s", term.name)
+            axes.plot(r, term.values, color=color, linewidth=1.8, linestyle=dashes, label=label)
+    style.dress(axes, "distance (m)", f"alignment term ({unit})")
+    axes.set_xlim(0.0, float(r[-1]))
+    low, high = axes.get_ylim()
+    axes.set_ylim(min(0.0, low), 1.4 * high)  # room for the legend
+    style.legend(axes)
+
+
+def _wall_panel(axes: Axes, *, model: Model, p: Any, r: Array, v: float, unit: str) -> None:
+    reach = float(r[-1])
+    distance = np.linspace(-0.1 * reach, reach, POINTS)
+    colors = (style.ORANGE, style.RED, style.PURPLE)
+    for share, color in zip(SHARES, colors, strict=True):
+        for number, term in enumerate(wall_response(model, p, distance, share * v)):
+            dashes = ("-", "--", ":")[number % 3]
+            label = _named(f"{share * v:.3g} m/s towards it", term.name)
+            axes.plot(distance, term.values, color=color, linewidth=1.8, linestyle=dashes, label=label)
+    axes.axvspan(float(distance[0]), 0.0, color=style.PALE, alpha=0.6, linewidth=0.0)
+    style.dress(axes, "distance to the wall (m)", f"wall term ({unit})")
+    axes.set_xlim(float(distance[0]), reach)
+    style.legend(axes)
+
+
+def _named(what: str, name: str) -> str:
+    return f"{what}, {name}" if name else what

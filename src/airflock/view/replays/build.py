@@ -1,0 +1,258 @@
+"""The page of a replay: a recording, what stands in its world, and the JavaScript that plays it, in one HTML file."""
+
+import base64
+import html
+import json
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from airflock.parts.metrics.registry import numbers_of
+from airflock.recordings import attributes
+from airflock.recordings.flown_scenario import scenario_of
+from airflock.recordings.layout import frames_of
+from airflock.scenarios.events import Event, events_of
+from airflock.scenarios.scenario import Scenario
+from airflock.support import atomic
+from airflock.support.errors import RecordingError
+from airflock.support.spelling import meant
+from airflock.support.suffixes import PAGES, suffix_fault
+from airflock.support.untrusted import own_path
+from airflock.view.replays.layers import flown_layers, layers
+from airflock.view.replays.pack import pack
+from airflock.view.stage import colours, shades
+from airflock.view.stage.scene import Stage, stage_of
+
+RATE = 10.0  # frames per second that are kept at most; the page draws between them
+MOST_EVENTS = 500
+SCRIPTS = ("data", "colours", "scene", "trails", "charts", "replay")  # in the order in which they need each other
+COUNTED = {"n_coll", "phi_coll", "collisions"}  # order parameters of flocks that can collide
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A recording as a page; a notebook shows it in place. `text` is the whole HTML."""
+
+    text: str
+    name: str
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page as .html."""
+        target = own_path(path)
+        wrong = suffix_fault(target, PAGES)
+        if wrong:
+            raise RecordingError(wrong)
+        atomic.write(target, self.text)
+        return target
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{html.escape(self.text, quote=True)}" title="{html.escape(self.name)}" '
+            'style="width:100%;height:520px;border:1px solid #ddd"></iframe>'
+        )
+
+
+def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") -> Replay:
+    """Page that plays a recording; it opens from disk without network and displays itself in a notebook.
+
+    recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
+    rate      : frames per second that are kept at most
+    colour    : what the colours stand for when it opens, as the page's menu names it: speed, heading, height, agent,
+                cluster, group, fault, a number that differs among agents, or a variable of the recording with one
+                number for each individual (at each time, or for good)
+
+    Individuals that are absent are not drawn.
+
+    Returns
+    -------
+    The page: `save(path)` writes it as one HTML file, `text` holds it, and a notebook shows it.
+
+    Raises RecordingError for a colour that the recording does not know, and for a rate that is none; ScenarioError and
+    FlightError where the scenario that it carries cannot be read or flown again.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> airflock.replay(airflock.simulate(short)).name
+    'vasarhelyi_2018/4ms'
+    """
+    if not 0.0 < rate < math.inf:
+        raise RecordingError(f"rate = {rate:g} frames per second is not above 0")
+    frames, period, present = frames_of(recording)
+    axes = frames.shape[1] // 2
+    stride = max(1, math.ceil(1.0 / (rate * period) - 1e-6))
+    there, every = present[::stride], period * stride
+    kept = _held(frames, present)[::stride]
+    scenario = scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
+    rows = layers(recording, scenario, kept[:, :axes], there, stride)
+    whole = there.all()
+    flat = np.zeros((kept.shape[2], 3))
+    flat[:, :axes] = kept[0, :axes].T
+    stage = _stage(scenario, kept[:, :axes], flat)
+    packed = pack(kept[:, :axes], [layer.bytes for layer in rows] + ([] if whole else [there.astype(np.uint8)]))
+    if scenario is None:  # tracks may lie at 5,000 km north, where a graphics card tells places half a metre apart
+        packed = packed._replace(low=[*np.subtract(packed.low[:2], stage["centre"][:2]).tolist(), *packed.low[2:]])
+        stage["centre"][:2] = 0.0, 0.0
+    own = [layer.shade.name for layer in rows]
+    ways = [*_motion(axes), *own]
+    _check_colour(colour, ways, "this recording")
+    first = float(recording["time"].values[0])
+    name = attributes.name_of(recording)
+    speed = np.sqrt((frames[::stride, axes:] ** 2).sum(1))
+    nearest, collisions = _near(frames[:, :axes], present, period, scenario)
+    about = {
+        "name": name, "seed": int(recording.attrs["airflock_seed"]) if "airflock_seed" in recording.attrs else None,
+        "first": first, "period": every, "shape": packed.shape, "low": packed.low, "quantum": packed.quantum,
+        "top": _nice(float(np.nanquantile(speed, 0.995))), "ramp": colours.RAMP.astype(int).tolist(),
+        "wheel": colours.WHEEL.astype(int).tolist(), "blank": shades.BLANK, "way": colour, "ways": ways,
+        "layers": [_told_layer(layer.shade) for layer in rows], "whole": bool(whole),
+        "height": [float(np.nanmin(frames[:, axes - 1])), float(np.nanmax(frames[:, axes - 1]))],
+        "leap": _leap(scenario), "collisions": [[first + t, i, j] for t, i, j in collisions],
+        "events": _events(recording, scenario), "stage": stage,
+        "charts": _known({"mean speed (m/s)": _mean(speed), "nearest pair (m)": nearest[::stride]}),
+    }  # fmt: skip
+    return Replay(_page(name, about, packed.data), name)
+
+
+def check_colour(scenario: Scenario, colour: str) -> None:
+    """Raise RecordingError for a colour that a replay of a flight of a scenario would refuse: before it is flown."""
+    _check_colour(colour, [*_motion(scenario.dimensions), *flown_layers(scenario)], scenario.name)
+
+
+def _motion(axes: int) -> list[str]:
+    return ["speed", "heading", *(["height"] if axes == 3 else []), "agent"]
+
+
+def _check_colour(colour: str, ways: Sequence[str], whose: str) -> None:
+    if colour not in ways:
+        hint = meant(colour, ways, lead="; ")
+        raise RecordingError(f"colour = {colour!r} is none that {whose} knows: {', '.join(ways)}{hint}")
+
+
+def _page(name: str, about: dict[str, Any], data: bytes) -> str:
+    """The template with everything in its place."""
+    root = resources.files("airflock.view.replays")
+    text = (root / "replay.html").read_text(encoding="utf-8")
+    parts = {
+        "TITLE": html.escape(name),
+        "ABOUT": json.dumps(about, allow_nan=False).replace("<", "\\u003c"),
+        "DATA": base64.b64encode(data).decode(),
+        "THREE": (root / "three.min.js").read_text(encoding="utf-8"),
+        "SCRIPT": "\n".join((root / f"{part}.js").read_text(encoding="utf-8") for part in SCRIPTS),
+    }
+    return re.sub("@([A-Z]+)@", lambda place: parts[place[1]], text)
+
+
+def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
+    """Frames in which an absent agent stays where it was last, or where it will be first."""
+    if present.all():
+        return frames
+    times = np.arange(len(frames))[:, None]
+    last = np.maximum.accumulate(np.where(present, times, -1), axis=0)
+    source = np.where(last >= 0, last, present.argmax(axis=0))
+    found = np.take_along_axis(frames, source[:, None, :], axis=0)
+    ever = present.any(axis=0)
+    found[:, :, ~ever] = found[:, :, [int(ever.argmax())]]
+    return found
+
+
+def _known(courses: Mapping[str, NDArray[Any]]) -> list[list[Any]]:
+    """Charts, as titles and values, of what is known at some time: a lone agent has no nearest pair."""
+    return [[title, _short(values)] for title, values in courses.items() if np.isfinite(values).any()]
+
+
+def _mean(speed: NDArray[Any]) -> NDArray[Any]:
+    """Mean (time,) over those present; nan where nobody is."""
+    known = np.isfinite(speed)
+    total = np.where(known, speed, 0.0).sum(axis=1)
+    return np.asarray(np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan))
+
+
+def _told_layer(shade: shades.Shade) -> dict[str, Any]:
+    """What the page needs to know of a layer."""
+    words = f"{shades.WORDS.get(shade.name, shade.name)}; {shade.told}" if shade.kind == shades.MARKS else shade.told
+    return {
+        "name": shade.name, "kind": shade.kind, "ends": [f"{shade.low:.3g}", f"{shade.high:.3g} {shade.unit}".strip()],
+        "names": list(shade.names), "tones": shades.palette(len(shade.names)).tolist(),
+        "told": words,
+    }  # fmt: skip
+
+
+def _near(
+    position: NDArray[Any], present: NDArray[np.bool_], period: float, scenario: Any
+) -> tuple[NDArray[Any], list[tuple[float, int, int]]]:
+    """Smallest distance at each frame (m; nan of one agent), and when which pair came nearer than a collision."""
+    measured = scenario.measured_by() if scenario else None
+    limit = float(measured.r_coll) if measured and COUNTED & set(numbers_of(scenario.measures, measured)) else 0.0
+    nearest, found = np.full(len(position), np.nan), []
+    touching: set[tuple[int, int]] = set()
+    for number, frame in enumerate(position):
+        who = np.flatnonzero(present[number])
+        points = frame.T[who].astype(float)
+        if len(points) < 2:
+            continue
+        box = None
+        if scenario and scenario.world.edges == "periodic":
+            world = scenario.world
+            box = np.array([world.side, world.side, world.height][: points.shape[1]])
+            points = np.mod(points + 0.5 * box, box)
+        tree = cKDTree(points, boxsize=box)
+        nearest[number] = tree.query(points, k=2)[0][:, 1].min()
+        near = tree.query_pairs(limit) if limit > 0.0 and nearest[number] < limit else set()
+        now = {(int(who[i]), int(who[j])) for i, j in near}
+        found += [(number * period, i, j) for i, j in sorted(now - touching)]
+        touching = now
+    return nearest, found[:MOST_EVENTS]
+
+
+def _events(recording: xr.Dataset, scenario: Any) -> list[list[Any]]:
+    """What was done to the flight: when, s, and what."""
+    found = [] if scenario is None else events_of(attributes.events(recording))[:MOST_EVENTS]
+    return [[event.step * scenario.flight.dt, _told(event)] for event in found]
+
+
+def _told(event: Event) -> str:
+    return f"{event.kind} " + ", ".join(f"{key} = {value}" for key, value in event.data.items())
+
+
+def _stage(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> dict[str, Any]:
+    """What stands in the world, as plain lists."""
+    axes = position.shape[1]
+    low, high = position.min(axis=(0, 2)), position.max(axis=(0, 2))
+    centre, span = [*(0.5 * (low + high)), *[0.0] * (3 - axes)], 0.55 * float(max(np.ptp([low, high], axis=0)))
+    solids: list[Any] = []
+    lines: list[Any] = []
+    if scenario is not None:
+        stage: Stage = stage_of(scenario, first)
+        if scenario.world.arena != "none":
+            centre, span = stage.centre.tolist(), max(stage.span, 1e-6)
+        solids = [[_short(s.vertices.ravel()), s.faces.ravel().tolist(), s.colour] for s in stage.solids]
+        lines = [[_short(line.points.ravel()), line.colour] for line in stage.lines]
+    plain = [float(c) for c in centre]
+    return {"centre": plain, "span": max(span, 1e-3), "space": axes == 3, "solids": solids, "lines": lines}
+
+
+def _leap(scenario: Any) -> float | None:
+    """Longest way between two frames that is flown, not a way through a periodic face, m; None without one."""
+    return 0.5 * float(scenario.world.side) if scenario and scenario.world.edges == "periodic" else None
+
+
+def _short(values: NDArray[Any]) -> list[float | None]:
+    """Numbers of five digits, for JSON; null for what is not finite."""
+    return [float(f"{v:.5g}") if np.isfinite(v) else None for v in np.asarray(values, float).tolist()]
+
+
+def _nice(value: float) -> float:
+    """A little more than a value, of two digits."""
+    return float(f"{max(value, 1e-6) * 1.1:.2g}")

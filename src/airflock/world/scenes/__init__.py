@@ -1,0 +1,1 @@
+"""Scenes: cities, forests, meshes and outlines of fields as rows of shapes and a flat tree."""

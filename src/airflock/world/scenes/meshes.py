@@ -1,0 +1,139 @@
+"""Meshes of the user's: read by trimesh, checked, turned upright, as rows of triangles. A mesh file is untrusted."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.support.errors import SceneError
+from airflock.support.untrusted import from_outside, own_path
+from airflock.world import scenery
+from airflock.world.scenes.headers import check_header
+from airflock.world.scenes.tree import segments, triangles
+from airflock.world.shapes import CLOSED
+
+MOST_BYTES = 200_000_000  # a larger file is refused before it is opened
+MOST_TRIANGLES = 2_000_000
+FORMATS = ("glb", "gltf", "obj", "off", "ply", "stl")  # read by trimesh from nothing but the file and its parts
+LEAST, MOST = 1.0, 1e5  # m; a world for drones is neither smaller nor larger
+
+
+def load_mesh(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Triangles of scene.file, one a row, in m, z up; in a plane, its walls where it crosses height 0. And notes."""
+    with from_outside(f"scene.file = {p.file}", SceneError):  # what a damaged file holds may break at any later step
+        return _loaded(p, dimensions)
+
+
+def _loaded(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    mesh = read(own_path(p.file))
+    notes = []
+    corners = np.asarray(mesh.vertices, float) * p.unit
+    if p.up == "y":
+        corners = np.stack([corners[:, 0], -corners[:, 2], corners[:, 1]], axis=1)
+    faults = check(p, corners)
+    if faults:
+        raise SceneError("\n".join(faults))
+    mesh.vertices = corners
+    closed = in_closed(mesh)
+    if not closed.all():
+        notes.append(
+            f"scene.file = {p.file}: the mesh is open, {int((~closed).sum())} of {len(closed)} triangles; these "
+            "surfaces stop agents from both sides, but nothing is inside them"
+        )
+    if closed.any() and (not mesh.is_winding_consistent or mesh.submesh([closed], append=True).volume < 0.0):
+        notes.append(
+            f"scene.file = {p.file}: the mesh is inverted (its faces look inwards); "
+            "its surfaces are taken from both sides"
+        )
+    found = triangles(corners[np.asarray(mesh.faces)])
+    found[:, CLOSED] = closed
+    sound = mesh.area_faces > 1e-12
+    if not sound.all():
+        notes.append(f"scene.file = {p.file}: {int((~sound).sum())} triangles without area were left out")
+        found = found[sound]
+    if dimensions == 2:
+        found = cut(mesh, closed)
+        if not len(found):
+            raise SceneError(f"scene.file = {p.file}: in a plane the mesh is cut at height 0, but nothing stands there")
+    return found, tuple(notes)
+
+
+def in_closed(mesh: Any) -> NDArray[np.bool_]:
+    """Which faces (face,) of a mesh belong to a closed surface: to a connected part without a free edge."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    faces = np.asarray(mesh.faces)
+    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    ends, uses = np.unique(sides, axis=0, return_counts=True)
+    size = len(mesh.vertices)
+    parts = connected_components(coo_array((np.ones(len(ends)), ends.T), (size, size)), directed=False)[1]
+    closed = np.ones(size, bool)
+    closed[parts[ends[uses % 2 == 1, 0]]] = False
+    found: NDArray[np.bool_] = closed[parts[faces[:, 0]]]
+    return found
+
+
+def cut(mesh: Any, closed: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Walls where a mesh crosses height 0, as segments that have its outside on their right."""
+    from trimesh import intersections
+
+    crossings: Any = intersections.mesh_plane
+    lines, faces = crossings(mesh, (0.0, 0.0, 1.0), (0.0, 0.0, 1e-6), return_faces=True)
+    a, b = np.asarray(lines).reshape(-1, 2, 3)[:, :, :2].transpose(1, 0, 2)
+    out = mesh.face_normals[faces]
+    turned = (b - a)[:, 1] * out[:, 0] - (b - a)[:, 0] * out[:, 1] < 0.0
+    found = segments(np.where(turned[:, None], np.hstack([b, a]), np.hstack([a, b])))
+    found[:, CLOSED] = closed[faces]
+    return found
+
+
+def read(path: Path) -> Any:
+    """Mesh of a file. Raises SceneError where it is missing, too large, of another format, empty or damaged."""
+    try:
+        import trimesh
+    except ModuleNotFoundError as fault:
+        raise SceneError(f"scene.file = {path}: meshes need trimesh: pip install 'airflock[scenes]'") from fault
+
+    kind = path.suffix.lower().lstrip(".")
+    if not path.is_file():
+        raise SceneError(f"scene.file = {str(path)!r}: no such file")
+    if kind not in FORMATS:
+        raise SceneError(f"scene.file = {path}: .{kind} is none of {', '.join(FORMATS)}")
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise SceneError(
+            f"scene.file = {path}: {size / 1e6:.0f} MB is more than {MOST_BYTES / 1e6:.0f} MB; simplify the mesh"
+        )
+    check_header(path, kind, size, MOST_TRIANGLES)
+    try:
+        mesh: Any = trimesh.load(path, force="mesh", process=True, skip_materials=True)
+        faces, corners = np.asarray(mesh.faces), np.asarray(mesh.vertices, float)
+    except Exception as fault:  # any parser may fail in any way on a damaged file
+        raise SceneError(f"scene.file = {path}: cannot be read, it is damaged or cut short: {fault}") from fault
+    if not len(faces):
+        raise SceneError(f"scene.file = {path}: no triangles in it; it is empty, damaged or cut short")
+    if len(faces) > MOST_TRIANGLES:
+        raise SceneError(
+            f"scene.file = {path}: {len(faces)} triangles are more than {MOST_TRIANGLES}; simplify the mesh"
+        )
+    if not np.isfinite(corners).all() or faces.max() >= len(corners):
+        raise SceneError(
+            f"scene.file = {path}: some corners are missing or not numbers; the file is damaged or cut short"
+        )
+    return mesh
+
+
+def check(p: scenery.Parameters, corners: NDArray[np.float64]) -> list[str]:
+    """What is wrong with the size of a mesh, one line each."""
+    size = float(np.ptp(corners, axis=0).max())
+    if LEAST <= size <= MOST:
+        return []
+    guess = min(
+        (1e-3, 0.01, 0.0254, 0.3048, 1.0, 1000.0), key=lambda u: abs(np.log(max(size, 1e-30) / p.unit * u / 300.0))
+    )
+    return [
+        f"scene.file = {p.file}: the mesh is {size:.3g} m large with scene.unit = {p.unit:g} m, "
+        f"outside [{LEAST:g}, {MOST:g}] m; it may be in another unit, try scene.unit = {guess:g}"
+    ]
