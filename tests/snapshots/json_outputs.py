@@ -115,6 +115,8 @@ def _output(words: str, folder: Path) -> dict[str, Any]:
     row: dict[str, Any] = {"status": done.returncode}
     if done.stdout.strip():
         found = json.loads(done.stdout.replace(str(folder), "FOLDER"))
+        if "seconds" in found:  # how long a search or a campaign took
+            found["seconds"] = "(float)"
         row["output"] = types(found) if words.split()[0] in ONLY_TYPES else plain(found)
     if done.returncode:
         lines = done.stderr.replace(str(folder), "FOLDER").splitlines()
