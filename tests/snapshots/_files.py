@@ -62,13 +62,14 @@ def circles(count):
 def flight(generator):
     """Return times (s), positions (m), velocities and commands (m/s), east and north, of a drone with a lag of 0.8 s.
 
-    It stands for two minutes; then it follows commands that change every four seconds.
+    It stands for two minutes; then it follows commands that change at every step.
     """
     times = np.arange(0.0, STANDING + FLYING, STEP)
-    wishes = generator.normal(0.0, 3.0, (len(times), 2))
-    place, speed, error, rows = generator.uniform(0.0, 60.0, 2), np.zeros(2), np.zeros(2), []
-    for i, now in enumerate(times):
-        wish = wishes[i // 20] if now >= STANDING else np.zeros(2)
+    place, rows = generator.uniform(0.0, 60.0, 2), []
+    speed, error, wish = np.zeros((3, 2))
+    for now in times:
+        if now >= STANDING:
+            wish = 0.95 * wish + generator.normal(0.0, 1.0, 2)
         error = 0.98 * error + generator.normal(0.0, 0.05, 2)
         rows.append((*(place + error), *(speed + generator.normal(0.0, 0.05, 2)), *wish))
         speed = speed + (wish - speed) * STEP / 0.8

@@ -35,13 +35,16 @@ NOT_RUN = {  # words of a command, and why it is not run
     r"\.\.\.": "a pattern, not a command",
 }
 SMALLER = {  # words of a command, and options that make it small; of two values of an option the last counts
+    r"^airflock evolve .*--limit": "--out study_of_limits",  # pages name one folder in blocks that are alternatives
+    r"^airflock evolve .*--fast": "--out study_fast",
+    r"^airflock tune logs": "--out tuned_by_logs",
     r"^airflock run": "--agents 5 --duration 5 --seeds 2",
     r"^airflock evolve": "--population 4 --generations 2 --agents 5 --duration 5",
     r"^airflock harden": "--generations 1 --duration 5 --seeds 2",
     r"^airflock certify (?!.*--check)": "--agents 5 --duration 5 --budget 5s",
     r"^airflock fleet": "--agents 3 --duration 5",
     r"^airflock sweep": "--agents 4 --duration 5 --seeds 1",
-    r"^airflock tune": "--agents 4 --duration 5 --budget 5s",
+    r"^airflock tune": "--agents 4 --duration 5 --limit 'r_min<0.1 at 10%' --budget 8s",
     r"^airflock plot mine": "--agents 4 --duration 5",
 }
 SECONDS = 180
@@ -68,7 +71,7 @@ def collect() -> dict[str, list[str]]:
 
 
 def _run(command: str, folder: Path) -> dict[str, Any]:
-    """Run a command in a folder; return its status and the first lines that it wrote to stderr, if it failed."""
+    """Run a command in a folder; return its status and its errors."""
     program, *words = shlex.split(command)
     words = [name for word in words for name in _matching(word, folder)]
     words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]
@@ -78,8 +81,9 @@ def _run(command: str, folder: Path) -> dict[str, Any]:
         )
     except subprocess.TimeoutExpired:
         return {"status": "took too long"}
-    told = done.stderr.replace(str(folder), "FOLDER").splitlines()[-3:]
-    return {"status": done.returncode} | ({"stderr": told} if done.returncode else {})
+    lines = done.stderr.replace(str(folder), "FOLDER").splitlines()
+    errors = [line for line in lines if line.startswith("airflock: ")]
+    return {"status": done.returncode} | ({"errors": errors} if errors else {})
 
 
 def _matching(word: str, folder: Path) -> list[str]:

@@ -35,10 +35,10 @@ CASES = (  # in this order: later ones read what earlier ones wrote
     "certify vasarhelyi_2018/real_6ms --limit 'r_min<1 at 50%' --flights 12 --agents 4 --duration 5"
     " --out certificate.toml --json",
     "certify certificate.toml --check --json",
-    "tune mine.toml --budget 5s --out tuned --json",
+    "tune mine.toml --limit 'r_min<0.1 at 10%' --budget 8s --out tuned --json",
     "import fish.csv --unit mm --save imported.nc --json",
     "import log_0.ulg log_1.ulg log_2.ulg --save fleet.nc --json",
-    "identify logs/0.ulg logs/1.ulg logs/2.ulg --heard heard.csv --standing 12:130 --like vasarhelyi_2018/real_6ms"
+    "identify logs/0.ulg logs/1.ulg logs/2.ulg --heard heard.csv --standing 0:120 --like vasarhelyi_2018/real_6ms"
     " --out identified.toml --json",
     "infer fish.nc --models couzin_2002,vicsek_1995 --json",
     "fleet vasarhelyi_2018/real_4ms --agents 3 --duration 5 --set world.side=120 --seeds 2 --against simulator --json",
@@ -110,14 +110,17 @@ class Watched(Logged):
 
 
 def _output(words: str, folder: Path) -> dict[str, Any]:
-    """Run one case; return its status, its parsed output and, where it failed, its last line."""
+    """Run one case; return its status, its parsed output and, where it failed, its errors."""
     done = airflock(folder, *shlex.split(words))
     row: dict[str, Any] = {"status": done.returncode}
     if done.stdout.strip():
         found = json.loads(done.stdout.replace(str(folder), "FOLDER"))
+        if "seconds" in found:  # how long a search or a campaign took
+            found["seconds"] = "(float)"
         row["output"] = types(found) if words.split()[0] in ONLY_TYPES else plain(found)
     if done.returncode:
-        row["stderr"] = done.stderr.replace(str(folder), "FOLDER").splitlines()[-1:]
+        lines = done.stderr.replace(str(folder), "FOLDER").splitlines()
+        row["errors"] = [line for line in lines if line.startswith("airflock: ")]
     return row
 
 
