@@ -135,7 +135,7 @@ def spans(judged, other):
 
 
 def table(folder):
-    """Tables of RESULTS-searches.md."""
+    """Print the tables for RESULTS.md."""
     known = read(folder / KNOWN)
     found = [read(path) for path in sorted(folder.glob("*_*.json"))]
     print("| search | seed | whole flights | processor s | winner | less Table S1, 400 pairs (95 %) | reached | "

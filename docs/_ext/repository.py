@@ -18,7 +18,7 @@ def repository() -> None:
     for path in decisions:
         copy(path, f"project/decisions/{path.name}")
     listed = "\n".join(path.stem for path in decisions)
-    head = "# Decisions\n\nWhat was weighed and why it was decided so.\n\n"
+    head = "# Decisions\n\nWhat is expensive to reverse, and what decided it.\n\n"
     put("project/decisions/index.md", f"{head}```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n")
     papers = sorted(path for path in (ROOT / "papers").iterdir() if (path / "README.md").is_file())
     for folder in papers:

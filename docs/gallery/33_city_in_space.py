@@ -2,7 +2,7 @@
 A city in space
 ===============
 
-The same flight, seen obliquely instead of from above. Paths behind a building are drawn faintly; stars are goals.
+The same flight, seen obliquely instead of from above. Buildings are outlines with pale roofs; stars are goals.
 """
 
 import airflock

@@ -178,7 +178,6 @@ except airflock.AirflockError as fault:
 
 # %%
 # From its own file, `mine.py`, the same law flies with `model.kind = "mine.py"` in a scenario file, and `--trust`.
-# `airflock types mine.py` then also finds misspelled parameters, without running anything.
 
 # %%
 # Several numbers with one meaning

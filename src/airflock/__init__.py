@@ -110,7 +110,7 @@ _WHERE = {
     "paper": "airflock.papers",
     "doctor": "airflock.recordings.health",
 }
-# packages; all but plots and measures can be called (decision 0010)
+# packages; all but plots and measures can be called: see callable_module
 _MODULES = ("evolve", "certify", "tune", "display", "fleet", "identify", "infer", "body", "plots", "measures")
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine"  # not in __all__: `from airflock import *` would hide Python's own

@@ -1,4 +1,7 @@
-"""Packages that bear a verb's name and can be called like the verb's function (docs/decisions/0010)."""
+"""Make a package that has a verb's name callable like the verb's function.
+
+Importing `airflock.evolve` puts the module where a function of that name would stand, so the module itself is called.
+"""
 
 import inspect
 import sys

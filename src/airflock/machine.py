@@ -4,6 +4,7 @@ import os
 import platform
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 CPUINFO = Path("/proc/cpuinfo")
 LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")  # of a container
@@ -28,8 +29,9 @@ def target() -> tuple[str, frozenset[str]]:
     import llvmlite.binding as llvm
     from numba import config
 
-    features = llvm.get_host_cpu_features().flatten() if config.CPU_FEATURES is None else config.CPU_FEATURES
-    name = llvm.get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME
+    named: Any = config  # whose settings Numba makes when it is imported
+    features = llvm.get_host_cpu_features().flatten() if named.CPU_FEATURES is None else named.CPU_FEATURES
+    name = llvm.get_host_cpu_name() if named.CPU_NAME is None else named.CPU_NAME
     return str(name), frozenset(word[1:] for word in features.split(",") if word.startswith("+"))
 
 

@@ -23,7 +23,7 @@ def smallest(settings, seeds):
 
 
 def test_fifteen_seconds_of_silence_bring_nobody_near():
-    """Twelve seeds here; docs/decisions/0056 has forty."""
+    """Twelve seeds here; docs/decisions/0021-stop-near-silent-neighbours.md has forty."""
     with_rule = smallest(BLACKOUT | {"silence.rule": "stop"}, 12)
     assert np.median(with_rule) > 5.0 and (with_rule < 3.0).sum() <= 1
     assert np.median(smallest(BLACKOUT, 12)) < 1.0, "who forgets whom it does not hear flies into it"

@@ -1,14 +1,13 @@
 """Does hardening keep what held? 20 drawn scenarios: drones, delay, field and trees of their own.
 
-    python tests/nightly/harden.py FOLDER [--start] [--margin KEY] [SEED ...]
+    python tests/nightly/harden.py FOLDER [--start] [SEED ...]
 
 Each is evolved for a short while (40 generations of 24) and then hardened on 60 seeds a step. Before and after are then
 flown on the same 300 seeds that nothing has chosen. Must hold: constraints that held before hold after, 20 of 20; in at
 least 12 the margin that was short grows by 20 % for at most 0.05 of fitness; the others say why not. The margin is the
 share of flights without a contact where walls are short (it grows by 20 % when a fifth of the contacts go), else the
-mean smallest distance. With --start nothing is evolved: the numbers of the law that the speed scales are hardened. With
---margin the short margin is the one that is named, such as radio.delay: the factor by which it may get worse, measured
-on the judge's seeds for the optimum and for what was kept. Goes on where it stopped; one JSON file per seed in FOLDER.
+mean smallest distance. With --start nothing is evolved: the numbers of the law that the speed scales are hardened. Goes
+on where it stopped; one JSON file per seed in FOLDER.
 """
 
 import argparse
@@ -16,8 +15,6 @@ import json
 import math
 import sys
 import time
-from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -30,10 +27,7 @@ from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.folder import STUDY
 from airflock.evolve.harden import COST, harden
 from airflock.evolve.held import SAFETY, SLACK
-from airflock.evolve.held import broken as what_breaks
 from airflock.evolve.intervals import interval
-from airflock.evolve.margins import read_margins
-from airflock.evolve.reach import reach
 from airflock.evolve.steps import Table, flown
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
@@ -76,7 +70,7 @@ def evolved(seed: int, folder: Path) -> Scenario:
     return found.scenario
 
 
-def judged(seed: int, folder: Path | None, along: str = "") -> dict[str, Any]:
+def judged(seed: int, folder: Path | None) -> dict[str, Any]:
     """Evolve in a folder, if there is one, and harden; what hardening changed on fresh seeds."""
     told: dict[str, Any] = {"seed": seed, "airflock": __version__, "agents": int(drawn(seed).flight.agents)}
     try:
@@ -84,7 +78,7 @@ def judged(seed: int, folder: Path | None, along: str = "") -> dict[str, Any]:
     except StudyError as fault:
         return {**told, "refused": str(fault).splitlines()[0], "held": True, "grown": False}
     try:
-        steps = harden(scenario, range(STEP), margin=along or (), threads=1)
+        steps = harden(scenario, range(STEP), threads=1)
     except ScenarioError as fault:
         return {**told, "refused": fault.faults[0], "held": True, "grown": False}
     fresh = range(FIRST, FIRST + JUDGED)
@@ -94,26 +88,12 @@ def judged(seed: int, folder: Path | None, along: str = "") -> dict[str, Any]:
     margin = [1.0 - contacts(table) if walls else float(table["r_min"].mean()) for table in (before, after)]
     gain = (contacts(before) - contacts(after)) / contacts(before) if walls else margin[1] / margin[0] - 1.0
     short = "walls" if walls else "distance"
-    if along:
-        short, margin = along, factors(scenario, along, before, [steps[0].parameters, steps[-1].parameters])
-        gain = margin[1] / margin[0] - 1.0
     return {
         **told, "short": short, "before": margin[0], "after": margin[1], "gain": gain,
         "cost": cost, "fitness": steps[0].fitness, "held": not broken(before, after), "broken": broken(before, after),
         "grown": gain >= 0.2 and cost <= COST, "verdict": steps[-1].verdict,
         "undone": [f"{step.name}: {step.verdict}" for step in steps[1:-1] if not step.kept],
     }  # fmt: skip
-
-
-def factors(scenario: Scenario, along: str, before: Table, sets: Sequence[Mapping[str, float]]) -> list[float]:
-    """By what factor a number may get worse until what held of the first of these sets no longer holds, for each."""
-    (margin,), _ = read_margins(along, [scenario])
-    fresh = range(FIRST, FIRST + JUDGED)
-
-    def ends(worse: Sequence[Scenario], parameters: Mapping[str, float]) -> str:
-        return what_breaks(before, flown(worse[0], [parameters], fresh, 1, None)[0], surely=True)
-
-    return [reach(margin, partial(ends, parameters=parameters)).holds for parameters in sets]
 
 
 def contacts(table: Table) -> float:
@@ -142,7 +122,6 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("seeds", type=int, nargs="*", default=list(SEEDS), metavar="SEED")
     parser.add_argument("--start", action="store_true", help="harden the scaled numbers, without a search")
-    parser.add_argument("--margin", default="", metavar="KEY", help="widen this margin")
     asked = parser.parse_intermixed_args()
     folder = asked.folder
     folder.mkdir(parents=True, exist_ok=True)
@@ -151,7 +130,7 @@ def main() -> int:
         path = folder / f"{seed}.json"
         if not path.is_file():
             began = time.process_time()
-            found = judged(seed, None if asked.start else folder / f"study_{seed}", asked.margin)
+            found = judged(seed, None if asked.start else folder / f"study_{seed}")
             atomic.write(path, json.dumps({**found, "seconds": time.process_time() - began}))
         rows.append(json.loads(path.read_text()))
     print("| seed | drones | fitness | short | before | after | gain | cost | held | what hardening says |")
@@ -160,7 +139,7 @@ def main() -> int:
         if "refused" in row:
             print(f"| {row['seed']} | {row['agents']} | | | | | | | yes | refused: {row['refused']} |")
             continue
-        unit = {"walls": "", "distance": " m"}.get(row["short"], " times")
+        unit = {"walls": "", "distance": " m"}[row["short"]]
         held = "yes" if row["held"] else "; ".join(row["broken"])
         margin = f"{row['short']} | {row['before']:.3g}{unit} | {row['after']:.3g}{unit} | {100.0 * row['gain']:+.0f} %"
         drones = f"{row['seed']} | {row['agents']} | {row['fitness']:.3f}"

@@ -5,11 +5,13 @@ import math
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 import airflock
 import airflock_papers
+from airflock.cli.main import app
 from airflock.errors import AirflockError
-from airflock_papers import breaks, campaign, quick, statistics
+from airflock_papers import breaks, quick, statistics
 from airflock_papers.claims import Claim, Measured, read_claims
 from airflock_papers.flights import Flights, scenario_keys, with_changes
 from airflock_papers.paper import Paper
@@ -175,7 +177,7 @@ ROOT = Path(__file__).parents[2] / "papers"
 def test_no_sentence_that_is_reproduced_still_holds_under_its_change(name: str) -> None:
     """Each was seen red, or the table says that its change was not made yet, or with too few flights."""
     good = {claim.id for path in (ROOT / name).glob("*.toml") for claim in read_claims(path)[1] if _holds(claim)}
-    rows = {row.id: row.result for row in campaign.committed() if row.paper == name}
+    rows = {row.id: row.result for row in breaks.committed() if row.paper == name}
     assert good <= set(rows)
     assert all(rows[claim] != breaks.GREEN for claim in good)
 
@@ -186,7 +188,7 @@ def test_every_sentence_that_is_judged_names_its_change_and_what_came_of_it(name
         claim.id for path in (ROOT / name).glob("*.toml") for claim in read_claims(path)[1]
         if claim.verdict in ("reproduced", "not reproduced")
     }  # fmt: skip
-    rows = {row.id: row for row in campaign.committed() if row.paper == name}
+    rows = {row.id: row for row in breaks.committed() if row.paper == name}
     assert judged <= set(rows)
     stated = breaks.load(f"airflock_papers.{name}")
     assert all(rows[id].change for id in judged)
@@ -195,10 +197,10 @@ def test_every_sentence_that_is_judged_names_its_change_and_what_came_of_it(name
 
 @pytest.mark.parametrize("name", airflock_papers.PAPERS)
 def test_red_as_they_are_are_the_sentences_that_their_page_does_not_count_as_reproduced(name: str) -> None:
-    pages = campaign.verdicts(ROOT)
-    for row in campaign.committed():
+    pages = {claim.id: claim.verdict for path in (ROOT / name).glob("*.toml") for claim in read_claims(path)[1]}
+    for row in breaks.committed():
         if row.paper == name:
-            assert (row.result == breaks.ALREADY) == (pages.get((name, row.id)) == "not reproduced"), row
+            assert (row.result == breaks.ALREADY) == (pages.get(row.id) == "not reproduced"), row
 
 
 def _holds(claim: Claim) -> bool:
@@ -206,10 +208,84 @@ def _holds(claim: Claim) -> bool:
 
 
 def test_the_committed_changes_are_those_of_the_statements() -> None:
-    rows = campaign.committed()
+    rows = breaks.committed()
     for name in airflock_papers.PAPERS:
         told = {row.id: (row.part, row.change) for row in rows if row.paper == name}
         statements = breaks.load(f"airflock_papers.{name}").values()
         keys = {s.id: (breaks.part_of(s), breaks.in_words(s.breaks)) for s in statements if s.breaks}
         words = {s.id: (breaks.part_of(s), s.fails_if) for s in statements if s.kind == "paper" and s.bound}
         assert told == words | keys
+
+
+ROWS = [
+    breaks.Row("kidger", "first", "first.a", "x = 1", breaks.RED, "0.5", "nan", "zen"),
+    breaks.Row("kidger", "last", "last.a", "x = 1", breaks.UNSHOWN),
+    breaks.Row("kidger", "last", "last.b", "x = 2", breaks.ALREADY),
+]
+
+
+def broken(flown: list):
+    """A flight of changes that is cut off at the second part, once."""
+
+    def fly(paper, *, only, seeds, threads, progress, ids):
+        flown.append((only, seeds, sorted(ids)))
+        progress("flights", 1, 2)
+        if only == "last" and len(flown) == 2:
+            raise KeyboardInterrupt
+        return [breaks.Break(f"{only}.a", only, "x = 1", breaks.RED, 0.5, math.nan)]
+
+    return fly
+
+
+def test_changes_of_all_papers_go_on_where_they_were_cut_off_and_leave_out_claims_that_are_red_as_they_are(
+    tmp_path, monkeypatch
+) -> None:
+    flown: list = []
+    monkeypatch.setattr(breaks, "committed", lambda: ROWS)
+    monkeypatch.setattr(breaks, "SEEDS", {("kidger", "last"): 7})
+    monkeypatch.setattr(breaks, "kind", lambda: "zen")
+    monkeypatch.setattr(breaks, "fly", broken(flown))
+    with pytest.raises(KeyboardInterrupt):
+        breaks.fly_all(tmp_path, print)
+    rows = breaks.fly_all(tmp_path, print)
+    assert flown == [("first", None, ["first.a"]), ("last", 7, ["last.a"]), ("last", 7, ["last.a"])]
+    assert rows == [ROWS[0], ROWS[1]._replace(result=breaks.RED, ours="0.5", changed="nan", processor="zen"), ROWS[2]]
+    kept = tmp_path / "kidger.first.breaks.json"
+    assert breaks._kept(kept, json.loads(kept.read_text())["texts"], {"first.a"}) == ROWS[:1]
+    assert breaks._kept(kept, json.loads(kept.read_text())["texts"], {"first.a", "first.b"}) is None
+    assert breaks._kept(kept, "others", {"first.a"}) is None
+    monkeypatch.setattr(breaks, "kind", lambda: "lake")  # where other flights were kept
+    elsewhere = breaks.fly_all(tmp_path, print)
+    assert flown[3:] == flown[:2] and [row.processor for row in elsewhere] == ["lake", "lake", ""]
+
+
+def test_claims_that_their_change_does_not_break_are_listed() -> None:
+    rows = ROWS[:1]
+    lost = [rows[0]._replace(result=breaks.UNSHOWN), rows[0]._replace(id="other", result=breaks.GREEN)]
+    assert breaks.worse(rows, rows) == []
+    assert breaks.worse(rows, lost) == [(lost[0], ""), (lost[1], "")]
+    assert breaks.worse(lost, lost) == [(lost[1], "")]  # never seen red, it cannot get worse; what still holds is told
+
+
+def test_few_flights_on_another_processor_are_not_judged_and_a_claim_that_still_holds_is_judged_everywhere() -> None:
+    red = ROWS[0]
+    for result in (breaks.UNSHOWN, breaks.UNMEASURED):
+        lost = red._replace(result=result, processor="lake")
+        assert breaks.worse([red], [lost]) == [(lost, "zen")]
+        assert breaks.worse([red._replace(processor="")], [lost]) == [(lost, "")]  # where it flew was not kept
+        assert breaks.worse([red._replace(processor="lake")], [lost]) == [(lost, "")]
+    holds = red._replace(result=breaks.GREEN, processor="lake")
+    assert breaks.worse([red], [holds]) == [(holds, "")]
+
+
+@pytest.mark.parametrize(("result", "status"), [(breaks.RED, 0), (breaks.UNSHOWN, 0), (breaks.GREEN, 1)])
+def test_all_breaks_fails_only_for_claims_that_are_judged(result, status, tmp_path, monkeypatch) -> None:
+    flown = ROWS[0]._replace(result=result, processor="lake")
+    monkeypatch.setattr(breaks, "committed", lambda: ROWS[:1])
+    monkeypatch.setattr(breaks, "fly_all", lambda folder, say, threads: [flown])
+    command = ["paper", "all", "--breaks", "--keep", str(tmp_path)]
+    found = CliRunner().invoke(app, command)
+    assert found.exit_code == status and f"1 claims under their changes: 1 {result}" in found.output
+    assert ("(not judged: turned red on zen)" in found.output) == (result == breaks.UNSHOWN)
+    (claim,) = json.loads(CliRunner().invoke(app, [*command, "--json"]).output)["worse"] or [{}]
+    assert claim.get("elsewhere") == {breaks.RED: None, breaks.UNSHOWN: "zen", breaks.GREEN: ""}[result]

@@ -9,11 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airflock.errors import AirflockError
-from airflock_papers import PAPERS, again, bounds, campaign, statistics
+from airflock_papers import PAPERS, bounds, statistics
 from airflock_papers.claims import Claim, Measured, judge, read_claims, verdict_of, write_claims
 from airflock_papers.counts import count, headline
 from airflock_papers.page import PART_BY_PART, flown_by
-from airflock_papers.renew import above, renewed, words
 from airflock_papers.statements import LONGEST, load, read
 
 ROOT = Path(__file__).parents[2] / "papers"
@@ -136,42 +135,11 @@ def test_claims_survive_a_file(tmp_path: Path) -> None:
         read_claims(tmp_path / "claims.toml")
 
 
-def test_a_renewed_page_keeps_what_was_measured_and_judges_it_by_the_statements_as_they_stand() -> None:
-    statements = read(GENERATION, "a file")
-    name, statement = next(iter(statements.items()))
-    found = Measured(name, statement.quantity, statement.at, statistics.mean([0.7, 0.8, 0.9]), "by seed")
-    old = judge(statements, [found])
-    assert renewed(statements, old, [], "command") == old
-    stricter = {name: replace(statement, bound="ours > 0.95")}
-    again = renewed(stricter, old, [], "command")[0]
-    assert (again.verdict, again.ours, again.note, again.bound) == (
-        "not reproduced",
-        old[0].ours,
-        "by seed",
-        "ours > 0.95",
-    )
-    flown = replace(found, note="")
-    assert renewed(statements, old, [flown], "command") == old  # the same number keeps what was said of it
-    other = replace(flown, value=statistics.mean([0.7, 0.8, 0.8]))
-    assert renewed(statements, old, [other], "command")[0].note == ""
-    assert renewed(statements, old, [replace(found, note="now")], "command")[0].note == "now"
-    elsewhere = {name: replace(statement, at="generation 10, elsewhere")}
-    lost = renewed(elsewhere, old, [], "command")[0]
-    assert lost.ours is None and lost.command == "command" and lost.verdict == "not flown yet"
-
-
-def test_words_of_a_page_are_those_above_its_pictures_and_claims() -> None:
-    text = "# T\n\n`c` computes this page again. About it.\n\nMore.\n\n**3 sentences of the paper: 3.**\n\n"
-    text += "## One (a)\n\nWords.\n\n| a | b |\n\n![p](figures/p.png)\n\n| claim | x |\n\n## Two\n\n| claim | x |\n"
-    assert words(text, "One (a)") == "Words.\n\n| a | b |" and words(text, "Two") == words(text, "Three") == ""
-    assert above(text) == "About it.\n\nMore."
-
-
 @pytest.mark.parametrize("name", PAPERS)
-def test_the_front_page_tells_what_the_page_counts(name: str) -> None:
+def test_the_table_of_papers_has_the_counts_of_each_page(name: str) -> None:
     """Reproduced, of what is judged by a bound: claims, and quotes of which every claim is."""
-    front = (ROOT.parent / "README.md").read_text(encoding="utf-8")
-    told = re.search(rf"\| (\d+) of (\d+); (\d+) of (\d+): \[papers/{name}\]", front)
+    front = (ROOT / "README.md").read_text(encoding="utf-8")
+    told = re.search(rf"\| (\d+) of (\d+); (\d+) of (\d+): \[{name}\]", front)
     claims = read_claims(ROOT / name / "claims.toml")[1]
     found = count(claims)
     good, bad = (found.verdicts[verdict] for verdict in ("reproduced", "not reproduced"))
@@ -204,17 +172,6 @@ def test_a_page_tells_which_text_flew_it() -> None:
     assert flown_by(header | {"texts": PART_BY_PART, "renewed": "ga: 45"}).startswith(
         "Each part by the text of its day: ga `45`."
     )
-
-
-def test_a_part_flown_again_is_held_against_every_page_of_its_paper() -> None:
-    name, before = "vasarhelyi_2018", campaign.verdicts(ROOT)
-    assert {(name, claim) for claim in ("s2.phi_vel.4ms", "s1.mean.4ms", "rounding.eq15.4ms")} <= set(before)
-    joint = read_claims(ROOT / name / "rounding.toml")[1]
-    assert joint and again.changed(name, before, joint) == []
-    turned = {"holds": ("does not hold", 0.0), "does not hold": ("holds", 1.0)}[joint[0].verdict]
-    other = replace(joint[0], verdict=turned[0], ours=turned[1])
-    assert again.changed(name, before, [other]) == [f"{other.id}: {joint[0].verdict} is now {other.verdict}"]
-    assert again.changed(name, {}, joint[:1]) == [f"{other.id}: on no page is now {joint[0].verdict}"]
 
 
 @pytest.mark.parametrize("path", sorted(ROOT.glob("*/*.toml")), ids=lambda path: f"{path.parent.name}-{path.stem}")

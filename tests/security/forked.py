@@ -4,18 +4,18 @@ It is what `recordings.isolated` makes of `subprocess.Popen`, as far as that is 
 started as it should be is tested elsewhere (test_recordings_apart.py).
 """
 
+import json
 import os
 import signal
-import sys
 import time
 
-from airflock.recordings import isolated, reader
+from airflock.recordings import isolated
 
 SHORT = 2.0  # s of a processor that a small file may take, without the start of an interpreter
 
 
 class Forked:
-    """A process that answers as reader.py does."""
+    """A process that answers as `isolated.START` does."""
 
     def __init__(self, *_, **__):
         asked, asking = os.pipe()
@@ -26,14 +26,13 @@ class Forked:
                 os.dup2(asked, 0)
                 os.dup2(told, 1)
                 os.closerange(3, 256)
-                sys.stdin = os.fdopen(0)
-                reader.main()
+                isolated.main(json.loads(os.fdopen(0).readline()))
                 os._exit(0)
             finally:
                 os._exit(1)
         os.close(asked)
         os.close(told)
-        self.stdin, self.stdout = os.fdopen(asking, "wb", buffering=0), os.fdopen(telling, "rb", buffering=0)
+        self.stdin, self.stdout = os.fdopen(asking, "wb"), os.fdopen(telling, "rb")
 
     def kill(self):
         """End it, if it has not ended."""

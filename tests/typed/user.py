@@ -31,7 +31,6 @@ def script() -> None:
     assert_type(airflock.keys("radio"), list[Key])
     assert_type(airflock.model(globals()), Model)
     assert_type(airflock.doctor(), dict[str, Any])
-    assert_type(airflock.check_types("mine.py").faults[0].line, int)
     assert_type(airflock.harden(scenario, range(2))[0].fitness, float)
     assert_type(airflock.evolve(scenario, "study", generations=2).fitness, float)
     assert_type(airflock.display(["AIR"], 20).formed[0].collisions, int)

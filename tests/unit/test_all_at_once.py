@@ -10,9 +10,9 @@ from airflock.cli.main import app
 from airflock.errors import AirflockError, CardError, ScenarioError
 
 SET = "vasarhelyi_2018/4ms"
-LIMIT, MARGIN = "--limit 'r_mim<3 at 1%'", "--margin radio.dely"
+LIMIT = "--limit 'r_mim<3 at 1%'"
 ASKED = [
-    (f"tune {SET} --out new", ["--budget soon", MARGIN, LIMIT, "--confidence 2", "--threads 0"]),
+    (f"tune {SET} --out new", ["--budget soon", LIMIT, "--confidence 2", "--threads 0"]),
     (f"certify {SET}", [
         "--budget soon", LIMIT, "--confidence 2", "--flights -1", "--out lost.nc", "--tolerance-of radio.dely",
         "--map radio.dely=0:1:2", "--timeout -1", "--precision 16", "--device tpu", "--threads 0",
@@ -21,8 +21,7 @@ ASKED = [
         "--population 1", "--generations x", LIMIT, "--sensitivity sobul", "--timeout -1", "--device tpu",
         "--threads 0",
     ]),
-    (f"harden {SET} --out new.toml", ["--out lost.nc", "--seeds 1", "--cost nan", LIMIT, MARGIN, "--threads 0"]),
-    (f"harden {SET} --out new.toml", ["--r-coll 0.5", "--delay 0.5", "--set model.p_rep=-1", MARGIN]),
+    (f"harden {SET} --out new.toml", ["--out lost.nc", "--seeds 1", "--cost nan", LIMIT, "--threads 0"]),
     (f"sweep {SET} --over radio.delay=0:1:2", [
         "--seeds 0", "--over radio.range", "--show fitnes", "--table lost.nc", "--precision 16", "--device tpu",
     ]),
@@ -71,7 +70,7 @@ def test_of_two_wrong_options_both_are_told(words, wrong, tmp_path, monkeypatch)
     for i, first in enumerate(wrong):
         for second in wrong[i + 1 :]:
             lines = refused(" ".join([words, first, second]))
-            of_scenario = [option for option in (first, second) if option.split()[0] in ("--limit", "--margin")]
+            of_scenario = [option for option in (first, second) if option.split()[0] == "--limit"]
             expected = [first, second]
             if any(option.startswith("--set") for option in expected):
                 expected = [option for option in expected if option not in of_scenario]

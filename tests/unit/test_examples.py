@@ -1,4 +1,4 @@
-"""Examples and the README's scenario file run as they stand; every publication named is in references.bib."""
+"""Examples and the start page's scenario file run as they stand; every publication named is in references.bib."""
 
 import re
 import subprocess
@@ -61,12 +61,12 @@ def test_the_environment_of_reinforcement_learning_keeps_the_rules_of_gymnasium(
     assert (east, north) == pytest.approx((4.0, -2.0), abs=0.8) and (seen[2:] != 0.0).any()
 
 
-def test_readme_scenario_is_valid(tmp_path):
-    block = re.search(r"```toml\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.S)
+def test_scenario_file_of_the_start_page_is_valid(tmp_path):
+    block = re.search(r"```toml\n(.*?)```", (ROOT / "docs/start.md").read_text(encoding="utf-8"), re.S)
     assert block
-    file = tmp_path / "readme.toml"
+    file = tmp_path / "mine.toml"
     file.write_text(block[1], encoding="utf-8")
-    assert load(file).agents == 30
+    assert load(file).agents == 12
 
 
 def test_every_model_file_is_named_after_a_publication_in_the_bibliography():

@@ -5,15 +5,12 @@ import pytest
 
 import toys
 from airflock.cli import harden as cli_harden
-from airflock.engine import score_flights
 from airflock.errors import ScenarioError
-from airflock.evolve import again, harden
+from airflock.evolve import harden
 from airflock.evolve.measures import CARRIED, STOPS, measures
 from airflock.evolve.sensitivity import sensitivity
-from airflock.evolve.space import with_parameters
 from airflock.evolve.steps import Measured
 from airflock.evolve.store import Store
-from airflock.evolve.study import load_study
 from airflock.executors.in_process import InProcess
 from airflock.radios.links import received
 from airflock.scenarios.files import load
@@ -205,24 +202,6 @@ def test_what_does_not_fly_is_not_hardened(monkeypatch):
     flown_by(monkeypatch, lambda p, chance: {"fitness": 0.0, "r_min": 5.0, "n_coll": 0.0, "f_wall": 0.0})
     with pytest.raises(ScenarioError, match="does not fly, so it cannot be hardened: f_wall is zero in 100 %"):
         harden.harden(load("vasarhelyi_2018/6ms"), range(5))
-
-
-def test_evolving_again_flies_a_stricter_scenario_but_is_measured_in_the_given_one(tmp_path):
-    """Workaround (i): the search minds larger spheres and a longer delay; what it costs and gains is told without."""
-    given = load("vasarhelyi_2018/6ms", {"agents": 8, "duration": 20.0, "dt": 0.05})
-    settings = again.cautious(given, r_coll=2.0, delay=1.5)
-    search = {"population": 4, "generations": 2, "top": 1, "pool": 0, "final_seeds": 2}
-    study = again.stricter(given, load_study("vasarhelyi_2018/6ms").space, settings, search)
-    assert study.scenario.metrics.r_coll == 2.0 * given.metrics.r_coll
-    assert study.scenario.radio.delay == 1.5 * given.radio.delay
-    steps = again.evolved_again(given, study, settings, tmp_path / "again", range(3))
-    optimum, evolved = steps
-    assert optimum.parameters["model.p_rep"] == given.parameters.p_rep and "metrics.r_coll = 6" in evolved.reason
-    for step in steps:
-        rows = score_flights([with_parameters(given, step.parameters)] * 3, range(3))
-        assert step.fitness == np.mean([row["fitness"] for row in rows])
-    continued = again.evolved_again(given, study, settings, tmp_path / "again", range(3))
-    assert continued[1].parameters == evolved.parameters
 
 
 def test_sensitivity_finds_the_share_of_each_parameter(tmp_path):

@@ -63,9 +63,8 @@ def test_genetic_algorithm_finds_all_ones_and_the_cell_of_a_sphere(seed):
     assert near.loss < 0.01
 
 
-@pytest.mark.parametrize("algorithm", ["nsga2", "nsga3"])
-def test_nondominated_sorting_reaches_the_front_of_zdt1(algorithm, seed):
-    _, _, found = run(algorithm, zdt1, 10, 2, 60, 120, seed)
+def test_nondominated_sorting_reaches_the_front_of_zdt1(seed):
+    _, _, found = run("nsga2", zdt1, 10, 2, 60, 120, seed)
     best = found[front(found)]
     assert len(best) >= 25
     away = np.abs(best[:, 1] - (1.0 - np.sqrt(best[:, 0])))
@@ -73,7 +72,7 @@ def test_nondominated_sorting_reaches_the_front_of_zdt1(algorithm, seed):
     assert best[:, 0].min() < 0.05 and best[:, 0].max() > 0.9
 
 
-@pytest.mark.parametrize(("algorithm", "objectives"), [("cmaes", 1), ("ga", 1), ("nsga2", 2), ("nsga3", 2)])
+@pytest.mark.parametrize(("algorithm", "objectives"), [("cmaes", 1), ("ga", 1), ("nsga2", 2)])
 def test_same_seed_same_points_whatever_others_draw(algorithm, objectives, seed):
     f = zdt1 if objectives == 2 else sphere
     first = run(algorithm, f, 4, objectives, 20, 5, seed)[1]

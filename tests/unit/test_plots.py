@@ -29,7 +29,6 @@ from airflock.models import vasarhelyi_2018
 from airflock.plots import flight as flight_view
 from airflock.plots import style
 from airflock.plots.certificate import certificate, tail
-from airflock.plots.exposure import develop, exposure, light
 from airflock.plots.film_stage import Stage
 from airflock.plots.heatmap import heatmap
 from airflock.plots.responses import alignment, allowed_difference, repulsion, wall_response
@@ -128,7 +127,7 @@ def test_a_window_without_frames_is_refused_in_one_line():
     with pytest.raises(RecordingError, match="from 200 to 300 s; it reaches from 0 to 100 s"):
         trajectories(flight(), start=200.0, stop=300.0)
     with pytest.raises(RecordingError, match="ends before it starts"):
-        exposure(flight(), start=30.0, stop=20.0)
+        trajectories(flight(), start=30.0, stop=20.0)
 
 
 def with_a_gap():
@@ -151,23 +150,6 @@ def test_missing_positions_leave_gaps_and_nothing_else():
     save_to_nowhere(trajectories(with_a_gap()))
 
 
-def test_missing_positions_shed_no_light_and_take_none_away_elsewhere():
-    films = []
-    for recording in (flight(document=SQUARE), with_a_gap()):
-        shown = flight_view.paths_of(recording)
-        films.append(light(shown, shown.position[:, 0], shown.position[:, 1], (-60.0, 60.0, -60.0, 60.0), 20.0))
-    lost = films[0] - films[1]
-    assert np.isfinite(films[1]).all()
-    assert lost.min() > -1e-9
-    expected = 20.0 * (math.exp(-(100.0 - 80.0) / 20.0) - math.exp(-(100.0 - 74.5) / 20.0))
-    assert lost.sum(axis=(0, 1)) == pytest.approx(expected * exposure_colour(flight_view.paths_of(flight())), rel=1e-4)
-    rows, columns = np.nonzero(lost.sum(axis=2) > 1e-9)
-    angle = np.arctan2(rows + 0.5 - lost.shape[0] / 2, columns + 0.5 - lost.shape[1] / 2)
-    begin, end = ((t * PACE / RADIUS + 2.0 * math.pi / 3.0) % (2.0 * math.pi) for t in (74.5, 80.0))
-    assert begin - 0.01 < angle.min() and angle.max() < end + 0.01
-    save_to_nowhere(exposure(with_a_gap(), start=70.0))
-
-
 def save_to_nowhere(figure):
     assert len(figure._repr_png_()) > 1000
 
@@ -177,30 +159,6 @@ def test_a_notebook_shows_a_wide_field_without_empty_paper_above_and_below():
     low["position"].values[:, 1] *= 0.1
     rows, columns = iio.imread(trajectories(low)._repr_png_()).shape[:2]
     assert rows < 0.5 * columns
-
-
-def test_light_adds_up_to_one_unit_per_agent_and_second_faded():
-    shown = flight_view.paths_of(flight())
-    x, y = shown.position[:, 0], shown.position[:, 1]
-    film = light(shown, x, y, (-60.0, 60.0, -60.0, 60.0), 20.0)
-    one_colour = exposure_colour(shown)
-    expected = 3 * 20.0 * (1.0 - math.exp(-100.0 / 20.0))
-    assert film.sum(axis=(0, 1)) == pytest.approx(expected * one_colour, rel=1e-4)
-    rows, columns = np.nonzero(film.sum(axis=2))
-    radius = np.hypot(columns + 0.5 - film.shape[1] / 2, rows + 0.5 - film.shape[0] / 2) * 120.0 / film.shape[1]
-    assert abs(radius - RADIUS).max() < 0.4
-
-
-def exposure_colour(shown):
-    from airflock.plots.exposure import LAMP
-
-    low, high = flight_view.speed_range(shown)
-    return np.array(LAMP((PACE - low) / max(high - low, 1e-9))[:3])
-
-
-def test_developed_pictures_are_colours_and_dark_where_nobody_flew():
-    picture = develop(np.zeros((8, 8, 3)))
-    assert picture.min() >= 0.0 and picture.max() < 0.06
 
 
 def test_series_of_a_circling_flock():
@@ -507,12 +465,6 @@ def test_nothing_is_drawn_through_a_periodic_face():
         centre = corners[:, 0, 0] + (corners[:, 2, 0] - corners[:, 0, 0]) * (0.6 / 0.82)
         away = np.abs(centre - expected)
         assert np.minimum(away, 40.0 - away).max() <= 0.5 * 0.5 * PACE + 0.02  # half a frame's way, at a face
-    shown = flight_view.paths_of(recording)
-    leaps = np.abs(np.diff(shown.position[:, 0], axis=0)) > 20.0
-    film = light(shown, shown.position[:, 0], shown.position[:, 1], (-20.0, 20.0, -20.0, 20.0), 1e9, leaps)
-    rows = film.sum(axis=2)[[350, 700, 1049]]  # where the three fly
-    assert rows.max(axis=1).min() > 0.0
-    assert (rows[:, 100:1300].max(axis=1) / rows[:, 100:1300].min(axis=1)).max() < 1.7  # no streak along the row
 
 
 def test_colours_follow_the_heading_where_all_fly_equally_fast():
@@ -559,11 +511,10 @@ def test_the_least_of_a_window_is_never_above_the_instant():
     assert line.get_ydata() == pytest.approx(3.0)
 
 
-@pytest.mark.parametrize("kind", ["trajectories", "exposure"])
-def test_pictures_of_one_panel_are_drawn_into_axes_that_are_given(kind):
+def test_pictures_of_one_panel_are_drawn_into_axes_that_are_given():
     figure = style.Picture(6.0, 3.0)
     left, right = figure.subplots(1, 2)
-    assert airflock.plot(flight(document=SQUARE), kind, ax=right) is figure
+    assert airflock.plot(flight(document=SQUARE), "trajectories", ax=right) is figure
     assert not left.has_data() and right.has_data()
 
 
@@ -616,7 +567,7 @@ def test_words_for_vectors_that_are_not_there_are_refused():
         airflock.model(broken, "broken")
 
 
-@pytest.mark.parametrize("kind", ["series", "rules", "transfer", "trajectories", "exposure"])
+@pytest.mark.parametrize("kind", ["series", "rules", "transfer", "trajectories"])
 def test_every_kind_of_picture_is_drawn_where_the_given_axes_are(kind):
     figure = style.Picture(8.0, 6.0)
     places = figure.subplots(2, 1)

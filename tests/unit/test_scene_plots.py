@@ -6,6 +6,7 @@ from importlib import import_module
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.collections import LineCollection
 
 import airflock
 from airflock.aero.wing import pitch
@@ -15,14 +16,13 @@ from airflock.plots.film_stage import Stage
 from airflock.plots.flight import paths_of, view_of
 from airflock.plots.flocked import flocked
 from airflock.plots.rays import cast_at, rays
-from airflock.plots.scene_paths import nearby, scenery, through
-from airflock.plots.solid import render
+from airflock.plots.scene_paths import ELEVATION, nearby, outlines_in_space, scenery, through
 from airflock.plots.trajectories import trajectories
 from airflock.plots.video import video
 from airflock.plots.wash import downwash, formation_at, wash
 from airflock.recordings.flights import plain
 from airflock.recordings.layout import dataset
-from airflock.stage.scene import prism
+from airflock.world.shapes import BOX, CYLINDER
 
 
 def recording(name="kidger/city", **keys):
@@ -118,47 +118,31 @@ def test_only_the_time_of_an_event_is_never(capsys):
         assert "clearance" not in shown and "nothing to measure: clearance" in out and shown["power"][0] == "inf"
 
 
-def boxes_in_the_way(points, toward, low, high):
-    """Whether a ray from each point along `toward` meets an upright box, by its slabs."""
-    with np.errstate(divide="ignore"):
-        a, b = ((bound[None] - points[:, None]) / toward for bound in (low, high))
-    enter, leave = np.minimum(a, b).max(axis=2), np.maximum(a, b).min(axis=2)
-    return ((enter <= leave) & (leave > 0.0)).any(axis=1)
-
-
-def test_what_a_solid_hides_is_what_a_ray_to_the_viewer_meets():
-    rng = np.random.default_rng(11)
-    low = np.column_stack([rng.uniform(-50.0, 45.0, (12, 2)), np.zeros(12)])
-    high = low + rng.uniform(4.0, 25.0, (12, 3))
-    solids = [
-        prism(f"box_{k}", np.array([[a[0], a[1]], [b[0], a[1]], [b[0], b[1]], [a[0], b[1]]]), 0.0, b[2], (90, 90, 90))
-        for k, (a, b) in enumerate(zip(low, high, strict=True))
-    ]
-    view = view_of(3, elevation_deg=40.0)
-    picture = render(solids, view, (-110.0, 110.0, -70.0, 90.0), pixels=700)
-    points = np.column_stack([rng.uniform(-60.0, 60.0, (4000, 2)), rng.uniform(0.0, 30.0, 4000)])
-    assert picture.toward @ view.right == pytest.approx(0.0) and picture.toward[2] == pytest.approx(
-        np.sin(np.radians(40.0))
-    )
-    expected = boxes_in_the_way(points, picture.toward, low, high)
-    assert 0.05 < expected.mean() < 0.95
-    assert (picture.hides(points) == expected).mean() > 0.985  # but for the pixels along edges
-    assert picture.colour.max() <= 1.0 and set(np.unique(np.round(picture.colour[..., 3], 2))) <= {
-        0.0,
-        0.25,
-        0.5,
-        0.75,
-        1.0,
-    }
-
-
 def test_a_city_in_space_draws_all_that_was_flown_once():
     made = recording()
-    figure = through(made, space=True)
-    hidden, seen = figure.axes[0].collections[:2]
+    axes = through(made, space=True).axes[0]
     flown = made["position"].values[:, :, 0]
-    assert len(hidden.get_segments()) + len(seen.get_segments()) == (len(flown) - 1) * 4
-    assert hidden.get_alpha() < 0.5 and seen.get_alpha() == 1.0
+    (paths,) = (
+        lines for lines in axes.collections if isinstance(lines, LineCollection) and lines.get_array() is not None
+    )
+    assert len(paths.get_segments()) == (len(flown) - 1) * 4
+
+
+@pytest.mark.parametrize("name", ["kidger/city", "kidger/forest"])
+def test_outlines_in_space_are_the_corners_and_rims_of_all_shapes(name):
+    made = recording(name)
+    shown = nearby(airflock.load(name), paths_of(made))
+    axes = through(made, space=True).axes[0]
+    outlines = axes.collections[0].get_segments()
+    boxes, cylinders = ((shown[:, 6] == kind).sum() for kind in (BOX, CYLINDER))
+    assert len(outlines) == 6 * (boxes + cylinders) == 6 * len(shown)  # two rims and four uprights each
+    view, points = view_of(3, elevation_deg=ELEVATION), np.concatenate(outlines)
+    if name == "kidger/city":
+        corners = [[row[a], row[b], row[c]] for row in shown for a in (0, 3) for b in (1, 4) for c in (2, 5)]
+        expected = np.column_stack(view(np.array(corners)))
+        assert {tuple(p) for p in np.round(points, 6)} == {tuple(p) for p in np.round(expected, 6)}
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    assert (points >= [left, bottom]).all() and (points <= [right, top]).all()  # nothing is cut off
 
 
 def test_videos_in_space_and_from_above_stand_on_the_same_ground(tmp_path):
@@ -166,7 +150,8 @@ def test_videos_in_space_and_from_above_stand_on_the_same_ground(tmp_path):
     for space in (True, False):
         stage = Stage(made, None, None, tail=0.1, height=160, speed=1.0, space=space)
         assert stage.picture(0.3).shape == (stage.size[1], stage.size[0], 4)
-        assert (stage.solid is not None) == space
+        drawn = sum(len(lines.get_segments()) for lines in stage.axes.collections[:1])
+        assert drawn == len(outlines_in_space(nearby(airflock.load("kidger/city"), paths_of(made))))
     corners = np.array([path.vertices[:4] for path in stage.darts.get_paths()])
     where = made["position"].sel(time=0.3, method="nearest").values[:2, 0].T
     np.testing.assert_allclose(corners[:, 0] + (corners[:, 2] - corners[:, 0]) * (0.6 / 0.82), where, atol=0.05)

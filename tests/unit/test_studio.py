@@ -29,7 +29,6 @@ from airflock.stage.clusters import clusters
 from airflock.stage.scene import dart, stage_of, turned
 from airflock.stage.shades import Shade
 from airflock.studio import charts, door, measures
-from airflock.studio.background import Study, around, summary, varied
 from airflock.studio.collisions import BOTH, Collisions
 from airflock.studio.controls import controls_of, controls_of_faults, span
 from airflock.studio.drawing import Flock, arrival
@@ -754,19 +753,6 @@ def test_links_by_radio_join_the_pairs_in_range_and_pale_with_the_loss():
     lossy = airflock.load(PRESET, {"radio.loss": 0.5})
     at, share = arrival(lossy.transceiver, lossy.radio)
     np.testing.assert_allclose(np.interp([0.0, 40.0, 80.0], at, share), [1.0, 0.875, 0.5], atol=1e-4)
-
-
-def test_a_study_in_the_background_searches_around_what_was_set(tmp_path):
-    scenario = airflock.load(PRESET, {"model.p_rep": 0.3})
-    found = around(scenario, varied(PRESET))
-    assert found["model.p_rep"] == (0.15, 0.6) and "model.v_flock" not in found
-    assert "model.v_flock" in around(scenario)
-    for key, (low, high) in found.items():
-        assert low <= value_of(scenario, key) <= high
-    rows = [(0, "[0.2]", '{"a": 1.0}'), (0, "[0.4]", '{"a": 2.0}'), (1, "[0.3]", '{"a": 3.0}'), (1, None, "{}")]
-    assert summary(rows) == ([(0.4, pytest.approx(0.3)), (0.4, 0.3)], 0.4, {"a": 2.0})
-    with pytest.raises(StudioError, match="no number"):
-        Study(tmp_path / "study", "", {}, "fitness")
 
 
 def test_an_agent_that_left_is_nowhere_and_the_others_fly_on(interpreted, player):

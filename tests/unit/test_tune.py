@@ -4,7 +4,6 @@ import hashlib
 import json
 import re
 import tomllib
-from html import escape
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,7 +26,7 @@ from airflock.scenarios.making import make
 from airflock.tune import run as tuning
 from airflock.tune.assumed import defaults
 from airflock.tune.feasible import infeasible
-from airflock.tune.folder import MOST_SEEDS
+from airflock.tune.folder import MOST_SEEDS, read_plan
 from airflock.tune.next_flight import replays
 from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
 from airflock.tune.request import usual_limits
@@ -200,32 +199,14 @@ def logs(tmp_path_factory):
     return path
 
 
-def test_a_margin_is_widened_told_in_the_report_and_goes_on_without_being_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
-    monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.evolve.environment.usual_keys", lambda _: ("radio.delay",))
-    how = {"warm": True, "budget": 16.0, "limit": ["r_min<0.1 at 10%"]}
-    with pytest.raises(ScenarioError, match="margin: radio.dely is not a number of the environment; did you mean"):
-        tune(make(MINE, "mine"), tmp_path / "a", margin="radio.dely", **how)
-    assert not (tmp_path / "a").exists()
-    found = tune(make(MINE, "mine"), tmp_path / "a", margin="radio.delay", **how)
-    told = json.loads((tmp_path / "a" / "hardening.json").read_text())
-    assert found.steps[0].margins["radio.delay"] >= 0.4 and "radio.delay: what held holds" in found.steps[-1].verdict
-    page = (tmp_path / "a" / "report.html").read_text()
-    assert escape(found.steps[0].verdict) in page and f"<td>{told['flights']:,}</td>" in page
-    monkeypatch.setattr("airflock.tune.stages.harden", lambda *_, **__: pytest.fail("hardened already"))
-    again = tune(make(MINE, "mine"), tmp_path / "a", resume=True, **how)
-    assert again.steps == found.steps
-    (tmp_path / "a" / "hardening.json").unlink()
-    asked = {}
-
-    def hardened(*_, margin, **__):
-        asked.update(margin=margin)
-        return list(found.steps)
-
-    monkeypatch.setattr("airflock.tune.stages.harden", hardened)
-    tune(make(MINE, "mine"), tmp_path / "a", resume=True, **how)
-    assert asked == {"margin": ["radio.delay"]}
+def test_a_plan_with_margins_of_an_earlier_version_is_refused_in_one_line(done, tmp_path):
+    plan = tmp_path / "tune.toml"
+    kept = (done[1] / "tune.toml").read_text()
+    plan.write_text(f"margins = []\n{kept}")
+    assert read_plan(plan) == read_plan(done[1] / "tune.toml")
+    plan.write_text(f'margins = ["radio.delay"]\n{kept}')
+    with pytest.raises(StudyError, match=r"margins are no longer widened; remove the line `margins` to go on"):
+        read_plan(plan)
 
 
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):

@@ -71,7 +71,7 @@ from airflock.scenarios.files import load
         ("run x --agent 3", "run: --agent: unknown option; did you mean --agents?"),
         ("sweep x --plots a.png", "sweep: --plots: unknown option; did you mean --plot?"),
         ("evolve a", "evolve: --out is missing; for instance: airflock evolve"),
-        ("plot a --kind serie", "plot: --kind serie is none of trajectories, exposure, series, rules, transfer, scene"),
+        ("plot a --kind serie", "plot: --kind serie is none of trajectories, series, rules, transfer, scene"),
         ("fly prepar", "fly: prepar: unknown command; did you mean prepare?"),
         ("fly prepare a --member 3", "fly prepare: --member: unknown option; did you mean --members?"),
     ],

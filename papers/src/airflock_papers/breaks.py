@@ -3,20 +3,37 @@
 A claim that no change could break would say nothing. Its `breaks` are keys of a scenario that are set in every flight
 of its part: of two sides that are compared, both have the same value then. It is flown with few seeds, as it is and
 changed: the bound has to hold before and fail after.
+
+The result of every change is committed in breaks.csv. `airflock paper all --breaks` flies all of them and compares;
+`python -m airflock_papers.breaks FOLDER` flies all of them and writes the table. Both keep each finished part in a
+folder with a hash of all texts that decide a flight, so that a run that was cut off goes on where it stopped. The row
+of a new claim, and that a claim is red as it is, are entered by hand: the tests name each row that does not fit.
+
+Each row names the kind of processor that flew it, since another kind flies other flights of the same seeds. Whether a
+claim holds beforehand may then be another by chance. That its change breaks it must be seen on every kind.
 """
 
+import json
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
+from airflock import atomic
 from airflock.errors import AirflockError
+from airflock.machine import kind
+from airflock.untrusted import TextError, json_object, read_text
+from airflock_papers import committed as tables
+from airflock_papers.catalogue import find
 from airflock_papers.claims import VERDICTS, Measured, judge
 from airflock_papers.flights import Flights
 from airflock_papers.paper import Paper
-from airflock_papers.progress import Progress, progress_bar
+from airflock_papers.progress import Progress, progress_bar, teller
 from airflock_papers.statements import Statement, load
+from airflock_papers.texts import texts
 
+COMMITTED = "breaks.csv"
 GOOD = {kind: verdicts[0] for kind, verdicts in VERDICTS.items()}
 RED = "turned red"
 GREEN = "still holds"  # a claim that its own change does not break
@@ -24,6 +41,21 @@ UNSHOWN = "does not hold with so few flights"  # so that its turning red would s
 UNMEASURED = "is not measured in the small form"  # it asks for more than a quick flight gives
 ALREADY = "is red as it is"  # its page does not count it as reproduced, so that there is nothing to break
 RESULTS = (RED, GREEN, ALREADY, UNSHOWN, UNMEASURED)
+# flights per number where those of the quick form are too few to show that a claim holds beforehand
+SEEDS = {
+    ("vasarhelyi_2018", "s2"): 40,
+    ("vasarhelyi_2018", "fig1"): 10,
+    ("vasarhelyi_2018", "fig34"): 10,
+    ("vasarhelyi_2018", "optima"): 40,
+    ("vasarhelyi_2018", "pressure"): 20,
+    ("vasarhelyi_2018", "limits"): 40,
+    ("vasarhelyi_2018", "tuning"): 40,
+    ("vasarhelyi_2018", "real"): 10,
+    ("zapotecatl_2016", "sequential"): 15,
+    ("kidger", "alone"): 10,
+    ("kidger", "conduct"): 10,
+    ("kidger", "tuning"): 40,
+}
 
 
 class Break(NamedTuple):
@@ -39,6 +71,33 @@ class Break(NamedTuple):
     result: str
     ours: float
     changed: float
+
+
+class Row(NamedTuple):
+    """A row of the committed table: fields as of `Break`, numbers to four digits.
+
+    processor : its kind, on which the change was flown; empty where that was not kept, or nothing was flown
+    """
+
+    paper: str
+    part: str
+    id: str
+    change: str
+    result: str
+    ours: str = ""
+    changed: str = ""
+    processor: str = ""
+
+
+class Worse(NamedTuple):
+    """A claim that its change does not break, or no longer does, as it is now.
+
+    elsewhere : the kind of processor on which it was seen red, if it is another and the claim does not hold beforehand
+                with the few flights of this one: not judged
+    """
+
+    row: Row
+    elsewhere: str = ""
 
 
 def fly(
@@ -136,3 +195,70 @@ def _broken(statement: Statement, part: str, plain: Measured | None, after: Meas
 def _holds(statement: Statement, measured: Measured | None) -> bool:
     """Whether the bound of a statement holds for what was measured; not if nothing was."""
     return measured is not None and judge({statement.id: statement}, [measured])[0].verdict == GOOD[statement.kind]
+
+
+def committed() -> list[Row]:
+    """Read the committed table.
+
+    Raises AirflockError if there is none.
+    """
+    return [Row(**row) for row in tables.read(COMMITTED, "python -m airflock_papers.breaks")]
+
+
+def fly_all(folder: Path, say: Callable[[str], None], threads: int | None = None) -> list[Row]:
+    """Fly every change of the committed table, except those of claims that are red as they are.
+
+    Returns the rows of the table with the new results. The folder keeps finished parts and a log of the progress.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    now = f"{texts()} on {kind()}"
+    rows = committed()
+    todo: dict[tuple[str, str], set[str]] = {}
+    for row in rows:
+        if row.result != ALREADY:
+            todo.setdefault((row.paper, row.part), set()).add(row.id)
+    new: dict[tuple[str, str], Row] = {}
+    for number, ((name, part), ids) in enumerate(todo.items(), 1):
+        path = folder / f"{name}.{part}.breaks.json"
+        flown = _kept(path, now, ids)
+        if flown is None:
+            tell = teller(folder / "log.txt", say, f"{number}/{len(todo)} {name} {part}")
+            results = fly(find(name), only=part, seeds=SEEDS.get((name, part)), threads=threads, progress=tell, ids=ids)
+            flown = [
+                Row(name, part, b.id, b.change, b.result, f"{b.ours:.4g}", f"{b.changed:.4g}", kind()) for b in results
+            ]
+            atomic.write(path, json.dumps({"texts": now, "rows": flown}))
+        new |= {(row.paper, row.id): row for row in flown}
+    return [new.get((row.paper, row.id), row) for row in rows]
+
+
+def _kept(path: Path, now: str, ids: Collection[str]) -> list[Row] | None:
+    """Return the rows of a part that was flown with these texts, or None if the file lacks some or cannot be read."""
+    try:
+        document = json_object(read_text(path))
+        rows = [Row(*map(str, row)) for row in document["rows"]] if document.get("texts") == now else []
+    except (OSError, TextError, LookupError, TypeError, ValueError):
+        return None
+    rows = [row for row in rows if row.id in ids]
+    return rows if {row.id for row in rows} == set(ids) else None
+
+
+def worse(before: Iterable[Row], after: Iterable[Row]) -> list[Worse]:
+    """List the claims that their change does not break, or no longer does.
+
+    One that still holds under its change is listed on every kind of processor. One that does not hold beforehand is not
+    judged where it was seen red on another kind; a kind that is not known is taken for this one.
+    """
+    red = {(row.paper, row.id): row.processor for row in before if row.result == RED}
+    listed = []
+    for row in after:
+        seen = red.get((row.paper, row.id))
+        if row.result == GREEN:
+            listed.append(Worse(row))
+        elif seen is not None and row.result != RED:
+            listed.append(Worse(row, seen if row.processor not in ("", seen) else ""))
+    return listed
+
+
+if __name__ == "__main__":
+    tables.renew("Make the change of every claim and commit the results.", COMMITTED, Row._fields, fly_all)

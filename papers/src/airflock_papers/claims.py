@@ -111,14 +111,6 @@ def unflown(statements: Mapping[str, Statement], claims: Iterable[Claim], comman
     return [Claim(**asdict(s) | {"verdict": s.verdict or UNFLOWN, "command": command}) for s in rest]
 
 
-MEASURED = ("ours", "sd", "low", "high", "runs", "p", "reference", "reference_sd", "note")
-
-
-def judged_again(statement: Statement, before: Claim) -> Claim:
-    """A claim whose measurement stays, by its statement as it stands now."""
-    return _by_bound(statement, asdict(statement) | {key: getattr(before, key) for key in MEASURED})
-
-
 def _judged(statement: Statement, found: Measured) -> Claim:
     for key in ("quantity", "at"):
         told, used = getattr(statement, key), getattr(found, key)
@@ -127,10 +119,6 @@ def _judged(statement: Statement, found: Measured) -> Claim:
     values = asdict(statement)
     values |= {**found.value._asdict(), "p": found.p, "note": found.note}
     values["reference"], values["reference_sd"] = found.reference or (None, None)
-    return _by_bound(statement, values)
-
-
-def _by_bound(statement: Statement, values: dict[str, Any]) -> Claim:
     holds, fails, none = VERDICTS[statement.kind]
     if not statement.bound:
         return Claim(**values | {"verdict": statement.verdict or none})

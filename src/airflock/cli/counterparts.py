@@ -61,11 +61,9 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "harden": Counterpart(
         'airflock.harden("study/best.toml", range(100))', "harden",
         {
-            "scenario": "scenario", **SEEDS, "cost": "cost", "limit": "limit", "margin": "margin", "threads": "threads",
-            **TABLE,
+            "scenario": "scenario", **SEEDS, "cost": "cost", "limit": "limit", "threads": "threads", **TABLE,
             "changes": LOADED["changes"],
             "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.evolve.harden.document",
-            **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.again.evolved_again"),
         },
     ),
     "certify": Counterpart(
@@ -88,7 +86,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.tune("mine.toml", "tuned")', "tune",
         {
             "scenario": "scenario", "out": "out", **SETTINGS, **TABLE,
-            **{name: name for name in ("budget", "limit", "margin", "confidence", "like", "heard", "warm", "resume")},
+            **{name: name for name in ("budget", "limit", "confidence", "like", "heard", "warm", "resume")},
             "threads": "threads", "trust": "trust",
         },
     ),

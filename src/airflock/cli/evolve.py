@@ -15,7 +15,7 @@ def evolve(
     ctx: typer.Context,
     scenario: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file, or a study file.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the study.", show_default=False)],
-    algorithm: Annotated[str | None, typer.Option(help="cmaes, ga, nsga2 or nsga3.", show_default="cmaes")] = None,
+    algorithm: Annotated[str | None, typer.Option(help="cmaes, ga or nsga2.", show_default="cmaes")] = None,
     population: Annotated[int | None, typer.Option(help="Candidates per generation.", show_default="100")] = None,
     generations: Annotated[int | None, typer.Option(help="Generations per run.", show_default="150")] = None,
     seeds: Annotated[int | None, typer.Option(help="Flights per candidate.", show_default="1")] = None,

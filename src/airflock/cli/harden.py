@@ -1,6 +1,5 @@
 """Verb harden: from an optimum to parameters that may be flown."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,7 +7,7 @@ import typer
 
 from airflock.asked import if_right, or_else
 from airflock.cli import options, tables
-from airflock.cli.progress import counted, searching
+from airflock.cli.progress import counted
 from airflock.errors import ScenarioError
 from airflock.suffixes import SCENARIOS
 
@@ -23,20 +22,6 @@ def harden(
     out: Annotated[Path, typer.Option(metavar="FILE.toml", help="The hardened scenario.", show_default=False)],
     seeds: Annotated[int, typer.Option(min=2, help="Flights per step.")] = 100,
     first_seed: options.FirstSeed = 0,
-    r_coll: Annotated[
-        float | None,
-        typer.Option(
-            help="Instead of the recipe: evolve again, with the collision radius this many times as large.",
-            show_default=False,
-        ),
-    ] = None,
-    delay: Annotated[
-        float | None,
-        typer.Option(
-            help="Instead of the recipe: evolve again, with the delay this many times as large.", show_default=False
-        ),
-    ] = None,
-    generations: Annotated[int, typer.Option(min=1, help="Generations when evolving again.")] = 150,
     cost: Annotated[float, typer.Option(min=0.0, help="Fitness that the recipe may give up.")] = 0.05,
     limit: Annotated[
         list[str] | None,
@@ -48,7 +33,6 @@ def harden(
             help="A limit that no step may break, such as 'r_min<3 at 0.01/h', as in certify; repeatable.",
         ),
     ] = None,
-    margin: options.Margin = None,
     changes: options.Set = None,
     trust: options.Trust = False,
     duration: options.Duration = None,
@@ -57,43 +41,24 @@ def harden(
 ) -> None:
     """Make an optimum safer: try the steps of Table S4, and keep those that help, cost little and break nothing.
 
-    A step towards a limit that is not kept yet may cost more. With --margin, steps must not shorten the margin that is
-    short, and those that widen it are kept. With a study of several scenarios, a step must keep what held in each;
-    further files end in _2 and so on. Exit status 1 if no step was kept.
+    A step towards a limit that is not kept yet may cost more. With a study of several scenarios, a step must keep what
+    held in each; further files end in _2 and so on. Exit status 1 if no step was kept.
 
-    Example: airflock harden study --out flyable.toml --margin radio.delay --margin faults
+    Example: airflock harden study --out flyable.toml
     """
     from airflock.evolve.folder import write
-    from airflock.evolve.harden import asked_for, document
+    from airflock.evolve.harden import MOST, asked_for, document, harden
 
     asked = options.asked(ctx)
     settings = asked.read(options.settings, changes, None, duration)
     optima = if_right(settings, asked.read(_optima, scenario, or_else(settings, {}), trust))
     places = asked.read(_places, out, len(or_else(optima, [])), scenario)
-    again = r_coll is not None or delay is not None
-    for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
-        asked.read(_sound_factor, name, factor)
-    if again and len(or_else(optima, [])) > 1:
-        asked.note(f"{scenario}: is a study of {len(optima)} scenarios; --r-coll and --delay take one")
-    if again and limit:
-        asked.note("--limit is for the recipe; leave it out with --r-coll and --delay")
-    if again and margin:
-        asked.note("--margin is for the recipe; leave it out with --r-coll and --delay")
-    if not again:
-        asked.read(asked_for, optima, or_else(cost, 0.0), limit or (), margin or ())
+    asked.read(asked_for, optima, or_else(cost, 0.0), limit or ())
     numbers = asked.read(options.seeds_of, first_seed, seeds)
     asked.refuse()
     tables.say_notes(note for each in optima for note in each.notes)
-    if again:
-        stricter = (r_coll or 1.0, delay or 1.0)
-        steps = _evolved_again(scenario, optima[0], stricter, generations, out, numbers, threads, as_json)
-    else:
-        from airflock.evolve.harden import harden, rounds
-
-        most = rounds(margin or ()) * seeds * len(optima)
-        with counted(f"{scenario}: flights", most, quiet=as_json) as done:
-            how: Any = {"limit": limit or (), "margin": margin or (), "threads": threads, "done": done}
-            steps = harden(optima, numbers, cost=cost, **how)
+    with counted(f"{scenario}: flights", MOST * seeds * len(optima), quiet=as_json) as done:
+        steps = harden(optima, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
     for each, place in zip(optima, places, strict=True):
         write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")
     if as_json:
@@ -113,12 +78,6 @@ def _places(out: Path, optima: int, where: str) -> list[Path]:
     return places
 
 
-def _sound_factor(name: str, factor: float | None) -> None:
-    """Refuse a factor that makes nothing stricter."""
-    if factor is not None and not 1.0 <= factor <= 100.0:
-        raise ScenarioError([f"{name} {factor:g} lies outside [1, 100]"])
-
-
 def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
     """The optimum, or that of each scenario of a study's folder."""
     from airflock.evolve.result import BEST, further_best
@@ -129,37 +88,6 @@ def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
         raise ScenarioError([f"{where}: holds no {BEST}: its search is not over, or nothing flies in it"])
     files = [folder / BEST, *further_best(folder)] if folder.is_dir() else [where]
     return [load(path, settings, trust=trust) for path in files]
-
-
-def _evolved_again(
-    where: str, optimum: Any, factors: tuple[float, float], generations: int, out: Path, numbers: Sequence[int],
-    threads: int | None, quiet: bool,
-) -> list[Any]:  # fmt: skip
-    """Workaround (i): the optimum, and what is evolved with a larger radius of collision and a longer delay."""
-    from airflock.evolve.again import cautious, evolved_again, stricter
-
-    settings = cautious(optimum, *factors)
-    study = stricter(optimum, _space(where, optimum), settings, {"generations": generations})
-    folder = out.parent / f"{out.stem}_study"
-    with searching(study, quiet=quiet) as (watch, note):
-        return evolved_again(optimum, study, settings, folder, numbers, threads, watch, note)
-
-
-def _space(where: str, scenario: Any) -> Any:
-    """The space of the study in a folder, of the study that is shipped for a preset, or the usual one."""
-    from airflock.evolve.bounds import usual_space
-    from airflock.evolve.folder import STUDY, read
-    from airflock.evolve.space_table import read_space
-    from airflock.evolve.study import load_study, shipped
-
-    if where in shipped():
-        return load_study(where).space
-    if (Path(where) / STUDY).is_file():
-        space, faults = read_space(read(Path(where) / STUDY)["space"], scenario)
-        if space is None:
-            raise ScenarioError([f"{where}: {fault}" for fault in faults])
-        return space
-    return usual_space(scenario)[0]
 
 
 def _print(name: str, steps: list[Any], seeds: int) -> None:
@@ -181,8 +109,6 @@ def _print(name: str, steps: list[Any], seeds: int) -> None:
         )
     console = Console()
     console.print(table)
-    if steps[0].verdict:
-        console.print(f"margins: {steps[0].verdict}", highlight=False, markup=False, soft_wrap=True)
     for step in steps[1:]:
         (cost, least, most), (gain, low, high) = step.cost, step.gain
         told = f"cost {cost:.3g} ({least:.3g} to {most:.3g}), gain {gain:.3g} m ({low:.3g} to {high:.3g}), 95 %"

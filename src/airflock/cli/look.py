@@ -15,7 +15,6 @@ class Kind(StrEnum):
     """What to draw."""
 
     TRAJECTORIES = "trajectories"
-    EXPOSURE = "exposure"
     SERIES = "series"
     RULES = "rules"
     TRANSFER = "transfer"
@@ -46,7 +45,7 @@ def plot(
     agents: options.Agents = None,
     duration: options.Duration = None,
 ) -> None:
-    """Draw trajectories coloured by speed, a long-exposure picture, order parameters over time, or a model's rules.
+    """Draw trajectories coloured by speed, order parameters over time, or a model's rules.
 
     In a city, forest or mesh: paths through the scene from above or in space, one agent's rays, share flocked. Also
     the time since the last packet by distance: --kind reception.
@@ -78,9 +77,7 @@ def video(
     end: End = None,
     space: Annotated[
         bool | None,
-        typer.Option(
-            "--space/--above", help="View at an angle with solid buildings, or from above.", show_default="as flown"
-        ),
+        typer.Option("--space/--above", help="View at an angle, or from above.", show_default="as flown"),
     ] = None,
     chart: Annotated[
         str,

@@ -44,15 +44,6 @@ Law = Annotated[
     str | None,
     typer.Option(metavar="NAME|FILE.py", help="Fly this law instead of the scenario's.", show_default=False),
 ]
-Margin = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--margin",
-        metavar="KEY|faults",
-        show_default=False,
-        help="Also widen how much worse this may get, such as radio.delay, or faults; repeatable.",
-    ),
-]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 PlotFile = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw the trajectories of the first flight.")

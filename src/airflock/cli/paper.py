@@ -69,7 +69,7 @@ def _all(
         told = "give --quick or --breaks, not both" if quick else told
         raise AirflockError(f"all: {', '.join(wrong)} is of one paper; name it" if wrong else f"all: {told}")
     if breaks:
-        _campaign(keep or cache_folder() / "papers" / "breaks", threads, as_json)
+        _all_breaks(keep or cache_folder() / "papers" / "breaks", threads, as_json)
         return
     before = tier.committed()
     rows = tier.fly(keep or cache_folder() / "papers" / "quick", tables.say, threads)
@@ -88,13 +88,13 @@ def _all(
         raise typer.Exit(1)
 
 
-def _campaign(folder: Path, threads: int | None, as_json: bool) -> None:
+def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
     """Every claim of every paper under its change, against what is committed."""
-    from airflock_papers import campaign
+    from airflock_papers import breaks
 
-    before = campaign.committed()
-    rows = campaign.fly(folder, tables.say, threads)
-    worse = campaign.worse(before, rows)
+    before = breaks.committed()
+    rows = breaks.fly_all(folder, tables.say, threads)
+    worse = breaks.worse(before, rows)
     if as_json:
         listed = [each.row._asdict() | {"elsewhere": each.elsewhere} for each in worse]
         tables.emit_json({"claims": [row._asdict() for row in rows], "worse": listed})

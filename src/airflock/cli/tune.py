@@ -31,7 +31,6 @@ def tune(
             show_default="collisions and contacts with walls at 0.01/h each",
         ),
     ] = None,
-    margin: options.Margin = None,
     confidence: Annotated[
         float | None, typer.Option(help="Confidence of the certificate.", show_default="0.95")
     ] = None,
@@ -79,13 +78,12 @@ def tune(
     plan = asked.read(kept_plan, out, start, resume) if like is None else None  # with logs, of what they will tell
     if confidence is not None:
         asked.read(sound_confidence, confidence)
-    asked.read(request_of, start, limit or (), margin or (), confidence, or_else(plan, None))
+    asked.read(request_of, start, limit or (), confidence, or_else(plan, None))
     asked.refuse()
     tables.say_notes(start.notes)
     options.compile_first(base, 32, "cpu")
     what: Any = base if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
-    how["margin"] = margin or ()
     if like is not None:
         how |= {"like": base, "heard": heard}
     shown: list[str] = []
@@ -119,7 +117,7 @@ def _named(scenario: list[str], like: str | None, heard: Path | None) -> str:
 
 
 def _as_it_will_fly(base: Any, like: str | None) -> Any:
-    """The scenario from which tuning starts; with logs it is not known yet, but takes the same limits and margins."""
+    """The scenario from which tuning starts; with logs it is not known yet, but takes the same limits."""
     from airflock.tune.start import start_of
 
     return base if like is not None else start_of(base)[0]

@@ -3,7 +3,8 @@
 Nobody heard is not nobody there. Flocks whose agents forget a silent neighbour fly into it. An agent that follows this
 rule stops as soon as a neighbour whose data have grown old could be near by now, and stays where it stopped until it
 hears of it again or gives it up, and for a pause beyond. Until data are that old, they count as heard.
-docs/decisions/0056 and 0095 tell what was measured.
+Of forty simulated flights with 15 s of silence, forty came below 3 m without the rule and none with it
+(`docs/decisions/0021-stop-near-silent-neighbours.md`).
 """
 
 from dataclasses import dataclass, replace
@@ -67,7 +68,8 @@ def of_standing(s: Parameters) -> Parameters:
     """The same numbers for a lost neighbour that said that it holds or returns: its reach grows half as fast.
 
     Its distance is measured from where an agent is now, so that half of twice the flock's speed still covers one that
-    has flown on at the speed of the flock. docs/decisions/0111 tells what was measured.
+    has flown on at the speed of the flock. At the full speed, four of forty
+    fleets in which one drone holds because its clock is 0.5 s ahead came below 3 m.
     """
     assert s.closing is not None, "complete"
     return replace(s, closing=0.5 * s.closing)

@@ -1,6 +1,6 @@
 """Drone displays: the points of shapes assigned to drones, flown by rules, and mended when drones fail.
 
-The package can be called: `airflock.display(["AIR", "heart.png"], 200)` (docs/decisions/0010).
+The package can be called: `airflock.display(["AIR", "heart.png"], 200)`.
 """
 
 from airflock.callable_module import make_callable

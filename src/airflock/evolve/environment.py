@@ -5,7 +5,6 @@ moved by: it is moved up from a first value.
 """
 
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 
 from airflock.core.parameters import Quantity, declarations
@@ -52,24 +51,19 @@ def usual_keys(scenario: Scenario) -> tuple[str, ...]:
     return (*used, *zero)
 
 
-def sound_keys(
-    scenario: Scenario, keys: list[str], what: str = "tolerance", beside: Sequence[str] = ()
-) -> tuple[str, ...]:
-    """The keys that are named; ScenarioError for one that cannot be varied.
-
-    what : what they are named for; beside : other names that may stand there
-    """
+def sound_keys(scenario: Scenario, keys: list[str]) -> tuple[str, ...]:
+    """The keys that are named; ScenarioError for one that cannot be varied."""
     known, faults = environment(scenario), []
     for key in keys:
         if key not in known:
-            hint = f"known: {', '.join([*known, *beside])}"
-            hint = hint if key in WORSE else meant(key, [*known, *beside], hint)
+            hint = f"known: {', '.join(known)}"
+            hint = hint if key in WORSE else meant(key, list(known), hint)
             of = "a number of this scenario" if key in WORSE else "a number of the environment"
-            faults.append(f"{what}: {key} is not {of}; {hint}")
+            faults.append(f"tolerance: {key} is not {of}; {hint}")
         elif not known[key][1] and key not in FROM_ZERO:
-            faults.append(f"{what}: {key} = 0 in {scenario.name}; give it a value that a factor can change")
+            faults.append(f"tolerance: {key} = 0 in {scenario.name}; give it a value that a factor can change")
         elif not known[key][1] and not _read(scenario, key):
-            faults.append(f"{what}: {key}: nothing reads it in {scenario.name}")
+            faults.append(f"tolerance: {key}: nothing reads it in {scenario.name}")
     if faults:
         raise ScenarioError(faults)
     return tuple(dict.fromkeys(keys))

@@ -1,7 +1,6 @@
-"""From an optimum to parameters that may be flown: the two workarounds of Vásárhelyi et al. 2018, step by step.
+"""From an optimum to parameters that may be flown: Table S4 of Vásárhelyi et al. 2018, step by step.
 
-The optimum of a fitness tolerates a few collisions. The paper makes it safe in two ways: (i) optimise with a larger
-radius of collision or a larger delay, so that distances grow, or (ii) by hand, Table S4: more repulsion, more
+The optimum of a fitness tolerates a few collisions. The paper makes it safe by hand, Table S4: more repulsion, more
 alignment, a slower but earlier braking at walls. Each step here flies the same seeds as the one before, so that its
 price in fitness and its gain in distance are differences of pairs.
 
@@ -18,10 +17,9 @@ from typing import Any
 from airflock.errors import ScenarioError
 from airflock.evolve.folder import plain
 from airflock.evolve.held import Constraints
-from airflock.evolve.margins import FAULTS, Margin, read_margins
 from airflock.evolve.objective_table import read_limits
 from airflock.evolve.space import declared
-from airflock.evolve.steps import APART, RECIPE, ROOM, Measured, Step, recipe, together
+from airflock.evolve.steps import RECIPE, ROOM, Measured, Step, recipe, together
 from airflock.evolve.trial import Trial
 from airflock.scenarios import formats
 from airflock.scenarios.files import loaded
@@ -29,12 +27,6 @@ from airflock.scenarios.scenario import Scenario
 
 COST = 0.05  # of fitness, at most
 MOST = 22  # rounds of flights, with all whole and half steps, the fresh seeds and measures beside the law
-ALONG, EACH, KINDS = 40, 3, 30  # rounds more along a margin, for each that was asked for, and for all kinds of fault
-
-
-def rounds(margins: Sequence[str]) -> int:
-    """Rounds of flights of hardening with these margins, about."""
-    return MOST + (ALONG + EACH * len(margins) + KINDS * (FAULTS in margins) if margins else 0)
 
 
 def harden(
@@ -44,7 +36,6 @@ def harden(
     steps: Sequence[Step] = RECIPE,
     cost: float = COST,
     limit: str | Sequence[str] = (),
-    margin: str | Sequence[str] = (),
     threads: int | None = None,
     done: Callable[[], None] | None = None,
 ) -> list[Measured]:
@@ -59,15 +50,12 @@ def harden(
         Seeds of the flights of each step; the result is judged on three times as many seeds after the largest of them.
     steps : sequence of Step
         What is tried, one after another; earlier braking is added where agents touch walls or obstacles, and comes
-        first where that is what is short; larger distances are added where a margin is to be widened.
+        first where that is what is short.
     cost : float
         Fitness, 0 to 1, that may be given up in all; a step towards limits that are not kept yet may cost more.
     limit : str or sequence of str
         What may happen how rarely, as `airflock.certify` takes it. A step must not raise the estimated probability of
         an event above its limit, with a reserve of ten.
-    margin : str or sequence of str
-        Margins to widen beside distances and room at walls: keys of numbers of the environment, such as radio.delay, or
-        "faults". Of several, the shortest is widened, and none may become shorter than that one was.
     threads : int, optional
         Flights side by side; by default one per core.
     done : callable, optional
@@ -78,13 +66,13 @@ def harden(
     list of Measured
         The optimum, each step that was tried with whether it was kept and why, where agents still come too near what
         measures beside the law would gain (`evolve.measures`), and last what is left on fresh seeds: parameters,
-        fitness, r_min (m), what it costs and gains, partial fitnesses, contacts with walls, margins.
+        fitness, r_min (m), what it costs and gains, partial fitnesses, contacts with walls.
 
     Raises
     ------
     ScenarioError
-        If the model has no such parameters, the flights have no fitness, the optimum does not fly, or a limit or a
-        margin cannot be read.
+        If the model has no such parameters, the flights have no fitness, the optimum does not fly, or a limit cannot
+        be read.
 
     Examples
     --------
@@ -96,9 +84,7 @@ def harden(
     """
     single = isinstance(scenario, (Scenario, str, os.PathLike))
     scenarios = [loaded(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
-    constraints, margins = asked_for(scenarios, cost, limit, margin)
-    steps = [*steps, *(APART if margins else ())]
-    trial = Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, constraints, margins, threads, done)
+    trial = Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, asked_for(scenarios, cost, limit), threads, done)
     found = [trial.first]
     hit = float((together(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()
@@ -114,17 +100,13 @@ def harden(
     return [*found, *trial.beside(), last]
 
 
-def asked_for(
-    scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[str] = (), margin: str | Sequence[str] = ()
-) -> tuple[Constraints, list[Margin]]:
-    """What must go on to hold, and what is to be widened. Raises ScenarioError, all faults together."""
+def asked_for(scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[str] = ()) -> Constraints:
+    """What must go on to hold. Raises ScenarioError, all faults together."""
     held, faults = read_limits({"limits": limit}, scenarios)
     faults += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
-    margins, wrong = read_margins(margin, scenarios)
-    faults += wrong
     if faults:
         raise ScenarioError(faults)
-    return Constraints(held, cost), margins
+    return Constraints(held, cost)
 
 
 def document(scenario: Scenario, step: Measured) -> dict[str, Any]:

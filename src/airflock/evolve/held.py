@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from airflock.evolve.intervals import interval
 from airflock.evolve.safe import allowed, excess
@@ -17,13 +16,6 @@ SAFETY = ("f_coll", "f_disc", "f_cluster", "f_wall")  # partial fitnesses that a
 SLACK = 0.02  # by which the mean of one may fall, and the share of flights with a contact may rise
 WALLS = ("clearance", "phi_wall", "n_contacts", "f_wall")  # scores of what flies into walls and obstacles
 RESERVE = Search().reserve  # how many times rarer than allowed an event is to look, as in a search
-
-
-class Broken(NamedTuple):
-    """What no longer holds, in words, and whether it is of walls and obstacles."""
-
-    why: str
-    at_walls: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,19 +38,11 @@ class Constraints:
         """All other limits."""
         return [limit for limit in self.limits if limit.score not in WALLS]
 
-    def broken(
-        self, scenarios: Sequence[Scenario], before: Sequence[Table], after: Sequence[Table], *, surely: bool = False
-    ) -> Broken | None:
-        """What of all that held before holds no longer; None if everything does; surely as in `broken`."""
-        for scenario, was, now in zip(scenarios, before, after, strict=True):
-            if found := broken(was, now, surely=surely) or self._limit_broken(scenario, was, now):
-                return found._replace(why=f"{found.why}, in {scenario.name}") if len(scenarios) > 1 else found
-        return None
-
     def refused(self, scenarios: Sequence[Scenario], before: Sequence[Table], after: Sequence[Table]) -> str:
         """What a step breaks, or that it costs too much, in words; empty if it may stay."""
-        if found := self.broken(scenarios, before, after):
-            return found.why
+        for scenario, was, now in zip(scenarios, before, after, strict=True):
+            if found := broken(was, now) or self._limit_broken(scenario, was, now):
+                return f"{found}, in {scenario.name}" if len(scenarios) > 1 else found
         if self.short(scenarios, after) < self.short(scenarios, before):
             return ""
         price = float((together(before)["fitness"] - together(after)["fitness"]).mean())
@@ -68,15 +52,14 @@ class Constraints:
         """How far flights are from keeping all limits in all scenarios; 0: they keep them."""
         return excess_of(self.limits, scenarios, tables)
 
-    def _limit_broken(self, scenario: Scenario, before: Table, after: Table) -> Broken | None:
-        """Which limit is broken that was kept, or more than before; None if none."""
+    def _limit_broken(self, scenario: Scenario, before: Table, after: Table) -> str:
+        """Return which limit that was kept is broken, or broken more than before, in words; empty if none."""
         for limit in self.limits:
             most = allowed(limit, scenario)
             was, now = (chance(limit, rows_of(table)) for table in (before, after))
             if now > max(was, most / RESERVE):
-                why = f"{limit.event} in about {now:.2g} of flights, before {was:.2g}; allowed are {most:.2g}"
-                return Broken(why, limit.score in WALLS)
-        return None
+                return f"{limit.event} in about {now:.2g} of flights, before {was:.2g}; allowed are {most:.2g}"
+        return ""
 
 
 def excess_of(limits: Sequence[Limit], scenarios: Sequence[Scenario], tables: Sequence[Table]) -> float:
@@ -87,23 +70,19 @@ def excess_of(limits: Sequence[Limit], scenarios: Sequence[Scenario], tables: Se
     )
 
 
-def broken(before: Table, after: Table, *, surely: bool = False) -> Broken | None:
-    """Which constraint that held is broken in one scenario; None if none.
-
-    surely : whether more flights with contacts count only with 95 % confidence, as what a mean loses always does
-    """
+def broken(before: Table, after: Table) -> str:
+    """Return which constraint that held is broken in one scenario, in words; empty if none."""
     for name in SAFETY:
         if name in before:
             drop, _, low, _ = interval((before[name] - after[name]).tolist())
             if drop > SLACK and low > 0.0:
-                return Broken(f"{name} falls from {before[name].mean():.3g} to {after[name].mean():.3g}", name in WALLS)
+                return f"{name} falls from {before[name].mean():.3g} to {after[name].mean():.3g}"
     for name, what in (("phi_wall", "leave the arena or enter obstacles"), ("n_coll", "have collisions")):
         if name in before:
             was, now = float((before[name] > 0.0).mean()), float((after[name] > 0.0).mean())
-            more = interval((1.0 * (after[name] > 0.0) - 1.0 * (before[name] > 0.0)).tolist())[2] > 0.0
-            if now - was > SLACK and (more or not surely):
-                return Broken(f"{100.0 * now:.0f} % of flights {what}, before {100.0 * was:.0f} %", name in WALLS)
-    return None
+            if now - was > SLACK:
+                return f"{100.0 * now:.0f} % of flights {what}, before {100.0 * was:.0f} %"
+    return ""
 
 
 def gains(before: Table, after: Table) -> bool:

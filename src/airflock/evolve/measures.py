@@ -22,7 +22,7 @@ def measures(scenarios: Sequence[Scenario]) -> list[tuple[Step, list[Scenario], 
     found = []
     for name, reason, settings in (
         (CARRIED, "Vásárhelyi et al. 2018, Drone setup: positions are carried forward by velocities", _carried),
-        (STOPS, "our choice, docs/decisions/0056: nobody heard is not nobody there", _stops),
+        (STOPS, "our choice: a neighbour that is not heard may still be near", _stops),
     ):
         changes = [settings(scenario) for scenario in scenarios]
         if not any(changes):

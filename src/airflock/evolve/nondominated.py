@@ -1,4 +1,4 @@
-"""Several objectives at once: NSGA-II (Deb et al. 2002) and NSGA-III (Deb & Jain 2014), by the package pymoo."""
+"""Several objectives at once: NSGA-II (Deb et al. 2002), by the package pymoo."""
 
 from typing import Any
 
@@ -11,9 +11,9 @@ from airflock.errors import StudyError
 class Nondominated:
     """Ask for points of the unit cube, tell their losses (candidate, objective)."""
 
-    def __init__(self, algorithm: str, dimension: int, objectives: int, population: int, seed: int):
-        """`algorithm` is nsga2 or nsga3, with pymoo's usual operators."""
-        self.algorithm = _algorithm(algorithm, dimension, objectives, population, seed)
+    def __init__(self, dimension: int, objectives: int, population: int, seed: int):
+        """Set up NSGA-II with pymoo's default operators."""
+        self.algorithm = _algorithm(dimension, objectives, population, seed)
         self.asked: Any = None
 
     def ask(self) -> NDArray[np.float64]:
@@ -43,20 +43,14 @@ def front(losses: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.sort(kept[:n])
 
 
-def _algorithm(name: str, dimension: int, objectives: int, population: int, seed: int) -> Any:
+def _algorithm(dimension: int, objectives: int, population: int, seed: int) -> Any:
     try:
         from pymoo.algorithms.moo.nsga2 import NSGA2
-        from pymoo.algorithms.moo.nsga3 import NSGA3
         from pymoo.core.problem import Problem
         from pymoo.core.termination import NoTermination
-        from pymoo.util.ref_dirs import get_reference_directions
     except ModuleNotFoundError as fault:
-        raise StudyError(f"{name} needs pymoo: pip install 'airflock[evolve]'") from fault
-    if name == "nsga2":
-        algorithm: Any = NSGA2(pop_size=population, eliminate_duplicates=False)
-    else:
-        directions = get_reference_directions("energy", objectives, max(population // 2, objectives), seed=1)
-        algorithm = NSGA3(pop_size=population, ref_dirs=directions, eliminate_duplicates=False)
+        raise StudyError("nsga2 needs pymoo: pip install 'airflock[evolve]'") from fault
+    algorithm = NSGA2(pop_size=population, eliminate_duplicates=False)
     problem = Problem(n_var=dimension, n_obj=objectives, xl=np.zeros(dimension), xu=np.ones(dimension))
     algorithm.setup(problem, termination=NoTermination(), seed=seed, verbose=False)
     return algorithm

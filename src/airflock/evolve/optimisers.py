@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from airflock.evolve.cmaes import CMAES, SIXTH
 
-ALGORITHMS = ("cmaes", "ga", "nsga2", "nsga3")
-SEVERAL = ("nsga2", "nsga3")  # for several objectives
+ALGORITHMS = ("cmaes", "ga", "nsga2")
+SEVERAL = "nsga2"  # the one for several objectives
 
 
 class Optimiser(Protocol):
@@ -42,4 +42,4 @@ def optimiser(
 
     if algorithm == "ga":
         return GeneticSearch(dimension, population, seed)
-    return Nondominated(algorithm, dimension, objectives, population, seed)
+    return Nondominated(dimension, objectives, population, seed)

@@ -41,8 +41,6 @@ RECIPE = (
         "v_shill down, r0_shill up", {"model.v_shill": 0.7}, f"{S4}: a higher r0_shill makes up for it", 0.5
     ),  # 0.5 s: 2 to 4 m; the paper's table has 0, 5 and 30 m
 )
-# where a margin is to be widened; of all numbers of the law, a fifth more of this one widened a delay's the most
-APART = (Step("r0_rep up", {"model.r0_rep": 1.2}, "our choice: farther apart, what is known late matters less"),)
 # where agents leave the arena or enter obstacles
 ROOM = tuple(Step(name, {}, "our choice: earlier braking, nothing else", 0.5) for name in ("r0_shill up", "and again"))
 
@@ -57,7 +55,6 @@ class Measured:
     contacts : share of flights in which somebody left the arena or entered an obstacle; nan where nobody looked
     clearance : mean over seeds of the smallest distance to walls and obstacles, m; nan where nobody looked
     kept     : whether the step stays; verdict: why, or why not
-    margins  : of margins that were asked for, those that were flown here: name → value up to which what held holds
     """
 
     name: str
@@ -73,7 +70,6 @@ class Measured:
     clearance: float = math.nan
     kept: bool = True
     verdict: str = ""
-    margins: Mapping[str, float] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """The step as plain values."""
@@ -91,7 +87,6 @@ class Measured:
             "clearance": self.clearance,
             "kept": self.kept,
             "verdict": self.verdict,
-            "margins": dict(self.margins),
         }
 
 
@@ -128,18 +123,6 @@ def moved(scenario: Scenario, now: Mapping[str, float], step: Step, part: float 
 
 def _inside(value: float, how: Any) -> float:
     return min(max(value, float(how.low)), float(how.high))
-
-
-def measured(
-    scenario: Scenario,
-    plans: Sequence[tuple[Step, dict[str, float]]],
-    seeds: Sequence[int],
-    threads: int | None = None,
-    done: Callable[[], None] | None = None,
-) -> list[Measured]:
-    """Fly each plan's parameters on the same seeds and set them against the first plan."""
-    tables = flown(scenario, [parameters for _, parameters in plans], seeds, threads, done)
-    return [against(tables[0], table, *plan) for table, plan in zip(tables, plans, strict=True)]
 
 
 def flown(

@@ -1,6 +1,6 @@
 """Fleets in software: vehicles that speak MAVLink, the ether between them, and a clock for all.
 
-The package can be called: `airflock.fleet("vasarhelyi_2018/real_4ms")` (docs/decisions/0010).
+The package can be called: `airflock.fleet("vasarhelyi_2018/real_4ms")`.
 """
 
 from airflock.callable_module import make_callable

@@ -34,7 +34,7 @@ class Phase(IntEnum):
 FLY = frozenset({Phase.TAKEOFF, Phase.GATHER, Phase.FLOCK, Phase.GOTO, Phase.HOLD, Phase.RETURN})
 FLOCKING = frozenset({Phase.FLOCK, Phase.GOTO})
 AIR = FLY | {Phase.LAND, Phase.MANUAL}
-STANDING = frozenset({Phase.HOLD, Phase.RETURN, Phase.MANUAL})  # they do not fly with the flock (decision 0111)
+STANDING = frozenset({Phase.HOLD, Phase.RETURN, Phase.MANUAL})  # they do not fly with the flock
 
 
 class Facts(NamedTuple):

@@ -2,7 +2,6 @@
 
 from airflock.plots.convergence import convergence
 from airflock.plots.display import stood
-from airflock.plots.exposure import exposure
 from airflock.plots.fitness_scatter import fitness_scatter
 from airflock.plots.flocked import flocked
 from airflock.plots.heatmap import heatmap
@@ -20,6 +19,6 @@ from airflock.plots.transfer import transfer
 from airflock.plots.wash import wash
 
 __all__ = [
-    "KINDS", "convergence", "exposure", "fitness_scatter", "flocked", "heatmap", "pareto", "plot", "rays", "received",
+    "KINDS", "convergence", "fitness_scatter", "flocked", "heatmap", "pareto", "plot", "rays", "received",
     "rotations", "rules", "save_figure", "series", "slices", "stood", "through", "trajectories", "transfer", "wash",
 ]  # fmt: skip

@@ -14,7 +14,6 @@ from airflock.errors import RecordingError
 from airflock.plots import style
 from airflock.plots.flight import (
     Paths,
-    View,
     details_of,
     extent,
     flown_with,
@@ -26,8 +25,7 @@ from airflock.plots.flight import (
     walls,
     world_of,
 )  # fmt: skip
-from airflock.plots.scene_paths import built, scenery
-from airflock.plots.solid import Rendering
+from airflock.plots.scene_paths import ELEVATION, draw_outlines, nearby, outlines_in_space, scenery
 from airflock.recordings.scores import over_time
 from airflock.spelling import meant
 from airflock.world.place import half_sizes
@@ -37,7 +35,6 @@ TAIL_POINTS = 9
 DPI = 100.0 / 720.0  # dots per inch and pixel of height: text grows with the picture
 # the outline of a dart that flies right, in units of its length
 DART = np.array([[0.6, 0.0], [-0.4, 0.32], [-0.22, 0.0], [-0.4, -0.32]])
-BEHIND = 0.25  # opacity of a dart behind a building
 HEAD = 0.085  # height of title and clock, in heights of what is below them
 BESIDE = 0.62  # width of the chart beside the picture, in heights of it
 
@@ -57,10 +54,14 @@ class Stage:
         self.oblique = not self.flat if space is None else space
         self.tail, self.speed = tail, speed
         self.world = world = world_of(recording)
-        self.view, self.solid = self._seen(recording, first)
-        left, right, bottom, top = extent(first, world, self.view, margin=0.03)
-        if self.solid is not None:
-            left, right, bottom, top = self.solid.box
+        scenario = flown_with(recording)
+        rows = None  # of the scene, where it is seen obliquely
+        self.view = view_of(3 if self.oblique else 2)
+        if self.oblique and not self.flat and scenario is not None and scenario.scene.kind != "none":
+            rows = nearby(scenario, first)
+            self.view = view_of(3, elevation_deg=ELEVATION)
+        around = [] if rows is None else outlines_in_space(rows)
+        left, right, bottom, top = extent(first, world, self.view, margin=0.03, around=around)
         head = HEAD * (top - bottom)
         aspect = float(np.clip((right - left) / (top + head - bottom), 0.4, 3.0))
         beside = BESIDE if chart else 0.0
@@ -71,7 +72,12 @@ class Stage:
         self.axes = axes = self.canvas.figure.add_axes((0.0, 0.0, share, 1.0))
         axes.set(xlim=(left, right), ylim=(bottom, top + head), aspect="equal")
         axes.set_axis_off()
-        self._stand(axes, recording, first)
+        self._stand(axes)
+        if rows is not None:
+            draw_outlines(axes, rows, self.view)
+        else:
+            lines = [np.column_stack(self.view(line)) for line in scenery(recording, first)]
+            axes.add_collection(LineCollection(lines, colors=style.GREY, linewidths=0.6, alpha=0.6), autolim=False)
         self.clock = _head(axes, recording, speed)
         self.scale = Normalize(*speed_range(first))
         self.tails = LineCollection([], linewidths=1.6, animated=True, capstyle="butt")
@@ -93,8 +99,6 @@ class Stage:
         self._set_tails(instant)
         self.darts.set_verts(list(_darts(x, y, x0, y0, self.dart)))
         self.darts.set_array(tempo)
-        if self.solid is not None:
-            self.darts.set_alpha(np.where(self.solid.hides(where.T), BEHIND, 1.0).tolist())
         self.clock.set_text(f"{instant:7.1f} s")
         for artist in (self.tails, self.darts, self.clock):
             self.axes.draw_artist(artist)
@@ -103,18 +107,8 @@ class Stage:
             self.cursor.axes.draw_artist(self.cursor)
         return np.asarray(self.canvas.buffer_rgba())
 
-    def _seen(self, recording: xr.Dataset, first: Paths) -> tuple[View, Rendering | None]:
-        """Projection, and what stands in a scene as solids where it is seen obliquely."""
-        scenario = flown_with(recording)
-        if not self.flat and self.oblique and scenario is not None and scenario.scene.kind != "none":
-            solid = built(scenario, first)
-            return solid.view, solid
-        if self.oblique:
-            return view_of(3), None
-        return view_of(2), None
-
-    def _stand(self, axes: Any, recording: xr.Dataset, first: Paths) -> None:
-        """Walls, obstacles and what stands in a scene."""
+    def _stand(self, axes: Any) -> None:
+        """Draw walls and obstacles."""
         for corners, obstacle in walls(self.world):
             x, y = self.view(corners)
             color = style.RED if obstacle else style.BLUE
@@ -122,12 +116,6 @@ class Stage:
                 axes.fill(x, y, facecolor=color, alpha=0.25, edgecolor=color, linewidth=1.2)
             else:
                 axes.plot(x, y, color=color, linewidth=1.4)
-        if self.solid is not None:
-            axes.imshow(self.solid.colour, extent=self.solid.box, interpolation="antialiased", zorder=0, aspect="equal")
-            axes.set(xlim=axes.get_xlim())
-            return
-        around = [np.column_stack(self.view(line)) for line in scenery(recording, first)]
-        axes.add_collection(LineCollection(around, colors=style.GREY, linewidths=0.6, alpha=0.6), autolim=False)
 
     def _place(self, instant: float) -> Array:
         """Positions of all agents (axis, agent), m."""

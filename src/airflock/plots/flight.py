@@ -1,6 +1,7 @@
 """What every picture of a flight needs: paths in a window of time, the world's outlines, a view onto a plane."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -184,11 +185,11 @@ def view_of(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.0) 
 
 
 def extent(
-    shown: Paths, world: arena.Parameters, view: View, margin: float = 0.04
+    shown: Paths, world: arena.Parameters, view: View, margin: float = 0.04, around: Sequence[Array] = ()
 ) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top of a picture that holds the arena and every path, m."""
+    """Left, right, bottom and top of a picture that holds the arena, every path and the lines `around` it, m."""
     xs, ys = view(shown.position)
-    points = [(xs.ravel(), ys.ravel())] + [view(wall.corners) for wall in walls(world)]
+    points = [(xs.ravel(), ys.ravel())] + [view(line) for line in (*(wall.corners for wall in walls(world)), *around)]
     x, y = np.concatenate([p[0] for p in points]), np.concatenate([p[1] for p in points])
     if not np.isfinite(x).any():
         raise RecordingError("recording: every position in this window is missing")

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.errors import AirflockError, RecordingError
-from airflock.plots.exposure import exposure
 from airflock.plots.flight import flown_with
 from airflock.plots.flocked import flocked
 from airflock.plots.rays import rays
@@ -29,7 +28,7 @@ from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
 
 KINDS = (
-    "trajectories", "exposure", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash", "reception",
+    "trajectories", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash", "reception",
 )  # fmt: skip
 OF_A_SCENARIO = ("rules", "transfer")  # pictures that take no flight
 What = Scenario | xr.Dataset | str | os.PathLike[str]
@@ -55,7 +54,7 @@ def plot(
         A scenario or the name of one, which is flown; or a recording (time, space, keypoint, individual), or a
         file (.nc) of one.
     kind : str
-        trajectories, exposure, series, flocked; scene, space, rays where something stands in the world; wash of a
+        trajectories, series, flocked; scene, space, rays where something stands in the world; wash of a
         formation of wings; reception, the time since the last packet by distance; rules of a model;
         transfer, the partial fitnesses.
     seed : int
@@ -121,8 +120,6 @@ def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: f
         return flocked(recording, start=start, stop=stop, ax=ax)
     if kind == "series":
         return series(recording, start=start, stop=stop, ax=ax)
-    if kind == "exposure":
-        return exposure(recording, start=start, stop=stop, ax=ax)
     return trajectories(recording, start=start, stop=stop, ax=ax)
 
 

@@ -6,13 +6,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.collections import LineCollection, PatchCollection, PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from airflock.errors import RecordingError
 from airflock.plots import style
@@ -20,22 +18,21 @@ from airflock.plots.flight import (
     Paths,
     View,
     details_of,
+    extent,
     flown_with,
     name_of,
     paths_of,
     speed_range,
     through_face,
     view_of,
+    walls,
 )  # fmt: skip
-from airflock.plots.solid import Rendering, ground, render
 from airflock.scenarios.scenario import Scenario
-from airflock.stage.scene import Solid, stage_of
 from airflock.world.shapes import BOX, CYLINDER, SEGMENT, TRIANGLE
 
 MARGIN = 40.0  # m of scenery shown around the paths
 MOST = 4000  # shapes drawn in space
 ELEVATION = 42.0  # deg; from which a city is seen
-FAINT = 0.18  # opacity of a path behind a building
 HEIGHT = LinearSegmentedColormap.from_list("height", ["#F2F2F2", "#8A8A8A"], N=256)
 
 
@@ -51,7 +48,7 @@ def through(
 
     recording   : (time, space, keypoint, individual), flown among buildings, trees or boxes, m and m/s
     start, stop : window of time, s; by default the whole flight
-    space       : solid and lit, obliquely from above, instead of ground plans; what a solid hides is drawn faintly
+    space       : outlines seen obliquely from above, instead of ground plans
     ax          : axes to draw into, instead of a new figure
 
     Raises RecordingError for tracks, which have no scene, for a flight in a plane, and for an empty window.
@@ -70,16 +67,18 @@ def through(
         raise RecordingError("recording: was flown in a plane; draw it from above")
     figure, axes = style.place(ax, 7.4, 5.4 if space else 6.0)
     scale = Normalize(*speed_range(shown))
+    low, high = _around(shown)
     goals = scenario.waypoints()
+    goals = goals[((goals[:, :2] >= low) & (goals[:, :2] <= high)).all(axis=1)]
     if space:
         in_space(axes, scenario, shown, scale, goals)
     else:
         rows = nearby(scenario, shown)
         heights = ground_plans(axes, rows)
         _paths(axes, shown, scale)
-        _frame(axes, shown)
-        low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-        _stars(axes, goals[:, :2][((goals[:, :2] >= low) & (goals[:, :2] <= high)).all(axis=1)])
+        _stars(axes, goals[:, :2])
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        style.dress(axes, "east (m)", "north (m)", grid=False)
         if heights is not None and shown.position.shape[1] == 3:
             style.colour_bar(figure, heights, axes, "height of the scene (m)", shrink=0.8)
     bar = ScalarMappable(scale, style.SPEED)
@@ -90,58 +89,27 @@ def through(
 
 
 def in_space(axes: Any, scenario: Scenario, shown: Paths, scale: Normalize, goals: NDArray[Any]) -> None:
-    """Solids, paths, goals and a scale of three axes, obliquely from above."""
-    rendering = built(scenario, shown)
-    left, right, bottom, top = rendering.box
-    axes.imshow(rendering.colour, extent=rendering.box, interpolation="antialiased", zorder=0)
+    """Draw outlines of the scene, paths, goals and a scale of three axes, obliquely from above."""
+    view, rows = view_of(3, elevation_deg=ELEVATION), nearby(scenario, shown)
+    box = extent(shown, scenario.world, view, margin=0.02, around=outlines_in_space(rows))
+    for wall in walls(scenario.world):
+        axes.plot(*view(wall.corners), color=style.RED if wall.obstacle else style.BLUE, linewidth=0.8, zorder=1)
+    draw_outlines(axes, rows, view)
     stride = max(1, len(shown.times) * shown.agents // 60_000)
     where, speed = shown.position[::stride], shown.speed[::stride]
     pieces = np.stack([where[:-1], where[1:]], axis=1).transpose(0, 3, 1, 2).reshape(-1, 2, 3)
     pace = (0.5 * (speed[:-1] + speed[1:])).ravel()
     kept = np.isfinite(pieces).all(axis=(1, 2)) & ~through_face(pieces, scenario.world)
-    pieces, pace = pieces[kept], pace[kept]
-    hidden = rendering.hides(pieces.mean(axis=1))
-    for part, alpha in ((hidden, FAINT), (~hidden, 1.0)):
-        flat = np.stack(rendering.view(pieces[part], axis=2), axis=-1)
-        lines = LineCollection(list(flat), norm=scale, cmap=style.SPEED, linewidths=0.9, alpha=alpha, zorder=3)
-        lines.set_array(pace[part])
-        axes.add_collection(lines)
-    ends = np.stack(rendering.view(shown.position[-1].T), axis=-1)
+    flat = np.stack(view(pieces[kept], axis=2), axis=-1)
+    lines = LineCollection(list(flat), norm=scale, cmap=style.SPEED, linewidths=0.9, zorder=3)
+    lines.set_array(pace[kept])
+    axes.add_collection(lines)
+    ends = np.stack(view(shown.position[-1].T), axis=-1)
     axes.scatter(*ends.T, s=14.0, color=style.INK, edgecolors="white", linewidths=0.4, zorder=5, label="at the end")
-    _stars(axes, np.stack(rendering.view(goals), axis=-1) if len(goals) else np.zeros((0, 2)))
-    _triad(axes, rendering.view, (left, right, bottom, top))
-    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+    _stars(axes, np.stack(view(goals), axis=-1))
+    _triad(axes, view, box)
+    axes.set(xlim=box[:2], ylim=box[2:], aspect="equal")
     axes.set_axis_off()
-
-
-def built(scenario: Scenario, shown: Paths, margin: float = 0.02) -> Rendering:
-    """What stands around the paths, rendered."""
-    low, high = (
-        bound(shown.position, axis=(0, 2)) + edge for bound, edge in ((np.nanmin, -MARGIN), (np.nanmax, MARGIN))
-    )
-    flat = np.zeros((1, 3))
-    flat[0] = 0.5 * (low + high)
-    solids = [part for solid in stage_of(scenario, flat).solids if (part := _within(solid, low, high)) is not None]
-    plan = [solid.vertices[solid.faces.astype(int)].reshape(-1, 3)[:, :2] for solid in solids]
-    edges = np.vstack([low[:2], high[:2], *plan])
-    low, high = np.append(edges.min(axis=0), low[2]), np.append(edges.max(axis=0), high[2])
-    tops = max([float(high[2]) - MARGIN, *(float(solid.vertices[:, 2].max()) for solid in solids)])
-    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (0.0, tops)])
-    view = view_of(3, elevation_deg=ELEVATION)
-    x, y = view(corners)
-    edge = margin * max(float(np.ptp(x)), float(np.ptp(y)))
-    box = (float(x.min()) - edge, float(x.max()) + edge, float(y.min()) - edge, float(y.max()) + edge)
-    return render([ground(low, high), *solids], view, box)
-
-
-def _within(solid: Solid, low: NDArray[Any], high: NDArray[Any]) -> Solid | None:
-    """The pieces of a solid that reach over a box of the plan, whole; None without any."""
-    faces, size = solid.faces.astype(int), len(solid.vertices)
-    joined = coo_array((np.ones(2 * len(faces)), (faces[:, [0, 0]].ravel(), faces[:, [1, 2]].ravel())), (size, size))
-    piece = connected_components(joined, directed=False)[1]
-    over = ((solid.vertices[:, :2] >= low[:2]) & (solid.vertices[:, :2] <= high[:2])).all(axis=1)
-    kept = np.isin(piece[faces[:, 0]], piece[over])
-    return solid._replace(faces=solid.faces[kept]) if kept.any() else None
 
 
 def _stars(axes: Any, points: NDArray[Any]) -> None:
@@ -172,11 +140,16 @@ def _triad(axes: Any, view: View, box: tuple[float, float, float, float]) -> Non
     axes.annotate(f"{length:g} m", below, fontsize=style.SMALL, color=style.GREY)
 
 
+def _around(shown: Paths) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the lower and the upper corner (2,) of the ground plan that is shown around the paths, m."""
+    plan = shown.position[:, :2]
+    return np.nanmin(plan, axis=(0, 2)) - MARGIN, np.nanmax(plan, axis=(0, 2)) + MARGIN
+
+
 def nearby(scenario: Scenario, shown: Paths) -> NDArray[np.float64]:
     """Rows of the shapes around the paths, without the ground."""
     shapes = scenario.stands().shapes
-    flat = shown.position[:, :2].transpose(0, 2, 1).reshape(-1, 2)
-    low, high = np.nanmin(flat, axis=0) - MARGIN, np.nanmax(flat, axis=0) + MARGIN
+    low, high = _around(shown)
     inside = (shapes[:, 3:5] > low).all(axis=1) & (shapes[:, :2] < high).all(axis=1)
     return np.asarray(shapes[inside & np.isin(shapes[:, 6], (BOX, CYLINDER, SEGMENT, TRIANGLE))])
 
@@ -200,16 +173,29 @@ def ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection | None
     return solid
 
 
+def draw_outlines(axes: Any, rows: NDArray[np.float64], view: View) -> None:
+    """Draw outlines of shapes in space, and pale roofs: without them front edges are easily taken for back ones."""
+    lines = [np.column_stack(view(line)) for line in outlines_in_space(rows)]
+    axes.add_collection(LineCollection(lines, colors=style.GREY, linewidths=0.5, alpha=0.7, zorder=1), autolim=False)
+    upright = rows[np.isin(rows[:, 6], (BOX, CYLINDER))]
+    rings = [(outline_from_above(row), row[5]) for row in upright[:MOST]]
+    roofs = [np.column_stack(view(np.column_stack([ring, np.full(len(ring), top)]))) for ring, top in rings]
+    axes.add_collection(PolyCollection(roofs, facecolors=style.PALE, alpha=0.6, zorder=1), autolim=False)
+
+
 def outlines_in_space(rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Edges of boxes and triangles, rims and four uprights of cylinders: lines (point, 3), m."""
+    """Return edges of boxes and triangles, rims and four uprights of cylinders, as lines (point, 3) in m.
+
+    Segments are left out: they are the plans of the world's own walls, which `walls` gives with their heights.
+    """
     lines: list[NDArray[np.float64]] = []
-    for r in rows[:MOST]:
+    for r in rows[rows[:, 6] != SEGMENT][:MOST]:
         if r[6] == TRIANGLE:
             lines.append(r[[7, 8, 9, 10, 11, 12, 13, 14, 15, 7, 8, 9]].reshape(4, 3))
             continue
-        low, high, ring = max(r[2], -100.0), min(r[5], 100.0), outline_from_above(r)
-        lines += [np.column_stack([ring, np.full(len(ring), z)]) for z in (low, high)]
-        lines += [np.array([[*p, low], [*p, high]]) for p in ring[:: 3 if r[6] == CYLINDER else 1]]
+        ring = outline_from_above(r)
+        lines += [np.column_stack([ring, np.full(len(ring), z)]) for z in (r[2], r[5])]
+        lines += [np.array([[*p, r[2]], [*p, r[5]]]) for p in ring[: -1 : 3 if r[6] == CYLINDER else 1]]
     return lines
 
 
@@ -245,11 +231,3 @@ def _paths(axes: Any, shown: Paths, scale: Normalize) -> None:
         axes.add_collection(pieces)
     look: dict[str, Any] = {"s": 14.0, "color": style.INK, "edgecolors": "white", "linewidths": 0.4}
     axes.scatter(*shown.position[-1, :2], zorder=5, label="at the end", **look)
-
-
-def _frame(axes: Any, shown: Paths) -> None:
-    points = shown.position.transpose(0, 2, 1).reshape(-1, shown.position.shape[1])
-    low, high = np.nanmin(points, axis=0) - MARGIN, np.nanmax(points, axis=0) + MARGIN
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    axes.set_aspect("equal")
-    style.dress(axes, "east (m)", "north (m)", grid=False)

@@ -59,7 +59,7 @@ def video(
     height : int
         Of the picture, pixels; its width follows from the arena; both are made even.
     space : bool, optional
-        Seen obliquely, what stands in a scene solid and lit; or from above. By default as it was flown.
+        Seen obliquely, or from above. By default as it was flown.
     chart : str
         Name of an order parameter that is drawn over time beside the picture.
     done : callable, optional

@@ -1,20 +1,24 @@
-"""Recordings opened by another process, with a time limit: this process reads plain arrays and never opens HDF5.
+"""Open a file in a process of its own, with limits of time and memory, and get plain arrays back.
 
-`docs/decisions/0028` says why. An `Opening` starts its process at once, so that it works while this one imports.
+HDF5 is a large library in C. A damaged file of 34 kB keeps it busy for ever, and no thread and no Ctrl-C ends it;
+others crash it. Readers of ArduPilot's logs loop without end in some files. `Opening` is the side of the caller. It
+starts the process at once, so that the process works while the caller still imports.
+
+The process gets one line of JSON, its request. It answers with lines of JSON: any number of {"share": of the file that
+has been read}, then {"error": text} or a header of attributes and variables, and after that the bytes of the variables.
 """
 
 import json
 import math
 import os
-import select
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from pathlib import Path
+from importlib import import_module
 from typing import Any
 
 from airflock.errors import RecordingError
@@ -22,68 +26,94 @@ from airflock.recordings.packed import refuse_packed, refuse_pickle
 from airflock.untrusted import from_outside, is_file, path_of
 
 LEAST_TIME = 15.0  # s of a processor that a file of any size may take
-WAIT = 4.0  # times as long it may take where processors are busy with other things
-PACE = 5e6  # bytes per second that a file of any size is read at
-MOST_ABOUT = 200_000_000  # bytes of names and attributes
+WAIT = 4.0  # time by the clock over that of a processor, for machines that are busy with other things
+MOST_HEADER = 200_000_000  # bytes of names and attributes
+SPARE = 4 * 2**30  # bytes of address space besides the arrays: libraries, buffers
+RECORDING = "a netCDF recording"
 FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", ".h5")  # what airflock import reads
 ENDED_LATE = tuple(-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name))
-READER = Path(__file__).with_name("reader.py")
+START = """import json, sys
+request = json.loads(sys.stdin.readline())
+sys.path[:] = request["paths"]
+from airflock.recordings.isolated import main
+main(request)"""
+
+Share = Callable[[float], None]
+# attributes of a file, and its variables by name: dimensions if they have names, attributes, values
+Contents = tuple[dict[str, Any], dict[str, tuple[list[str] | None, dict[str, Any], Any]]]
 
 
-KINDS = {
-    "recording": "a netCDF recording", "netcdf": "a netCDF file",
-    "hdf5": "a HDF5 file", "dataflash": "a DataFlash log", "telemetry": "telemetry",
-}  # fmt: skip
-PACES = {"dataflash": 1e5, "telemetry": 1e5}  # bytes per second; read by Python, row by row
+def netcdf(path: str, room: int, _: Share) -> Contents:
+    """Read a netCDF file; raise ValueError for what reaches outside the file or is too large."""
+    import h5netcdf
+
+    _refuse_outside(path, room)
+    with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
+        return _to_json(file.attrs), {
+            name: (list(variable.dimensions), _to_json(variable.attrs), variable[...])
+            for name, variable in file.variables.items()
+        }
 
 
-def _memory() -> int:
-    """Bytes of this machine's memory; 8 GB where the system does not tell, as Windows."""
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 8 << 30
+def hdf5(path: str, room: int, _: Share) -> Contents:
+    """Read the arrays at the root of any HDF5 file; raise ValueError as `netcdf` does."""
+    import h5py
+
+    _refuse_outside(path, room)
+    with h5py.File(path, "r") as file:
+        arrays = {name: file[name] for name in file if isinstance(file[name], h5py.Dataset)}
+        return _to_json(file.attrs), {name: (None, {}, array[()]) for name, array in arrays.items()}
 
 
 class Opening:
     """A file that another process is opening. `answer` waits for it; `close` ends the process in any case."""
 
-    def __init__(self, path: str | os.PathLike[str], *, how: str = "recording", limit: float | None = None):
-        """Start the process; how: a recording, or one of `reader.READ`.
+    def __init__(
+        self, path: str | os.PathLike[str], read: Callable[[str, int, Share], Contents] = netcdf,
+        kind: str = RECORDING, *, pace: float = 5e6, limit: float | None = None,
+    ):  # fmt: skip
+        """Start the process.
 
-        limit : s of a processor, by default 15 s and a second for each 5 MB of the file (0.1 MB of an ArduPilot log)
+        read  : runs there, on the path, the bytes that all arrays may take, and a function that reports the share read
+        kind  : of file, for messages; pace : bytes of it that are read in a second
+        limit : s of a processor, by default 15 s and what the file takes at its pace
 
         Raises RecordingError where there is no such file or no process can be started.
         """
-        self.path = path_of(path)
+        self.path, self.kind, self.decoded = path_of(path), kind, read is netcdf
         if not is_file(self.path):
             raise RecordingError(f"{self.path}: no such file")
-        if how == "recording" and self.path.suffix.lower() in FOREIGN:
+        if kind == RECORDING and self.path.suffix.lower() in FOREIGN:
             raise RecordingError(
                 f"{self.path}: holds tracks, not a recording: airflock import {self.path.name} --save FILE.nc"
             )
         with from_outside(self.path, RecordingError):
             refuse_packed(self.path)
             refuse_pickle(self.path)
-        self.how = how
-        self.limit = LEAST_TIME + self.path.stat().st_size / PACES.get(how, PACE) if limit is None else limit
-        most = _memory() // 4
-        paths = [path for path in sys.path if os.path.isabs(path)]
-        asked = {"paths": paths, "file": str(self.path.absolute()), "most": most}
-        asked["how"] = "netcdf" if how == "recording" else how
-        asked["seconds"] = math.ceil(self.limit)
+        self.limit = LEAST_TIME + self.path.stat().st_size / pace if limit is None else limit
+        posix = hasattr(os, "sysconf")  # Windows does not tell its memory: 8 GB there
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if posix else 8 << 30
+        request = {
+            "paths": [path for path in sys.path if os.path.isabs(path)], "file": str(self.path.absolute()),
+            "read": [read.__module__, read.__name__], "room": memory // 4, "seconds": math.ceil(self.limit),
+        }  # fmt: skip
         # isolated (-I, -S): neither the folder of the recording nor a start-up file decides what is imported
-        command = [sys.executable, "-I", "-S", str(READER)]
+        command = [sys.executable or "", "-I", "-S", "-c", START]
         # one thread, and no filter of HDF5 from outside its own library
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::"}
         pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
-        if not sys.executable:  # a program that has Python inside
-            raise RecordingError(f"{self.path}: cannot be opened: Python does not know its own path")
         try:
-            self.process = subprocess.Popen(command, env=environment, bufsize=0, **pipes)
-        except OSError as fault:
-            raise RecordingError(f"{self.path}: no process can be started to open it: {fault.strerror}") from fault
+            self.process = subprocess.Popen(command, env=environment, **pipes)
+        except OSError as error:
+            raise RecordingError(f"{self.path}: no process can be started to open it: {error.strerror}") from error
+        # the limit of a processor's time does not end a process that waits, and Windows has none
+        self.clock = threading.Timer(WAIT * self.limit, self.process.kill)
+        self.clock.daemon, self.deadline = True, time.monotonic() + WAIT * self.limit
+        self.clock.start()
+        self.stdout: Any = self.process.stdout
         assert self.process.stdin is not None
-        with suppress(BrokenPipeError), self.process.stdin as question:  # if it has ended, `answer` says so
-            question.write(json.dumps(asked).encode())
-        self.until = time.monotonic() + WAIT * self.limit
+        with suppress(BrokenPipeError), self.process.stdin as pipe:  # if the process has ended, `answer` says so
+            pipe.write(json.dumps(request).encode() + b"\n")
 
     def __enter__(self) -> "Opening":
         return self
@@ -93,93 +123,153 @@ class Opening:
 
     def close(self) -> None:
         """End the process."""
+        self.clock.cancel()
         self.process.kill()
         self.process.wait()
-        if self.process.stdout is not None:
-            self.process.stdout.close()
+        self.stdout.close()
 
-    def answer(self, done: Callable[[float], None] | None = None) -> Any:
-        """The file as an xarray Dataset, a netCDF file decoded; `done` is called with the share that has been read.
+    def answer(self, done: Share | None = None) -> Any:
+        """Return the file as an xarray Dataset, a netCDF file decoded; `done` is called with the share that was read.
 
         Raises RecordingError where it is of another kind, or takes too long.
         """
-        with self, from_outside(self.path, RecordingError):
-            about: dict[str, Any] = {"share": 0.0}
-            while set(about) == {"share"}:
-                if done is not None:
-                    done(min(0.99, float(about["share"])))
-                length = int.from_bytes(self._take(bytearray(8)), "little")
-                if length > MOST_ABOUT:
-                    raise RecordingError(f"{self.path}: its names and attributes take {length / 1e6:.0f} MB")
-                about = json.loads(self._take(bytearray(length)))
-            if "fault" in about:
-                raise RecordingError(f"{self.path}: is not {KINDS[self.how]} that can be read: {about['fault']}")
-            return self._dataset(about)
-
-    def _dataset(self, about: dict[str, Any]) -> Any:
         import numpy as np
         import xarray as xr
 
-        variables = {}
-        for given in about["variables"]:
-            if "strings" in given:
-                values = np.array(given["strings"], str).reshape(given["shape"])
-            else:
-                dtype = np.dtype(given["dtype"])
-                if dtype.kind not in "fiubS":
-                    raise RecordingError(f"{self.path}: a variable is of kind {dtype}")
-                values = np.empty(given["shape"], dtype)
-                self._take(values.reshape(-1).view(np.uint8).data)
-            variables[given["name"]] = xr.Variable(given["dims"], values, _attributes(given["attributes"]))
-        raw = xr.Dataset(variables, attrs=_attributes(about["attributes"]))
-        return xr.decode_cf(raw) if self.how in ("recording", "netcdf") else raw
+        with self, from_outside(self.path, RecordingError):
+            header: dict[str, Any] = {"share": 0.0}
+            while "share" in header:
+                if done is not None:
+                    done(min(0.99, header["share"]))
+                line = self.stdout.readline()
+                if not line.endswith(b"\n"):
+                    raise self._ended()
+                header = json.loads(line)
+            if "error" in header:
+                raise RecordingError(f"{self.path}: is not {self.kind} that can be read: {header['error']}")
+            variables = {}
+            for name, dims, attributes, dtype, shape in header["variables"]:
+                values = np.empty(shape, dtype)
+                if self.stdout.readinto(_bytes_of(values)) < values.nbytes:
+                    raise self._ended()
+                variables[name] = xr.Variable(dims, values, _from_json(attributes))
+            dataset = xr.Dataset(variables, attrs=_from_json(header["attributes"]))
+            return xr.decode_cf(dataset) if self.decoded else dataset
 
-    def _late(self) -> RecordingError:
-        return RecordingError(f"{self.path}: could not be opened within {self.limit:.0f} s; it may be damaged")
+    def _ended(self) -> RecordingError:
+        """Say why the process ended before its answer was complete."""
+        code = self.process.wait(timeout=10.0)
+        if code in ENDED_LATE or time.monotonic() >= self.deadline:
+            return RecordingError(f"{self.path}: could not be opened within {self.limit:.0f} s; it may be damaged")
+        how = f"signal {-code}" if code < 0 else f"status {code}"
+        return RecordingError(f"{self.path}: is damaged: the process that opened it ended with {how}")
 
-    def _take(self, into: Any) -> Any:
-        """Fill a buffer from the pipe, in time."""
-        assert self.process.stdout is not None
-        view, pipe = memoryview(into), self.process.stdout.fileno()
-        while len(view):
-            count = self._piece(pipe, view[: 1 << 20])
-            if not count:
-                code = self.process.wait(timeout=10.0)
-                if code in ENDED_LATE:
-                    raise self._late()
-                how = f"signal {-code}" if code < 0 else f"status {code}"
-                raise RecordingError(f"{self.path}: is damaged: the process that opened it ended with {how}")
-            view = view[count:]
-        return into
 
-    def _piece(self, pipe: int, view: memoryview) -> int:
-        """Read into a buffer what the pipe has, in time; how many bytes, 0 where it has ended."""
-        left = self.until - time.monotonic()
-        if hasattr(os, "readv"):
-            if left <= 0.0 or not select.select([pipe], [], [], left)[0]:
-                raise self._late()
-            return os.readv(pipe, [view])
-        clock = threading.Timer(max(left, 0.0), self.process.kill)  # Windows cannot wait for a pipe
-        clock.start()
+def main(request: Mapping[str, Any]) -> None:
+    """Read a file in this process, and write the answer to standard output."""
+    _limit(request["room"], request["seconds"])
+    with os.fdopen(os.dup(1), "wb") as out:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # libraries print there what they think of a file
+
+        def send(header: dict[str, Any]) -> None:
+            text = json.dumps(header).encode()
+            if len(text) > MOST_HEADER:
+                raise ValueError(f"its names and attributes take {len(text) / 1e6:.0f} MB")
+            out.write(text + b"\n")
+            out.flush()
+
         try:
-            data = os.read(pipe, len(view))
-        finally:
-            clock.cancel()
-        if not data and time.monotonic() >= self.until:
-            raise self._late()
-        view[: len(data)] = data
-        return len(data)
+            module, name = request["read"]
+            read = getattr(import_module(module), name)
+            attributes, variables = read(request["file"], request["room"], lambda share: send({"share": share}))
+            entries, arrays = [], []
+            for name, (dims, own, values) in variables.items():
+                array = _plain(name, values)
+                dims = dims or [f"{name}_{axis}" for axis in range(array.ndim)]
+                entries.append([name, dims, own, array.dtype.str, list(array.shape)])
+                arrays.append(array)
+            send({"attributes": attributes, "variables": entries})
+        except Exception as error:  # a damaged file may raise anything
+            send({"error": (str(error).splitlines() or [""])[0] or type(error).__name__})
+            return
+        for array in arrays:
+            out.write(_bytes_of(array))
 
 
-def _attributes(given: dict[str, Any]) -> dict[str, Any]:
-    """Attributes as xarray has them: texts, numbers of NumPy, arrays."""
+def _limit(room: int, seconds: int) -> None:
+    """Allow no core file, no file written, no more memory than the arrays may need, so many seconds of a processor."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limits
+        return
+    limits = {"CORE": 0, "FSIZE": 0, "AS": 3 * room + SPARE, "CPU": seconds}
+    for kind, value in ((getattr(resource, f"RLIMIT_{name}"), value) for name, value in limits.items()):
+        with suppress(ValueError):  # a hard limit below this one stays
+            resource.setrlimit(kind, (value, resource.getrlimit(kind)[1]))
+
+
+def _refuse_outside(path: str, room: int) -> None:
+    """Refuse arrays that take too many bytes, links to other files, and arrays whose bytes or parts lie in others."""
+    import h5py
+
+    total = 0.0
+    with h5py.File(path, "r") as file:
+        for name in file:
+            if isinstance(file.get(name, getlink=True), h5py.ExternalLink):
+                raise ValueError(f"{name} is a link to another file")
+            member = file[name]
+            if isinstance(member, h5py.Dataset):
+                if member.external or member.is_virtual:
+                    raise ValueError(f"{name} keeps its values in another file")
+                total += math.prod(map(float, member.shape or ())) * member.dtype.itemsize
+    if total > room:
+        raise ValueError(f"its arrays take {total / 1e9:.3g} GB; there is room for {room / 1e9:.3g} GB")
+
+
+def _plain(name: str, values: Any) -> Any:
+    """Return the values of a variable as a contiguous array of numbers or texts."""
     import numpy as np
 
-    found: dict[str, Any] = {}
-    for name, value in given.items():
-        if isinstance(value, dict):
-            array = np.array(value["values"], np.dtype(value["dtype"])).reshape(value["shape"])
-            found[name] = array[()] if array.ndim == 0 else array
-        else:
-            found[name] = value
-    return found
+    array = np.asarray(values, order="C")
+    if array.dtype.kind == "O":
+        array = np.array([_text(value) for value in array.ravel().tolist()], str).reshape(array.shape)
+    if array.dtype.kind not in "fiubSU":
+        raise ValueError(f"variable {name} is of kind {array.dtype}")
+    return array
+
+
+def _bytes_of(array: Any) -> memoryview:
+    view: memoryview = array.reshape(-1).view("u1").data
+    return view
+
+
+def _to_json(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes as JSON has them: a text, a list of texts, or dtype and numbers; others are left out."""
+    import numpy as np
+
+    entries: dict[str, Any] = {}
+    for name, value in attributes.items():
+        array = np.asarray(value)
+        if isinstance(value, (str, bytes)):
+            entries[name] = _text(value)
+        elif array.dtype.kind in "OUS":
+            entries[name] = [_text(each) for each in array.ravel().tolist()]
+        elif array.dtype.kind in "fiub":
+            entries[name] = {"dtype": array.dtype.str, "numbers": array.tolist()}
+    return entries
+
+
+def _from_json(entries: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes as xarray has them: texts, numbers of NumPy, arrays."""
+    import numpy as np
+
+    numbers = {k: np.array(v["numbers"], v["dtype"])[()] for k, v in entries.items() if isinstance(v, dict)}
+    return {**entries, **numbers}
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", errors="replace")
+    if not isinstance(value, str):
+        raise ValueError(f"a value of kind {type(value).__name__} where words are expected")
+    return value

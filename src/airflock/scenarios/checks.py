@@ -110,7 +110,7 @@ def pair_notes(flight: Any, q: Any, metrics: tuple[Metric, ...], cells: bool) ->
     ]
     if flight.agents < MANY or not paired:
         return []
-    seconds = 0.4e-9 * flight.agents**2  # one core, measured in benchmarks/RESULTS-boids.md
+    seconds = 0.4e-9 * flight.agents**2  # measured: 0.4 ns a pair, one core, in vectors
     return [
         f"metrics.kind = {q.kind!r} looks at all pairs of {flight.agents:g} agents ({', '.join(paired)}), about "
         f"{seconds:.2g} s for each sample; metrics.kind = 'order' does not, a longer metrics.period looks less often"

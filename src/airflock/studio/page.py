@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from airflock.studio.acting import Acting
 from airflock.studio.comparing import Comparing
 from airflock.studio.drawing import Drawing
-from airflock.studio.evolving import Evolving
 from airflock.studio.measuring import Measuring
 from airflock.studio.opening import Opening
 from airflock.studio.player import Player
@@ -41,13 +40,11 @@ class Page:
             self.opening = Opening(self)
         with tune:
             self.tuning = Tuning(self, tune)
-            self.evolving = Evolving(self)
         self.measuring = Measuring(self, measure)
         with compare:
             self.comparing = Comparing(self, compare)
         self.rooms: list[Room] = [
             self.playing, self.selecting, self.acting, self.opening, self.tuning, self.measuring, self.comparing,
-            self.evolving,
         ]  # fmt: skip
         for room in self.rooms:
             room.rebuild()

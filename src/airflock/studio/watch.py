@@ -83,8 +83,6 @@ def watch(
             page.run()
         except KeyboardInterrupt:
             say(f"ended at t = {player.time:.1f} s")
-        finally:
-            page.evolving.stop()
     finally:
         view.stop()
 

@@ -7,8 +7,8 @@ from airflock.certify.counting import BATCH
 from airflock.evolve.store import Store
 from airflock.evolve.trial import ROUNDS
 from airflock.scenarios.timing import clock
-from airflock.tune.folder import read_plan, steps_flown
-from airflock.tune.result import CERTIFICATE, PLAN, STEPS, STUDY, TUNED, Tuned
+from airflock.tune.folder import read_plan
+from airflock.tune.result import CERTIFICATE, PLAN, STUDY, TUNED, Tuned
 
 STAGES = {
     "search": "search", "race": "candidates that race for the final", "final": "final",
@@ -28,9 +28,6 @@ def flights(found: Tuned) -> list[tuple[str, str, str]]:
         rows.append(
             ("hardening: what was kept", f"up to {ROUNDS * plan.seeds:,} a set", f"{plan.seeds} to {fresh - 1}")
         )
-        if plan.margins:
-            count = steps_flown(found.folder / STEPS)
-            rows.append(("hardening: these, and how far margins reach", f"{count:,}", f"0 to {fresh - 1}"))
     return rows + _stored(found.folder / "certificate_flights")
 
 

@@ -54,10 +54,11 @@ def read_plan(path: Path) -> tuple[Plan, str]:
         search = {str(key): value for key, value in found["search"].items()}
         limits = [str(text) for text in found.get("limits", ())]
         sure = float(found.get("confidence", CONFIDENCE))
-        margins = [str(name) for name in found.get("margins", ())]
-        made = Plan(search, int(found["seeds"]), float(found["seconds"]), float(found["rate"]), limits, sure, margins)
+        made = Plan(search, int(found["seeds"]), float(found["seconds"]), float(found["rate"]), limits, sure)
     except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
         raise StudyError(f"{path}: is damaged: no plan of a tuning is in it; give another --out") from fault
+    if found.get("margins"):  # of a version that could widen them
+        raise StudyError(f"{path}: margins are no longer widened; remove the line `margins` to go on without them")
     if not (0 < made.seeds <= MOST_SEEDS and 0.0 <= made.seconds < 1e9 and 0.0 < made.rate < 1e9):
         raise StudyError(f"{path}: is damaged: its numbers are no plan of a tuning; give another --out")
     return made, str(found.get("identity"))
@@ -78,15 +79,6 @@ def read_steps(path: Path) -> tuple[list[Measured], str]:
         raise StudyError(f"{path}: is damaged; remove it, and the hardening is done once more") from fault
 
 
-def steps_flown(path: Path) -> int:
-    """Flights of the hardening that a folder keeps; StudyError where the file is damaged."""
-    with from_outside(path, StudyError):
-        found = json_object(read_text(path)).get("flights")
-    if not isinstance(found, int):
-        raise StudyError(f"{path}: is damaged; remove it, and the hardening is done once more")
-    return found
-
-
 def _measured(told: Mapping[str, Any]) -> Measured:
     """One step from plain values; raises what its constructors raise."""
 
@@ -102,5 +94,4 @@ def _measured(told: Mapping[str, Any]) -> Measured:
         fitness=float(told["fitness"]), r_min=float(told["r_min"]), n_coll=float(told["n_coll"]),
         cost=three(told["cost"]), gain=three(told["gain"]), parts=table("parts"), contacts=float(told["contacts"]),
         clearance=float(told.get("clearance", "nan")), kept=bool(told["kept"]), verdict=str(told["verdict"]),
-        margins={str(name): float(value) for name, value in told.get("margins", {}).items()},
     )  # fmt: skip

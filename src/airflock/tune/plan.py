@@ -1,12 +1,10 @@
 """Plan: how a budget of time is shared between searching, hardening and certifying; written once, then kept."""
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from airflock import __version__
 from airflock.errors import StudyError
-from airflock.evolve.harden import MOST, rounds
 
 SEARCH, HARDEN, CERTIFY = 0.45, 0.15, 0.4  # shares of the budget
 TRIED = 15  # rounds of flights that hardening is planned with; all whole and half steps and fresh seeds would be 19
@@ -24,8 +22,7 @@ class Plan:
 
     search : keys of the table [search]; seeds: flights of each step of hardening; seconds: of certifying
     rate   : flights per second that the plan was made with
-    limits, confidence : what is to be shown; margins: what hardening is to widen; goes on with these unless others are
-                         given
+    limits, confidence : what is to be shown; goes on with these unless others are given
     """
 
     search: dict[str, Any]
@@ -34,20 +31,16 @@ class Plan:
     rate: float
     limits: list[str] = field(default_factory=list)
     confidence: float = CONFIDENCE
-    margins: list[str] = field(default_factory=list)
 
     def document(self) -> dict[str, Any]:
         """The plan as plain values."""
         return {"airflock": __version__, **asdict(self)}
 
 
-def plan_of(
-    budget: float, rate: float, *, warm: bool = False, telling: int = USUAL, margins: Sequence[str] = ()
-) -> Plan:
+def plan_of(budget: float, rate: float, *, warm: bool = False, telling: int = USUAL) -> Plan:
     """A plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
 
     telling : flights that tell whether the rarest limit is kept: at most so many for each finalist and each step
-    margins : what hardening is to widen, as `airflock.harden` takes it
     StudyError where nothing sensible fits into it.
     """
     flights = budget * SEARCH * rate
@@ -57,10 +50,9 @@ def plan_of(
     pool = int(min(max(finals / 16.0, 2 * top), 100))
     spent = 8 * pool + (top + AVERAGES + 2) * final_seeds
     generations = int((flights - spent) / (POPULATION * FLIGHTS))
-    tried = TRIED + rounds(margins) - MOST
-    seeds = int(min(budget * HARDEN * rate / tried, max(telling, 2 * USUAL)))
+    seeds = int(min(budget * HARDEN * rate / TRIED, max(telling, 2 * USUAL)))
     if generations < LEAST or seeds < 10:
-        flown = max((LEAST * POPULATION * FLIGHTS + spent) / SEARCH, 10 * tried / HARDEN)
+        flown = max((LEAST * POPULATION * FLIGHTS + spent) / SEARCH, 10 * TRIED / HARDEN)
         raise StudyError(
             f"the budget of {budget:g} s is too small: one flight takes {1.0 / rate:.2g} s here; give at least "
             f"{1.1 * flown / rate:.2g} s, or shorten the flights with --duration"

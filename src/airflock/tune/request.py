@@ -1,4 +1,4 @@
-"""What a tuning is asked for, checked before anything flies: what is to be shown, and what is to be widened."""
+"""What a tuning is asked for, checked before anything flies: what is to be shown."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +8,6 @@ from airflock.asked import Asked
 from airflock.certify.campaign import Campaign
 from airflock.certify.request import campaign_of
 from airflock.errors import ScenarioError, StudyError
-from airflock.evolve.margins import Margin, read_margins
 from airflock.metrics.registry import numbers_of
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.plan import CONFIDENCE, Plan
@@ -20,18 +19,15 @@ class Request:
     """What a tuning is asked for.
 
     campaign : what its certificate is to show; limits: the texts of its limits
-    margins  : what hardening is to widen as well, by name
     """
 
     campaign: Campaign
     limits: list[str]
-    margins: list[str]
 
 
 def request_of(
     start: Scenario,
     limit: Sequence[str] = (),
-    margin: str | Sequence[str] = (),
     confidence: float | None = None,
     plan: Plan | None = None,
 ) -> Request:
@@ -43,24 +39,14 @@ def request_of(
     limits = list(limit) or (plan.limits if plan else []) or asked.read(usual_limits, start)
     sure = (plan.confidence if plan else CONFIDENCE) if confidence is None else confidence
     campaign = asked.read(campaign_of, start, limits, sure)
-    margins = [margin] if isinstance(margin, str) else list(margin) or (plan.margins if plan else [])
-    asked.read(sound_margins, margins, start)
     asked.refuse()
-    return Request(campaign, limits, margins)
+    return Request(campaign, limits)
 
 
 def sound_budget(budget: float) -> None:
     """Refuse a time in which nothing could be tuned, and one without an end."""
     if not 0.0 < budget < math.inf:
         raise StudyError(f"budget = {budget:g} s is not positive")
-
-
-def sound_margins(names: Sequence[str], start: Scenario) -> list[Margin]:
-    """Margins by their names. Raises ScenarioError, all faults together."""
-    found, faults = read_margins(names, [start])
-    if faults:
-        raise ScenarioError(faults)
-    return found
 
 
 def usual_limits(scenario: Scenario) -> list[str]:

@@ -31,7 +31,6 @@ def tune(
     *,
     budget: float = 1200.0,
     limit: Sequence[str] = (),
-    margin: str | Sequence[str] = (),
     confidence: float | None = None,
     like: Scenario | str | os.PathLike[str] | None = None,
     heard: str | os.PathLike[str] | None = None,
@@ -58,8 +57,6 @@ def tune(
         What is to be shown, as `airflock.certify` takes it; by default that collisions (`metrics.r_coll`) are rarer
         than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
         that look as if they kept these limits before all others.
-    margin : str or sequence of str
-        Margins that hardening is to widen as well, as `airflock.harden` takes them.
     confidence : float, optional
         Confidence of the certificate, a share in [0.5, 1); by default 0.95.
     like : Scenario, str or path, optional
@@ -69,7 +66,7 @@ def tune(
     warm : bool
         Search from the start's own numbers on, which its speed scales, instead of the middle of all ranges.
     resume : bool
-        Continue the work in the folder; limits, margins and confidence that are not given are as in the first call.
+        Continue the work in the folder; limits and confidence that are not given are as in the first call.
     settings : mapping, optional
         Keys of the scenario to change.
     threads : int, optional
@@ -108,14 +105,14 @@ def tune(
     begun = parts.read(_begun, scenario, like, heard, settings, folder, trust)
     start = parts.read(lambda found: found.start, begun)
     plan = parts.read(kept_plan, folder, start, resume)
-    asked = parts.read(request_of, start, limit, margin, confidence, or_else(plan, None))
+    asked = parts.read(request_of, start, limit, confidence, or_else(plan, None))
     parts.refuse()
     logs = begun.logs
     sure, rated = asked.campaign.confidence, [each for each in asked.campaign.limits if each.rate is not None]
     if plan is None:
         telling = flights_that_count(rated, start)
-        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling, margins=asked.margins)
-        plan = replace(made, limits=asked.limits, confidence=sure, margins=asked.margins)
+        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling)
+        plan = replace(made, limits=asked.limits, confidence=sure)
         keep_plan(folder, start, plan)
     searched = [each.text for each in rated]
     if logs is not None and not (folder / TOLD).is_file():
@@ -130,7 +127,7 @@ def tune(
         result = search(folder, start, plan, searched, threads, watch)
         if result.dead:
             raise StudyError(f"{start.name}: {result.dead}")
-        tuned, steps, why = hardening(folder, plan, searched, threads, trust, watch, asked.margins)
+        tuned, steps, why = hardening(folder, plan, searched, threads, trust, watch)
         shown = certificate(folder, tuned, asked.limits, sure, plan, threads, watch)
         found = Tuned(
             folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,

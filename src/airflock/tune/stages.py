@@ -16,8 +16,8 @@ from airflock.certify.request import campaign_of
 from airflock.certify.run import run as certified
 from airflock.errors import ScenarioError
 from airflock.evolve.folder import open_folder, write
+from airflock.evolve.harden import MOST, harden
 from airflock.evolve.harden import document as hardened_document
-from airflock.evolve.harden import harden, rounds
 from airflock.evolve.result import BEST, Result
 from airflock.evolve.run import executor_for as searching
 from airflock.evolve.run import run as evolved
@@ -78,13 +78,7 @@ def search(
 
 
 def hardening(
-    folder: Path,
-    plan: Plan,
-    limits: Sequence[str],
-    threads: int | None,
-    trust: bool,
-    watch: Watch,
-    margins: Sequence[str] = (),
+    folder: Path, plan: Plan, limits: Sequence[str], threads: int | None, trust: bool, watch: Watch
 ) -> tuple[Scenario, list[Measured], str]:
     """The scenario after hardening, its steps, and why there are none."""
     if (folder / STEPS).is_file():
@@ -97,10 +91,10 @@ def hardening(
 
     def done() -> None:
         count = next(flown)
-        watch(Stage("hardening", "", count, max(count, rounds(margins) * plan.seeds)))
+        watch(Stage("hardening", "", count, max(count, MOST * plan.seeds)))
 
     try:
-        steps = harden(best, range(plan.seeds), limit=limits, margin=margins, threads=threads, done=done)
+        steps = harden(best, range(plan.seeds), limit=limits, threads=threads, done=done)
         write(folder / TUNED, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune.")
     except ScenarioError as fault:
         why = fault.faults[0]
@@ -108,7 +102,7 @@ def hardening(
         if law.suffix == ".py" and law.is_file():
             atomic.write(folder / law.name, law.read_bytes())
         write(folder / TUNED, document(best), "Evolved by airflock tune; not hardened.")
-    told = {"why": why, "flights": next(flown) - 1, "steps": [step.as_dict() for step in steps]}
+    told = {"why": why, "steps": [step.as_dict() for step in steps]}
     atomic.write(folder / STEPS, json.dumps(told))
     return load(folder / TUNED, trust=trust), steps, why
 

@@ -38,7 +38,8 @@ def move(build: Builder) -> None:
 
     They stand in its own lines, which compile to the same bits as ever; where agents move in turn they are functions.
     Where rows of faults are read beside those of states, all are told to lie apart: else those that are written are
-    compared with every other at every step. Not where a body remembers, as of decision 0116.
+    compared with every other at every step. Not where a body remembers: the last
+    bit of a quadrotor would change.
     """
     plan = build.plan
     struck = plan.struck and build.ranges

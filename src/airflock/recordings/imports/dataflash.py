@@ -1,8 +1,10 @@
 """ArduPilot DataFlash logs (.bin) and telemetry logs (.tlog), by pymavlink (LGPL-3, an extra that is only imported).
 
-Fields are asked for by name, because their sets change between releases.
+Fields are read by name, because their sets change between releases. Both are read in a process of its own
+(`recordings.isolated`): pymavlink loops without end in some damaged logs.
 """
 
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -11,9 +13,10 @@ import numpy as np
 
 from airflock.errors import RecordingError
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
-from airflock.recordings.isolated import Opening
-from airflock.recordings.reader import PARTS
+from airflock.recordings.isolated import Contents, Opening, Share
 
+PARTS = ("PSCN", "PSCE", "PSCD")  # position control: north, east, down
+PACE = 1e5  # bytes per second; read by Python, row by row
 HEAD = b"\xa3\x95"  # of each message; source: ArduPilot, AP_Logger/LogStructure.h
 GPS_EPOCH = 315964800.0  # 6 January 1980 in seconds since 1970
 LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so that it cannot part them
@@ -25,7 +28,7 @@ def read_dataflash(path: Path, options: Options, findings: Findings) -> list[Tra
     with path.open("rb") as file:
         if file.read(len(HEAD)) != HEAD:
             raise RecordingError(f"{path}: is no DataFlash log of ArduPilot: it does not begin with its mark, A3 95")
-    told = Opening(path, how="dataflash").answer(options.done)
+    told = Opening(path, dataflash, "a DataFlash log", pace=PACE).answer(options.done)
     rows = {part: told[part].values for part in PARTS if part in told}
     if "PSCN" not in rows or "PSCE" not in rows:
         raise RecordingError(
@@ -77,7 +80,7 @@ def read_tlog(path: Path, options: Options, findings: Findings) -> list[Track]:
     All vehicles are stamped by the receiver's clock, so they share it; their positions are about their own origins.
     """
     _need_pymavlink(path)
-    told = Opening(path, how="telemetry").answer(options.done)
+    told = Opening(path, telemetry, "telemetry", pace=PACE).answer(options.done)
     if "LOCAL_POSITION_NED" not in told:
         raise RecordingError(f"{path}: has no LOCAL_POSITION_NED; import the vehicles' own logs instead")
     states = _by_vehicle(told, "LOCAL_POSITION_NED", (0, 2, 1, 3, 5, 4, 6), (1, 1, 1, -1, 1, 1, -1))
@@ -104,6 +107,50 @@ def _by_vehicle(told: Any, kind: str, columns: tuple[int, ...], factors: tuple[f
         return {}
     table = told[kind].values
     return {int(who): table[table[:, 0] == who][:, 1:][:, columns] * factors for who in np.unique(table[:, 0])}
+
+
+def dataflash(path: str, _: int, share: Share) -> Contents:
+    """Read tables of time (µs), position, velocity, commanded velocity of each axis; of origins; of GPS times."""
+    from pymavlink import DFReader
+
+    fields: dict[str, tuple[str, ...]] = {
+        part: ("TimeUS", f"P{part[-1]}", f"V{part[-1]}", f"TV{part[-1]}") for part in PARTS
+    }
+    fields |= {"ORGN": ("Lat", "Lng", "Alt"), "GPS": ("TimeUS", "GWk", "GMS", "I")}
+    return _tables(DFReader.DFReader_binary(path), fields, lambda message: [], share)
+
+
+def telemetry(path: str, _: int, share: Share) -> Contents:
+    """Read tables of vehicle, time (s) and six numbers of states, three of commands and of origins."""
+    from pymavlink import mavutil
+
+    fields = {
+        "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
+        "POSITION_TARGET_LOCAL_NED": ("vx", "vy", "vz"),
+        "GPS_GLOBAL_ORIGIN": ("latitude", "longitude", "altitude"),
+    }
+
+    def source(message: Any) -> list[float]:
+        return [message.get_srcSystem(), getattr(message, "_timestamp", 0.0)]
+
+    return _tables(mavutil.mavlink_connection(path), fields, source, share)
+
+
+def _tables(
+    log: Any, fields: Mapping[str, tuple[str, ...]], source: Callable[[Any], list[float]], share: Share
+) -> Contents:
+    """Read one table of float64 for each kind of message, a row each: its source, then its fields."""
+    rows: dict[str, list[list[float]]] = {kind: [] for kind in fields}
+    percent = 0.0
+    while (message := log.recv_match(type=[*fields])) is not None:
+        kind = message.get_type()
+        # a log without I is of a vehicle with one GPS receiver, number 0
+        numbers = [getattr(message, name, 0.0 if name == "I" else np.nan) for name in fields[kind]]
+        rows[kind].append([*source(message), *numbers])
+        if getattr(log, "percent", 0.0) >= percent + 1.0:
+            percent = log.percent
+            share(percent / 100.0)
+    return {}, {kind: (None, {}, np.array(table, float)) for kind, table in rows.items() if table}
 
 
 def _need_pymavlink(path: Path) -> None:

@@ -10,7 +10,7 @@ from airflock.errors import RecordingError, gathering
 from airflock.recordings.imports import headers
 from airflock.recordings.imports.arrays import read_idtracker
 from airflock.recordings.imports.track import COMMAND, VELOCITY, Findings, Options, Track
-from airflock.recordings.isolated import Opening
+from airflock.recordings.isolated import Opening, hdf5, netcdf
 
 OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
 
@@ -18,10 +18,10 @@ OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0
 def read_netcdf(path: Path, options: Options, findings: Findings) -> list[Track]:
     """Tracks of a netCDF file of `movement`, or of trajectories.h5 of idtracker.ai."""
     if path.suffix.lower() in (".h5", ".hdf5"):
-        plain = Opening(path, how="hdf5").answer()
+        plain = Opening(path, hdf5, "a HDF5 file").answer()
         if "position" not in plain:
             return read_idtracker(plain, path, options, findings)
-    return read_dataset(Opening(path, how="netcdf").answer(), options, str(path))
+    return read_dataset(Opening(path, netcdf, "a netCDF file").answer(), options, str(path))
 
 
 def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") -> list[Track]:
