@@ -22,8 +22,9 @@ MISSING = "(missing)"
 
 
 def names():
-    """Return the names of all snapshots."""
-    return sorted(path.stem for path in HERE.glob("*.py") if path.stem != "run" and path.stem[:5] != "test_")
+    """Return the names of all snapshots; modules named _* and test_* are none."""
+    stems = (path.stem for path in HERE.glob("*.py"))
+    return sorted(stem for stem in stems if stem != "run" and not stem.startswith(("_", "test_")))
 
 
 def module(name):

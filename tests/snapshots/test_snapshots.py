@@ -21,4 +21,4 @@ def test_one_changed_value_is_seen():
     assert run.differences(old, {"a": {"b": [1, 2], "c": {}}, "d": "x"}) == []
     assert run.differences(old, {"a": {"b": [1, 3], "c": {}}, "d": "x"}) == [("a / b / 1", 2, 3)]
     assert run.differences(old, {"a": {"b": [1, 2]}, "d": "x"}) == [("a / c", {}, run.MISSING)]
-    assert run.differences({}, {"e": None}) == [("e", run.MISSING, None)]
+    assert run.differences({"d": 1}, {"d": 1, "e": None}) == [("e", run.MISSING, None)]
