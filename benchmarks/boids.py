@@ -16,7 +16,7 @@ import numba
 
 from airflock.engine import cpu, plan_of
 from airflock.engine.stages.flight import EVERY
-from airflock.engine.tables import tables
+from airflock.engine.tables import world_tables
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
@@ -44,9 +44,11 @@ def seconds_per_step(scenario: Scenario, steps: int, rounds: int, timer: Timer) 
     for count in (1, 1 + steps):
         found = load(BEST, {**settings_of(scenario), "duration": count * dt})
         plan = plan_of(found)
-        table = tables(found, plan, 1)
-        cpu.fly(plan, table)
-        best[count] = min(timed(lambda plan=plan, table=table: cpu.fly(plan, table), timer) for _ in range(rounds))
+        table = world_tables(found, plan, 1)
+        cpu.fly_on_cpu(plan, table)
+        best[count] = min(
+            timed(lambda plan=plan, table=table: cpu.fly_on_cpu(plan, table), timer) for _ in range(rounds)
+        )
     return max(best[1 + steps] - best[1], 1e-9) / steps
 
 

@@ -183,7 +183,7 @@ def random_start(scenario: Scenario, seed: int) -> np.ndarray[Any, Any]:
 
 def difference(settings: Callable[[int], dict[str, Any]], agents: int, steps: int, seed: int = 1) -> float:
     """Largest difference (m, m/s) to Airflock's CPU engine after some steps from one start, in double precision."""
-    from airflock.engine import fly
+    from airflock.engine import fly_world
     from airflock.scenarios.files import load
 
     keys = settings(agents)
@@ -191,7 +191,7 @@ def difference(settings: Callable[[int], dict[str, Any]], agents: int, steps: in
     start = random_start(found, seed)
     boids = Boids(found, start[:3].T, start[3:].T, bits=64)
     boids.advance(steps)
-    return float(np.abs(boids.state() - fly(found, 0, precision=64, start=start).state).max())
+    return float(np.abs(boids.state() - fly_world(found, 0, precision=64, start=start).state).max())
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from splitting import counted
 
-from airflock.certificates.bounds import look, schedule
+from airflock.certificates.bounds import look_schedule, take_look
 
 REPETITIONS, ALPHA, ONCE, MOST = 200, 0.05, 4000, 100.0  # MOST events expected in a repetition
 
@@ -23,10 +23,10 @@ REPETITIONS, ALPHA, ONCE, MOST = 200, 0.05, 4000, 100.0  # MOST events expected 
 def looked(events, limit):
     """Upper bound after the looks until a limit is shown or refuted; events (flight,) so far."""
     low, high = 0.0, 1.0
-    for flights, above, below in schedule(limit, ALPHA):
+    for flights, above, below in look_schedule(limit, ALPHA):
         if flights > len(events):
             break
-        found = look(flights, int(events[flights - 1]), above, below)
+        found = take_look(flights, int(events[flights - 1]), above, below)
         low, high = max(low, found.low), min(high, found.high)
         if high <= limit or low > limit:
             break
@@ -49,7 +49,7 @@ def main():
         for _ in range(REPETITIONS):
             drawn = rng.integers(0, len(least), max(ONCE, round(MOST / truth)))
             events = np.cumsum(least[drawn] < distance)
-            held[0] += look(ONCE, int(events[ONCE - 1]), ALPHA, ALPHA).high >= truth
+            held[0] += take_look(ONCE, int(events[ONCE - 1]), ALPHA, ALPHA).high >= truth
             for place, factor in enumerate((1.0, 1.5, 3.0), start=1):
                 held[place] += looked(events, factor * truth) >= truth
             wrong += looked(events, truth / 1.001) <= truth / 1.001

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.timing import clock
+from airflock.scenarios.timing import step_counts
 
 HERE = Path(__file__).parent
 
@@ -87,7 +87,7 @@ def build(source: Path, library: Path, options: Sequence[str]) -> Path:
 
 def parameters_of(scenario: Scenario, bits: int = 32) -> Any:
     """Numbers of a scenario as the struct of vasarhelyi.h."""
-    body, sensors, measured = scenario.body, scenario.sensors, scenario.measured_by()
+    body, sensors, measured = scenario.body, scenario.sensors, scenario.resolved_metrics()
     numbers = {name: getattr(scenario.parameters, name) for name in PARAMETERS if hasattr(scenario.parameters, name)}
     numbers |= {
         "tau": body.tau, "a_max": body.a_max, "outer_noise": body.noise,
@@ -119,7 +119,7 @@ class Reference:
             raise RuntimeError(f"{name} was built with another width of vectors or reals")
         self.scenario = scenario
         self.parameters = parameters_of(scenario, bits)
-        times = clock(scenario)
+        times = step_counts(scenario)
         self.times = {name: times[name] for name in TIMES if name in times} | {"agents": scenario.agents}
         self.times["links"] = int(scenario.transceiver.name == "links")
         self.times["delay"] = times["delay"] // times["decide_every"]

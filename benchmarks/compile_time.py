@@ -31,16 +31,16 @@ def child(preset: str) -> None:
     import numba  # noqa: F401
     import numpy as np
 
-    from airflock.engine.cpu import fly
+    from airflock.engine.cpu import fly_on_cpu
     from airflock.engine.simulate import plan_of
-    from airflock.engine.tables import tables
+    from airflock.engine.tables import world_tables
     from airflock.scenarios.files import load
 
     scenario = load(preset, {"duration": 1.0})
     plan = plan_of(scenario)
-    given = tables(scenario, plan, 1)
+    given = world_tables(scenario, plan, 1)
     begun = time.process_time()
-    found = fly(plan, given)
+    found = fly_on_cpu(plan, given)
     seconds = time.process_time() - begun
     print(json.dumps((seconds, hashlib.sha256(np.ascontiguousarray(found.state).tobytes()).hexdigest()[:12])))
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from c_reference import SCORES, parameters_of
 
-from airflock.scenarios.timing import clock
+from airflock.scenarios.timing import step_counts
 from airflock.support import gpu as device
 
 HERE = Path(__file__).parent
@@ -48,10 +48,9 @@ class CudaC:
 
     def ready(self, flocks: int) -> Callable[[], Any]:
         """A function that flies this many flocks, seeds from 1 on, and returns the scores (flock, order parameter)."""
-        from cuda.core import LaunchConfig
-        from cuda.core import launch as run
+        from cuda.core import LaunchConfig, launch as run
 
-        cuda, t = device.runtime(), self.times
+        cuda, t = device.cuda_runtime(), self.times
         rows = cuda.to_device(np.tile(numbers_of(self.scenario), (flocks, 1)))
         scores = cuda.to_device(np.zeros((flocks, len(SCORES)), np.float32))
         threads = -(-t["agents"] // 32) * 32 * self.per_agent
@@ -73,7 +72,7 @@ def _address(array: Any) -> int:
 
 def times_of(scenario: Any) -> dict[str, int]:
     """Numbers of events in steps, and of agents."""
-    found = clock(scenario) | {"agents": scenario.agents}
+    found = step_counts(scenario) | {"agents": scenario.agents}
     return found | {"delay": found["delay"] // found["decide_every"]}
 
 
@@ -87,7 +86,7 @@ def trial(source: Path) -> str:
     """Output of another CUDA C program that prints its own times."""
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder) / "trial"
-        capability = "".join(map(str, device.runtime().get_current_device().compute_capability))
+        capability = "".join(map(str, device.cuda_runtime().get_current_device().compute_capability))
         command = ["nvcc", "-O3", f"-arch=sm_{capability}", "-use_fast_math", str(source), "-o", str(program)]
         subprocess.run(command, check=True)
         return subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout

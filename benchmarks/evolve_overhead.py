@@ -10,11 +10,11 @@ import time
 from pathlib import Path
 
 from airflock.engine import score_flight, score_flights
-from airflock.runs.executors.in_process import InProcess
+from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.space import with_parameters
-from airflock.runs.store import Batch, Store
-from airflock.search.run import executor_for
-from airflock.search.search import search
+from airflock.runs.store import CandidateBatch, FlightStore
+from airflock.search.run import study_executor
+from airflock.search.search import run_search
 from airflock.search.study import load_study
 
 NAME = "vasarhelyi_2018/6ms"
@@ -26,10 +26,10 @@ def overhead(generations, rounds):
     values = score_flight(with_parameters(study.scenario, {}), 0)
     best = float("inf")
     for _ in range(rounds):
-        with tempfile.TemporaryDirectory() as folder, Store(Path(folder)) as store:
-            executor = InProcess(lambda p, s: values, 1)
+        with tempfile.TemporaryDirectory() as folder, FlightStore(Path(folder)) as store:
+            executor = ThreadExecutor(lambda p, s: values, 1)
             begin = time.process_time()
-            search(study, store, executor)
+            run_search(study, store, executor)
             best = min(best, (time.process_time() - begin) / generations)
             executor.close()
     return best
@@ -41,15 +41,15 @@ def ratio(generations, population, duration, rounds):
     for i in range(rounds):
         keys = {"generations": generations, "population": population, "seed": i}
         study = load_study(NAME, search=keys, settings={"duration": duration})
-        with tempfile.TemporaryDirectory() as folder, Store(Path(folder)) as store:
-            executor = executor_for(study)
+        with tempfile.TemporaryDirectory() as folder, FlightStore(Path(folder)) as store:
+            executor = study_executor(study)
             begin = time.process_time()
-            search(study, store, executor)
+            run_search(study, store, executor)
             whole = time.process_time() - begin
             executor.close()
             scenarios, seeds = [], []
             for g in range(generations):
-                points = store.asked(Batch("search", 0, g))
+                points = store.asked(CandidateBatch("search", 0, g))
                 scenarios += [with_parameters(study.scenario, study.space.parameters(p)) for p in points]
                 seeds += [study.seed(0, g * population + k) for k in range(population)]
         begin = time.process_time()

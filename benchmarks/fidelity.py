@@ -15,11 +15,11 @@ import numpy as np
 from scipy.stats import kendalltau
 
 from airflock.engine import score_flight, score_flights
-from airflock.runs.folder import read
+from airflock.runs.folder import read_toml_file
 from airflock.runs.space import with_parameters
-from airflock.runs.store import Batch, Store
-from airflock.scenarios.change import remade
-from airflock.scenarios.making import make
+from airflock.runs.store import CandidateBatch, FlightStore
+from airflock.scenarios.change import rebuilt
+from airflock.scenarios.making import build_scenario
 from airflock.search.space_table import read_space
 
 PARTS = {"early": (2, 4, 6, 8, 10, 12), "late": (40, 46, 52, 58, 64, 70)}  # generations, five candidates of each
@@ -34,7 +34,7 @@ def kinds(scenario):
         "whole": {}, "steps twice as long": {"dt": 2.0 * dt}, "a quarter of the time": {"duration": duration / 4.0},
         "half of the agents": half, "all three": {"dt": 2.0 * dt, "duration": duration / 4.0, **half},
     }  # fmt: skip
-    return {name: remade(scenario, change) if change else scenario for name, change in changes.items()}
+    return {name: rebuilt(scenario, change) if change else scenario for name, change in changes.items()}
 
 
 def flown(scenario, parameters, flights, first):
@@ -53,13 +53,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
-    scenario = make(read(folder / "study.toml")["scenario"], str(folder))
-    space, _ = read_space(read(folder / "study.toml")["space"], scenario)
+    scenario = build_scenario(read_toml_file(folder / "study.toml")["scenario"], str(folder))
+    space, _ = read_space(read_toml_file(folder / "study.toml")["space"], scenario)
     print("| part of the search | flights | ms | one flight and truth | means and truth | mean fitness |")
     print("|---|---|---|---|---|---|")
     for part, numbers in PARTS.items():
-        with Store(folder, write=False) as store:
-            points = [point for number in numbers for point in store.asked(Batch("search", 0, number))[:EACH]]
+        with FlightStore(folder, write=False) as store:
+            points = [point for number in numbers for point in store.asked(CandidateBatch("search", 0, number))[:EACH]]
         parameters = [space.parameters(np.array(point)) for point in points]
         truth = flown(scenario, parameters, TRUTH, FIRST)[0].mean(axis=1)
         for name, kind in kinds(scenario).items():

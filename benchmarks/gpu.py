@@ -30,7 +30,7 @@ from airflock.engine import cpu, plan_of, score_flights
 from airflock.engine.cuda import launch
 from airflock.engine.cuda.kernel import ARGUMENTS
 from airflock.engine.cuda.memory import layout_of
-from airflock.engine.tables import tables
+from airflock.engine.tables import world_tables
 from airflock.scenarios.files import load
 from airflock.support import gpu as device
 
@@ -66,14 +66,14 @@ QUICK = Sizes(duration=60.0, saturated=1000, generations=15, flights=100, boids=
 
 def ours(scenario: Any, flocks: int, per_agent: int) -> Callable[[], Any]:
     """A function that flies this many flocks with the generated kernel; memory is there already."""
-    cuda = device.runtime()
+    cuda = device.cuda_runtime()
     plan = plan_of(scenario, grid=False)
-    shape = layout_of(plan, scenario.agents, flocks, device.multiprocessors())
+    shape = layout_of(plan, scenario.agents, flocks, device.multiprocessor_count())
     shape = replace(shape, per_agent=per_agent, threads=shape.threads // shape.per_agent * per_agent)
     driver = launch.flight_driver(plan, shape)
-    jobs = [tables(scenario, plan, 1 + flock) for flock in range(flocks)]
-    own = launch.arrays(plan, driver, shape, jobs, None)
-    kernel = launch.configured(driver.fly, flocks, shape.threads)
+    jobs = [world_tables(scenario, plan, 1 + flock) for flock in range(flocks)]
+    own = launch.make_arguments(plan, driver, shape, jobs, None)
+    kernel = launch.configure_kernel(driver.fly, flocks, shape.threads)
     given = [own[name] for name in ARGUMENTS]
 
     def go() -> Any:
@@ -150,8 +150,8 @@ def agreement(scenario: Any, flocks: int) -> dict[str, Any]:
 def apart(scenario: Any) -> dict[str, float]:
     """Largest difference of any position (m) or velocity (m/s) of CPU and GPU in double precision, three seeds."""
     plan = plan_of(scenario, precision=64, record=True, grid=False)
-    jobs = [tables(scenario, plan, seed) for seed in (1, 2, 3)]
-    pairs = zip([cpu.fly(plan, job) for job in jobs], launch.fly_many(plan, jobs), strict=True)
+    jobs = [world_tables(scenario, plan, seed) for seed in (1, 2, 3)]
+    pairs = zip([cpu.fly_on_cpu(plan, job) for job in jobs], launch.fly_many(plan, jobs), strict=True)
     return {
         "seconds flown": scenario.flight.duration,
         "largest difference": max(float(np.abs(a.frames - b.frames).max()) for a, b in pairs),  # type: ignore[operator]
@@ -209,18 +209,18 @@ def rehearsing() -> bool:
 
 def big_flock(sizes: Sizes) -> dict[str, Any]:
     """Steps per second of one flock by cells, beside the same boids in JAX, in turn, each time from its start."""
-    from airflock.engine.cuda.crowd import Crowd
+    from airflock.engine.cuda.crowd import LargeFlock
 
     scenario = load("zapotecatl_2016/literal", crowd_settings(sizes.boids))
-    crowd = Crowd(scenario, plan_of(scenario), seed=1)
-    begun = [device.runtime().to_device(table.copy_to_host()) for table in (crowd.near, crowd.rest)]
+    crowd = LargeFlock(scenario, plan_of(scenario), seed=1)
+    begun = [device.cuda_runtime().to_device(table.copy_to_host()) for table in (crowd.near, crowd.rest)]
 
     def advance() -> None:
         crowd.near.copy_to_device(begun[0])
         crowd.rest.copy_to_device(begun[1])
         crowd.step = 0
         crowd.advance(sizes.steps)
-        device.runtime().synchronize()
+        device.cuda_runtime().synchronize()
 
     sides: dict[str, Callable[[], Any]] = {"airflock": advance}
     fault = boids_jax.missing()
@@ -276,9 +276,9 @@ def main() -> None:
         import rehearsal
 
         sizes = rehearsal.begin(Sizes)
-    device.required()
+    device.require_gpu()
     scenario = load(PRESET, {"duration": sizes.duration, "agents": sizes.agents})
-    found: dict[str, Any] = {"devices": device.describe()}
+    found: dict[str, Any] = {"devices": device.describe_gpus()}
     say(found)
     parts: dict[str, Callable[[], Any]] = {
         "second start": lambda: second_start(sizes),

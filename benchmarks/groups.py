@@ -13,7 +13,7 @@ import time
 import numba
 
 from airflock.engine import cpu, plan_of
-from airflock.engine.tables import tables
+from airflock.engine.tables import world_tables
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
@@ -46,9 +46,9 @@ def timed(scenario: Scenario, grid: bool) -> float:
     """Processor seconds of a flight that is compiled already."""
     plan = plan_of(scenario, grid=grid)
     assert plan.grid == grid
-    table = tables(scenario, plan, 1)
+    table = world_tables(scenario, plan, 1)
     begun = time.process_time()
-    cpu.fly(plan, table)
+    cpu.fly_on_cpu(plan, table)
     return time.process_time() - begun
 
 

@@ -44,9 +44,9 @@ ROWS = {
 
 def child() -> None:
     """Fly what standard input names (preset, settings, seed or none), and answer with seconds; one line each."""
-    from airflock.engine.cpu import fly
+    from airflock.engine.cpu import fly_on_cpu
     from airflock.engine.simulate import plan_of
-    from airflock.engine.tables import tables
+    from airflock.engine.tables import world_tables
     from airflock.scenarios.files import load, presets
     from airflock.support.errors import ScenarioError
 
@@ -63,10 +63,10 @@ def child() -> None:
             except ScenarioError:
                 scenario = load(preset, {key: value for key, value in settings.items() if "." not in key})
             plan = plan_of(scenario)
-            ready[key] = plan, tables(scenario, plan, *(seed or [1]))
-            fly(*ready[key])  # compiled, and loaded into the caches
+            ready[key] = plan, world_tables(scenario, plan, *(seed or [1]))
+            fly_on_cpu(*ready[key])  # compiled, and loaded into the caches
         begun = time.process_time()
-        fly(*ready[key])
+        fly_on_cpu(*ready[key])
         print(time.process_time() - begun, flush=True)
 
 

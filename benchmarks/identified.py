@@ -23,14 +23,14 @@ from scipy.stats import ttest_ind, ttest_rel
 
 import airflock
 from airflock.engine import score_flights
-from airflock.estimate.identify import body, packets, periods, sensors, synthetic
-from airflock.estimate.identify.logs import Logs
-from airflock.estimate.identify.run import identify
-from airflock.support.many_tests import holm
+from airflock.estimate.identification import body, packets, periods, sensors, synthetic
+from airflock.estimate.identification.logs import FlightLogs
+from airflock.estimate.identification.run import identify
+from airflock.support.many_tests import holm_correction
 
 PRESET, DRONES, SECONDS, STEP, GROUND = "vasarhelyi_2018/real_6ms", 10, 300.0, 0.05, 120.0
 SAME = {"agents": DRONES, "duration": SECONDS, "radio.kind": "links", "radio.range": 250.0}
-LOGGER = synthetic.Disturbed(white=0.1, stamp_jitter=0.02)
+LOGGER = synthetic.LogDisturbance(white=0.1, stamp_jitter=0.02)
 SEEDS = range(60)
 NEVER = 60.0  # m/s²; no command of these fleets asks for so much
 NEAR = 10.0  # m; nearer than any distance at which packets of these fleets begin to be lost
@@ -41,7 +41,7 @@ def logs_of(seed, **changed):
     generator, numbers = truth(seed)
     scenario = airflock.load(PRESET, {**SAME, "metrics.period": STEP, **numbers, **changed})
     logs, heard, _ = synthetic.fly_logs(scenario, seed, LOGGER, generator)
-    ground = synthetic.stand(seed + 1_000_000, DRONES, GROUND, scenario.sensors, LOGGER, generator)
+    ground = synthetic.standing_logs(seed + 1_000_000, DRONES, GROUND, scenario.sensors, LOGGER, generator)
     return scenario, joined(ground, logs), heard
 
 
@@ -51,7 +51,7 @@ def joined(ground, logs):
     parts = {name: np.concatenate([getattr(each, name) for each in (before, logs)])
              for name in ("time", "position", "velocity", "command", "who", "new", "standing")}  # fmt: skip
     order = np.argsort(parts["who"], kind="stable")
-    return Logs(**{name: values[order] for name, values in parts.items()}, names=logs.names)
+    return FlightLogs(**{name: values[order] for name, values in parts.items()}, names=logs.names)
 
 
 def flown(seed):
@@ -83,7 +83,7 @@ def silent(seed):
     walk = scenario.sensors.noise * scenario.sensors.damping
     ahead = replace(logs, velocity=logs.command + generator.normal(0.0, 0.05, logs.command.shape))
     period = scenario.sensors.period
-    short = synthetic.stand(seed, 2, 10.0, scenario.sensors, LOGGER, generator)
+    short = synthetic.standing_logs(seed, 2, 10.0, scenario.sensors, LOGGER, generator)
     slow = logs_of(seed, **{"metrics.period": period})[1]
     one_way = heard[heard["receiver"] < heard["sender"]]
     near = heard[heard["distance"] < NEAR]
@@ -106,7 +106,7 @@ def judged(rows):
     for test, at in (("Welch", 2), ("pairs", 4)):
         for row in rows:
             name, far = max(((name, found[at]) for name, found in row["scores"].items()), key=lambda each: abs(each[1]))
-            least = min(holm([found[at + 1] for found in row["scores"].values()]))
+            least = min(holm_correction([found[at + 1] for found in row["scores"].values()]))
             held &= least > 0.05 and abs(far) < 3.0
             refused = ", ".join(row["refused"])
             print(f"{test}: {row['seed']}: farthest {name} {far:+.1f}; least p {least:.2g}; refused {refused}")

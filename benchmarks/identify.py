@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 import airflock
-from airflock.estimate.identify import body, packets, sensors, synthetic
-from airflock.estimate.identify.hills import LINKS
+from airflock.estimate.identification import body, packets, sensors, synthetic
+from airflock.estimate.identification.hills import CURVE_PARAMETERS
 
 KEYS = {"tau": "body.tau", "a_max": "body.a_max", "noise": "body.noise"}
 
@@ -39,28 +39,28 @@ def fleet(seed, white, rate, duration, only_body):
         "metrics.period": 1 / rate,
     }
     scenario = airflock.load("vasarhelyi_2018/real_6ms", {**extra, **numbers})
-    logger = synthetic.Disturbed(white=white, stamp_jitter=0.02)
+    logger = synthetic.LogDisturbance(white=white, stamp_jitter=0.02)
     logs, heard, _ = synthetic.fly_logs(scenario, seed, logger, generator)
     begin = time.process_time()
     walk = scenario.sensors.noise * scenario.sensors.damping
     if not only_body:
-        ground = synthetic.stand(seed + 1_000_000, 10, 120.0, scenario.sensors, logger, generator)
+        ground = synthetic.standing_logs(seed + 1_000_000, 10, 120.0, scenario.sensors, logger, generator)
         still = sensors.fit_sensors(ground, scenario.sensors.period)
         walk = still.value["noise"] * still.value["damping"]
     middle = time.process_time()
     found = body.fit_body(logs, scenario.flight.dt, walk)
     row = {
-        "seed": seed, "saturated": found.saturated, "gain": found.gain, "second_tau": found.second_tau,
-        "white": found.value["white"], "dead_time": found.dead_time,
+        "seed": seed, "saturated": found.saturated_rows, "gain": found.gain, "second_tau": found.second_tau,
+        "white": found.value["white"], "dead_time": found.command_delay,
     }  # fmt: skip
-    rows = {key: (found.value[n], found.interval[n], found.refused.get(n, "")) for n, key in KEYS.items()}
+    rows = {key: (found.value[n], found.intervals[n], found.refused.get(n, "")) for n, key in KEYS.items()}
     row["seconds_body"] = time.process_time() - middle
     if not only_body:
-        rows["sensors.noise"] = still.value["noise"], still.interval["noise"], still.refused.get("noise", "")
+        rows["sensors.noise"] = still.value["noise"], still.intervals["noise"], still.refused.get("noise", "")
         late = packets.fit_delay(heard)
         rows["radio.delay"] = late.value, late.interval, late.reason
         links = packets.fit_links(heard, scenario.sensors.period, scenario.radio)
-        rows |= {f"radio.{n}": (links.value[n], links.interval[n], links.refused.get(n, "")) for n in LINKS}
+        rows |= {f"radio.{n}": (links.value[n], links.intervals[n], links.refused.get(n, "")) for n in CURVE_PARAMETERS}
         row["seconds"] = time.process_time() - begin
     for key, (value, (low, high), reason) in rows.items():
         row |= {

@@ -18,15 +18,15 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 import airflock
-from airflock.certificates.chance import index_of, indices
-from airflock.certificates.limit import read
+from airflock.certificates.chance import reliability_index, reliability_indices
+from airflock.certificates.limit import parse_limit
 from airflock.search.cmaes import CMAES
-from airflock.search.safe import allowed, safe_first
+from airflock.search.safe import allowed_probability, rank_by_excess
 
 AXES, SD, GENERATIONS, POPULATION, FLIGHTS = 11, 1.5, 300, 24, 2
 SCENARIO = airflock.load("vasarhelyi_2018/6ms")
-LIMIT = read("r_min<3 at 0.01/h", SCENARIO)
-ASKED = index_of(allowed(LIMIT, SCENARIO) / 10.0)
+LIMIT = parse_limit("r_min<3 at 0.01/h", SCENARIO)
+ASKED = reliability_index(allowed_probability(LIMIT, SCENARIO) / 10.0)
 
 
 def distance(points):
@@ -47,9 +47,9 @@ def searched(how, seed):
         near = distance(points)[:, None] + SD * dice.standard_normal((POPULATION, FLIGHTS))
         good = fitness(points)[:, None] * np.where(near < LIMIT.value, 0.3, 1.0)
         losses = -(good * (1.0 + 0.05 * dice.standard_normal(near.shape))).mean(axis=1)
-        short = ASKED - indices(LIMIT, [[{"r_min": x} for x in row] for row in near])
+        short = ASKED - reliability_indices(LIMIT, [[{"r_min": x} for x in row] for row in near])
         if how == "first":
-            losses = safe_first(losses[:, None], np.maximum(short, 0.0))[:, 0]
+            losses = rank_by_excess(losses[:, None], np.maximum(short, 0.0))[:, 0]
         elif how == "lagrange":
             lagrange = lagrange or AugmentedLagrangian(AXES)
             if not lagrange.is_initialized:
@@ -70,7 +70,10 @@ def main():
     runs = parser.parse_args().runs
     room = {"type": "ineq", "fun": lambda point: distance(point) - LIMIT.value - ASKED * SD}
     best = minimize(lambda p: -fitness(p), np.full(AXES, 0.5), constraints=[room], bounds=[(0.0, 1.0)] * AXES)
-    print(f"asked {norm.sf(ASKED):.2g}, allowed {allowed(LIMIT, SCENARIO):.2g}; the safe optimum has {-best.fun:.3f}")
+    print(
+        f"asked {norm.sf(ASKED):.2g}, allowed {allowed_probability(LIMIT, SCENARIO):.2g}; "
+        f"the safe optimum has {-best.fun:.3f}"
+    )
     warnings.simplefilter("ignore")
     for how in ("none", "first", "lagrange"):
         chances, found = zip(*(searched(how, seed) for seed in range(runs)), strict=True)

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from airflock.engine import score_flights
-from airflock.runs.folder import read
+from airflock.runs.folder import read_toml_file
 from airflock.runs.space import with_parameters
-from airflock.runs.store import Batch, Store
-from airflock.scenarios.making import make
-from airflock.search.racing import still_needed
+from airflock.runs.store import CandidateBatch, FlightStore
+from airflock.scenarios.making import build_scenario
+from airflock.search.racing import remaining_candidates
 from airflock.search.space_table import read_space
 
 SEEDS, GENERATIONS, FIRST = 4, (0, 3, 10, 30, 100), 4_000_000_000
@@ -26,7 +26,7 @@ def race(values, seeds):
     for seen in range(1, seeds + 1):
         flown[alive] = seen
         told = [row[:count].tolist() for row, count in zip(values, flown, strict=True)]
-        alive = still_needed(told, alive, seeds - seen, True)
+        alive = remaining_candidates(told, alive, seeds - seen, True)
     means = np.array([row[:count].mean() for row, count in zip(values, flown, strict=True)])
     return flown.sum(), better(means)
 
@@ -39,13 +39,13 @@ def better(means):
 def main():
     """One row for each generation and number of seeds."""
     folder = Path(sys.argv[1])
-    scenario = make(read(folder / "study.toml")["scenario"], str(folder))
-    space, _ = read_space(read(folder / "study.toml")["space"], scenario)
+    scenario = build_scenario(read_toml_file(folder / "study.toml")["scenario"], str(folder))
+    space, _ = read_space(read_toml_file(folder / "study.toml")["space"], scenario)
     print("| generation | seeds | median fitness | flights saved | of the better half kept |")
     print("|---|---|---|---|---|")
-    with Store(folder, write=False) as store:
+    with FlightStore(folder, write=False) as store:
         for generation in GENERATIONS:
-            points = store.asked(Batch("search", 0, generation))
+            points = store.asked(CandidateBatch("search", 0, generation))
             if not points:
                 continue
             varied = [with_parameters(scenario, space.parameters(point)) for point in points]

@@ -40,8 +40,8 @@ def begin(sizes: Callable[..., Any] = SimpleNamespace) -> Any:
     from airflock.engine.cuda import crowd, launch, memory
     from airflock.support import gpu as device
 
-    device.trouble = lambda: None
-    device.describe = lambda: [{"name": "rehearsal"}]
+    device.unavailable_reason = lambda: None
+    device.describe_gpus = lambda: [{"name": "rehearsal"}]
     for module in (device, launch, crowd):
         module.required = lambda simulated=False: None
         module.free_memory = lambda: 10**9

@@ -23,11 +23,11 @@ import numpy as np
 from c_reference import Reference
 from trial import Trial
 
-from airflock.engine import fly, score_flight, score_flights
+from airflock.engine import fly_world, score_flight, score_flights
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.support.machine import vector_bits
-from airflock.support.threads import cores
+from airflock.support.threads import available_cores
 
 PRESET, LINKS = "vasarhelyi_2018/4ms", "vasarhelyi_2018/real_gnss"
 SEEDS = (1, 2, 3)  # flights of one round on one thread
@@ -96,7 +96,7 @@ def pairs(scenario: Scenario, folder: Path, bits: int, many: int, trial: Path | 
             1.15, one,
         ),
         Pair(
-            f"all {cores()} cores, float32, {many} flights",
+            f"all {available_cores()} cores, float32, {many} flights",
             lambda: score_flights([scenario] * many, list(range(1, many + 1))),
             lambda: c.evaluate_many(1, many), 1.3, many, time.perf_counter,
         ),
@@ -123,7 +123,7 @@ def agreement(scenario: Scenario, folder: Path, bits: int, seeds: int) -> dict[s
     for preset, precision, seconds, margin in tried:
         short = load(preset, {"duration": seconds})
         frames, _ = Reference(short, folder, bits=precision, vector_bits=bits).frames(1)
-        flown = fly(short, 1, precision=precision, record=True)
+        flown = fly_world(short, 1, precision=precision, record=True)
         apart, what = float(np.abs(frames - flown.frames[:, :4]).max()), "" if preset == PRESET else "two lossy links, "
         name = f"{what}float{precision}, first {seconds:g} s"
         found[name] = {"apart": apart, "margin": margin, "holds": apart <= margin}
@@ -153,7 +153,7 @@ def machine(bits: int) -> dict[str, object]:
     import numba
 
     return {
-        "processor": cpu, "cores": cores(), "compiler": version.splitlines()[0],
+        "processor": cpu, "cores": available_cores(), "compiler": version.splitlines()[0],
         "flags": " ".join(c_reference.flags(bits)), "c_vector_bits": bits, "airflock_vector_bits": vector_bits(),
         "numba": numba.__version__, "python": platform.python_version(), "commit": commit.strip(),
     }  # fmt: skip
@@ -200,7 +200,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         result = {"machine": machine(bits), "agreement": agreement(scenario, folder, bits, 8 if given.quick else 20)}
-        found = pairs(scenario, folder, bits, 4 * cores(), given.trial)
+        found = pairs(scenario, folder, bits, 4 * available_cores(), given.trial)
         for pair in found:
             pair.measure(max(1, given.rounds))
     rows = [pair.row() for pair in found]

@@ -17,10 +17,10 @@ import numpy as np
 from scipy.stats import beta
 
 from airflock import __version__
-from airflock.certificates.branches import REPETITIONS, begun, falls, sample_period
-from airflock.certificates.counting import BATCH
-from airflock.certificates.splitting import estimate
-from airflock.runs.store import Store
+from airflock.certificates.branches import REPETITIONS, record_falls, sample_period, start_repetition
+from airflock.certificates.counting import COUNT_BATCH
+from airflock.certificates.splitting import estimate_probability
+from airflock.runs.store import FlightStore
 from airflock.scenarios.files import load
 from airflock.support import atomic
 
@@ -30,8 +30,8 @@ TIMES = 10
 def counted(folder):
     """Seeds of the flights of a campaign in their order, and smallest distances (m) at samples and at motion steps."""
     wanted = "seed, json_extract(scores, '$.r_min'), json_extract(scores, '$.closest')"
-    with Store(folder, write=False) as store:
-        rows = store.rows(f"SELECT {wanted} FROM flight WHERE stage=? ORDER BY repeat", (BATCH.stage,))
+    with FlightStore(folder, write=False) as store:
+        rows = store.rows(f"SELECT {wanted} FROM flight WHERE stage=? ORDER BY repeat", (COUNT_BATCH.stage,))
     return [int(own) for own, _, _ in rows], [r for _, r, _ in rows], [r if c is None else c for _, r, c in rows]
 
 
@@ -52,7 +52,7 @@ class Flown:
         """How the smallest distance fell in each flight."""
         for lineage in lineages:
             if lineage not in self.known:
-                self.known[lineage] = falls(self.scenario, lineage)
+                self.known[lineage] = record_falls(self.scenario, lineage)
         return [self.known[lineage] for lineage in lineages]
 
 
@@ -63,11 +63,11 @@ def repeated(scenario, seeds, least, targets, number):
         began, runs = time.process_time(), []
         for k in range(REPETITIONS):
             mine, rng = slice(k * share, (k + 1) * share), np.random.default_rng([number, k])
-            runs.append(begun(seeds[mine], least[mine], target, fly, period, rng))
-        found = estimate(runs, target, least)
+            runs.append(start_repetition(seeds[mine], least[mine], target, fly, period, rng))
+        found = estimate_probability(runs, target, least)
         rows[target] = {
             "probability": found.probability, "low": found.low, "high": found.high, "refused": found.refused,
-            "runs": [run.probability(target) for run in runs], "ancestors": [run.ancestors for run in runs],
+            "runs": [run.probability(target) for run in runs], "ancestors": [run.ancestor_count for run in runs],
             "flights": sum(run.flights for run in runs), "seconds": time.process_time() - began,
             "airflock": __version__,
         }  # fmt: skip
@@ -91,7 +91,7 @@ def main():
         if not all(path.is_file() for path in paths.values()):
             part = slice(number * share, (number + 1) * share)
             for target, row in repeated(scenario, seeds[part], least[part], asked.limits, number).items():
-                atomic.write(paths[target], json.dumps(row))
+                atomic.write_file(paths[target], json.dumps(row))
         for target, path in paths.items():
             found[target].append(json.loads(path.read_text()))
     for target, rows in found.items():

@@ -64,15 +64,15 @@ def receive(address):
 def opened(name, settings, links, against=None):
     """A page that flies in a thread, with a client and a counter of frames."""
     from airflock.studio.flights import FlightRequest
-    from airflock.studio.page import Page
+    from airflock.studio.page import FlightPage
     from airflock.studio.player import Player
-    from airflock.studio.view import View
+    from airflock.studio.view import BrowserView
 
-    player = Player(FlightRequest(name, settings, 1, against=against))
+    player = Player(FlightRequest(name, settings, 1, compared_with=against))
     player.start()
-    view = View("127.0.0.1", 0, player.where)
-    page = Page(player, view)
-    page.drawing.links, page.drawn = links, 0
+    view = BrowserView("127.0.0.1", 0, player.where)
+    page = FlightPage(player, view)
+    page.scene.links, page.drawn = links, 0
     draw = page.frame
 
     def counted(chart):

@@ -19,10 +19,10 @@ import numpy as np
 from cma.fitness_models import LQModel, SurrogatePopulation, kendall_tau
 
 from airflock.engine import score_flights
-from airflock.runs.folder import read
+from airflock.runs.folder import read_toml_file
 from airflock.runs.space import with_parameters
-from airflock.runs.store import Batch, Store
-from airflock.scenarios.making import make
+from airflock.runs.store import CandidateBatch, FlightStore
+from airflock.scenarios.making import build_scenario
 from airflock.search.cmaes import CMAES
 from airflock.search.space_table import read_space
 
@@ -83,9 +83,9 @@ class LqCMAES(CMAES):
 def generations(folder):
     """Points (candidate, axis) and losses (candidate, repeat) of each generation."""
     found = []
-    with Store(folder, write=False) as store:
-        while points := store.asked(Batch("search", 0, len(found))):
-            rows = store.flown(Batch("search", 0, len(found)))
+    with FlightStore(folder, write=False) as store:
+        while points := store.asked(CandidateBatch("search", 0, len(found))):
+            rows = store.flown(CandidateBatch("search", 0, len(found)))
             repeats = 1 + max(repeat for _, repeat in rows)
             losses = [[-rows[i, r]["fitness"] for r in range(repeats)] for i in range(len(points))]
             found.append((np.array(points), np.array(losses)))
@@ -126,8 +126,8 @@ def halves(losses):
 
 def flown(folder, points, flights):
     """Mean loss of fresh flights of candidates at these points."""
-    scenario = make(read(folder / "study.toml")["scenario"], str(folder))
-    space, _ = read_space(read(folder / "study.toml")["space"], scenario)
+    scenario = build_scenario(read_toml_file(folder / "study.toml")["scenario"], str(folder))
+    space, _ = read_space(read_toml_file(folder / "study.toml")["space"], scenario)
     candidates = [with_parameters(scenario, space.parameters(point)) for point in points]
     seeds = [FIRST + i for i in range(flights)]
     rows = score_flights([s for s in candidates for _ in seeds], seeds * len(candidates), threads=1)

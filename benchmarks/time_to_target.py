@@ -26,13 +26,13 @@ from airflock import __version__
 from airflock.engine import score_flight, score_flights
 from airflock.runs.folder import open_folder
 from airflock.runs.space import with_parameters
-from airflock.runs.store import Batch, Store
+from airflock.runs.store import CandidateBatch, FlightStore
 from airflock.scenarios.files import load
 from airflock.search import search
-from airflock.search.intervals import interval
-from airflock.search.optimisers import optimiser
-from airflock.search.run import executor_for, run
-from airflock.search.search import averaged
+from airflock.search.intervals import mean_interval
+from airflock.search.optimisers import make_optimiser
+from airflock.search.run import run_study, study_executor
+from airflock.search.search import averaged_means
 from airflock.search.search_table import FAST
 from airflock.search.study import load_study
 from airflock.support import atomic
@@ -71,7 +71,7 @@ def lq_optimiser(algorithm, dimension, objectives, population, seed, *, spread, 
 
 def flown(folder, whole, where=""):
     """Cost of a study, or of a part of it, in whole flights."""
-    with Store(folder, write=False) as store:
+    with FlightStore(folder, write=False) as store:
         rows = store.rows(
             "SELECT json_extract(c.parameters, '$.duration'), count(*) FROM flight f "
             f"JOIN candidate c USING (stage, run, generation, candidate) {where} GROUP BY 1"
@@ -83,12 +83,12 @@ def searched(what, seed, folder):
     """Fly a search from its beginning; its winner, processor time (s) and cost."""
     shutil.rmtree(folder, ignore_errors=True)  # of one that was cut off: its processor time is not known
     study = study_of(what, seed)
-    executor = executor_for(study, threads=1)
-    search.optimiser = lq_optimiser if "lq" in what else optimiser
+    executor = study_executor(study, threads=1)
+    search.make_optimiser = lq_optimiser if "lq" in what else make_optimiser
     score_flight(study.scenario, 0)
     open_folder(folder, study, resume=False)
     begin = time.process_time()
-    result = run(study, folder, executor)
+    result = run_study(study, folder, executor)
     seconds = time.process_time() - begin
     return {
         "search": what, "seed": seed, "seconds": seconds, "flights": flown(folder, study.scenario.flight.duration),
@@ -99,19 +99,19 @@ def searched(what, seed, folder):
 def curve(what, seed, folder):
     """(whole flights, difference to Table S1 at coarse steps) of the average of a search's means so far."""
     study, points, means, cost = study_of(what, seed), [], [], 0.0
-    state = optimiser("cmaes", len(study.space.axes), 1, study.population(0), study.whole("seed") << 16)
+    state = make_optimiser("cmaes", len(study.space.axes), 1, study.population(0), study.whole("seed") << 16)
     seeds = [CURVE_FIRST + i for i in range(CURVE)]
     known = fitness(study.scenario, seeds)
-    with Store(folder, write=False) as store:
+    with FlightStore(folder, write=False) as store:
         for generation in range(study.whole("generations")):
-            asked, batch = state.ask(), Batch("search", 0, generation)
+            asked, batch = state.ask(), CandidateBatch("search", 0, generation)
             rows = [scores["fitness"] for _, scores in sorted(store.flown(batch).items())]
             state.tell(asked, -np.array(rows).reshape(len(asked), -1).mean(axis=1)[:, None])
             where = f"WHERE f.stage = 'search' AND f.generation = {generation}"
             spent = flown(folder, study.scenario.flight.duration, where)
             means = means if spent < len(asked) else [*means, np.clip(state.centre(), 0.0, 1.0)]
             if means and (cost + spent) // STEP > cost // STEP:
-                varied = with_parameters(study.scenario, study.space.parameters(averaged(means, 1)[0]))
+                varied = with_parameters(study.scenario, study.space.parameters(averaged_means(means, 1)[0]))
                 points.append((cost + spent, float((fitness(varied, seeds) - known).mean())))
             cost += spent
     return points
@@ -132,7 +132,7 @@ def judged(name, parameters, known, flights):
 def spans(judged, other):
     """Mean difference of two sets, SD and 95 % interval, one pair for each seed of the judge that both have flown."""
     pairs = min(len(judged), len(other))
-    return interval((np.array(judged[:pairs]) - np.array(other[:pairs])).tolist())
+    return mean_interval((np.array(judged[:pairs]) - np.array(other[:pairs])).tolist())
 
 
 def table(folder):
@@ -166,7 +166,7 @@ def together(what, rows, known, studies):
     for other, fitness in others.items():
         less = np.array([row["judged"] for row in rows]) - np.array(fitness)
         for name, values in (("flights", less.mean(axis=0)), ("runs", less.mean(axis=1))):
-            mean, _, low, high = interval(values.tolist())
+            mean, _, low, high = mean_interval(values.tolist())
             print(f"less {other}, interval over {name}: {mean:+.4f} ({low:+.4f} to {high:+.4f})\n")
 
 
@@ -181,7 +181,7 @@ def curves(folder, what):
             continue
         if "curve" not in row:
             row["curve"] = curve(what, row["seed"], folder / f"study_{path.stem}")
-            atomic.write(path, json.dumps(row))
+            atomic.write_file(path, json.dumps(row))
         found.append(row)
     figure, axes = plt.subplots(figsize=(6.0, 3.6), layout="constrained")
     for row in found:
@@ -223,7 +223,7 @@ def main():
             name: judged(place, {}, known.get(name, []), asked.flights)
             for name, place in (("S1", NAME), ("full", FULL))
         }
-        atomic.write(asked.folder / KNOWN, json.dumps(known))
+        atomic.write_file(asked.folder / KNOWN, json.dumps(known))
         first, _, end = asked.seeds.partition(":")
         for seed in range(int(first), int(end) if end else int(first) + 1):
             for number, what in enumerate(SEARCHES):
@@ -231,9 +231,9 @@ def main():
                     continue
                 path = asked.folder / f"{number}_{seed}.json"
                 row = read(path) or searched(what, seed, asked.folder / f"study_{number}_{seed}")
-                atomic.write(path, json.dumps(row))
+                atomic.write_file(path, json.dumps(row))
                 row["judged"] = judged(NAME, row["parameters"], row.get("judged", []), asked.flights)
-                atomic.write(path, json.dumps(row))
+                atomic.write_file(path, json.dumps(row))
     table(asked.folder)
 
 

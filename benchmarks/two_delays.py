@@ -18,8 +18,8 @@ import numpy as np
 from airflock.engine import score_flights
 from airflock.runs.folder import open_folder
 from airflock.runs.space import with_parameters
-from airflock.search.intervals import interval
-from airflock.search.run import executor_for, run
+from airflock.search.intervals import mean_interval
+from airflock.search.run import run_study, study_executor
 from airflock.search.study import load_study
 from airflock.support import atomic
 
@@ -39,7 +39,7 @@ def studies(search):
 def evolved(folder, study):
     """Parameters of a study's winner; a study that was cut off is continued."""
     open_folder(folder, study, resume=(folder / "study.toml").is_file())
-    return run(study, folder, executor_for(study, threads=1)).parameters
+    return run_study(study, folder, study_executor(study, threads=1)).parameters
 
 
 def judged(scenario, parameters, pairs):
@@ -65,7 +65,7 @@ def main():
         if not path.is_file():
             parameters = evolved(asked.folder / f"study_{number}", study)
             told = {"parameters": parameters, "judged": [judged(each, parameters, pairs) for each in scenarios]}
-            atomic.write(path, json.dumps(told))
+            atomic.write_file(path, json.dumps(told))
         rows[what] = np.array(json.loads(path.read_text())["judged"])
     told = " | ".join(f"fitness at {delay:g} s | P(r_min < 3 m) at {delay:g} s" for delay in DELAYS)
     print(f"| evolved at | {told} | against 0.4 s, at 0.4 s (95 %) | against 0.4 s, at 1 s (95 %) |")
@@ -73,7 +73,7 @@ def main():
     for what, table in rows.items():
         cells = [f"{table[i, 0].mean():.4f} | {(table[i, 1] < 3.0).mean():.3f}" for i in range(2)]
         for i in range(2):
-            mean, _, low, high = interval((table[i, 0] - rows["0.4 s"][i, 0]).tolist())
+            mean, _, low, high = mean_interval((table[i, 0] - rows["0.4 s"][i, 0]).tolist())
             cells.append(f"{mean:+.4f} ({low:+.4f} to {high:+.4f})")
         print(f"| {what} | {' | '.join(cells)} |")
 

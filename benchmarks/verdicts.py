@@ -18,7 +18,7 @@ def _slower(found: dict[str, Any], flocks: int) -> float:
 
 def rows(sizes: Any) -> list[Row]:
     """All rows for these sizes."""
-    full, few = sizes.saturated, sizes.generation
+    full, few = sizes.saturated_rows, sizes.generation
     count = sizes.generation * sizes.generations
     return [
         (f"evaluations per second, {full} flocks, against CUDA C", ">= 0.92, aim 1",

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from airflock.search.genetic import BinaryGenetic, decode, genetic
+from airflock.search.genetic import BinaryGenetic, decode, minimise_over_bits
 from airflock_papers.breaks import in_words
 from airflock_papers.dimock_2003.flights import Birds, Start, Task, holds_vee, in_row, spacing
 from airflock_papers.dimock_2003.ga import (
@@ -129,7 +129,7 @@ def exploited(seeds: int = 3, first: int = 1) -> None:
         for seed in range(first, first + seeds):
             run = Run(FIRST, seed)
             losses = losses_of(Birds(changes={"model.v_max": v}), run)
-            genetic(lambda bits, of=losses: of(decode(bits)), 50, seed=seed)
+            minimise_over_bits(lambda bits, of=losses: of(decode(bits)), 50, seed=seed)
             half = len(run.rows) // 2
             parts = [[row for k_d, row in part if k_d >= GREEDY] for part in (run.rows, run.rows[half:])]
             whole, second = (f"{np.mean(part):.0%} of {len(part)}" if part else "none" for part in parts)

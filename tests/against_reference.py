@@ -54,21 +54,21 @@ def compared(draw: Draw) -> Verdict:
     return Verdict(frames, values, (max(EXACT, CHAOS * chaos[0]), max(EXACT, CHAOS * chaos[1])), moved)
 
 
-def interpreted_flight(draw: Draw) -> cpu.Flown:
+def interpreted_flight(draw: Draw) -> cpu.DriverResult:
     """The flight by the text of its driver, every line of it."""
-    scenario = draw.scenario.in_flight(draw.seed)
-    plan = plan_of(scenario, precision=64, record=True, grid=False).built(given_start=draw.start is not None)
+    scenario = draw.scenario.with_drawn_scene(draw.seed)
+    plan = plan_of(scenario, precision=64, keep_frames=True, grid=False).built(given_start=draw.start is not None)
     with_all_lines = interpreted.flight_driver(plan, exact=True)
     with patch.object(cpu, "driver_of", lambda plan, device="cpu": with_all_lines):
-        return cpu.fly(plan, tables(scenario, plan, draw.seed), draw.start, "python")
+        return cpu.fly_on_cpu(plan, tables(scenario, plan, draw.seed), draw.start, "python")
 
 
-def reference_flight(draw: Draw) -> cpu.Flown:
+def reference_flight(draw: Draw) -> cpu.DriverResult:
     """The same by the reference."""
     return fly_plainly(draw.scenario, draw.seed, draw.start)
 
 
-def _attempt(flight: Any, draw: Draw) -> tuple[cpu.Flown | None, str]:
+def _attempt(flight: Any, draw: Draw) -> tuple[cpu.DriverResult | None, str]:
     """A flight, or what it raised: a rule may divide by zero in plain Python, where a driver says inf."""
     try:
         return flight(draw), ""
@@ -76,12 +76,12 @@ def _attempt(flight: Any, draw: Draw) -> tuple[cpu.Flown | None, str]:
         return None, type(fault).__name__
 
 
-def _start(flown: cpu.Flown, draw: Draw) -> np.ndarray:
+def _start(flown: cpu.DriverResult, draw: Draw) -> np.ndarray:
     """Where a flight began, (component, agent)."""
     return draw.start if draw.start is not None else flown.frames[0, : 2 * draw.scenario.dimensions]
 
 
-def _nudged(draw: Draw, flown: cpu.Flown) -> Draw:
+def _nudged(draw: Draw, flown: cpu.DriverResult) -> Draw:
     start = _start(flown, draw).copy()
     start[: draw.scenario.dimensions] += NUDGE * np.random.default_rng(0).choice(
         (-1.0, 1.0), start[: draw.scenario.dimensions].shape
@@ -89,7 +89,7 @@ def _nudged(draw: Draw, flown: cpu.Flown) -> Draw:
     return draw._replace(start=start)
 
 
-def _apart(one: cpu.Flown, other: cpu.Flown) -> tuple[float, float]:
+def _apart(one: cpu.DriverResult, other: cpu.DriverResult) -> tuple[float, float]:
     """Largest difference of frames and states, and of order parameters; inf where one has what the other lacks."""
     if one.frames.shape != other.frames.shape or one.values.keys() != other.values.keys():
         return np.inf, np.inf

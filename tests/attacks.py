@@ -6,12 +6,12 @@ python tests/attacks.py 1000000 7
 import random
 import sys
 
-from airflock.drones.mavlink.signing import EPOCH, LAST_STAMP, Receiver, Signer
-from airflock.drones.mavlink.status import MESSAGE, Status, message
-from airflock.support.coordinates import Site
+from airflock.drones.mavlink.signing import MAX_STAMP, SIGNING_EPOCH, PacketReceiver, PacketSigner
+from airflock.drones.mavlink.status import STATUS_MESSAGE, DroneStatus, status_message
+from airflock.support.coordinates import FlightSite
 
 KEY, NOW = bytes(range(32)), 1_800_000_000_000_000
-SITE = Site(47.5, 19.0, 120.0)
+SITE = FlightSite(47.5, 19.0, 120.0)
 KINDS = (
     "random", "random after a header", "mutated", "unsigned", "wrong key", "replayed", "own id", "stranger", "old",
     "future", "lock-out", "poisoned time", "MAVLink 1",
@@ -21,16 +21,16 @@ KINDS = (
 def attacks(count, seed):
     """Send this many false datagrams and a genuine one before every fiftieth; how many were accepted, and crashes."""
     rng = random.Random(seed)
-    receiver = Receiver(KEY, 1, {MESSAGE: range(2, 60)}, started=NOW - 10**7)
-    genuine, wrong = Signer(KEY, 7), Signer(bytes(32), 7)
-    told, seen, utc = Status(NOW, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0), 1.0, 6, True, 7, b"card"), [], NOW
+    receiver = PacketReceiver(KEY, 1, {STATUS_MESSAGE: range(2, 60)}, started=NOW - 10**7)
+    genuine, wrong = PacketSigner(KEY, 7), PacketSigner(bytes(32), 7)
+    told, seen, utc = DroneStatus(NOW, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0), 1.0, 6, True, 7, b"card"), [], NOW
     counts = {"sent": 0, "accepted": 0, "crashes": 0, "genuine": 0, "genuine_accepted": 0}
-    plain = bytearray(genuine(message(told, SITE), NOW - 10**6))
+    plain = bytearray(genuine(status_message(told, SITE), NOW - 10**6))
     plain[2] = 0
     for k in range(count):
         utc += 1000
         if k % 50 == 0:
-            frame = genuine(message(told, SITE), utc)
+            frame = genuine(status_message(told, SITE), utc)
             counts["genuine"] += 1
             counts["genuine_accepted"] += receiver(frame, utc) is not None
             seen = [*seen[-50:], frame]
@@ -50,7 +50,7 @@ def attacks(count, seed):
 
 def false_datagram(kind, rng, seen, wrong, told, utc, unsigned):
     """One datagram that must not be accepted."""
-    last, packet = seen[-1], message(told, SITE)
+    last, packet = seen[-1], status_message(told, SITE)
     if kind == "random":
         return rng.randbytes(rng.randrange(0, 300))
     if kind == "random after a header":
@@ -58,18 +58,18 @@ def false_datagram(kind, rng, seen, wrong, told, utc, unsigned):
     if kind == "mutated":
         return mutated(last, rng)
     if kind == "lock-out":
-        return last[:-12] + LAST_STAMP.to_bytes(6, "little") + rng.randbytes(6)
+        return last[:-12] + MAX_STAMP.to_bytes(6, "little") + rng.randbytes(6)
     if kind == "MAVLink 1":
         return b"\xfe" + last[1:]
     made = {
         "unsigned": lambda: unsigned,
         "wrong key": lambda: wrong(packet, utc),
         "replayed": lambda: rng.choice(seen),
-        "own id": lambda: Signer(KEY, 1)(packet, utc),
-        "stranger": lambda: Signer(KEY, 200)(packet, utc),
-        "old": lambda: Signer(KEY, 8)(packet, utc - 60 * 10**6),
-        "future": lambda: Signer(KEY, 8)(packet, utc + 60 * 10**6),
-        "poisoned time": lambda: Signer(KEY, 9)(packet, EPOCH + 10 * (LAST_STAMP - 1)),
+        "own id": lambda: PacketSigner(KEY, 1)(packet, utc),
+        "stranger": lambda: PacketSigner(KEY, 200)(packet, utc),
+        "old": lambda: PacketSigner(KEY, 8)(packet, utc - 60 * 10**6),
+        "future": lambda: PacketSigner(KEY, 8)(packet, utc + 60 * 10**6),
+        "poisoned time": lambda: PacketSigner(KEY, 9)(packet, SIGNING_EPOCH + 10 * (MAX_STAMP - 1)),
     }
     return made[kind]()
 

@@ -40,10 +40,10 @@ def pytest_collection_modifyitems(config, items):
 @pytest.fixture
 def gpu():
     """Skips a test where no GPU can be used; with AIRFLOCK_NEED_GPU set nothing is skipped, and the test fails."""
-    from airflock.support.gpu import trouble
+    from airflock.support.gpu import unavailable_reason
 
-    if trouble() is not None:
-        pytest.skip(f"{trouble()}; AIRFLOCK_NEED_GPU makes this a failure")
+    if unavailable_reason() is not None:
+        pytest.skip(f"{unavailable_reason()}; AIRFLOCK_NEED_GPU makes this a failure")
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from airflock.parts.faults.registry import KINDS
 from airflock.parts.radios.registry import RADIOS
 from airflock.parts.sensors.registry import SENSORS
 from airflock.parts.topologies.registry import TOPOLOGIES
-from airflock.scenarios.making import make
+from airflock.scenarios.making import build_scenario
 from airflock.scenarios.sections import SECTIONS
 from flocks import ISLANDS, NOTCHED, scenario
 
@@ -130,7 +130,7 @@ def held(found):
     numbers = any(group.numbers for group in found.groups) and plan.varied
     differ |= ({("groups", "spread")} if spread else set()) | ({("groups", "numbers")} if numbers else set())
     return {
-        ("sensors", plan.sensor.name if plan.noisy else "perfect"), ("radio", plan.radio.name),
+        ("sensors", plan.sensor.name if plan.has_sensor_error else "perfect"), ("radio", plan.radio.name),
         ("topology", plan.topology.name if plan.topology is not None else "range"), ("body", plan.body.name),
         ("wind", choices(found.wind)["kind"] if plan.windy else "none"),
         *(("faults", kind.name) for kind in plan.faults), *(differ or {("groups", "none")}),
@@ -210,7 +210,7 @@ def flight(made):
         "laws": [{"name": "a", "agents": [1, 4], "model": other}],
     }[made["groups"]]  # fmt: skip
     keys["faults"] = [_fault(kind, place, length) for place, kind in enumerate(made["faults"])]
-    return make({"model": {"kind": law}}, "covering", keys)
+    return build_scenario({"model": {"kind": law}}, "covering", keys)
 
 
 def _sensor(kind, length):

@@ -1,14 +1,14 @@
 """Fleets and cards that several tests fly."""
 
 import airflock
-from airflock.drones.mavlink.orders import new_keys
-from airflock.drones.onboard.card import card_of, hash_of
-from airflock.fleets.lockstep import Fleet
-from airflock.fleets.prepare import card_document
+from airflock.drones.mavlink.orders import new_operator_keys
+from airflock.drones.onboard.card import card_hash, parse_card
+from airflock.fleets.lockstep import LockstepFleet
+from airflock.fleets.prepare import make_card_document
 
 SITE = (47.5, 19.0, 120.0)
 QUIET = {"body.noise": 0.0, "sensors.noise": 0.0}
-PRIVATE, PUBLIC = new_keys()
+PRIVATE, PUBLIC = new_operator_keys()
 
 
 def scenario(agents=3, duration=60.0, noisy=False, **more):
@@ -21,15 +21,15 @@ def document(found, **more):
     """Document of a card without hash."""
     usual = {"site": SITE, "members": range(1, found.agents + 1), "mission": 7, "expires": 1_900_000_000}
     limits = {"tick": 0.2, "status_period": 0.2} | more.pop("safety", {})
-    return card_document(found, **(usual | {"operator": PUBLIC, "margin": 40.0, "safety": limits} | more))
+    return make_card_document(found, **(usual | {"operator": PUBLIC, "margin": 40.0, "safety": limits} | more))
 
 
 def card(found, **more):
     """A checked card."""
     made = document(found, **more)
-    return card_of({**made, "hash": hash_of(made)})
+    return parse_card({**made, "hash": card_hash(made)})
 
 
 def fleet(found, seed=0, start=None, faults=(), **more):
     """A fleet in lock-step."""
-    return Fleet(found, card(found, **more), seed, start=start, faults=faults, operator=PRIVATE)
+    return LockstepFleet(found, card(found, **more), seed, start=start, faults=faults, operator=PRIVATE)

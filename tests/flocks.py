@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from airflock.engine import fly, measure_frames
-from airflock.scenarios.making import make
+from airflock.engine import fly_world, measure_frames
+from airflock.scenarios.making import build_scenario
 
 ISLANDS = [[[-12.0, -10.0], [4.0, -14.0], [2.0, 3.0], [-9.0, 6.0]], [[12.0, 8.0], [20.0, 8.0], [16.0, 17.0]]]
 NOTCHED = [[-45.0, -38.0], [40.0, -38.0], [40.0, 4.0], [2.0, 6.0], [6.0, 44.0], [-45.0, 40.0]]  # an L
@@ -16,7 +16,9 @@ IDEAL = SILENT | {"radio.delay": 0.0, "radio.range": 1e6}  # no noise, everybody
 
 def scenario(kind="vasarhelyi_2018", **settings):
     """Scenario with keys such as world__side = 100."""
-    return make({"model": {"kind": kind}}, "test", {key.replace("__", "."): value for key, value in settings.items()})
+    return build_scenario(
+        {"model": {"kind": kind}}, "test", {key.replace("__", "."): value for key, value in settings.items()}
+    )
 
 
 def ideal(dims=2, **settings):
@@ -28,12 +30,12 @@ def ideal(dims=2, **settings):
 
 def flown(found, seed=0, start=None, precision=64):
     """Frames and order parameters of a compiled flight."""
-    return fly(found, seed, precision=precision, record=True, start=start)
+    return fly_world(found, seed, precision=precision, record=True, start=start)
 
 
 def interpreted(found, seed=0, start=None):
     """The same flight by the same driver text, not compiled: for whatever is no question of compiling."""
-    return fly(found, seed, precision=64, record=True, start=start, device="python")
+    return fly_world(found, seed, precision=64, record=True, start=start, device="python")
 
 
 def measured_plainly(scenario, frames, period, **more):

@@ -2,14 +2,14 @@
 
 from functools import cache
 
-from airflock.engine.text.generate import Source
+from airflock.engine.text.generate import DriverSource
 from inside import HEAD, JIT, load_driver, primitives
 
 
 @cache
 def compiled(rule, bits=64, loop=""):
     """Compiled twin of a rule; `loop` is driver text that calls RULE, and defines `run`, which is returned instead."""
-    source = Source(JIT, {})
+    source = DriverSource(JIT, {})
     name = source.name(rule)
     head = HEAD.format(label=rule.__name__, bits=bits, primitives=primitives(bits))
     called = f"run = njit(**JIT | CALLED)({name}.py_func)"  # of a driver Python calls the last one only

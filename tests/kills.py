@@ -21,14 +21,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import toys
-from airflock.runs.executors.in_process import InProcess
-from airflock.runs.folder import STUDY, open_folder, remove_unfinished, versions
-from airflock.runs.store import FILE, Store
-from airflock.search.search import search
-from airflock.search.winner import conclude
+from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.folder import STUDY_FILE, open_folder, program_versions, remove_unfinished
+from airflock.runs.store import FILE, FlightStore
+from airflock.search.search import run_search
+from airflock.search.winner import conclude_study
 from airflock.support import atomic
 
-RUN, NAMED = versions(), ("result.toml", "best.toml", "study.toml")
+RUN, NAMED = program_versions(), ("result.toml", "best.toml", "study.toml")
 CANDIDATES = "SELECT * FROM candidate"
 FLIGHTS = "SELECT stage, run, generation, candidate, repeat, seed, scores, reason FROM flight"
 MINE = {
@@ -40,12 +40,12 @@ MINE = {
 def evolve(folder):
     """A study of toy flights."""
     study = toys.study(generations=12, seeds=2, restarts=1)
-    open_folder(folder, study, resume=(folder / STUDY).exists())
-    executor = InProcess(toys.slow_bowl, 2)
-    with Store(folder) as store:
+    open_folder(folder, study, resume=(folder / STUDY_FILE).exists())
+    executor = ThreadExecutor(toys.slow_bowl, 2)
+    with FlightStore(folder) as store:
         store.begin(RUN)
         remove_unfinished(folder)
-        conclude(study, store, executor, search(study, store, executor), folder)
+        conclude_study(study, store, executor, run_search(study, store, executor), folder)
     executor.close()
 
 
@@ -61,23 +61,23 @@ def rows(folder):
 
 def certify(folder):
     """A campaign of toy flights, so many in all, and its certificate."""
-    from airflock.certificates.campaign import FOLDER, Campaign
-    from airflock.certificates.limit import read_all
-    from airflock.certificates.run import run
+    from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
+    from airflock.certificates.limit import parse_limits
+    from airflock.certificates.run import run_campaign
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_6ms")
-    campaign = Campaign(scenario, read_all(["r_min<1 at 2%", "phi_vel>=5 in 98%"], scenario), flights=400)
+    campaign = Campaign(scenario, parse_limits(["r_min<1 at 2%", "phi_vel>=5 in 98%"], scenario), flights=400)
 
     def dice(_, own):
         time.sleep(0.001)
         chance = random.Random(own)
         return {"r_min": 0.5 if chance.random() < 0.005 else 5.0, "phi_vel": 6.0 + chance.gauss(0.0, 0.4)}
 
-    open_folder(folder, campaign, resume=(folder / f"{FOLDER}.toml").is_file(), kind=FOLDER)
-    executor = InProcess(dice, 2)
+    open_folder(folder, campaign, resume=(folder / f"{CAMPAIGN_KIND}.toml").is_file(), kind=CAMPAIGN_KIND)
+    executor = ThreadExecutor(dice, 2)
     try:
-        run(campaign, folder, executor, 60.0).save(folder / "certificate.toml")
+        run_campaign(campaign, folder, executor, 60.0).save(folder / "certificate.toml")
     finally:
         executor.close()
 
@@ -91,17 +91,17 @@ def tune(folder):
     """A tuning of real flights, tiny ones, but for its pictures."""
     from importlib import import_module
 
-    from airflock.scenarios.making import make
+    from airflock.scenarios.making import build_scenario
 
     tuning = import_module("airflock.search.tune.run")
     tuning.rate_of = lambda *_: 300.0
     import_module("airflock.search.run").draw = lambda *_: None
-    import_module("airflock.search.tune.report").save = lambda found: atomic.write(
+    import_module("airflock.search.tune.report").save = lambda found: atomic.write_file(
         found.folder / "report.html", repr(found)
     )
     # the limit is shown after its first looks, whatever the time
     resume = (folder / "tune.toml").is_file()
-    tuning.tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 20%"], resume=resume)
+    tuning.tune(build_scenario(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 20%"], resume=resume)
 
 
 def of_tuning(folder):
@@ -128,7 +128,7 @@ def tracks(folder):
     time_, who = np.meshgrid(0.1 * np.arange(3000), np.arange(6), indexing="ij")
     east, north = 20.0 * np.sin(0.1 * time_ + who), 20.0 * np.cos(0.1 * time_ + who)
     columns = {"t": time_, "id": who, "x": east, "y": north}
-    atomic.write("tracks.csv", pd.DataFrame({k: v.ravel() for k, v in columns.items()}).to_csv(index=False))
+    atomic.write_file("tracks.csv", pd.DataFrame({k: v.ravel() for k, v in columns.items()}).to_csv(index=False))
     found = load_tracks("tracks.csv")
     save(found, "flight.nc")
     export(found, "again.csv")
@@ -137,8 +137,8 @@ def tracks(folder):
 def of_tracks(folder):
     """Every file, by its content; nothing else is left, not even what a dead process had begun."""
     atomic.FRESH = -1.0
-    atomic.swept.cache_clear()
-    atomic.swept(folder)
+    atomic.remove_leftovers.cache_clear()
+    atomic.remove_leftovers(folder)
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
@@ -269,8 +269,8 @@ def under_deaths(what, folder, kills, seed, life):
 
 def workers(folder, kills, seed):
     """Kill workers of dask under studies until so many have died."""
-    from airflock.runs.executors.cluster import Cluster
-    from airflock.search.run import run
+    from airflock.runs.executors.cluster import DaskCluster
+    from airflock.search.run import run_study
 
     best, space = dict(toys.BEST), toys.SPACE
 
@@ -287,13 +287,13 @@ def workers(folder, kills, seed):
     def ended(name, executor):
         shutil.rmtree(folder / name, ignore_errors=True)
         open_folder(folder / name, study, resume=False)
-        run(study, folder / name, executor)
+        run_study(study, folder / name, executor)
         return rows(folder / name)
 
-    wanted = ended("here", InProcess(lambda p, s: task(p, s)[0], 2))
+    wanted = ended("here", ThreadExecutor(lambda p, s: task(p, s)[0], 2))
 
     def life(number, address):
-        assert ended(f"there{number}", Cluster([task], address)) == wanted, f"study {number} ended differently"
+        assert ended(f"there{number}", DaskCluster([task], address)) == wanted, f"study {number} ended differently"
 
     under_deaths("workers", folder, kills, seed, life)
 
@@ -315,32 +315,32 @@ def sweeps(folder, kills, seed):
 
 def certificates(folder, kills, seed):
     """Kill workers of dask under campaigns of real flights until so many have died."""
-    from airflock.certificates.campaign import FOLDER, Campaign
+    from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
     from airflock.certificates.flights import CampaignTask
-    from airflock.certificates.limit import read_all
-    from airflock.certificates.run import run
-    from airflock.runs.executors.cluster import Cluster
+    from airflock.certificates.limit import parse_limits
+    from airflock.certificates.run import run_campaign
+    from airflock.runs.executors.cluster import DaskCluster
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_4ms", {"agents": 10, "duration": 300.0})
-    limits = read_all(["r_min<3 at 5%", "phi_vel>=2 in 90%"], scenario)
+    limits = parse_limits(["r_min<3 at 5%", "phi_vel>=2 in 90%"], scenario)
     campaign = Campaign(scenario, limits, flights=1000)
     task = CampaignTask(scenario, limits, 32)
 
     def ended(name, executor):
         place = folder / name
         shutil.rmtree(place, ignore_errors=True)
-        open_folder(place, campaign, resume=False, kind=FOLDER)
+        open_folder(place, campaign, resume=False, kind=CAMPAIGN_KIND)
         try:
-            run(campaign, place, executor, 600.0, kept=False).save(place / "certificate.toml")
+            run_campaign(campaign, place, executor, 600.0, is_stored=False).save(place / "certificate.toml")
         finally:
             executor.close()
         return of_certificate(place)
 
-    wanted = ended("here", InProcess(lambda p, s: task(p, s)[0], 1))
+    wanted = ended("here", ThreadExecutor(lambda p, s: task(p, s)[0], 1))
 
     def life(number, address):
-        assert ended(f"there{number}", Cluster([task], address)) == wanted, f"campaign {number} ended differently"
+        assert ended(f"there{number}", DaskCluster([task], address)) == wanted, f"campaign {number} ended differently"
 
     under_deaths("certificates", folder, kills, seed, life)
 

@@ -5,23 +5,23 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from airflock.estimate.infer.candidates import Number
-from airflock.estimate.infer.likelihood import Model
+from airflock.estimate.inference.candidates import FitParameter
+from airflock.estimate.inference.likelihood import FitModel
 
 STEPS, NOISE = 400, 0.05
 
 
-class Line(Model):
+class Line(FitModel):
     """A law of one line: what is seen is a function of the numbers' places and of a known input, with noise."""
 
     def __init__(self, law, names, truth, defaults=None, usual_numbers=(), log=()):
         defaults = defaults or dict.fromkeys(names, 0.5)
         self.numbers = [
-            Number(f"model.{name}", -1, "1", 1.0, 10.0, True, 10.0 ** defaults[name]) if name in log
-            else Number(f"model.{name}", -1, "m", 0.0, 1.0, False, defaults[name])
+            FitParameter(f"model.{name}", -1, "1", 1.0, 10.0, True, 10.0 ** defaults[name]) if name in log
+            else FitParameter(f"model.{name}", -1, "m", 0.0, 1.0, False, defaults[name])
             for name in names
         ]  # fmt: skip
-        self.named, self.usual, self.axes, self.spans, self.held = len(names), None, 2, [(0, 0)], frozenset()
+        self.named, self.speed_index, self.axes, self.spans, self.held = len(names), None, 2, [(0, 0)], frozenset()
         self.soft = False
         self.own_speed, self.tracks, self.scale = True, (), None
         flags = {name: defaults[name] for name in usual_numbers}

@@ -22,9 +22,9 @@ from airflock.parts.bodies.registry import BODIES as KNOWN_BODIES
 from airflock.parts.faults.registry import KINDS
 from airflock.parts.radios.registry import RADIOS
 from airflock.parts.sensors.registry import SENSORS
-from airflock.scenarios.families import Given
-from airflock.scenarios.laws import MODELS, find_model
-from airflock.scenarios.making import make
+from airflock.scenarios.families import CallerParts
+from airflock.scenarios.laws import MODELS, find_law
+from airflock.scenarios.making import build_scenario
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.support.errors import ScenarioError
@@ -81,7 +81,9 @@ def drawn(rng: Random) -> Draw:
         keys, start = settings(rng)
         try:
             own = OWN_TOPOLOGY if keys.get("topology.kind") == OWN_TOPOLOGY.name else None
-            found = make({"model": {"kind": keys["model.kind"]}}, "drawn", keys, given=Given(own_topology=own))
+            found = build_scenario(
+                {"model": {"kind": keys["model.kind"]}}, "drawn", keys, caller_parts=CallerParts(own_topology=own)
+            )
         except ScenarioError:
             continue  # a crowd without room, or a goal inside a building: the border says so, and it draws again
         return Draw(found, rng.randrange(2**32), start, keys)
@@ -119,7 +121,7 @@ def settings(rng: Random) -> tuple[dict[str, Any], NDArray[np.float64] | None]:
 
 def silence(keys: dict[str, Any], rng: Random, kind: str, length: float, dt: float) -> None:
     """Who stops for a neighbour that is lost: at once, soon, or never within such a flight."""
-    law = find_model(kind)
+    law = find_law(kind)
     hears = law.command == "velocity" and law.neighbour is not None and law.flock is None and "aero.k_d" not in keys
     if not hears or keys["update"] == "sequential" or rng.random() > 0.4:
         return
@@ -135,7 +137,7 @@ def groups(keys: dict[str, Any], rng: Random, kind: str) -> None:
     found: list[dict[str, Any]] = [{"name": "some", "agents": rng.randint(1, keys["agents"])}]
     if found[0]["agents"] < keys["agents"]:
         found.append({"name": "rest"})
-    law, body = find_model(kind), KNOWN_BODIES[keys["body.kind"]]
+    law, body = find_law(kind), KNOWN_BODIES[keys["body.kind"]]
     for group in found:
         flown = other_law(rng, law) if rng.random() < 0.6 and "aero.k_d" not in keys else law
         sections = {"model": flown.Parameters, "body": body.Parameters}
@@ -158,7 +160,7 @@ def groups(keys: dict[str, Any], rng: Random, kind: str) -> None:
 
 def other_law(rng: Random, law: Model) -> Model:
     """A law of the same kind of command, if there is one that flies beside it."""
-    known = [model for model in map(find_model, MODELS) if model.command == law.command and model.flock is None]
+    known = [model for model in map(find_law, MODELS) if model.command == law.command and model.flock is None]
     return rng.choice(known) if law.flock is None else law
 
 
@@ -205,7 +207,7 @@ def sometimes(keys: dict[str, Any], rng: Random, record: type, section: str, sha
 
 def model(keys: dict[str, Any], rng: Random, kind: str) -> None:
     """The law, its body, and drag descent beside another law."""
-    law = find_model(kind)
+    law = find_law(kind)
     sometimes(keys, rng, law.Parameters, "model", 0.3, ("rays", "most"))
     if kind == "kidger":
         if keys.get("model.r_sep") == 0.0:
@@ -436,7 +438,7 @@ def options(record: type) -> dict[str, tuple[str, ...]]:
 
 
 OPTIONS = {section: options(record) for section, record in {**SECTIONS, "flight": Flight}.items()}
-OPTIONS |= {kind: options(find_model(kind).Parameters) for kind in MODELS}
+OPTIONS |= {kind: options(find_law(kind).Parameters) for kind in MODELS}
 OPTIONS |= {
     "model": {"kind": MODELS},
     "sensors": {"kind": tuple(SENSORS)},
@@ -455,12 +457,12 @@ def notions(draw: Draw) -> set[str]:
     """What is on or off, and which of each choice was drawn."""
     found, keys = draw.scenario, draw.keys
     switches: dict[str, bool] = {
-        "three": found.dimensions == 3, "noisy": found.errs, "late": found.radio.delay > 0.0,
+        "three": found.dimensions == 3, "noisy": found.has_sensor_error, "late": found.radio.delay > 0.0,
         "lossy": found.radio.loss > 0.0, "links": found.transceiver.name == "links", "gusts": found.wind.gust > 0.0,
         "periodic": found.world.edges == "periodic", "islands": bool(found.world.obstacles),
         "scene": found.scene.kind != "none", "goals": found.goals.kind not in ("none", "own"),
         "own": found.goals.kind == "own", "sequential": found.flight.update == "sequential",
-        "stop": found.metrics.stop == "collision", "descends": found.descends, "given": draw.start is not None,
+        "stop": found.metrics.stop == "collision", "descends": found.is_aerodynamic, "given": draw.start is not None,
         "sees": found.model.sight is not None, "walls": found.model.boundary is not None,
         "groups": bool(found.groups), "laws": len(found.laws) > 1, "faults": bool(found.fault_kinds),
         "absent": any(kind.leaves for kind in found.fault_kinds), "silent": found.silence.rule == "stop",
@@ -473,7 +475,7 @@ def notions(draw: Draw) -> set[str]:
         "world": found.world, "scene": found.scene, "topology": found.topology,
         "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics,
         "flight": found.flight, "silence": found.silence,
-    } | ({"aero": found.aero} if found.descends else {})  # fmt: skip
+    } | ({"aero": found.aero} if found.is_aerodynamic else {})  # fmt: skip
     kind = keys["model.kind"]
     for section, record in records.items():
         owner = kind if section == "model" else section

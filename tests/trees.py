@@ -10,7 +10,7 @@ import ast
 import copy
 import hashlib
 
-from airflock.core.rules.nodes import walk
+from airflock.core.rules.nodes import walk_tree
 
 TURNS = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move", "overrule")
 STAGES = (
@@ -41,14 +41,14 @@ def functions(text, rows):
             kept = sorted(a for a in arguments if a in _read(node.body))
             read_by[name] = [arguments.index(a) for a in kept]
             node.args.args = [ast.arg(a) for a in kept]
-        for call in walk(node):
+        for call in walk_tree(node):
             if isinstance(call, ast.Call) and getattr(call.func, "id", "") in read_by:
                 call.args = [call.args[k] for k in read_by[call.func.id]]
         node.body = _alive(node.body)
         lift = _Lift()
         node = lift.visit(node)
         node.body = [lift.found[key] for key in sorted(lift.found)] + node.body
-        own = {n.id for n in walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        own = {n.id for n in walk_tree(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
         found[name] = _Locals(own - {a.arg for a in node.args.args}).visit(node)
     return found
 
@@ -58,7 +58,7 @@ def reached(found, first="fly"):
     done, new = set(), {first}
     while new:
         done |= new
-        new = {n.id for x in new for n in walk(found[x]) if isinstance(n, ast.Name)} & found.keys() - done
+        new = {n.id for x in new for n in walk_tree(found[x]) if isinstance(n, ast.Name)} & found.keys() - done
     return {name: found[name] for name in done}
 
 
@@ -81,7 +81,7 @@ def digests(text, rows):
 def _by_name(tree, rows):
     """The tree with rows by name."""
     names = {number: name for name, number in reversed(rows.items())}
-    for node in walk(tree):
+    for node in walk_tree(tree):
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "work":
             if _number(node.slice) is not None:
                 node.slice = ast.Constant(names[_number(node.slice) % len(rows)])
@@ -117,7 +117,7 @@ def _with_parts(statements, parts):
 
 def _without_constants(statements):
     """Statements with a named constant in place of each local that is bound to nothing but that constant."""
-    nodes = [node for statement in statements for node in walk(statement)]
+    nodes = [node for statement in statements for node in walk_tree(statement)]
     stored = [node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
     found = {}
     for node in nodes:
@@ -131,7 +131,7 @@ def _without_constants(statements):
 
 
 def _read(statements):
-    return {n.id for s in statements for n in walk(s) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    return {n.id for s in statements for n in walk_tree(s) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
 
 
 def _alive(statements):

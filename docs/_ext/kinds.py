@@ -8,7 +8,7 @@ from writing import key_table, plain, prose, put
 
 def faults() -> None:
     """A section for each kind of fault: what it does, the rules that disturb a flight, its numbers."""
-    from airflock.core.fault import RULES
+    from airflock.core.fault import FAULT_RULES
     from airflock.parts.faults.registry import KINDS
     from airflock.scenarios.keys import sections
 
@@ -21,7 +21,7 @@ def faults() -> None:
     for name, kind in KINDS.items():
         pieces.append(f'\n## kind = "{name}"\n\n{prose(kind.doc)}\n\n')
         for stage, rule in kind.rules.items():
-            pieces.append(f"Its rule `{stage}` returns {RULES[stage][1]}.\n\n")
+            pieces.append(f"Its rule `{stage}` returns {FAULT_RULES[stage][1]}.\n\n")
             pieces.append(f"```python\n{getsource(rule)}```\n\n")
         pieces.append(key_table(known[name].keys) if known[name].keys else "It has no numbers of its own.\n")
     put("fault_kinds.md", "".join(pieces))

@@ -53,15 +53,14 @@ def equations(name: str) -> dict[str, str]:
 
 def models(drawn: bool) -> None:
     """A page for each model: docstring, picture, equations beside code, parameters, presets, what reproduces."""
-    from airflock.scenarios.files import load
-    from airflock.scenarios.files import presets as known
+    from airflock.scenarios.files import load, presets as known
     from airflock.scenarios.keys import keys as keys_of
-    from airflock.scenarios.laws import MODELS, find_model
+    from airflock.scenarios.laws import MODELS, find_law
 
     scenarios = {name: load(name) for name in known()}
     rows = []
     for name in MODELS:
-        model = find_model(name)
+        model = find_law(name)
         title, _, rest = model.doc.strip().partition("\n")
         source = (ROOT / "src/airflock/parts/laws" / f"{name}.py").read_text(encoding="utf-8")
         functions = {
@@ -179,8 +178,7 @@ def robots() -> None:
     """Bodies, sensors, radio, silence and wind: what stands between a command and a motion."""
     import sys
 
-    from airflock.core import radio as radios
-    from airflock.core import silence
+    from airflock.core import radio as radios, silence
     from airflock.parts.bodies import wind
     from airflock.parts.bodies.registry import BODIES
     from airflock.parts.radios.registry import RADIOS
@@ -361,8 +359,7 @@ def _help(text: str) -> str:
 
 def presets() -> None:
     """All presets with their titles."""
-    from airflock.scenarios.files import load
-    from airflock.scenarios.files import presets as known
+    from airflock.scenarios.files import load, presets as known
 
     rows = []
     for name in known():

@@ -9,5 +9,8 @@ __all__ = [*__all__, "__version__"]
 
 
 def __getattr__(name: str) -> object:
-    # `open` is not in __all__: `from airflock import *` would hide Python's own
-    return _attached("Flight" if name == "open" else name)
+    if name == "open":  # not in __all__: `from airflock import *` would hide Python's own
+        name = "Flight"
+    if name not in __all__:
+        raise AttributeError(f"module 'airflock' has no attribute {name!r}")
+    return _attached(name)

@@ -10,60 +10,42 @@ from .check.types import check_types as check_types
 from .cli.papers import paper as paper
 from .core.contract import (
     body as body,
-)
-from .core.contract import (
     metric as metric,
-)
-from .core.contract import (
     model as model,
 )
 from .core.fault import fault as fault
 from .core.parameters import (
     Parameters as Parameters,
-)
-from .core.parameters import (
     choice as choice,
-)
-from .core.parameters import (
     quantity as quantity,
 )
 from .core.radio import radio as radio
 from .core.sensor import sensor as sensor
 from .displays.displays import display as display
 from .engine import Flight as Flight
-from .estimate.identify.run import identify as identify
-from .estimate.infer.run import infer as infer
+from .estimate.identification.run import identify as identify
+from .estimate.inference.run import infer as infer
 from .fleets.flying import fleet as fleet
 from .parts.metrics.registry import metric_set as metric_set
-from .plots.picture import plot as plot
-from .plots.video import video as video
 from .recordings import measures as measures
 from .recordings.exports.export import export as export
 from .recordings.files import (
     load_recording as load_recording,
-)
-from .recordings.files import (
     save as save,
 )
 from .recordings.flights import (
     recording_of as recording_of,
-)
-from .recordings.flights import (
     simulate as simulate,
 )
 from .recordings.health import doctor as doctor
 from .recordings.imports.load import load_tracks as load_tracks
 from .recordings.scores import (
     over_time as over_time,
-)
-from .recordings.scores import (
     score as score,
 )
 from .recordings.sweeps import sweep as sweep
 from .scenarios.files import (
     load as load,
-)
-from .scenarios.files import (
     presets as presets,
 )
 from .scenarios.keys import keys as keys
@@ -76,6 +58,8 @@ from .search.validation import validate as validate
 from .studio.watch import watch as watch
 from .support.errors import AirflockError as AirflockError
 from .view import plots as plots
-from .view.replays import replay as replay
+from .view.plots.picture import plot as plot
+from .view.plots.video import video as video
+from .view.replays.build import replay as replay
 
 __version__: str

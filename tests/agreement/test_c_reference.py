@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.scenarios.files import load
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -31,7 +31,7 @@ def crowd(seconds):
 def test_hand_written_c_flies_the_compiled_flight(tmp_path, seed, bits, seconds, margin):
     found = crowd(seconds)
     frames, score = c_reference.Reference(found, tmp_path, bits=bits).frames(seed)
-    flown = fly(found, seed, precision=bits, record=True)
+    flown = fly_world(found, seed, precision=bits, record=True)
     assert np.abs(np.diff(frames, axis=0)).max() > 0.1  # something happens
     np.testing.assert_allclose(frames, flown.frames[:, :4], rtol=0.0, atol=margin)
     assert score["n_coll"] > 0.0
@@ -43,7 +43,7 @@ def test_hand_written_c_hears_the_packets_that_the_compiled_flight_hears(tmp_pat
     keys = {"radio.kind": "links", "radio.delay": 0.4, "radio.near": 5.0, "radio.far": 15.0, "radio.received_far": 0.2}
     found = load("vasarhelyi_2018/4ms", CROWDED | keys | {"duration": 12.0})
     frames, score = c_reference.Reference(found, tmp_path, bits=64).frames(seed)
-    flown = fly(found, seed, precision=64, record=True)
+    flown = fly_world(found, seed, precision=64, record=True)
     np.testing.assert_allclose(frames, flown.frames[:, :4], rtol=0.0, atol=1e-9)
     assert flown.values == pytest.approx(score, rel=1e-9, abs=1e-9)
 

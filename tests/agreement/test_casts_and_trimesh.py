@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airflock.world import bvh
-from airflock.world.scenes.tree import boxes, cylinders, scene, triangles
+from airflock.world.scenes.tree import box_rows, cylinder_rows, make_scene, triangle_rows
 from kernels import compiled
 from needed import needed
 
@@ -70,7 +70,7 @@ def edge_distance(mesh, points, faces):
 @pytest.mark.parametrize(("bits", "relative"), [(32, 1e-4), (64, 1e-9)])
 def test_rays_hit_what_embree_hits(bits, relative):
     mesh, real = scenery(1, bits)
-    found = scene([triangles(mesh.triangles)])
+    found = make_scene([triangle_rows(mesh.triangles)])
     origins, directions = rays(np.random.default_rng(2), real)
     ours = compiled(bvh.cast, bits, LOOP)(
         origins, directions, real(LENGTH), found.shapes.astype(real), found.nodes.astype(real), found.links
@@ -107,7 +107,7 @@ def test_rays_hit_what_embree_hits(bits, relative):
 
 def test_distances_are_those_of_trimesh():
     mesh, _ = scenery(3, 64)
-    found = scene([triangles(mesh.triangles)])
+    found = make_scene([triangle_rows(mesh.triangles)])
     points = np.random.default_rng(4).uniform(-120.0, 120.0, (2000, 3))
     nearest = compiled(bvh.nearest)
     ours = np.array([nearest(*p, 1e6, found.shapes, found.nodes, found.links)[0] for p in points])
@@ -126,10 +126,10 @@ def test_boxes_and_cylinders_are_their_own_meshes():
         tube = trimesh.creation.cylinder(radius=radius, height=z1 - z0, sections=512)
         solids.append(tube.apply_translation([x, y, 0.5 * (z0 + z1)]))
     mesh = trimesh.util.concatenate(solids)
-    exact = scene([boxes(np.hstack([low, high])), cylinders(upright)])
-    tiled = scene([triangles(mesh.triangles)])
+    exact = make_scene([box_rows(np.hstack([low, high])), cylinder_rows(upright)])
+    tiled = make_scene([triangle_rows(mesh.triangles)])
     origins, directions = rays(rng, np.float64)
-    outside = np.array([bvh.nearest(*p, 1e6, *exact.lists).distance > 0.1 for p in origins[:3000].tolist()])
+    outside = np.array([bvh.nearest(*p, 1e6, *exact.as_lists).distance > 0.1 for p in origins[:3000].tolist()])
     origins, directions = origins[:3000][outside], directions[:3000][outside]
     cast = compiled(bvh.cast, 64, LOOP)
     a, b = (cast(origins, directions, LENGTH, s.shapes, s.nodes, s.links) for s in (exact, tiled))

@@ -10,20 +10,19 @@ import warnings
 import pytest
 
 import toys
-from airflock.certificates.campaign import FOLDER, Campaign
-from airflock.certificates.flights import CampaignTask, measured, score_of
-from airflock.certificates.limit import read_all
-from airflock.certificates.run import run as certified
-from airflock.runs.executors import Flight
-from airflock.runs.executors import cluster as executors_cluster
-from airflock.runs.executors.cluster import Cluster
-from airflock.runs.executors.in_process import InProcess
-from airflock.runs.executors.scores import scores
+from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
+from airflock.certificates.flights import CampaignTask, limit_score_function, with_distance_metrics
+from airflock.certificates.limit import parse_limits
+from airflock.certificates.run import run_campaign as certified
+from airflock.runs.executors import Flight, cluster as executors_cluster
+from airflock.runs.executors.cluster import DaskCluster
+from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.executors.scores import score_scenarios
 from airflock.runs.folder import open_folder
-from airflock.runs.store import Store
+from airflock.runs.store import FlightStore
 from airflock.scenarios.files import load
-from airflock.search.run import run
-from airflock.search.task import tasks_of
+from airflock.search.run import run_study
+from airflock.search.task import study_tasks
 from airflock.support.errors import FlightError, StudyError
 from needed import needed
 
@@ -53,7 +52,7 @@ def doomed():
 
 
 def contents(folder):
-    with Store(folder, write=False) as store:
+    with FlightStore(folder, write=False) as store:
         return [store.rows(sql) for sql in TABLES]
 
 
@@ -80,7 +79,7 @@ def here(parameters, seed):
 def test_workers_killed_at_random_change_nothing(tmp_path, doomed, seed):
     study = toys.study(population=10, generations=10, seeds=2)
     open_folder(tmp_path / "here", study, resume=False)
-    wanted = run(study, tmp_path / "here", InProcess(here, 2))
+    wanted = run_study(study, tmp_path / "here", ThreadExecutor(here, 2))
     over, kills = threading.Event(), []
 
     def killer():
@@ -94,10 +93,10 @@ def test_workers_killed_at_random_change_nothing(tmp_path, doomed, seed):
 
     thread = threading.Thread(target=killer)
     open_folder(tmp_path / "there", study, resume=False)
-    executor = Cluster([toy_task(0.06)], doomed.scheduler_address)
+    executor = DaskCluster([toy_task(0.06)], doomed.scheduler_address)
     thread.start()
     try:
-        found = run(study, tmp_path / "there", executor)
+        found = run_study(study, tmp_path / "there", executor)
     finally:
         over.set()
         thread.join()
@@ -113,9 +112,9 @@ def test_flights_that_never_end_are_recorded_as_failed(doomed):
         clock.sleep(9.0 if parameters["model.r0_rep"] > 50.0 else 0.0)
         return {"fitness": 1.0}, "", 0.0, "worker"
 
-    executor = Cluster([task], doomed.scheduler_address, timeout=2.0)
+    executor = DaskCluster([task], doomed.scheduler_address, timeout=2.0)
     flights = [Flight(i, 0, {"model.r0_rep": r}, i) for i, r in enumerate((20.0, 60.0, 30.0))]
-    landed = {x.flight.candidate: x for x in executor.fly(flights)}
+    landed = {x.flight.candidate_index: x for x in executor.fly(flights)}
     executor.close()
     assert landed[1].values is None and landed[1].reason == "took longer than 2 s, 3 times"
     assert landed[0].values == landed[2].values == {"fitness": 1.0}
@@ -123,14 +122,14 @@ def test_flights_that_never_end_are_recorded_as_failed(doomed):
 
 def test_schedulers_without_workers_are_one_line():
     with local(0) as empty, pytest.raises(StudyError, match="has no workers"):
-        Cluster(tasks_of(toys.study()), empty.scheduler_address, answer=0.3)
+        DaskCluster(study_tasks(toys.study()), empty.scheduler_address, connect_timeout=0.3)
 
 
 def test_a_scheduler_that_loses_all_its_workers_is_one_line(monkeypatch):
     """Found by kills: two workers died while they started, their nannies gave up, and the study waited for ever."""
     monkeypatch.setattr(executors_cluster, "DESERTED", 0.5)
     with local(1) as alone:
-        executor = Cluster([toy_task(0.2)], alone.scheduler_address)
+        executor = DaskCluster([toy_task(0.2)], alone.scheduler_address)
         flying = executor.fly([Flight(0, repeat, dict(toys.BEST), repeat) for repeat in range(20)])
         next(flying)
         alone.scale(0)
@@ -141,11 +140,11 @@ def test_a_scheduler_that_loses_all_its_workers_is_one_line(monkeypatch):
 
 def test_schedulers_that_do_not_answer_are_one_line():
     with pytest.raises(StudyError, match="--scheduler tcp://127.0.0.1:9: does not answer"):
-        Cluster(tasks_of(toys.study()), "tcp://127.0.0.1:9", answer=0.3)
+        DaskCluster(study_tasks(toys.study()), "tcp://127.0.0.1:9", connect_timeout=0.3)
 
 
 def test_workers_with_different_processors_are_named(cluster, monkeypatch):
-    executor = Cluster(tasks_of(toys.study()), cluster.scheduler_address)
+    executor = DaskCluster(study_tasks(toys.study()), cluster.scheduler_address)
     monkeypatch.setattr(executor.client, "run", lambda _, **_given: {"a": "Epyc", "b": "Xeon"})
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
@@ -161,13 +160,13 @@ def test_a_task_flies_the_same_flight_as_this_process():
 
     study = load_study("vasarhelyi_2018/4ms", settings={"duration": 2.0, "agents": 10})
     parameters = study.space.parameters([0.5] * 11)
-    values, reason, _, _ = tasks_of(study)[0](parameters, 5)
+    values, reason, _, _ = study_tasks(study)[0](parameters, 5)
     assert not reason and values == score_flight(with_parameters(study.scenario, parameters), 5)
 
 
 def test_a_certificate_over_workers_that_are_killed_is_that_of_one_process(tmp_path, doomed, seed):
     scenario = load("vasarhelyi_2018/real_6ms")
-    campaign = Campaign(scenario, read_all(["r_min<1 at 5%"], scenario))
+    campaign = Campaign(scenario, parse_limits(["r_min<1 at 5%"], scenario))
 
     def task(parameters, own):  # a closure, because workers cannot import the tests
         import random as chance
@@ -177,15 +176,17 @@ def test_a_certificate_over_workers_that_are_killed_is_that_of_one_process(tmp_p
         near = chance.Random(own).random() < 0.01
         return {"r_min": 0.5, "closest": 0.4, "first": [3.0]} if near else {"r_min": 5.0}, "", 0.0, "worker"
 
-    open_folder(tmp_path / "here", campaign, resume=False, kind=FOLDER)
-    wanted = certified(campaign, tmp_path / "here", InProcess(lambda p, own: task(p, own)[0], 4), 600.0, kept=False)
-    open_folder(tmp_path / "there", campaign, resume=False, kind=FOLDER)
-    executor = Cluster([task], doomed.scheduler_address)
+    open_folder(tmp_path / "here", campaign, resume=False, kind=CAMPAIGN_KIND)
+    wanted = certified(
+        campaign, tmp_path / "here", ThreadExecutor(lambda p, own: task(p, own)[0], 4), 600.0, is_stored=False
+    )
+    open_folder(tmp_path / "there", campaign, resume=False, kind=CAMPAIGN_KIND)
+    executor = DaskCluster([task], doomed.scheduler_address)
     worker = random.Random(seed).choice(list(doomed.workers.values()))
     killer = threading.Timer(0.5, os.kill, (worker.pid, signal.SIGKILL))
     killer.start()
     try:
-        found = certified(campaign, tmp_path / "there", executor, 600.0, kept=False)
+        found = certified(campaign, tmp_path / "there", executor, 600.0, is_stored=False)
     finally:
         executor.close()
         killer.join()
@@ -195,9 +196,9 @@ def test_a_certificate_over_workers_that_are_killed_is_that_of_one_process(tmp_p
 
 def test_a_worker_flies_a_certificate_to_the_bits_of_one_process():
     scenario = load("vasarhelyi_2018/real_4ms", {"agents": 6, "duration": 10.0})
-    limits = read_all(["r_min<60 at 5%", "phi_wall>0 at 5%"], scenario)
+    limits = parse_limits(["r_min<60 at 5%", "phi_wall>0 at 5%"], scenario)
     task = pickle.loads(pickle.dumps(CampaignTask(scenario, limits, 32)))
-    score = score_of(measured(scenario, limits), limits, 32)
+    score = limit_score_function(with_distance_metrics(scenario, limits), limits, 32)
     for own in range(3):
         values, reason, _, _ = task({}, own)
         assert values == score({}, own) and not reason
@@ -209,8 +210,8 @@ def test_scores_over_workers_are_those_of_this_process(cluster):
     louder = load("vicsek_1995/ordered", {"agents": 6, "duration": 2.0, "model.eta": 1.0})
     scenarios, seeds = [plain, louder, plain, louder], [0, 0, 1, 1]
     landed = []
-    found = scores(scenarios, seeds, scheduler=cluster.scheduler_address, done=lambda: landed.append(1))
-    assert found == scores(scenarios, seeds) and len(landed) == 4
+    found = score_scenarios(scenarios, seeds, scheduler=cluster.scheduler_address, on_done=lambda: landed.append(1))
+    assert found == score_scenarios(scenarios, seeds) and len(landed) == 4
 
 
 def test_a_flight_that_goes_wrong_on_a_worker_is_one_line(cluster, monkeypatch):
@@ -219,11 +220,11 @@ def test_a_flight_that_goes_wrong_on_a_worker_is_one_line(cluster, monkeypatch):
             (None, f"seed {seed}: agent 0 left the finite numbers", 0.0, "worker") if seed == 3 else ({}, "", 0.0, "")
         )
 
-    monkeypatch.setattr("airflock.runs.executors.cluster.Task", lambda scenario, precision: task)
+    monkeypatch.setattr("airflock.runs.executors.cluster.ScenarioTask", lambda scenario, precision: task)
     with pytest.raises(FlightError, match="^seed 3: agent 0 left the finite numbers$"):
-        scores([load("vicsek_1995/ordered")] * 5, range(5), scheduler=cluster.scheduler_address)
+        score_scenarios([load("vicsek_1995/ordered")] * 5, range(5), scheduler=cluster.scheduler_address)
 
 
 def test_workers_fly_on_their_own_processors():
     with pytest.raises(StudyError, match="device = cuda: workers of a scheduler fly on their cpu"):
-        scores([load("vicsek_1995/ordered")], [0], scheduler="tcp://127.0.0.1:9", device="cuda")
+        score_scenarios([load("vicsek_1995/ordered")], [0], scheduler="tcp://127.0.0.1:9", device="cuda")

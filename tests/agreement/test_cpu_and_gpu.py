@@ -21,7 +21,7 @@ def both(found, seeds, precision=64, **layout):
     plan = plan_of(found, precision=precision, record=True, grid=False)
     jobs = [tables(found, plan, seed) for seed in seeds]
     shape = replace(layout_of(plan, found.agents, len(jobs)), **layout) if layout else None
-    return [cpu.fly(plan, job) for job in jobs], fly_many(plan, jobs, shape=shape)
+    return [cpu.fly_on_cpu(plan, job) for job in jobs], fly_many(plan, jobs, shape=shape)
 
 
 CASES = {

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.core.composition import added
+from airflock.core.composition import add_laws
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters as Record
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.parts.aero import descent
 from airflock.parts.laws import reynolds_1987, vasarhelyi_2018
 from airflock.scenarios.files import load
@@ -39,19 +39,20 @@ class Still:
 def test_without_gain_no_bit_of_a_flight_changes(seed):
     bare = load(PRESET, SMALL)
     document = {key: value for key, value in bare.document.items() if key != "aero"}
-    alone = airflock.scenarios.making.make(document, "alone")
+    alone = airflock.scenarios.making.build_scenario(document, "alone")
     assert alone.model.flock is None
     frames = [
-        fly(each, seed, record=True, device="python").frames for each in (alone, load(PRESET, SMALL | {"aero.k_d": 0}))
+        fly_world(each, seed, record=True, device="python").frames
+        for each in (alone, load(PRESET, SMALL | {"aero.k_d": 0}))
     ]
     np.testing.assert_array_equal(*frames)
-    moved = fly(bare, seed, record=True, device="python").frames
+    moved = fly_world(bare, seed, record=True, device="python").frames
     assert np.abs(moved - frames[0]).max() > 1e-3
 
 
 def test_plain_python_is_the_compiled_flight(seed):
     found = load(PRESET, SMALL)
-    plain, compiled = fly_plainly(found, seed), fly(found, seed, precision=64, record=True)
+    plain, compiled = fly_plainly(found, seed), fly_world(found, seed, precision=64, record=True)
     np.testing.assert_allclose(compiled.frames, plain.frames, rtol=0.0, atol=1e-7)
 
 
@@ -69,15 +70,15 @@ def test_two_birds_tip_to_tip_move_as_by_the_rule_of_dimock_2003():
 
 def test_equal_sums_are_the_same_functions_and_ask_for_what_both_need():
     base = model(vasarhelyi_2018, "vasarhelyi_2018")
-    both = added(base, DESCENT)
-    assert both.decide is added(model(vasarhelyi_2018, "vasarhelyi_2018"), DESCENT).decide
+    both = add_laws(base, DESCENT)
+    assert both.decide is add_laws(model(vasarhelyi_2018, "vasarhelyi_2018"), DESCENT).decide
     assert both.flock is descent.flock and both.neighbour is base.neighbour and both.Memory is base.Memory
     with pytest.raises(RuleError, match="solves for the whole flock itself"):
-        added(both, DESCENT)
+        add_laws(both, DESCENT)
     with pytest.raises(RuleError, match="commands acceleration"):
-        added(model(reynolds_1987, "reynolds_1987"), DESCENT)
+        add_laws(model(reynolds_1987, "reynolds_1987"), DESCENT)
     with pytest.raises(RuleError, match=r"can have no neighbour, .*sums.* of its own"):
-        added(base, replace(base, name="second"))
+        add_laws(base, replace(base, name="second"))
 
 
 BAD = {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.parts.faults.registry import KINDS
 from airflock.scenarios.files import load
 from reference.flight import fly_plainly
@@ -81,7 +81,7 @@ def test_every_kind_that_is_replaced_flies_as_the_reference_does(kind, radio, de
     hit = {"kind": kind, "agents": [2], **({"endurance": 1.0} if kind == "battery" else {})}
     faults = [hit | {"at": 0.4}, hit | {"at": 0.83} | OTHER.get(kind, {}), hit | {"at": 1.1, "lasts": 0.3}]
     scenario = load(PAPER, {**SMALL, "duration": 2.5, "radio.delay": delay, **radio, "faults": faults})
-    found = fly(scenario, seed, record=True, device="python")
+    found = fly_world(scenario, seed, record=True, device="python")
     np.testing.assert_allclose(found.frames, fly_plainly(scenario, seed).frames, rtol=0.0, atol=1e-9)
 
 
@@ -89,7 +89,7 @@ def test_pictures_are_stamped_by_the_own_clock_of_their_moment(seed):
     keys = {"radio.kind": "vision", "radio.field": 4.0, "radio.hold": 1.0, "radio.delay": 0.3}
     faults = [{"kind": "clock", "at": 0.5, "agents": [1, 2], "ahead": 0.4}, {"kind": "clock", "at": 0.9, "agents": [2]}]
     scenario = load(PAPER, {**SMALL, **keys, "duration": 2.0, "faults": faults})
-    found = fly(scenario, seed, record=True, device="python")
+    found = fly_world(scenario, seed, record=True, device="python")
     np.testing.assert_allclose(found.frames, fly_plainly(scenario, seed).frames, rtol=0.0, atol=1e-9)
 
 
@@ -97,10 +97,12 @@ def test_a_battery_that_is_warned_of_again_lands_by_the_later_warning():
     """It landed by the first, though that one had been replaced."""
     hit = {"kind": "battery", "agents": [2]}
     faults = [hit | {"at": 1.0, "endurance": 2.0}, hit | {"at": 2.5, "endurance": 1.5}]
-    gone = np.isnan(fly(load(PAPER, {**SMALL, "faults": faults}), 1, record=True, device="python").frames[:, 0, 2])
+    gone = np.isnan(
+        fly_world(load(PAPER, {**SMALL, "faults": faults}), 1, record=True, device="python").frames[:, 0, 2]
+    )
     assert np.flatnonzero(gone)[0] == round(4.0 / 0.2)
     never = [hit | {"at": 1.0, "endurance": 2.0}, hit | {"at": 2.5, "endurance": 9.0, "lasts": 1.0}]
-    frames = fly(load(PAPER, {**SMALL, "faults": never}), 1, record=True, device="python").frames
+    frames = fly_world(load(PAPER, {**SMALL, "faults": never}), 1, record=True, device="python").frames
     assert np.isfinite(frames).all()
 
 

@@ -8,10 +8,10 @@ import pytest
 import airflock
 import wary as wary_law
 from against_reference import compared
-from airflock.engine import driver_text, fly, plan_of
-from airflock.recordings.flown_scenario import scenario_of
+from airflock.engine import driver_text, fly_world, plan_of
+from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.scenarios.files import load
-from airflock.scenarios.laws import find_model
+from airflock.scenarios.laws import find_law
 from airflock.support.errors import ScenarioError
 from scenarios_drawn import Draw
 
@@ -51,10 +51,10 @@ def test_who_hears_nobody_flies_as_in_a_flock_of_its_law():
     """Without neighbours an agent of each law flies as if all flew by it: no law reads what is another's."""
     alone = {"radio.range": 0.0, "world.side": 60.0}
     start = np.random.default_rng(3).normal(0.0, 12.0, (4, 7))
-    mixed = fly(beside("viragh_2014", **alone), 5, record=True, start=start, device="python").frames
+    mixed = fly_world(beside("viragh_2014", **alone), 5, record=True, start=start, device="python").frames
     for law, who in ((None, [0, 2, 3, 5, 6]), ("viragh_2014", [1, 4])):
         whole = {key: value for key, value in {**DENSE, **alone}.items() if law is None or not key.startswith("model.")}
-        known = fly(load(PAPER, whole, law), 5, record=True, start=start, device="python").frames
+        known = fly_world(load(PAPER, whole, law), 5, record=True, start=start, device="python").frames
         assert np.array_equal(mixed[:, :, who], known[:, :, who])
 
 
@@ -65,7 +65,7 @@ def test_a_group_that_names_the_law_of_the_flock_changes_no_text():
     found = load(PAPER, {**DENSE, "groups": twice})
     assert [law.varied for law in found.laws] == [(), (("p", "p_rep"),)]  # one text, two numbers
     assert plan_of(found).columns == (("p", "p_rep"), ("", "law"))
-    assert found.own_numbers("p", "p_rep", 0)[:4] == [1.0, 1.0, 2.0, 2.0]
+    assert found.agent_values("p", "p_rep", 0)[:4] == [1.0, 1.0, 2.0, 2.0]
 
 
 def test_any_cuts_branches_and_snapshots_give_the_bits_of_the_whole():
@@ -129,10 +129,10 @@ def test_a_law_of_ones_own_asks_for_groups_compiled_and_in_plain_python(wary):
     assert [law.agents for law in scenario.laws] == [(0, 2, 3, 4, 5), (1, 6)]
     verdict = compared(Draw(scenario, 3, None, {}))
     assert verdict.agrees and not verdict.fault, verdict
-    plain = fly(scenario, 3, record=True, device="python").frames
-    np.testing.assert_allclose(fly(scenario, 3, precision=64, record=True).frames, plain, atol=1e-9)
+    plain = fly_world(scenario, 3, record=True, device="python").frames
+    np.testing.assert_allclose(fly_world(scenario, 3, precision=64, record=True).frames, plain, atol=1e-9)
     alike = load(PAPER, keys, law=wary)  # without groups all are kin
-    assert not np.array_equal(fly(alike, 3, record=True, device="python").frames, plain)
+    assert not np.array_equal(fly_world(alike, 3, record=True, device="python").frames, plain)
 
 
 def test_the_law_of_a_group_may_lie_in_a_file_or_be_given(wary, tmp_path):
@@ -145,7 +145,7 @@ def test_the_law_of_a_group_may_lie_in_a_file_or_be_given(wary, tmp_path):
         with pytest.raises(ScenarioError, match="would run the code in"):
             load(tmp_path / name)
         assert load(tmp_path / name, trust=True).laws[1].parameters.style == "chase"
-    given = find_model("wary.py", tmp_path, trust=True)
+    given = find_law("wary.py", tmp_path, trust=True)
     group = [{"agents": 2, "model": {"kind": "wary", "k": 2.0}}]
     scenario = load(PAPER, {**DENSE, "groups": group}, laws=given)
     assert scenario.laws[1].model is given
@@ -153,7 +153,9 @@ def test_the_law_of_a_group_may_lie_in_a_file_or_be_given(wary, tmp_path):
         airflock.open(scenario, 1, device="python", record=True).advance(0.5).change({"radio.range": 20.0}).advance(0.2)
     )
     recording = airflock.recording_of(flight)
-    assert [group.agents for group in scenario_of(recording).groups] == [(0, 1)]  # though nobody knows how they fly
+    assert [group.agents for group in scenario_of_recording(recording).groups] == [
+        (0, 1)
+    ]  # though nobody knows how they fly
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import airflock
 import wary as wary_law
 from airflock.engine import driver_text, plan_of
 from airflock.scenarios import cells
-from airflock.scenarios.cost import seconds_of
+from airflock.scenarios.cost import estimated_seconds
 from airflock.scenarios.files import load
 from inside import cpu, tables
 
@@ -81,7 +81,7 @@ def test_groups_of_many_kinds_fly_by_cells_as_among_all_pairs(groups, more, seed
     plans = [plan_of(scenario, precision=64, record=True, grid=grid) for grid in (True, False)]
     assert plans[0].grid
     by_cells, by_pairs = (
-        cpu.fly(plan, tables(scenario, plan, seed), None, device).frames
+        cpu.fly_on_cpu(plan, tables(scenario, plan, seed), None, device).frames
         for plan, device in zip(plans, ("cpu", "python"), strict=True)
     )
     np.testing.assert_allclose(by_cells, by_pairs, rtol=0.0, atol=1e-9)
@@ -120,5 +120,5 @@ def test_a_law_without_a_reach_keeps_a_large_flock_from_cells_and_a_note_says_so
     group = {"name": "wary", "agents": 20, "model": {"kind": wary}}
     large = {**SCHOOL, "agents": 2000, "groups": [group]}
     found, plain = load("couzin_2002/torus", large, trust=True), load("couzin_2002/torus", {**large, "groups": []})
-    assert not plan_of(found).grid and seconds_of(found) > 10.0 * seconds_of(plain)
+    assert not plan_of(found).grid and estimated_seconds(found) > 10.0 * estimated_seconds(plain)
     assert any("wary sees without limit" in note and "on one core" in note for note in found.notes)

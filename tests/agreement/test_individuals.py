@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import driver_text, fly, plan_of
+from airflock.engine import driver_text, fly_world, plan_of
 from airflock.parts.faults.registry import KINDS
 from airflock.recordings.flights import recording_of
-from airflock.recordings.scores import measure
+from airflock.recordings.scores import measure_recording
 from airflock.scenarios.files import load, presets
 from airflock.support.errors import FlightError, RuleError, ScenarioError
 from inside import course, cpu
@@ -25,7 +25,7 @@ PAPER = "vasarhelyi_2018/4ms"
 def flown(faults=(), name=PAPER, seed=3, **more):
     """A closed flight, interpreted, with its frames."""
     scenario = load(name, {**SMALL, **more, **({"faults": list(faults)} if faults else {})})
-    return fly(scenario, seed, record=True, device="python")
+    return fly_world(scenario, seed, record=True, device="python")
 
 
 def whole(flight):
@@ -47,7 +47,7 @@ def test_who_leaves_is_met_by_nobody():
         flight = airflock.open(crowd, 1, start=start, device="python", record=True).remove(gone)
         flight.finish()
         others = [k for k in range(8) if k != gone]
-        known = fly(alone, 1, record=True, start=start[:, others], device="python", precision=64)
+        known = fly_world(alone, 1, record=True, start=start[:, others], device="python", precision=64)
         assert np.array_equal(flight.frames[:, :, others], known.frames)
         assert np.isnan(flight.frames[:, :, gone]).all() and np.isnan(flight.state[:, gone]).all()
 
@@ -57,7 +57,7 @@ def test_an_instant_in_flight_is_scored_as_in_its_recording():
     flight = airflock.open(scenario, 5, device="python", record=True)
     flight.advance(3.0).remove(2).advance(2.01).remove(6).advance(4.0).add(2, [0.0, 0.0], [1.0, 0.0])
     scores = flight.finish()
-    values, _ = measure(recording_of(flight))
+    values, _ = measure_recording(recording_of(flight))
     for name in ("phi_vel", "phi_corr", "n_min", "r_min", "phi_coll", "n_coll", "phi_wall"):
         assert scores[name] == pytest.approx(values[name], rel=1e-9), name
     assert values["present"] == pytest.approx(scores["present"], abs=0.01)
@@ -127,8 +127,10 @@ def test_random_numbers_of_the_others_do_not_depend_on_who_left(agents, first):
     known = airflock.open(load(PAPER, far), 4, device="python").advance(2.0)
     by_hand = airflock.open(load(PAPER, far), 4, device="python").advance(0.5)
     by_hand.remove(gone[0]).advance(0.7).remove(gone[1]).advance(0.8)
-    faults = [{"kind": "fails", "at": at, "agents": [agent]} for at, agent in zip((0.5, 1.2), gone, strict=True)]
-    by_fault = airflock.open(load(PAPER, far | {"faults": faults}), 4, device="python").advance(2.0)
+    recorded_faults = [
+        {"kind": "fails", "at": at, "agents": [agent]} for at, agent in zip((0.5, 1.2), gone, strict=True)
+    ]
+    by_fault = airflock.open(load(PAPER, far | {"faults": recorded_faults}), 4, device="python").advance(2.0)
     others = [agent for agent in range(agents) if agent not in gone]
     for flight in (by_hand, by_fault):
         assert np.array_equal(flight.state[:, others], known.state[:, others])
@@ -211,9 +213,9 @@ def test_a_constant_error_of_all_receivers_shifts_the_flock_and_nothing_else():
 def test_an_agent_that_is_off_shies_from_a_wall_that_is_not_there():
     alone = {"agents": 1, "sensors.noise": 0.0, "body.noise": 0.0, "duration": 60.0}
     east, farthest = np.array([[0.0], [0.0], [4.0], [0.1]]), []
-    for faults in ([], [{"kind": "gnss_offset", "at": 0.0, "east": 60.0}]):
-        scenario = load(PAPER, {**alone, **({"faults": faults} if faults else {})})
-        farthest.append(fly(scenario, 1, record=True, start=east, device="python").frames[:, 0].max())
+    for recorded_faults in ([], [{"kind": "gnss_offset", "at": 0.0, "east": 60.0}]):
+        scenario = load(PAPER, {**alone, **({"faults": recorded_faults} if recorded_faults else {})})
+        farthest.append(fly_world(scenario, 1, record=True, start=east, device="python").frames[:, 0].max())
     assert farthest[0] - farthest[1] == pytest.approx(60.0, abs=2.0)
 
 
@@ -252,8 +254,8 @@ def test_a_frozen_radio_repeats_the_packet_that_it_sent_last(noise):
     """With its errors: they are part of what was sent. Two faults, so that the second one repeats a newer packet."""
     keys = {"sensors.noise": noise, "radio.delay": 0.4, "radio.range": 1e4, "duration": 8.0}
     hit = {"kind": "radio_frozen", "agents": [2]}
-    faults = [hit | {"at": 1.0, "lasts": 2.0}, hit | {"at": 3.6, "lasts": 1.0}]
-    flight = airflock.open(load(PAPER, {**SMALL, **keys, "faults": faults}), 1, device="python")
+    recorded_faults = [hit | {"at": 1.0, "lasts": 2.0}, hit | {"at": 3.6, "lasts": 1.0}]
+    flight = airflock.open(load(PAPER, {**SMALL, **keys, "faults": recorded_faults}), 1, device="python")
     told = []
     for _ in range(30):
         flight.advance(0.2).sense()
@@ -266,8 +268,8 @@ def test_a_frozen_radio_repeats_the_packet_that_it_sent_last(noise):
 
 def test_a_frozen_receiver_repeats_the_position_that_it_reported_last():
     """It was thought to report its true position when it froze, which no receiver knows."""
-    faults = [{"kind": "gnss_frozen", "at": 1.1, "agents": [2], "lasts": 2.0}]
-    flight = airflock.open(load(PAPER, {**SMALL, "radio.range": 1e4, "faults": faults}), 1, device="python")
+    recorded_faults = [{"kind": "gnss_frozen", "at": 1.1, "agents": [2], "lasts": 2.0}]
+    flight = airflock.open(load(PAPER, {**SMALL, "radio.range": 1e4, "faults": recorded_faults}), 1, device="python")
     believed, told = [], []
     for _ in range(25):
         flight.advance(0.2).sense()
@@ -299,8 +301,8 @@ def test_a_fault_that_is_named_in_flight_repeats_what_was_last(joined):
 def test_what_is_frozen_was_off_already_and_is_off_no_further(kinds):
     keys = {**SMALL, "sensors.noise": 0.0, "radio.range": 1e4}
     at = {"gnss_offset": 0.0, "gnss_frozen": 2.0}
-    faults = [{"kind": kind, "at": at[kind], "agents": [2]} for kind in kinds]
-    flight = airflock.open(load(PAPER, {**keys, "faults": faults}), 1, device="python").advance(1.8).sense()
+    recorded_faults = [{"kind": kind, "at": at[kind], "agents": [2]} for kind in kinds]
+    flight = airflock.open(load(PAPER, {**keys, "faults": recorded_faults}), 1, device="python").advance(1.8).sense()
     last = flight.look(2).own
     assert last.x == pytest.approx(flight.look(2).true.x + 10.0, abs=1e-5)
     flight.advance(1.0).sense()
@@ -312,9 +314,11 @@ def test_a_clock_that_is_ahead_extrapolates_too_far():
     keys = {"radio.kind": "links", "radio.near": 500.0, "radio.received_near": 1.0, "radio.range": 1e4}
     keys |= {"sensors.noise": 0.0, "body.noise": 0.0}
     found = []
-    for faults in ([], [{"kind": "clock", "at": 0.0, "agents": [2], "ahead": 1.5}]):
+    for recorded_faults in ([], [{"kind": "clock", "at": 0.0, "agents": [2], "ahead": 1.5}]):
         flight = airflock.open(
-            load(PAPER, {**SMALL, **keys, **({"faults": faults} if faults else {})}), 1, device="python"
+            load(PAPER, {**SMALL, **keys, **({"faults": recorded_faults} if recorded_faults else {})}),
+            1,
+            device="python",
         )
         flight.advance(1.0).sense()
         found.append((flight.look(0).heard, flight.look(2).heard))
@@ -347,23 +351,23 @@ def test_a_battery_lands_the_agent_when_it_is_empty():
 
 def test_faults_that_come_at_random_come_as_often_as_they_should():
     scenario = load(PAPER, {"agents": 20, "duration": 3600.0, "faults": [{"kind": "motor", "per_hour": 30.0}]})
-    from airflock.scenarios.onsets import onsets
+    from airflock.scenarios.onsets import draw_onsets
 
-    counts = [onsets(scenario, seed) for seed in range(60)]
+    counts = [draw_onsets(scenario, seed) for seed in range(60)]
     assert np.mean([len(found) for found in counts]) == pytest.approx(30.0, abs=4.0 * np.sqrt(30.0 / 60.0))
     agents = np.bincount([onset.agent for found in counts for onset in found], minlength=20)
     assert ((agents - agents.mean()) ** 2 / agents.mean()).sum() < 45.0  # chi squared, 19 degrees of freedom
-    other = onsets(scenario, 0, world=1)
+    other = draw_onsets(scenario, 0, world=1)
     assert other != counts[0]
 
 
 def test_any_cuts_and_any_way_to_say_it_give_the_same_bits():
-    faults = [
+    recorded_faults = [
         {"kind": "gnss_frozen", "at": 1.01, "agents": [1], "lasts": 1.5}, {"kind": "motor", "per_hour": 4000.0},
         {"kind": "battery", "at": 0.5, "agents": [3], "endurance": 1.23}, {"kind": "stuck", "at": 2.0, "number": 2},
     ]  # fmt: skip
-    scenario = load(PAPER, {**SMALL, "faults": faults})
-    closed = fly(scenario, 3, record=True, device="python")
+    scenario = load(PAPER, {**SMALL, "faults": recorded_faults})
+    closed = fly_world(scenario, 3, record=True, device="python")
     for steps in (1, 7, 100):
         flight = airflock.open(scenario, 3, record=True, device="python")
         while not flight.over:
@@ -411,7 +415,7 @@ def test_a_recording_tells_what_befell_whom():
     told = json.loads(recording.attrs["airflock_faults"])["faults"]
     assert told == [{"kind": "fails", "agent": 2, "begin": 1.0, "end": None}]
     assert recording.confidence.values[:, 0, 2].tolist() == [1.0] * 5 + [0.0] * 26
-    assert measure(recording)[0]["present"] == pytest.approx(1.0 - 26.0 / 31.0 / 8.0)
+    assert measure_recording(recording)[0]["present"] == pytest.approx(1.0 - 26.0 / 31.0 / 8.0)
 
 
 class Magnet:
@@ -425,7 +429,7 @@ class Magnet:
 
 def test_a_kind_of_ones_own_flies(tmp_path):
     found = load(PAPER, {**SMALL, "faults": [{"kind": "magnet", **ONCE}]}, faults=Magnet)
-    one = fly(found, 3, record=True, device="python").frames
+    one = fly_world(found, 3, record=True, device="python").frames
     (tmp_path / "magnet.py").write_text(
         "def sense(x, y, z, vx, vy, vz):\n    return x, y, z, vy, -vx, vz\n", encoding="utf-8"
     )
@@ -434,7 +438,7 @@ def test_a_kind_of_ones_own_flies(tmp_path):
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
     with pytest.raises(ScenarioError, match="if you trust it, add --trust"):
         load(tmp_path / "mine.toml")
-    two = fly(load(tmp_path / "mine.toml", trust=True), 3, record=True, device="python").frames
+    two = fly_world(load(tmp_path / "mine.toml", trust=True), 3, record=True, device="python").frames
     assert np.array_equal(one, two)
     assert not np.array_equal(one, flown().frames)
 
@@ -517,11 +521,13 @@ def test_a_group_flies_as_it_is_told():
 def test_tolerances_are_drawn_as_they_are_told():
     spread = {"name": "all", "body": {"tau": {"value": 1.0, "spread": 0.1}}, "model": {"p_rep": {"spread": 0.02}}}
     scenario = load(PAPER, {"agents": 2000, "world.side": 3000.0, "groups": [spread]})
-    tau, p_rep = (np.array(scenario.own_numbers(*key, 5)) for key in (("b", "tau"), ("p", "p_rep")))
+    tau, p_rep = (np.array(scenario.agent_values(*key, 5)) for key in (("b", "tau"), ("p", "p_rep")))
     assert tau.mean() == pytest.approx(1.0, abs=0.01) and tau.std() == pytest.approx(0.1, rel=0.07)
     assert p_rep.mean() == pytest.approx(scenario.parameters.p_rep, abs=0.003)
     assert abs(np.corrcoef(tau, p_rep)[0, 1]) < 0.1
-    assert np.array_equal(tau, scenario.own_numbers("b", "tau", 5)) and tau[0] != scenario.own_numbers("b", "tau", 6)[0]
+    assert (
+        np.array_equal(tau, scenario.agent_values("b", "tau", 5)) and tau[0] != scenario.agent_values("b", "tau", 6)[0]
+    )
 
 
 def test_numbers_of_their_own_that_are_the_same_are_the_plain_flight():
@@ -536,8 +542,8 @@ def test_numbers_of_their_own_that_are_the_same_are_the_plain_flight():
 
     numbers = tables(scenario, plan, 3)
     same = replace(numbers, own=np.full_like(numbers.own, base.body.tau))
-    assert np.array_equal(cpu.fly(plan, same, device="python").frames, plain.frames)
-    assert not np.array_equal(cpu.fly(plan, numbers, device="python").frames, plain.frames)
+    assert np.array_equal(cpu.fly_on_cpu(plan, same, device="python").frames, plain.frames)
+    assert not np.array_equal(cpu.fly_on_cpu(plan, numbers, device="python").frames, plain.frames)
 
 
 def test_a_group_measures_by_numbers_of_its_own():
@@ -552,7 +558,7 @@ def test_a_group_measures_by_numbers_of_its_own():
     assert (off[1][[0, 5]] == 0.0).all() and (off[0] > 0.0).all()
     assert np.array_equal(off[0][others], off[1][others])
     alone = load(PAPER, {**apart, "sensors.noise": 0.0, "groups": [{"agents": [2], "sensors": {"noise": 0.3}}]})
-    assert alone.errs and not alone.unerring.errs
+    assert alone.has_sensor_error and not alone.without_sensor_errors.has_sensor_error
 
 
 @pytest.mark.parametrize(("agents", "few"), [(4, 1), (7, 1), (30, 6), (100, 20)])
@@ -598,15 +604,15 @@ def test_a_law_that_solves_for_the_whole_flock_has_one_set_of_numbers():
 
 
 def test_faults_of_a_recording_are_told_where_people_look(tmp_path):
-    from airflock.recordings.attributes import faults, told_faults
+    from airflock.recordings.attributes import faults_line, recorded_faults
     from airflock.support.errors import RecordingError
 
     recording = airflock.simulate(load(PAPER, {**SMALL, "faults": [{"kind": "fails", **ONCE}]}), 1, device="python")
-    assert told_faults(faults(recording)) == "1 fault: fails of agent 2 at 1 s"
+    assert faults_line(recorded_faults(recording)) == "1 fault: fails of agent 2 at 1 s"
     figure = airflock.plots.series(recording)
     assert "fails (2)" in "".join(text.get_text() for axes in figure.axes for text in axes.texts)
     with pytest.raises(RecordingError, match="airflock_faults is damaged"):
-        faults(recording.assign_attrs(airflock_faults='{"faults": [3]}'))
+        recorded_faults(recording.assign_attrs(airflock_faults='{"faults": [3]}'))
 
 
 def test_groups_are_scored_alone_and_against_each_other():
@@ -637,8 +643,8 @@ def test_groups_are_scored_alone_and_against_each_other():
 def test_a_group_that_is_never_there_is_a_row_without_numbers(seed):
     """It ended the table of all others with "no individual is present"."""
     groups = [{"name": "gone", "agents": 2}, {"name": "rest"}]
-    faults = [{"kind": "fails", "at": 0.0, "group": "gone"}]
-    scenario = load(PAPER, {**SMALL, "duration": 1.0, "groups": groups, "faults": faults})
+    recorded_faults = [{"kind": "fails", "at": 0.0, "group": "gone"}]
+    scenario = load(PAPER, {**SMALL, "duration": 1.0, "groups": groups, "faults": recorded_faults})
     recording = airflock.simulate(scenario, seed, device="python")
     table = airflock.score(recording, groups=True)
     assert table.loc["gone", "present"] == 0.0 and table.loc["gone"].drop("present").isna().all()

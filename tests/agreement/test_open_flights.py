@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import fly, plan_of
+from airflock.engine import fly_world, plan_of
 from airflock.scenarios.files import load, presets
 from airflock.support.errors import FlightError, ScenarioError
 
@@ -71,7 +71,7 @@ def test_any_cuts_of_any_plan_give_the_bits_of_the_whole(name, threads):
 
 def cut_and_whole(name, steps):
     scenario = few(name)
-    closed = fly(scenario, 3, record=True)
+    closed = fly_world(scenario, 3, record=True)
     flight = airflock.open(scenario, 3, record=True)
     while not flight.over:
         flight.advance(steps=steps)
@@ -99,7 +99,7 @@ def test_every_preset_flies_the_same_in_parts(name):
 def test_a_flight_that_ends_at_a_collision_ends_there_in_parts_too():
     crowded = {"agents": 40, "duration": 60.0, "metrics.stop": "collision", "metrics.r_coll": 12.0}
     scenario = load("vasarhelyi_2018/4ms", crowded)
-    closed = fly(scenario, 1, record=True, device="python")
+    closed = fly_world(scenario, 1, record=True, device="python")
     flight = airflock.open(scenario, 1, record=True, device="python")
     while not flight.over:
         flight.advance(steps=37)
@@ -319,7 +319,7 @@ def test_what_makes_no_sense_is_one_line(scenario, call, said):
     [("vasarhelyi_2018/4ms", "cpu"), ("vasarhelyi_2018/real_gnss", "python")],  # its sensor, compiled: covering.PLANS
 )
 def test_what_an_agent_perceives_makes_up_its_command(name, device):
-    from airflock.core.vocabulary import answer
+    from airflock.core.vocabulary import call_rule
 
     scenario = load(name, {"agents": 12, "duration": 20.0, "radio.range": 200.0})
     flight = airflock.open(scenario, 3, precision=64, device=device).advance(5.0)
@@ -335,7 +335,7 @@ def test_what_an_agent_perceives_makes_up_its_command(name, device):
 
         own = Own(v.vx, v.vy, 0.0, v.vx / norm, v.vy / norm, 0.0)
         given = {"own": own, "sums": view.sums, "walls": view.walls, "p": scenario.parameters}
-        wished = answer(scenario.model.decide, "decide", given, "law")
+        wished = call_rule(scenario.model.decide, "decide", given, "law")
         assert wished[:2] == pytest.approx(view.command, abs=1e-9)
         assert flight.commands[:, view.agent] == pytest.approx(view.command)
 
@@ -368,7 +368,7 @@ def test_an_interruption_ends_one_long_flight():
     signal.setitimer(signal.ITIMER_REAL, 0.5)
     try:
         with pytest.raises(KeyboardInterrupt):
-            fly(scenario, 1)
+            fly_world(scenario, 1)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import fly, plan_of
-from airflock.fleets.prepare import card_document
-from airflock.recordings.files import fly_again
+from airflock.engine import fly_world, plan_of
+from airflock.fleets.prepare import make_card_document
+from airflock.recordings.files import replay_recording
 from airflock.scenarios.files import load
 from airflock.support.errors import AirflockError, CardError, RecordingError, RuleError, ScenarioError
 from reference.flight import fly_plainly
@@ -36,14 +36,14 @@ def test_it_is_one_file_outside_the_package(beside, seed):
     with pytest.raises(ScenarioError, match="if you trust it, add --trust"):
         load(beside / "mine.toml")
     scenario = load(beside / "mine.toml", trust=True)
-    assert scenario.meets.name == "beside" and scenario.topology.times == 1.5
-    found = fly(scenario, seed, record=True, device="python").frames
+    assert scenario.topology_rule.name == "beside" and scenario.topology.times == 1.5
+    found = fly_world(scenario, seed, record=True, device="python").frames
     np.testing.assert_allclose(found, fly_plainly(scenario, seed).frames, atol=1e-9)
     lean = load(beside / "mine.toml", {"metrics.kind": "order"}, trust=True)  # which compiles sooner
-    compiled = fly(lean, seed, record=True, device="cpu", precision=64).frames
+    compiled = fly_world(lean, seed, record=True, device="cpu", precision=64).frames
     np.testing.assert_allclose(compiled, found, atol=1e-9)
     given = load(PAPER, SMALL | {"topology.times": 1.5}, topology=beside / "beside.py")
-    assert np.array_equal(fly(given, seed, record=True, device="python").frames, found)
+    assert np.array_equal(fly_world(given, seed, record=True, device="python").frames, found)
     airflock.check_topology(str(beside / "beside.py"))
 
 
@@ -80,7 +80,7 @@ def test_a_recording_is_scored_and_is_not_flown_again_without_it(beside, seed):
     recording = airflock.simulate(load(beside / "mine.toml", trust=True), seed, device="python")
     assert np.isfinite(float(airflock.score(recording)["phi_corr"].iloc[0]))
     with pytest.raises(RecordingError, match="topology.kind"):
-        fly_again(recording)
+        replay_recording(recording)
 
 
 def empty():
@@ -120,7 +120,7 @@ def test_a_wrong_number_of_it_is_said_in_one_line(beside):
 def test_a_card_names_ours_only(beside):
     scenario = load(beside / "mine.toml", trust=True)
     with pytest.raises(CardError, match="the topology beside is not in the package"):
-        card_document(scenario, site=(47.0, 19.0, 100.0), members=range(1, 7), mission=1, expires=2_000_000_000)
+        make_card_document(scenario, site=(47.0, 19.0, 100.0), members=range(1, 7), mission=1, expires=2_000_000_000)
 
 
 def above(n, dz, r2, met):
@@ -131,7 +131,7 @@ def above(n, dz, r2, met):
 def test_a_rule_that_asks_for_the_height_alone_is_given_it(seed):
     """Found by a draw: offsets were kept only where a rule asked for dx."""
     scenario = load(PAPER, SMALL | {"world.dimensions": "3", "duration": 1.0}, topology={"meet": above})
-    found = fly(scenario, seed, record=True, device="python").frames
+    found = fly_world(scenario, seed, record=True, device="python").frames
     np.testing.assert_allclose(found, fly_plainly(scenario, seed).frames, atol=1e-9)
     everybody = load(PAPER, SMALL | {"world.dimensions": "3", "duration": 1.0})
-    assert np.abs(found - fly(everybody, seed, record=True, device="python").frames).max() > 1e-3
+    assert np.abs(found - fly_world(everybody, seed, record=True, device="python").frames).max() > 1e-3

@@ -9,27 +9,25 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import airflock
 from airflock.core.agent import State
 from airflock.core.contract import model
-from airflock.core.hearing import Hearing
+from airflock.core.hearing import PacketPolicy
 from airflock.core.parameters import choices
 from airflock.core.pilot import Pilot
-from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import complete, could_be_near, counts, of_standing
-from airflock.core.vocabulary import answer
-from airflock.drones.onboard.fields import frozen
-from airflock.fleets.prepare import plain
+from airflock.core.silence import Parameters as Silence, could_be_near, counts, for_standing_neighbour, with_defaults
+from airflock.core.vocabulary import call_rule
+from airflock.drones.onboard.fields import to_tuples
+from airflock.fleets.prepare import to_json_table
 from airflock.parts.bodies.registry import BODIES
 from airflock.parts.laws import dimock_2003, vasarhelyi_2018, vicsek_1995
 from airflock.parts.radios.registry import RADIOS
 from airflock.support.errors import RuleError
 from airflock.world import arena
-from airflock.world.corners import counter_clockwise, polygon_fault
-from airflock.world.place import Place, Shapes
+from airflock.world.corners import counter_clockwise, polygon_error
+from airflock.world.place import Shapes, WorldMap
 from flocks import ISLANDS, PENTAGON
 
 QUIET = {"sensors.noise": 0.0, "body.noise": 0.0, "duration": 10.0, "metrics.period": 0.2}
@@ -54,18 +52,18 @@ FLIGHTS = {
     }),
     "swarm": ("couzin_2002/torus", {"agents": 10, "body.noise": None, "duration": 3.0}),
 }  # fmt: skip
-PLAIN = Hearing.simulated(RADIOS["constant"], RADIOS["constant"].Parameters())
+PLAIN = PacketPolicy.simulated(RADIOS["constant"], RADIOS["constant"].Parameters())
 
 
 def place_of(scenario):
     """The world of a scenario as a drone carries it: read from the text of a card."""
     stands, rule = scenario.stands(), scenario.model.wall_reach
     tables = {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()}
-    text = json.dumps({"world": plain(scenario.world), "shapes": tables})
+    text = json.dumps({"world": to_json_table(scenario.world), "shapes": tables})
     read = json.loads(text)
     look = 1e30 if rule is None else rule(scenario.parameters)
-    world = arena.Parameters(**frozen(read["world"]))
-    return Place(world, Shapes(**read["shapes"]), look=look, casts=scenario.model.sight is not None)
+    world = arena.Parameters(**to_tuples(read["world"]))
+    return WorldMap(world, Shapes(**read["shapes"]), look=look, casts=scenario.model.sight is not None)
 
 
 @cache
@@ -78,12 +76,12 @@ def fly(scenario, start, seed):
     """Positions (time, agent, axis) of N pilots and their bodies; packets arrive after the delay, all of them."""
     n, dims, dt, k = scenario.agents, scenario.dimensions, scenario.flight.dt, scenario.radio
     every, late = max(1, round(scenario.sensors.period / dt)), round(k.delay / dt)
-    period, sampled = every * dt, max(1, round(scenario.measured_by().period / dt))
-    hearing = Hearing(extrapolate=k.kind == "links", forget=late * dt + 0.5 * period)
+    period, sampled = every * dt, max(1, round(scenario.resolved_metrics().period / dt))
+    hearing = PacketPolicy(extrapolate=k.kind == "links", forget=late * dt + 0.5 * period)
     pilots = [
         Pilot(
             scenario.model, scenario.parameters, place_of(scenario), index=i, period=period, hearing=hearing,
-            body=scenario.vehicle, b=scenario.body, flat=dims == 2, seed=seed, topology=scenario.meets,
+            body=scenario.vehicle, b=scenario.body, flat=dims == 2, seed=seed, topology=scenario.topology_rule,
             t=scenario.topology,
         )
         for i in range(n)
@@ -97,7 +95,7 @@ def fly(scenario, start, seed):
             for i, pilot in enumerate(pilots):
                 for j in range(n):
                     if math.dist(now[i][:3], now[j][:3]) <= k.range:
-                        pilot.hear(j, said[j], (step - late) * dt, step * dt)
+                        pilot.receive(j, said[j], (step - late) * dt, step * dt)
                     else:
                         pilot.forget(j)
                 commands[i] = pilot.decide(now[i], step * dt).command
@@ -112,7 +110,7 @@ def moved(scenario, s, c, dt):
     body = scenario.vehicle
     known = {"v": s[3:], "m": s[3:], "c": c, "g": (0.0,) * 3, "w": (0.0,) * 3}
     given = {a + axis: v[k] for a, v in known.items() for k, axis in enumerate("xyz")}
-    velocity = answer(body.move, "move", given | {"dt": dt, "b": scenario.body}, body.name)
+    velocity = call_rule(body.move, "move", given | {"dt": dt, "b": scenario.body}, body.name)
     old = choices(scenario.body).get("integration", body.integration) == "old"
     vx, vy, vz = s[3:] if old else velocity
     x, y, z = s.x + vx * dt, s.y + vy * dt, s.z + vz * dt
@@ -142,7 +140,7 @@ def test_pilots_fly_what_the_simulator_flies(name):
 @given(at=st.tuples(st.floats(-150, 150), st.floats(-150, 150), st.floats(-60, 60)), turn=st.floats(0, 6.28))
 @settings(max_examples=60, deadline=None)
 def test_a_place_read_from_a_card_is_the_world_of_the_flight(name, at, turn):
-    from airflock.scenarios.surroundings import Place as Engine
+    from airflock.scenarios.surroundings import FlightWorld as Engine
 
     scenario = build(name)
     ours, theirs = place_of(scenario), Engine(scenario)
@@ -159,13 +157,13 @@ def test_a_place_read_from_a_card_is_the_world_of_the_flight(name, at, turn):
 def test_polygons_are_judged_as_shapely_judges_them(corners):
     from shapely.geometry import Polygon
 
-    from airflock.scenarios.geometry import polygon_fault as theirs
+    from airflock.scenarios.geometry import polygon_error as theirs
 
     whole = [(round(x, 1), round(y, 1)) for x, y in corners]
     shape = Polygon(whole)
     if len(set(whole)) < len(whole) or (shape.is_valid and shape.area < 1.0):
         return  # repeated corners and slivers: a matter of rounding
-    assert bool(polygon_fault(whole)) == bool(theirs(whole)), whole
+    assert bool(polygon_error(whole)) == bool(theirs(whole)), whole
     if not theirs(whole):
         assert Polygon(counter_clockwise(whole)).exterior.is_ccw
 
@@ -175,29 +173,31 @@ def test_polygons_are_judged_as_shapely_judges_them(corners):
 
 def pilot(**more):
     law = model(vasarhelyi_2018)
-    return Pilot(law, law.Parameters(), Place(arena.Parameters()), **({"index": 0, "period": 0.2, "flat": True} | more))
+    return Pilot(
+        law, law.Parameters(), WorldMap(arena.Parameters()), **({"index": 0, "period": 0.2, "flat": True} | more)
+    )
 
 
 def test_a_law_that_no_single_drone_can_fly_is_refused_when_the_pilot_is_made():
     flock = model(dimock_2003)
     with pytest.raises(RuleError, match="whole flock"):
-        Pilot(flock, flock.Parameters(), Place(arena.Parameters()), index=0, period=0.2)
+        Pilot(flock, flock.Parameters(), WorldMap(arena.Parameters()), index=0, period=0.2)
     heading = model(vicsek_1995)
     with pytest.raises(RuleError, match="give a body"):
-        Pilot(heading, heading.Parameters(), Place(arena.Parameters()), index=0, period=0.2)
+        Pilot(heading, heading.Parameters(), WorldMap(arena.Parameters()), index=0, period=0.2)
     with pytest.raises(RuleError, match="not positive"):
         pilot(period=0.0)
 
 
 def test_only_the_newest_sound_packet_counts():
     one = pilot()
-    assert one.hear(3, State(1.0, 2.0, 0.0, 1.0, 0.0, 0.0), 5.0, 5.1)
-    assert not one.hear(3, State(9.0, 9.0, 0.0, 0.0, 0.0, 0.0), 4.9, 5.2)
-    assert not one.hear(3, State(9.0, 9.0, 0.0, 0.0, 0.0, 0.0), 5.0, 5.2)
-    assert not one.hear(3, State(9.0, 9.0, 0.0, 0.0, 0.0, 0.0), 5.9, 5.2)
-    assert not one.hear(3, State(math.nan, 9.0, 0.0, 0.0, 0.0, 0.0), 5.15, 5.2)
-    assert not one.hear(4, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), math.nan, 5.2)
-    assert not one.hear(0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 5.1, 5.2)
+    assert one.receive(3, State(1.0, 2.0, 0.0, 1.0, 0.0, 0.0), 5.0, 5.1)
+    assert not one.receive(3, State(9.0, 9.0, 0.0, 0.0, 0.0, 0.0), 4.9, 5.2)
+    assert not one.receive(3, State(9.0, 9.0, 0.0, 0.0, 0.0, 0.0), 5.0, 5.2)
+    assert not one.receive(3, State(9.0, 9.0, 0.0, 0.0, 0.0, 0.0), 5.9, 5.2)
+    assert not one.receive(3, State(math.nan, 9.0, 0.0, 0.0, 0.0, 0.0), 5.15, 5.2)
+    assert not one.receive(4, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), math.nan, 5.2)
+    assert not one.receive(0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 5.1, 5.2)
     (heard,) = one.heard(7.0)
     assert heard.state == State(3.0, 2.0, 0.0, 1.0, 0.0, 0.0) and heard.age == 2.0
     assert not one.heard(10.1)
@@ -206,14 +206,14 @@ def test_only_the_newest_sound_packet_counts():
 def test_a_simulated_radio_of_one_delay_is_heard_once_and_believes_every_clock():
     one = pilot(hearing=PLAIN)
     own, east = State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0), State(9.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    assert one.hear(1, east, 7.0, 5.0), "its clock is 2 s ahead"
-    assert one.hear(1, east._replace(x=8.0), 4.0, 5.0), "now it is right again"
+    assert one.receive(1, east, 7.0, 5.0), "its clock is 2 s ahead"
+    assert one.receive(1, east._replace(x=8.0), 4.0, 5.0), "now it is right again"
     (heard,) = one.heard(5.0)
     assert heard.state.x == 8.0 and heard.age == 1.0
     met, alone = one.decide(own, 5.0).command, one.decide(own, 5.2).command
     assert met != alone and not one.heard(5.2)
-    links = pilot(hearing=Hearing.simulated(RADIOS["links"], RADIOS["links"].Parameters()))
-    links.hear(1, east, 4.0, 5.0)
+    links = pilot(hearing=PacketPolicy.simulated(RADIOS["links"], RADIOS["links"].Parameters()))
+    links.receive(1, east, 4.0, 5.0)
     links.decide(own, 5.0)
     assert links.heard(500.0)[0].state.x == 9.0 + 496.0
 
@@ -221,21 +221,21 @@ def test_a_simulated_radio_of_one_delay_is_heard_once_and_believes_every_clock()
 def test_who_is_out_of_sight_does_not_count():
     one, own = pilot(), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
     alone = one.decide(own, 1.0).command
-    one.hear(1, State(9.0, 0.0, 0.0, 1.0, 0.0, 0.0), 1.0, 1.0)
+    one.receive(1, State(9.0, 0.0, 0.0, 1.0, 0.0, 0.0), 1.0, 1.0)
     assert one.decide(own, 1.0, only=()).command == alone != one.decide(own, 1.0, only={1}).command
 
 
 def test_an_autopilot_is_asked_for_a_velocity_whatever_the_law_commands():
     law, turning = model(vicsek_1995), BODIES["heading"]
     b = turning.Parameters()
-    one = Pilot(law, law.Parameters(), Place(arena.Parameters()), index=0, period=0.2, flat=True, body=turning, b=b)
+    one = Pilot(law, law.Parameters(), WorldMap(arena.Parameters()), index=0, period=0.2, flat=True, body=turning, b=b)
     own = State(0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
     assert math.hypot(*one.steer(own, 0.0)) == pytest.approx(b.speed)
 
 
 @given(st.floats(0, 200), st.floats(0, 60), st.floats(0, 60))
 def test_a_lost_neighbour_comes_nearer_with_silence_and_is_given_up(distance, age, longer):
-    s = complete(Silence(rule="stop"), 4.0)
+    s = with_defaults(Silence(rule="stop"), 4.0)
     if could_be_near(distance, age, s) and age + longer < s.forget:
         assert could_be_near(distance, age + longer, s), "silence never makes it safe before it is given up"
     assert not could_be_near(distance, s.forget, s)
@@ -247,8 +247,8 @@ def test_who_said_that_it_holds_may_have_flown_on_with_the_flock_unnoticed_no_ne
     distance, age, share, speed
 ):  # fmt: skip
     """Whatever part of the time it has flown towards here at up to the flock's speed: within `keep` it stops us."""
-    s = complete(Silence(rule="stop"), speed)
-    slow = of_standing(s)
+    s = with_defaults(Silence(rule="stop"), speed)
+    slow = for_standing_neighbour(s)
     flown = (speed or 4.0) * share * age
     if s.patience < age < s.forget and distance - flown < s.keep - 1e-6:
         assert could_be_near(distance, age, slow)
@@ -261,16 +261,16 @@ def test_a_pilot_stops_later_for_whom_it_lost_when_it_held():
     stops = []
     for stands in (False, True):
         one, own = pilot(silence=Silence(rule="stop", closing=8.0)), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
-        one.hear(1, State(60.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, stands=stands)
+        one.receive(1, State(60.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, stands=stands)
         stops.append([age for age in range(1, 20) if one.lost_near(own, float(age))][0])
     assert stops == [7, 14]
-    one.hear(1, State(60.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.5, 0.5)
+    one.receive(1, State(60.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.5, 0.5)
     assert one.lost_near(own, 8.0), "its last word counts"
 
 
 @given(st.floats(0, 60), st.floats(0, 200))
 def test_a_neighbour_counts_as_heard_or_as_lost_but_never_as_both(age, distance):
-    s = complete(Silence(rule="stop"), 4.0, delay=1.0)
+    s = with_defaults(Silence(rule="stop"), 4.0, delay=1.0)
     assert not (counts(age, s) and could_be_near(distance, age, s))
     if age < s.forget:
         assert counts(age, s) or could_be_near(0.0, age, s)
@@ -284,7 +284,7 @@ def test_a_missing_packet_does_not_make_a_pilot_forget_who_sent_the_last():
     )
     for rule, known in ((Silence(rule="stop", patience=1.5), True), (None, False)):
         one = pilot(silence=rule, hearing=hearing)
-        one.hear(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 1.0)
+        one.receive(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 1.0)
         assert one.heard(1.0)
         one.decide(own, 1.0)
         assert bool(one.heard(1.4)) is known and not one.heard(1.6)
@@ -293,18 +293,18 @@ def test_a_missing_packet_does_not_make_a_pilot_forget_who_sent_the_last():
 def test_who_is_lost_when_its_packet_comes_is_not_heard():
     """A patience shorter than the delay: the simulator hears nobody then, and so does its pilot."""
     one = pilot(silence=Silence(rule="stop", patience=0.3), hearing=PLAIN)
-    one.hear(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.35)
+    one.receive(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.35)
     assert not one.heard(0.35) and one.heard(0.25)
 
 
 def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():
     one, own = pilot(silence=Silence(rule="stop", patience=2.0)), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
-    one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+    one.receive(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
     assert math.hypot(*one.decide(own, 1.9).command[:2]) > 1.0
     assert one.decide(own, 4.0).command == (0.0, 0.0, 0.0)
     away = own._replace(x=1.5, y=-2.0)
     assert one.decide(away, 4.05).command == pytest.approx((-0.75, 1.0, 0.0)), "back to where it stopped"
-    one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 4.1)
+    one.receive(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 4.1)
     assert one.decide(away, 4.2).command == pytest.approx((-0.75, 1.0, 0.0)), "it stands for a second more"
     assert math.hypot(*one.decide(own, 5.1).command[:2]) > 1.0
     assert one.steer(own, 9.0) == (0.0, 0.0, 0.0)

@@ -84,7 +84,7 @@ def test_a_crowd_without_room_is_refused_by_both(seed):
     status = fly_plainly(found, seed).status
     assert status < 0
     plan = plan_of(found, precision=64, record=True)
-    assert cpu.fly(plan, tables(found, plan, seed)).status == status
+    assert cpu.fly_on_cpu(plan, tables(found, plan, seed)).status == status
 
 
 def test_drones_that_land_with_an_empty_battery_are_absent_in_both(seed):

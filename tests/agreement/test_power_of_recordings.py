@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from airflock.recordings.flown_scenario import aero_settings
-from airflock.recordings.layout import dataset
-from airflock.recordings.scores import measure
+from airflock.recordings.flown_scenario import power_settings
+from airflock.recordings.layout import make_dataset
+from airflock.recordings.scores import measure_recording
 from formations import FOOT, drags, vee, wing_of
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
@@ -32,7 +32,7 @@ def flown(places, heading, speed=12.0, dimensions=3):
     frames = np.zeros((21, 3 * dimensions, len(places)))
     frames[:, :dimensions] = position[:, :dimensions]
     frames[:, dimensions : 2 * dimensions] = velocity[None, :dimensions, None]
-    return dataset(frames, dimensions, 0.1, {}, "velocity")
+    return make_dataset(frames, dimensions, 0.1, {}, "velocity")
 
 
 def test_a_formation_saves_the_same_in_any_direction(seed):
@@ -43,7 +43,7 @@ def test_a_formation_saves_the_same_in_any_direction(seed):
     alone = float(drags(np.zeros((1, 3)), w)[0]) * 12.0
     for heading in (0.0, rng.uniform(0.0, 2.0 * math.pi)):
         recording = flown(places, heading)
-        values, course = measure(recording, aero_settings(recording, WING))
+        values, course = measure_recording(recording, power_settings(recording, WING))
         assert values["power"] == pytest.approx(expected, rel=1e-5)
         assert values["saving"] == pytest.approx(1.0 - expected / alone, rel=1e-5)
         assert np.ptp(course["power"]) < 1e-4 * expected

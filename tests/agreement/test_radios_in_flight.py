@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import fly, plan_of
+from airflock.engine import fly_world, plan_of
 from airflock.parts.radios.registry import RADIOS
 from airflock.scenarios.files import load
 from airflock.support.errors import RuleError, ScenarioError
@@ -37,9 +37,11 @@ def over(kind, **more):
 def test_a_radio_flies_as_the_reference_does(kind, dims, seed):
     scenario = over(kind, **{"world.dimensions": dims})
     known = fly_plainly(scenario, seed)
-    found = fly(scenario, seed, record=True, device="python")
+    found = fly_world(scenario, seed, record=True, device="python")
     np.testing.assert_allclose(found.frames, known.frames, atol=1e-9)
-    free = fly(over("constant", **{"world.dimensions": dims, "radio.loss": 0.0}), seed, record=True, device="python")
+    free = fly_world(
+        over("constant", **{"world.dimensions": dims, "radio.loss": 0.0}), seed, record=True, device="python"
+    )
     assert np.abs(found.frames - free.frames).max() > 1e-3  # it does something
 
 
@@ -74,7 +76,7 @@ def test_a_radio_that_asks_for_everything_flies_compiled_as_the_reference_does(d
     known = fly_plainly(scenario, seed)
     devices = ("python", "cpu") if dims == "2" else ("python",)
     for device in devices:
-        found = fly(scenario, seed, record=True, device=device, precision=64)
+        found = fly_world(scenario, seed, record=True, device=device, precision=64)
         np.testing.assert_allclose(found.frames, known.frames, atol=1e-9)
 
 
@@ -106,7 +108,7 @@ def test_an_open_flight_takes_another_radio_and_looks_through_it():
 @pytest.mark.parametrize("fault", ["radio_deaf", "radio_silent", "radio_range", "fails"])
 def test_faults_and_absence_come_on_top_of_a_radio(kind, fault, seed):
     ill = over(kind, faults=[{"kind": fault, "at": 0.9, "agents": [2]}])
-    found = fly(ill, seed, record=True, device="python").frames
+    found = fly_world(ill, seed, record=True, device="python").frames
     np.testing.assert_allclose(found, fly_plainly(ill, seed).frames, atol=1e-9)
 
 
@@ -125,10 +127,10 @@ def test_a_radio_of_ones_own_is_one_file_outside_the_package(tmp_path, seed):
             load(tmp_path / "mine.toml")
         scenario = load(tmp_path / "mine.toml", trust=True)
         assert scenario.radio.delay == 0.2 and scenario.transceiver.name == name[:-3]
-        found = fly(scenario, seed, record=True, device="python").frames
+        found = fly_world(scenario, seed, record=True, device="python").frames
         np.testing.assert_allclose(found, fly_plainly(scenario, seed).frames, atol=1e-9)
         given = load(PAPER, {"agents": 4, "duration": 2.0, "radio.delay": 0.2}, radio=tmp_path / name)
-        assert np.array_equal(fly(given, seed, record=True, device="python").frames, found)
+        assert np.array_equal(fly_world(given, seed, record=True, device="python").frames, found)
         airflock.check_radio(str(tmp_path / name))
 
 
@@ -179,4 +181,4 @@ def test_a_radio_given_directly_stays_through_changes_and_its_recordings_are_sco
     assert flight.scenario.transceiver.receive is everything and flight.scenario.parameters.p_rep == 0.2
     recording = airflock.simulate(scenario, 2, device="python")
     scored = float(airflock.score(recording)["phi_vel"].iloc[0])
-    assert scored == pytest.approx(fly(scenario, 2, device="python").values["phi_vel"], rel=1e-5)
+    assert scored == pytest.approx(fly_world(scenario, 2, device="python").values["phi_vel"], rel=1e-5)

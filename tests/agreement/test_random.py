@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from airflock.core import random
-from airflock.engine.text.generate import Source
+from airflock.engine.text.generate import DriverSource
 from airflock.recordings.perception import packet_uniforms
 from inside import HEAD, load_driver, primitives
 
@@ -40,7 +40,7 @@ def fill(counters, keys, words, uniforms, normals):
 def compiled(request):
     """Function of counters (4, n) and keys (2, n) → words (4, n), uniforms (n,), normals (4, n), compiled."""
     bits = request.param
-    source = Source("@njit(**JIT)", {})
+    source = DriverSource("@njit(**JIT)", {})
     names = {"philox": source.name(random.philox), "uniform": source.name(random.uniform)}
     text = LOOP.format(**names, pair=source.name(random.normal_pair))
     head = HEAD.format(label="random numbers", bits=bits, primitives=primitives(bits))
@@ -119,15 +119,15 @@ def test_receivers_that_share_a_call_hear_independently(seed):
 
 
 def test_draws_of_a_stream_meet_no_other_stream():
-    assert random.words(1, random.SENSOR, 0, 5, 2, draw=1) == random.philox(2, 5, random.SENSOR + 256, 0, 1, 0)
+    assert random.random_words(1, random.SENSOR, 0, 5, 2, draw=1) == random.philox(2, 5, random.SENSOR + 256, 0, 1, 0)
     seen = {(s + 256 * d) for s in range(1, 8) for d in range(256)}
     assert len(seen) == 7 * 256
 
 
 def test_seeds_may_use_64_bits():
-    low, high = random.words(7, 1, 0, 0, 0), random.words(7 + (1 << 32), 1, 0, 0, 0)
+    low, high = random.random_words(7, 1, 0, 0, 0), random.random_words(7 + (1 << 32), 1, 0, 0, 0)
     assert low != high
-    assert random.words(7 + (1 << 64), 1, 0, 0, 0) == low
+    assert random.random_words(7 + (1 << 64), 1, 0, 0, 0) == low
 
 
 N = 100_000

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock.engine import fly, plan_of
-from airflock.support.threads import in_threads
+from airflock.engine import fly_world, plan_of
+from airflock.support.threads import run_in_threads
 from flocks import flown, interpreted, scenario
 from inside import cpu, flight_driver, tables
 
@@ -19,9 +19,9 @@ PAPER = {
 FRESH = """
 import hashlib
 from airflock.engine import fly
-from airflock.scenarios.making import make
+from airflock.scenarios.making import build_scenario
 settings = {settings!r}
-found = make({{"model": {{"kind": "vasarhelyi_2018"}}}}, "test", settings)
+found = build_scenario({{"model": {{"kind": "vasarhelyi_2018"}}}}, "test", settings)
 print(hashlib.sha256(fly(found, {seed}, record=True).frames.tobytes()).hexdigest())
 """
 
@@ -33,9 +33,9 @@ def digest(frames):
 @pytest.mark.parametrize("threads", [1, 2, 7])
 def test_the_number_of_threads_changes_no_bit(threads, seed):
     found = scenario(**PAPER)
-    jobs = [lambda s=s: digest(fly(found, seed + s, record=True).frames) for s in range(8)]
+    jobs = [lambda s=s: digest(fly_world(found, seed + s, record=True).frames) for s in range(8)]
     alone = [job() for job in jobs]
-    assert list(in_threads(jobs, threads)) == alone
+    assert list(run_in_threads(jobs, threads)) == alone
     assert len(set(alone)) == len(alone)  # seeds differ
 
 
@@ -74,7 +74,7 @@ def test_recording_a_flight_changes_nothing_and_takes_no_driver_of_its_own(seed)
     found = scenario(**SMALL)
     plain, recorded = (plan_of(found, precision=64, record=record) for record in (False, True))
     assert flight_driver(plain) is flight_driver(recorded)
-    alone, kept = (cpu.fly(plan, tables(found, plan, seed), device="python") for plan in (plain, recorded))
+    alone, kept = (cpu.fly_on_cpu(plan, tables(found, plan, seed), device="python") for plan in (plain, recorded))
     assert alone.frames is None and kept.frames is not None
     np.testing.assert_array_equal(alone.state, kept.state)
     np.testing.assert_array_equal(alone.state, kept.frames[-1][: len(alone.state)])
@@ -89,7 +89,7 @@ def test_skipped_collision_checks_change_nothing(seed):
     for s in range(12):
         r_coll = (4.0, 6.0, 12.0)[s % 3]
         table = tables(scenario(**PAPER | {"duration": 60.0, "metrics__r_coll": r_coll}), plan, seed + s)
-        skipping, looking = cpu.fly(plan, table), cpu.fly(watchful, table)
+        skipping, looking = cpu.fly_on_cpu(plan, table), cpu.fly_on_cpu(watchful, table)
         np.testing.assert_array_equal(skipping.frames, looking.frames)
         assert skipping.values["n_coll"] == looking.values["n_coll"]
         assert skipping.values["phi_coll"] == looking.values["phi_coll"]

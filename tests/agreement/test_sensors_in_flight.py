@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.parts.sensors.registry import SENSORS
 from airflock.scenarios.files import load
 from airflock.support.errors import RuleError, ScenarioError
@@ -34,7 +34,7 @@ def with_sensor(kind, **more):
 def test_a_sensor_flies_as_the_reference_does(kind, dims, seed):
     scenario = with_sensor(kind, **{"world.dimensions": dims, "radio.delay": 0.3})
     known = fly_plainly(scenario, seed)
-    found = fly(scenario, seed, record=True, device="python")
+    found = fly_world(scenario, seed, record=True, device="python")
     np.testing.assert_allclose(found.frames, known.frames, atol=1e-9)
 
 
@@ -88,7 +88,7 @@ def test_who_joins_measures_as_at_the_start_and_the_others_as_before():
 @pytest.mark.parametrize("fault", ["gnss_offset", "gnss_drift", "gnss_frozen", "gnss_spoofed"])
 def test_faults_of_satellite_navigation_come_on_top_of_a_sensor(fault, seed):
     ill = with_sensor("gnss", faults=[{"kind": fault, "at": 1.0, "agents": [2]}], **{"radio.range": 1e4})
-    found = fly(ill, seed, record=True, device="python").frames
+    found = fly_world(ill, seed, record=True, device="python").frames
     np.testing.assert_allclose(found, fly_plainly(ill, seed).frames, atol=1e-9)
     sound = airflock.open(with_sensor("gnss", **{"radio.range": 1e4}), seed, device="python").advance(1.01)
     flight = airflock.open(ill, seed, device="python").advance(1.01)
@@ -129,10 +129,10 @@ def test_a_sensor_of_ones_own_is_one_file_outside_the_package(tmp_path, seed):
             load(tmp_path / "mine.toml")
         scenario = load(tmp_path / "mine.toml", trust=True)
         assert scenario.sensors.period == 0.1 and scenario.sensor.name == name[:-3]
-        found = fly(scenario, seed, record=True, device="python").frames
+        found = fly_world(scenario, seed, record=True, device="python").frames
         np.testing.assert_allclose(found, fly_plainly(scenario, seed).frames, atol=1e-9)
         given = load(PAPER, {"agents": 4, "duration": 2.0, "sensors.period": 0.1}, sensor=tmp_path / name)
-        assert np.array_equal(fly(given, seed, record=True, device="python").frames, found)
+        assert np.array_equal(fly_world(given, seed, record=True, device="python").frames, found)
         airflock.check_sensor(str(tmp_path / name))
     keys = {"agents": 2, "duration": 1.0, "sensors.off": 0.5, "start.speed": 3.0}
     turned = load(PAPER, keys, sensor=tmp_path / "compass.py")
@@ -172,7 +172,7 @@ def asks_for_more(x, altitude):
 )
 def test_what_is_no_sensor_is_said_in_one_line(rules, said):
     with pytest.raises(RuleError, match=said):
-        fly(load(PAPER, {**SMALL, "duration": 0.1}, sensor=airflock.sensor(rules, "mine")), 1, device="python")
+        fly_world(load(PAPER, {**SMALL, "duration": 0.1}, sensor=airflock.sensor(rules, "mine")), 1, device="python")
 
 
 @pytest.mark.parametrize(
@@ -200,4 +200,4 @@ def test_a_sensor_given_directly_stays_through_changes_and_its_recordings_are_sc
     assert flight.scenario.sensor.measure is mirrored and flight.scenario.parameters.p_rep == 0.2
     recording = airflock.simulate(scenario, 2, device="python")
     scored = float(airflock.score(recording)["phi_vel"].iloc[0])
-    assert scored == pytest.approx(fly(scenario, 2, device="python").values["phi_vel"], rel=1e-5)
+    assert scored == pytest.approx(fly_world(scenario, 2, device="python").values["phi_vel"], rel=1e-5)

@@ -11,9 +11,9 @@ import pytest
 
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters, quantity
-from airflock.scenarios.families import Given
+from airflock.scenarios.families import CallerParts
 from airflock.scenarios.files import load
-from airflock.scenarios.making import make
+from airflock.scenarios.making import build_scenario
 from flocks import interpreted
 from reference.flight import fly_plainly
 
@@ -64,7 +64,12 @@ def test_a_neighbour_at_exactly_the_edge_counts(perception, edges, limit, seed):
     start = np.array([[-7.0, 0.0, 7.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     for length, met in ((7.0, [1.0, 2.0, 1.0]), (7.0 - 1e-9, [0.0, 0.0, 0.0])):
         key = {"range": {"radio.range": length}, "reach": {"model.near": length, "radio.range": 1e6}}[limit]
-        found = make({"model": {"kind": "counting"}}, "test", keys | key, given=Given(law=counting(limit == "reach")))
+        found = build_scenario(
+            {"model": {"kind": "counting"}},
+            "test",
+            keys | key,
+            caller_parts=CallerParts(law=counting(limit == "reach")),
+        )
         for flight in (interpreted, fly_plainly):
             assert flight(found, seed, start).frames[0, 4].tolist() == met
 
@@ -77,7 +82,7 @@ def test_what_stands_between_shades_at_exactly_the_range_too(wall, seed):
     keys |= {"agents": 2, "duration": 0.1, "body.kind": "direct", "world.side": 100.0, "start.separation": 0.0}
     keys["world.obstacles"] = [[[-1.0, -2.0], [1.0, -2.0], [1.0, 2.0], [-1.0, 2.0]]]
     start = np.array([[-3.5, 3.5], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
-    found = make({"model": {"kind": "counting"}}, "test", keys, given=Given(law=counting(False)))
+    found = build_scenario({"model": {"kind": "counting"}}, "test", keys, caller_parts=CallerParts(law=counting(False)))
     for flight in (interpreted, fly_plainly):
         assert flight(found, seed, start).frames[0, 4].tolist() == ([1.0, 1.0] if wall == 0.0 else [0.0, 0.0])
 

@@ -11,10 +11,10 @@ import airflock
 from against_reference import interpreted_flight
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters
-from airflock.drones.onboard.card import card_of, hash_of
+from airflock.drones.onboard.card import card_hash, parse_card
 from airflock.engine import plan_of
-from airflock.scenarios.families import Given
-from airflock.scenarios.files import make
+from airflock.scenarios.families import CallerParts
+from airflock.scenarios.files import build_scenario
 from airflock.search.space_table import read_space
 from airflock.support.errors import CardError, ScenarioError
 from fleets import document, scenario
@@ -55,7 +55,7 @@ def counted(places, velocities=None, **keys):
     places = np.array(places, float)
     start = np.concatenate([places.T, np.zeros_like(places.T) if velocities is None else np.array(velocities).T])
     keys = IDEAL | {"agents": len(places)} | {name.replace("__", "."): value for name, value in keys.items()}
-    found = make({"model": {"kind": "counting"}}, "test", keys, given=Given(law=COUNTING))
+    found = build_scenario({"model": {"kind": "counting"}}, "test", keys, caller_parts=CallerParts(law=COUNTING))
     text, known = (flight(found, 1, start).frames[-1, 4:6] for flight in (interpreted, fly_plainly))
     np.testing.assert_allclose(text, known, atol=1e-12)
     return text[0].tolist(), text[1].tolist()
@@ -148,7 +148,7 @@ def test_whatever_the_radio_the_same_are_met_as_in_the_reference(kind, seed):
         for trait, half in zip(RADIOS, halves, strict=True):
             keys |= trait if number in half else {}
         found, plain = (
-            make({"model": {"kind": "counting"}}, "test", keys | more, given=Given(law=COUNTING))
+            build_scenario({"model": {"kind": "counting"}}, "test", keys | more, caller_parts=CallerParts(law=COUNTING))
             for more in ({}, {"topology.kind": "range"})
         )
         world = rng.randrange(2**32)
@@ -193,12 +193,12 @@ def test_numbers_of_neighbours_are_searched_as_whole_numbers():
 
 def test_a_card_carries_the_topology():
     plain, near = (document(scenario(**keys)) for keys in ({}, {"topology.kind": "nearest"}))
-    assert "topology" not in plain and card_of(plain | {"hash": hash_of(plain)}).pilot(1).topology is None
-    pilot = card_of(near | {"hash": hash_of(near)}).pilot(1)
+    assert "topology" not in plain and parse_card(plain | {"hash": card_hash(plain)}).pilot(1).topology is None
+    pilot = parse_card(near | {"hash": card_hash(near)}).pilot(1)
     assert pilot.topology.name == "nearest" and pilot.t.k == 7.0
     wrong = near | {"topology": {"kind": "nearst", "k": 1.5}}
     with pytest.raises(CardError, match="topology.kind"):
-        card_of(wrong | {"hash": hash_of(wrong)})
+        parse_card(wrong | {"hash": card_hash(wrong)})
 
 
 def test_by_cells_the_same_are_met():
@@ -210,7 +210,7 @@ def test_by_cells_the_same_are_met():
     }  # fmt: skip
     found = airflock.load("zapotecatl_2016/best", keys)
     plan = plan_of(found, precision=64, record=True, grid=True)
-    by_cells = cpu.fly(plan, tables(found, plan, 1), device="python").frames
+    by_cells = cpu.fly_on_cpu(plan, tables(found, plan, 1), device="python").frames
     by_pairs = interpreted(found, 1).frames
     assert plan.grid and np.abs(by_pairs[-1] - by_pairs[0]).max() > 0.1
     np.testing.assert_allclose(by_cells, by_pairs, atol=1e-12)

@@ -16,23 +16,27 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from airflock.engine import plan_of
 from airflock.scenarios.files import load, presets
 from flocks import ISLANDS, NOTCHED, SILENT, scenario
-from inside import CudaBuilder, no_cuda, shape_of
-from inside import cuda_cells as cells
-from inside import cuda_kernel as kernel
-from inside import passes_build as building
-from inside import passes_driver as driver
-from inside import specialise_values as values
-from inside import stages_clusters as clusters
-from inside import stages_decide as decide
-from inside import stages_measure as measure
-from inside import stages_move as move
-from inside import stages_noise as noise
-from inside import stages_pair as pair
-from inside import stages_perceive as perceive
-from inside import stages_receive as receive
-from inside import stages_scene as scene
-from inside import stages_start as start
-from inside import stages_surfaces as surfaces
+from inside import (
+    CudaBuilder,
+    cuda_cells as cells,
+    cuda_kernel as kernel,
+    no_cuda,
+    passes_build as building,
+    passes_driver as driver,
+    shape_of,
+    specialise_values as values,
+    stages_clusters as clusters,
+    stages_decide as decide,
+    stages_measure as measure,
+    stages_move as move,
+    stages_noise as noise,
+    stages_pair as pair,
+    stages_perceive as perceive,
+    stages_receive as receive,
+    stages_scene as scene,
+    stages_start as start,
+    stages_surfaces as surfaces,
+)
 from trees import digests
 
 RECORD = Path(__file__).with_suffix(".json")
@@ -90,19 +94,29 @@ def found_of(name):
     one = SCENARIOS[name]
     plan = plan_of(one, precision=32).built(grid=False)
     shape = shape_of(one.agents, 1, sequential=plan.sequential, whole=bool(plan.model.flock))
-    found = {"32": trees_of(driver.flight, plan), "64": trees_of(driver.flight, plan.built(bits=64, record=True))}
+    found = {
+        "32": trees_of(driver.flight_driver_text, plan),
+        "64": trees_of(driver.flight_driver_text, plan.built(bits=64, keep_frames=True)),
+    }
     if found["64"] == found["32"]:
         del found["64"]
     if no_cuda(plan, one.agents) is None:
-        found["kernel"] = trees_of(kernel.flight, plan, shape, builder=CudaBuilder)
-    alone = not (plan.noisy or plan.delayed or plan.lossy or plan.radio.keeps or plan.sequential or plan.varies("p"))
+        found["kernel"] = trees_of(kernel.flight_text, plan, shape, builder=CudaBuilder)
+    alone = not (
+        plan.has_sensor_error
+        or plan.delayed
+        or plan.lossy
+        or plan.radio.keeps_packets
+        or plan.sequential
+        or plan.varies("p")
+    )
     if alone and plan.model.neighbour is not None and plan.model.reach is not None:
-        found["grid"] = trees_of(driver.flight, plan.built(grid=True))
-        found["near"] = trees_of(driver.flight, plan.built(grid=True, near=True))
+        found["grid"] = trees_of(driver.flight_driver_text, plan.built(grid=True))
+        found["near"] = trees_of(driver.flight_driver_text, plan.built(grid=True, near=True))
         if found["near"] == found["grid"]:
             del found["near"]
         if plan.start in ("arena", "ball") and not plan.model.flock:
-            found["cells"] = trees_of(cells.crowd, plan.built(grid=True), builder=CudaBuilder)
+            found["cells"] = trees_of(cells.large_flock_text, plan.built(grid=True), builder=CudaBuilder)
     return found
 
 
@@ -135,13 +149,13 @@ def test_one_changed_word_of_a_stage_is_seen(module, old, new, name, monkeypatch
     lines = SimpleNamespace(getlines=lambda path: [changed.get(path) or Path(path).read_text()])
     monkeypatch.setattr(values, "linecache", lines)
     values._module.cache_clear()
-    values.text_of.cache_clear()
+    values.function_syntax.cache_clear()
     try:
         plan = plan_of(SCENARIOS[name], precision=32).built(grid=False)
-        assert trees_of(driver.flight, plan) != json.loads(RECORD.read_text())[name]["32"]
+        assert trees_of(driver.flight_driver_text, plan) != json.loads(RECORD.read_text())[name]["32"]
     finally:
         values._module.cache_clear()
-        values.text_of.cache_clear()
+        values.function_syntax.cache_clear()
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.scenarios.files import load
 from reference.flight import fly_plainly
 
@@ -25,7 +25,7 @@ FLIGHTS = {
 def test_plain_python_is_the_compiled_flight(name, seed):
     preset, settings = FLIGHTS[name]
     found = load(preset, settings)
-    plain, compiled = fly_plainly(found, seed), fly(found, seed, precision=64, record=True)
+    plain, compiled = fly_plainly(found, seed), fly_world(found, seed, precision=64, record=True)
     assert np.abs(np.diff(plain.frames, axis=0)).max() > 1e-2  # something happens
     np.testing.assert_allclose(compiled.frames, plain.frames, rtol=0.0, atol=1e-7)
     assert compiled.values == pytest.approx(plain.values, rel=1e-8, abs=1e-9, nan_ok=True)
@@ -33,7 +33,7 @@ def test_plain_python_is_the_compiled_flight(name, seed):
 
 def test_a_collision_ends_both_alike(seed):
     found = load("dimock_2003/published", SMALL | {"metrics.r_coll": 2.2, "duration": 3.0})
-    plain, compiled = fly_plainly(found, seed), fly(found, seed, precision=64, record=True)
+    plain, compiled = fly_plainly(found, seed), fly_world(found, seed, precision=64, record=True)
     assert plain.values["n_coll"] >= 1.0
     assert 1 < len(plain.frames) < 31
     assert compiled.frames.shape == plain.frames.shape

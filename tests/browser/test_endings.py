@@ -25,7 +25,7 @@ def test_a_page_whose_network_was_cut_comes_back_to_the_same_flight(browser, tab
             tab.goto(view.address.replace(f":{port}/", f":{cable.port}/"), timeout=PATIENCE * 1000)
             until(lambda: view.clients == 1, "no page opened")
             player.ask(lambda: player.change("model.p_rep", 0.2))
-            cable.cut()
+            cable.loop_over_lanes()
             until(lambda: view.clients == 0, "a page that is gone still counts")
             then = player.flight.time
             until(lambda: player.flight.time > then + 1.0, "the flight waits for a page that is gone")
@@ -43,9 +43,9 @@ def test_two_pages_see_one_flight_and_both_have_its_controls(browser, tab):
         other = browser.new_page()
         opened(other, view)
         tab.get_by_text("Pause", exact=True).first.click()
-        until(lambda: player.paused, "the first page does not pause")
+        until(lambda: player.is_paused, "the first page does not pause")
         other.get_by_text("Fly", exact=True).first.click(timeout=PATIENCE * 1000)
-        until(lambda: not player.paused, "the second page does not fly on")
+        until(lambda: not player.is_paused, "the second page does not fly on")
         for page in (tab, other):
             page.get_by_text("Pause", exact=True).first.wait_for(timeout=PATIENCE * 1000)
         other.close()

@@ -9,14 +9,14 @@ from pixels import chart, coloured, places, shot
 from test_watch import until
 
 from airflock.core.agent import State
-from airflock.drones.mavlink.orders import Do
-from airflock.fleets.faults import Fault
-from airflock.fleets.lockstep import STARTED
-from airflock.fleets.observer import Observer
-from airflock.fleets.starting import KEY
-from airflock.fleets.teller import Teller
+from airflock.drones.mavlink.orders import OrderKind
+from airflock.fleets.faults import InjectedFault
+from airflock.fleets.lockstep import START_TIME
+from airflock.fleets.observer import FleetObserver
+from airflock.fleets.starting import SOFTWARE_KEY
+from airflock.fleets.teller import TelemetryBroadcast
 from airflock.studio.fleet_page import FleetPage
-from airflock.studio.view import View
+from airflock.studio.view import BrowserView
 from fleets import fleet, scenario
 
 pytestmark = pytest.mark.browser
@@ -29,7 +29,7 @@ class Flown:
 
     def __init__(self):
         self.fleet = fleet(scenario(6), start=START)
-        self.teller = Teller(self.fleet.card.members, [Fault("loss", (5,), 0.0, 1e6, 0.5)])
+        self.teller = TelemetryBroadcast(self.fleet.card.members, [InjectedFault("loss", (5,), 0.0, 1e6, 0.5)])
         self.mute, self.orders = set(), []
 
     def __call__(self):
@@ -39,19 +39,19 @@ class Flown:
         for order in self.orders:
             f.order(order)
         self.orders = []
-        said = {node.member: node.say_status(f.now) for node in f.nodes if node.member not in self.mute}
+        said = {node.member: node.status_datagrams(f.now) for node in f.nodes if node.member not in self.mute}
         for to in range(6):
             for who, datagrams in said.items():
                 if who != f.card.members[to] and 1 not in (who, f.card.members[to]):
-                    self.teller.arrived(to, datagrams[0], f.now)
-        return [*sum(said.values(), []), *self.teller.report(f.now, STARTED + round(f.now * 1e6))]
+                    self.teller.note_arrival(to, datagrams[0], f.now)
+        return [*sum(said.values(), []), *self.teller.report(f.now, START_TIME + round(f.now * 1e6))]
 
 
 @contextmanager
 def shown():
     flown = Flown()
-    observer = Observer(flown.fleet.card, KEY, now=0.0, utc=STARTED - 1)
-    view = View("127.0.0.1", 0, "fleet")
+    observer = FleetObserver(flown.fleet.card, SOFTWARE_KEY, now=0.0, utc=START_TIME - 1)
+    view = BrowserView("127.0.0.1", 0, "fleet")
     page = FleetPage(observer, view, flown, clock=lambda: flown.fleet.now)
     thread = threading.Thread(target=page.run)
     thread.start()
@@ -84,7 +84,7 @@ def test_a_running_fleet_is_seen_with_phases_links_faults_and_silence(browser, t
         until(lambda: len(page.observer.links(flown.fleet.now)) == 10, "no links but those of drone 1")
         flown.mute.add(6)
         until(lambda: "drone 6: silent" in body() and "5 of 6 drones heard" in body(), "silence is not told")
-        flown.orders.append(Do.RETURN)
+        flown.orders.append(OrderKind.RETURN)
         until(lambda: "FLOCK → RETURN" in body(), "another phase is not told")
         until(lambda: tinted((204, 121, 167)) >= 3, "no drones in the colour of the new phase")
 
@@ -92,7 +92,7 @@ def test_a_running_fleet_is_seen_with_phases_links_faults_and_silence(browser, t
         until(lambda: page.chosen == 0 and "known to" in body(), "S selects nobody")
         tab.get_by_label("colour by").first.click()
         tab.get_by_role("option", name="battery", exact=True).click()
-        until(lambda: page.drawing.shown.name == "battery", "the menu does nothing")
+        until(lambda: page.scene.shown.name == "battery", "the menu does nothing")
         tab.get_by_text("Measure", exact=True).click()
 
         until(lambda: places(coloured(chart(tab, 1)), cell=10) >= 5, "the chart of the smallest distance is empty")

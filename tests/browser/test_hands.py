@@ -40,12 +40,12 @@ def test_a_goal_is_dragged_by_its_handle_with_the_mouse(browser, tab):
     with flying(settings={**GOALS, "agents": 8}) as (player, view, page):
         opened(tab, view)
         until(lambda: places(coloured(shot(tab), right=640)) >= 5, "no agents are seen")
-        player.ask(player.toggle)
-        player.ask(lambda: page.acting._drag(True))
-        until(lambda: page.acting.dragging, "no handles")
+        player.ask(player.toggle_pause)
+        player.ask(lambda: page.actions._drag(True))
+        until(lambda: page.actions.is_dragging, "no handles")
         until(lambda: any("goal_0" in node.name for node in view._standing), "no handles")
         tab.wait_for_timeout(3000)
-        size = 2.0 * page.drawing.size
+        size = 2.0 * page.scene.size
         x, y = on_screen(view, [40.0 + 0.7 * size, 0.0, 0.0], tab.viewport_size)
         far, _ = on_screen(view, [10.0 + 0.7 * size, 0.0, 0.0], tab.viewport_size)
         tab.mouse.move(x, y)
@@ -71,19 +71,23 @@ def test_the_keyboard_alone_plays_pauses_steps_selects_and_goes_back(browser, ta
             return player.scenario.wind.east > 0.0 or player.flight.waiting or player.flight.events
 
         tab.keyboard.press("p")
-        until(lambda: player.paused, "P does not pause")
+        until(lambda: player.is_paused, "P does not pause")
         then = player.flight.step
         tab.keyboard.press("n")
         until(lambda: player.flight.step > then, "N does not step")
         tab.keyboard.press("s")
-        until(lambda: page.selecting.chosen == 0, "S selects nobody")
+        until(lambda: page.selection.chosen == 0, "S selects nobody")
         tab.keyboard.press("s")
-        until(lambda: page.selecting.chosen == 1, "S does not select the next")
+        until(lambda: page.selection.chosen == 1, "S does not select the next")
         tab.keyboard.press("p")
-        until(lambda: not player.paused, "P does not fly on")
+        until(lambda: not player.is_paused, "P does not fly on")
         tab.keyboard.press("r")
-        until(lambda: page.selecting.chosen is None, "R does not begin anew")
-        for name, there in (("Pause", lambda: player.paused), ("Act on the world", lambda: True), ("Gust", gust_blows)):
+        until(lambda: page.selection.chosen is None, "R does not begin anew")
+        for name, there in (
+            ("Pause", lambda: player.is_paused),
+            ("Act on the world", lambda: True),
+            ("Gust", gust_blows),
+        ):
             for _ in range(80):  # every control can be reached
                 tab.keyboard.press("Tab")
                 if tab.evaluate("document.activeElement.textContent.trim()") == name:
@@ -106,7 +110,7 @@ def test_a_page_of_a_phones_width_shows_the_flock_and_its_controls(browser):
         box = button.bounding_box()
         assert box["x"] >= 0 and box["x"] + box["width"] <= 390
         button.tap()
-        until(lambda: player.paused, "the button does nothing")
+        until(lambda: player.is_paused, "the button does nothing")
         assert tab.evaluate("document.documentElement.scrollWidth") <= 391
     context.close()
 
@@ -116,10 +120,10 @@ def test_agents_take_the_colours_of_what_the_menu_names(browser, tab):
     with flying(settings={"groups": groups}) as (player, view, page):
         opened(tab, view)
         until(lambda: places(coloured(shot(tab), right=640)) >= 10, "no agents are seen")
-        player.ask(player.toggle)
+        player.ask(player.toggle_pause)
         tab.get_by_label("colour by").first.click()
         tab.get_by_role("option", name="group", exact=True).click()
-        until(lambda: page.drawing.shading.shown.name == "group", "the menu does nothing")
+        until(lambda: page.scene.colouring.shown.name == "group", "the menu does nothing")
         until(lambda: "slow" in tab.inner_text("body"), "no key")
 
         def tinted(tone):
@@ -162,10 +166,10 @@ def test_three_kinds_of_control_reach_the_flight(browser, tab):
 def test_any_earlier_moment_is_reached_by_its_time(browser, tab):
     with flying() as (player, view, page):
         opened(tab, view)
-        player.ask(lambda: setattr(player.pace, "speed", 20.0))
+        player.ask(lambda: setattr(player.clock, "speed", 20.0))
         until(lambda: player.time > 12.0, "it does not fly")
-        player.ask(player.toggle)
-        until(lambda: player.paused, "no pause")
+        player.ask(player.toggle_pause)
+        until(lambda: player.is_paused, "no pause")
         before = shot(tab)
         tab.get_by_label("moment (s)").fill("3.4")
         tab.get_by_text("Go to this moment", exact=True).click()
@@ -214,16 +218,16 @@ def test_a_law_that_stops_flying_says_so_and_the_moment_before_is_a_button(brows
         lines = []
         player.fault = lines.append
         opened(tab, view)
-        player.ask(lambda: setattr(player.pace, "speed", 5.0))
+        player.ask(lambda: setattr(player.clock, "speed", 5.0))
         until(lambda: player.time > 5.0, "it does not fly")
         player.ask(lambda: player.change("model.pull", 3e38))
-        until(lambda: player.failure, "it does not fail")
+        until(lambda: player.failure_message, "it does not fail")
         button = tab.get_by_text("Go back one moment", exact=True)
         until(lambda: "agent" in tab.inner_text("body") and button.is_visible(), "the page does not tell")
         assert any(line.startswith("stopped:") and "agent" in line for line in lines)
         failed = player.time
         button.click()
-        until(lambda: not player.failure and player.paused, "the button does nothing")
+        until(lambda: not player.failure_message and player.is_paused, "the button does nothing")
         assert failed - 4.0 < player.time < failed and np.isfinite(player.flight.state).all()
         until(lambda: not button.is_visible(), "the button stays")
         until(lambda: places(coloured(shot(tab), right=640)) >= 10, "no agents are seen")
@@ -233,7 +237,7 @@ def test_a_law_that_stops_flying_says_so_and_the_moment_before_is_a_button(brows
 def test_an_order_parameter_that_no_paper_reports_is_drawn(browser, tab):
     with flying("vasarhelyi_2018/real_gnss") as (player, view, page):
         opened(tab, view)
-        player.ask(lambda: setattr(player.pace, "speed", 5.0))
+        player.ask(lambda: setattr(player.clock, "speed", 5.0))
         tab.get_by_text("Measure", exact=True).click()
         until(lambda: player.time > 20.0, "it does not fly")
 
@@ -243,5 +247,5 @@ def test_an_order_parameter_that_no_paper_reports_is_drawn(browser, tab):
         until(lambda: lines() >= 8, "the chart of the order parameter is empty")
         tab.get_by_label("order parameter").first.click()
         tab.get_by_role("option", name="phi_vel", exact=True).click()
-        until(lambda: page.measuring.name == "phi_vel" and lines() >= 8, "another order parameter is not drawn")
+        until(lambda: page.measurement.name == "phi_vel" and lines() >= 8, "another order parameter is not drawn")
         assert not tab.faults

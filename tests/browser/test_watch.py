@@ -8,9 +8,9 @@ import pytest
 from pixels import coloured, places, shot
 
 from airflock.studio.flights import FlightRequest
-from airflock.studio.page import Page
+from airflock.studio.page import FlightPage
 from airflock.studio.player import Player
-from airflock.studio.view import View
+from airflock.studio.view import BrowserView
 
 pytestmark = pytest.mark.browser
 PATIENCE = 120.0  # s
@@ -20,8 +20,8 @@ PATIENCE = 120.0  # s
 def flying(where="vasarhelyi_2018/4ms", settings=None, **more):
     """A page that flies in a thread of its own."""
     player = Player(FlightRequest(where, {"agents": 20, **(settings or {})}, seed=1, **more))
-    view = View("127.0.0.1", 0, player.where)
-    page = Page(player, view)
+    view = BrowserView("127.0.0.1", 0, player.where)
+    page = FlightPage(player, view)
     thread = threading.Thread(target=page.run)
     thread.start()
     try:
@@ -79,7 +79,7 @@ def test_the_flock_is_seen_moves_pauses_and_takes_changes(live, tab):
     until(lambda: (coloured(shot(tab), right=640) ^ first).mean() > 1e-3, "nothing moves")
 
     tab.get_by_text("Pause", exact=True).first.click()
-    until(lambda: player.paused, "the button did not pause")
+    until(lambda: player.is_paused, "the button did not pause")
     step = player.flight.step
     tab.get_by_text("Step", exact=True).click()
     until(lambda: player.flight.step > step, "no step was flown")
@@ -103,7 +103,7 @@ def test_the_flock_is_seen_moves_pauses_and_takes_changes(live, tab):
     tab.get_by_text("Push", exact=True).click()
     until(lambda: player.flight.events[-1].kind == "push", "nobody was pushed")
     tab.get_by_text("Let it fail", exact=True).click()
-    player.ask(player.toggle)
+    player.ask(player.toggle_pause)
     until(lambda: player.flight.faults, "no motor fails")
     assert [event.kind for event in player.flight.events][-2:] == ["push", "fault"]
     assert player.flight.faults[0]["kind"] == "motor" and not tab.faults
@@ -138,7 +138,7 @@ def test_a_fork_flies_beside_and_what_is_changed_is_its_own(live, tab):
     opened(tab, view)
     until(lambda: places(coloured(shot(tab), right=640)) >= 10, "no agents are seen")
     tab.get_by_text("Pause", exact=True).first.click()
-    until(lambda: player.paused, "the button did not pause")
+    until(lambda: player.is_paused, "the button did not pause")
     tab.get_by_text("Compare", exact=True).click()
     tab.get_by_text("Fork here", exact=True).click()
     until(lambda: len(player.sides) == 2, "no fork")
@@ -154,11 +154,11 @@ def test_a_fork_flies_beside_and_what_is_changed_is_its_own(live, tab):
     a, b = player.sides
     until(lambda: b.flight.events, "no change came")
     assert [event.kind for event in b.flight.events] == ["change"] and not a.flight.events
-    player.ask(player.toggle)
+    player.ask(player.toggle_pause)
     then = a.flight.time
     until(lambda: a.flight.time > then + 1.0, "nothing flies")
-    player.ask(player.toggle)
-    until(lambda: player.paused, "no pause")
+    player.ask(player.toggle_pause)
+    until(lambda: player.is_paused, "no pause")
     assert a.flight.time == b.flight.time and (a.flight.state != b.flight.state).any()
     tab.get_by_text("Compare", exact=True).click()
     until(lambda: "model.p_rep" in tab.inner_text("body"), "the difference is not in the table")
@@ -171,10 +171,10 @@ def test_an_obstacle_is_thrown_in_a_gust_blows_and_agents_are_removed(browser, t
     with flying("vasarhelyi_2018/obstacles", {"agents": 12}) as (player, view, page):
         opened(tab, view)
         until(lambda: places(coloured(shot(tab), right=640)) >= 10, "no agents are seen")
-        player.ask(player.toggle)
+        player.ask(player.toggle_pause)
         tab.get_by_text("Act on the world", exact=True).click()
         tab.get_by_text("Throw an obstacle in", exact=True).click()
-        until(lambda: page.acting.aiming, "the button did nothing")
+        until(lambda: page.actions.is_aiming, "the button did nothing")
         before, known = coloured(shot(tab), right=640), len(player.scenario.world.obstacles)
         tab.mouse.click(330, 420)
         until(lambda: player.flight.events or player.note, "the click did nothing")
@@ -185,13 +185,13 @@ def test_an_obstacle_is_thrown_in_a_gust_blows_and_agents_are_removed(browser, t
         assert before[390:450, 290:370].sum() < 200
 
         tab.get_by_text("Gust", exact=True).click()
-        player.ask(player.toggle)
+        player.ask(player.toggle_pause)
         until(lambda: player.scenario.wind.east == 8.0, "no gust")
-        player.ask(lambda: setattr(player.pace, "speed", 20.0))
+        player.ask(lambda: setattr(player.clock, "speed", 20.0))
         until(lambda: player.scenario.wind.east == 0.0, "the gust does not end")
         assert [list(event.data) for event in player.flight.events[-2:]] == [["wind.east", "wind.north"]] * 2
 
-        player.ask(lambda: page.playing.reset(agents=1))
+        player.ask(lambda: page.playback.reset(agents=1))
         until(lambda: player.flight.agents == 1, "agents stay")
         time.sleep(2.0)
         inside = shot(tab)[160:615, 140:640]  # of the arena's blue walls

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from airflock.core.hearing import EARLY
-from airflock.drones.onboard.card import card_of, hash_of
-from airflock.drones.onboard.mission import Phase
-from airflock.fleets import compare, realtime, starting
-from airflock.fleets import live as live_
-from airflock.fleets.ailing import Ailing
-from airflock.fleets.befalling import Faults
-from airflock.fleets.lockstep import Fleet
+from airflock.drones.onboard.card import card_hash, parse_card
+from airflock.drones.onboard.mission import MissionPhase
+from airflock.fleets import compare, live as live_, realtime, starting
+from airflock.fleets.ailing import FaultyNode
+from airflock.fleets.befalling import DroneFaults
+from airflock.fleets.lockstep import LockstepFleet
 from airflock.parts.faults.registry import KINDS
 from airflock.recordings.flights import simulate
 from airflock.support.errors import CardError
@@ -57,16 +56,16 @@ BEFALLEN = {
 def flown(settings, faults, seed=1, duration=5.2, **limits):
     """A fleet in lock-step and its scenario, from where the simulated drones start."""
     found = scenario(3, duration, **CROWD, **settings, **({"faults": faults} if faults else {}))
-    found = compare.sampled(found, 0.2)
+    found = compare.with_metric_period(found, 0.2)
     made = card(found, as_simulated=True, silent=False, safety=OPEN_MINDED | limits)
-    fleet = Fleet(found, made, seed, start=compare.first_states(found, seed))
+    fleet = LockstepFleet(found, made, seed, start=compare.simulated_start(found, seed))
     fleet.advance(duration + found.flight.dt)
     return fleet
 
 
 def simulated(found, seed=1):
     """Positions of the simulation from the same start, (time, agent, axis)."""
-    start = np.array([[*s[:2], *s[3:5]] for s in compare.first_states(found, seed)]).T
+    start = np.array([[*s[:2], *s[3:5]] for s in compare.simulated_start(found, seed)]).T
     made = simulate(found, seed, precision=64, start=start, device="python")
     return made.position.transpose("time", "individual", "space", "keypoint").values.reshape(-1, 3, 2)
 
@@ -80,7 +79,7 @@ def test_a_clock_and_what_is_replaced_act_on_a_fleet_as_in_the_simulator(name):
     assert np.abs(ours - plain.array()[:, :, :2]).max() > 0.2
     known = simulated(fleet.scenario)
     assert np.abs(ours[: len(known)] - known).max() < 1e-4
-    assert set(fleet.phases()) == {Phase.FLOCK} and not any(any(n.refused.values()) for n in fleet.nodes)
+    assert set(fleet.phases()) == {MissionPhase.FLOCK} and not any(any(n.refused.values()) for n in fleet.nodes)
 
 
 def test_over_a_radio_that_asks_for_no_age_a_clock_changes_nothing():
@@ -97,22 +96,22 @@ def test_a_vehicle_whose_motors_are_off_falls_whatever_its_autopilot_keeps_follo
 
 def test_real_drones_believe_stamps_and_simulated_ones_do_not_ask():
     real, software = card(scenario(2)), compare.software_card(scenario(2))
-    assert (real.hearing.early, real.hearing.in_order, real.hearing.once) == (EARLY, True, False)
+    assert (real.hearing.early, real.hearing.drop_reordered, real.hearing.once) == (EARLY, True, False)
     assert not {"once", "any_stamp"} & real.document["radio"].keys()
-    assert software.hearing.early > 1e9 and not software.hearing.in_order and software.hearing.once
+    assert software.hearing.early > 1e9 and not software.hearing.drop_reordered and software.hearing.once
     assert not compare.software_card(scenario(2, **LINKS)).hearing.once, "the newest packet counts until the next comes"
-    assert compare.software_card(scenario(2), live=True).hearing == real.hearing
+    assert compare.software_card(scenario(2), realtime=True).hearing == real.hearing
     made = document(scenario(2))
     for wrong in (1, "yes", None):
         odd = {**made, "radio": {**made["radio"], "once": wrong}}
         with pytest.raises(CardError, match=f"radio.once = {wrong!r}: give true or false"):
-            card_of({**odd, "hash": hash_of(odd)})
+            parse_card({**odd, "hash": card_hash(odd)})
 
 
 def test_ages_are_told_by_both_clocks():
     """The delay, less by how far the sender's clock was ahead when it sent, more by how far the own one is."""
     fleet = flown(SURE, hit("clock", {"at": 2.0, "ahead": 0.8}))
-    ages, now = fleet.ages(), 0.2 * np.arange(len(fleet.stamps))
+    ages, now = fleet.packet_ages(), 0.2 * np.arange(len(fleet.state_times))
     np.testing.assert_allclose(ages[:, 0, 1], np.where(now < 2.99, 1.0, 0.2), atol=2e-6)
     np.testing.assert_allclose(ages[:, 1, 0], np.where(now < 1.99, 1.0, 1.8), atol=2e-6)
 
@@ -123,22 +122,28 @@ def test_a_node_minds_a_clock_by_the_limits_of_its_card():
     for ahead in (0.8, -0.8):
         fleet = flown(LINKS, hit("clock", {"at": 1.0, "ahead": ahead}), duration=4.0, clock_error=0.2, clock_spread=1.0)
         phases[ahead] = fleet.nodes[1].phase
-        assert fleet.nodes[0].phase == fleet.nodes[2].phase == Phase.FLOCK
-    assert phases == {0.8: Phase.FLOCK, -0.8: Phase.HOLD}
+        assert fleet.nodes[0].phase == fleet.nodes[2].phase == MissionPhase.FLOCK
+    assert phases == {0.8: MissionPhase.FLOCK, -0.8: MissionPhase.HOLD}
 
 
 @pytest.mark.parametrize(
     ("ahead", "limits", "phase", "suspects"),
-    [(0.9, {}, Phase.FLOCK, False), (1.5, {}, Phase.HOLD, True), (1.5, {"clock_spread": 1.0}, Phase.FLOCK, False)],
+    [
+        (0.9, {}, MissionPhase.FLOCK, False),
+        (1.5, {}, MissionPhase.HOLD, True),
+        (1.5, {"clock_spread": 1.0}, MissionPhase.FLOCK, False),
+    ],
 )
 def test_a_clock_that_is_more_than_a_second_ahead_is_told_by_the_ages_of_packets(ahead, limits, phase, suspects):
     """By its own node, if it lets such old packets in: by default it refuses them all. The others suspect nobody."""
     fleet = flown(LINKS, hit("clock", {"at": 1.0, "ahead": ahead}), duration=6.0, **limits)
-    assert [node.phase for node in fleet.nodes] == [Phase.FLOCK, phase, Phase.FLOCK]
-    assert [node.peers.clocks_suspect() for node in fleet.nodes] == [False, suspects, False]
+    assert [node.phase for node in fleet.nodes] == [MissionPhase.FLOCK, phase, MissionPhase.FLOCK]
+    assert [node.peers.is_own_clock_suspect() for node in fleet.nodes] == [False, suspects, False]
     own = fleet.nodes[1]
     assert (own.refused["clock"] > 0) == ("clock_spread" in limits)
-    assert own.wire.clock_offset() == 0.0, "of ten samples of the autopilot's clock the least delayed is an old one"
+    assert own.autopilot_link.clock_offset() == 0.0, (
+        "of ten samples of the autopilot's clock the least delayed is an old one"
+    )
 
 
 def test_a_delay_between_two_decisions_leaves_nobody_deaf():
@@ -155,9 +160,9 @@ def test_a_delay_between_two_decisions_leaves_nobody_deaf():
 def live(faults, duration=2.0, mode="tasks", agents=2, **more):
     """A fleet on the real clock, from where the simulated drones start."""
     keys = {"radio.delay": 0.1, "world.side": 120.0} | more
-    found = compare.sampled(scenario(agents, duration, **keys, faults=faults), 0.2)
-    made = compare.software_card(found, silent=True, live=True)
-    return realtime.fly(found, made, 1, mode, start=compare.first_states(found, 1))
+    found = compare.with_metric_period(scenario(agents, duration, **keys, faults=faults), 0.2)
+    made = compare.software_card(found, stop_for_lost=True, realtime=True)
+    return realtime.fly_in_realtime(found, made, 1, mode, start=compare.simulated_start(found, 1))
 
 
 @pytest.mark.parametrize("mode", ["tasks", "processes"])
@@ -175,7 +180,7 @@ def test_on_the_real_clock_each_drone_suffers_by_its_own_time(mode):
 
 def test_on_the_real_clock_who_is_silent_is_heard_no_more_and_a_clock_stamps():
     found = live(hit("radio_silent", {"at": 0.8}, who=0) + hit("clock", {"at": 0.8, "ahead": 0.6}))
-    ages = found.ages()
+    ages = found.packet_ages()
     assert ages[-1, 1, 0] > 0.6 + 1.0, "nothing since 0.8 s, by a clock that is ahead"
     assert ages[-1, 0, 1] < 0.0 < ages[2, 0, 1], "sent 0.1 s ago, it seems to come from the future"
 
@@ -184,24 +189,24 @@ def test_on_the_real_clock_who_drops_out_is_absent():
     found = live(hit("fails", {"at": 0.8}))
     rows = found.array()
     assert np.isnan(rows[5:, 1]).all() and np.isfinite(rows[:4, 1]).all() and np.isfinite(rows[:, 0]).all()
-    assert found.ages()[-1, 0, 1] > 0.8 and np.isnan(found.ages()[-1, 1]).all()
+    assert found.packet_ages()[-1, 0, 1] > 0.8 and np.isnan(found.packet_ages()[-1, 1]).all()
     assert [who for _, who, note in found.log if "drops out" in note] == [2]
-    assert compare.recording(found).position.isnull().any()
+    assert compare.fleet_recording(found).position.isnull().any()
 
 
 def test_on_the_real_clock_packets_say_what_a_fault_tells():
     """The wrapper of both modes: what a node sends, retold and signed; nothing before the fault and after it."""
     found = scenario(2, 3.0, faults=hit("pretender", {"at": 1.0, "lasts": 1.0, "east": 7.0}))
-    made, zero = compare.software_card(found, live=True), 100.0
-    fleet = Fleet(found, compare.software_card(found), 1, start=compare.first_states(found, 1))
+    made, zero = compare.software_card(found, realtime=True), 100.0
+    fleet = LockstepFleet(found, compare.software_card(found), 1, start=compare.simulated_start(found, 1))
     fleet.advance(0.4)
     node = fleet.nodes[1]
-    faults = Faults(found, 1, only=1)
-    ailing = Ailing(lambda: node, faults, 1, made.site, lambda own: own - zero)
+    faults = DroneFaults(found, 1, only=1)
+    ailing = FaultyNode(lambda: node, faults, 1, made.site, lambda own: own - zero)
     said = []
     for time in (0.5, 1.5, 2.5):
         faults.until(time)
-        (datagram,) = node.say_status(zero + time)
+        (datagram,) = node.status_datagrams(zero + time)
         said.append(ailing.told(datagram, time) == datagram)
     assert said == [True, False, True]
 
@@ -209,19 +214,19 @@ def test_on_the_real_clock_packets_say_what_a_fault_tells():
 def test_on_the_real_clock_buildings_shade_the_radio(monkeypatch):
     """The ether asks the map of the card between where two vehicles are; it took all ways for clear."""
     asked = []
-    monkeypatch.setattr(starting, "clear", lambda card, here, there: bool(asked.append((here, there))))
-    monkeypatch.setattr(live_, "clear", starting.clear)
+    monkeypatch.setattr(starting, "is_clear_between", lambda card, here, there: bool(asked.append((here, there))))
+    monkeypatch.setattr(live_, "clear", starting.is_clear_between)
     keys = {"radio.kind": "shadow", "radio.near": 5.0, "radio.far": 25.0, "world.obstacles": ISLANDS}
     live((), duration=0.4, **keys)
     assert asked and all(0.0 < math.dist(*pair) < 120.0 for pair in asked)
     with_buildings = card(scenario(2, **keys))
     monkeypatch.undo()
-    assert not starting.clear(with_buildings, (-30.0, -5.0, 20.0), (30.0, -5.0, 20.0)), "through an island"
-    assert starting.clear(with_buildings, (-30.0, -30.0, 20.0), (30.0, -30.0, 20.0)), "south of it"
+    assert not starting.is_clear_between(with_buildings, (-30.0, -5.0, 20.0), (30.0, -5.0, 20.0)), "through an island"
+    assert starting.is_clear_between(with_buildings, (-30.0, -30.0, 20.0), (30.0, -30.0, 20.0)), "south of it"
 
 
 def test_no_kind_is_refused_on_any_clock():
     for kind in KINDS:
         found = scenario(2, 1.0, faults=hit(kind, {"at": 0.5}))
-        assert Faults(found, 0) and not realtime.refused(())
-        assert math.isfinite(Faults(found, 0).ahead(1, 0.7))
+        assert DroneFaults(found, 0) and not realtime.lockstep_only_errors(())
+        assert math.isfinite(DroneFaults(found, 0).ahead(1, 0.7))

@@ -19,35 +19,35 @@ from airflock.core import random
 from airflock.core.agent import State
 from airflock.core.radio import lost
 from airflock.drones.mavlink import dialect
-from airflock.drones.mavlink.autopilots import AUTOPILOTS, Speaker
+from airflock.drones.mavlink.autopilots import AUTOPILOTS, AutopilotCommands
 from airflock.drones.mavlink.frames import frames_in
-from airflock.drones.mavlink.orders import Do
+from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.log import replay
-from airflock.drones.onboard.mission import Phase
+from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.ports import open_port
-from airflock.drones.onboard.run import fly as fly_node
+from airflock.drones.onboard.run import run_node as fly_node
 from airflock.fleets import compare
-from airflock.fleets.dice import OuterNoise, PacketDice, SensorDice
-from airflock.fleets.ether import Ether
-from airflock.fleets.faults import KINDS, Fault, read_faults
-from airflock.fleets.holding import GAIN, STOOD
-from airflock.fleets.individuals import sensors_of
-from airflock.fleets.lockstep import KEY
-from airflock.fleets.vehicle import Vehicle
+from airflock.fleets.dice import MotionNoise, PacketNumbers, SensorWords
+from airflock.fleets.ether import RadioChannel
+from airflock.fleets.faults import INJECTED_KINDS, InjectedFault, read_injected_faults
+from airflock.fleets.holding import POSITION_GAIN, STANDING_SPEED
+from airflock.fleets.individuals import agent_sensors
+from airflock.fleets.lockstep import SOFTWARE_KEY
+from airflock.fleets.vehicle import SoftwareVehicle
 from airflock.parts.radios import jitter, links
 from airflock.parts.radios.registry import RADIOS
 from airflock.recordings.flights import simulate
-from airflock.recordings.scores import measure
-from airflock.support.coordinates import Site
+from airflock.recordings.scores import measure_recording
+from airflock.support.coordinates import FlightSite
 from airflock.support.errors import ScenarioError
 from fleets import card, fleet, scenario
 
 
 def in_the_air(agents, duration, seed=0, faults=(), noisy=False, silent=False, **more):
     """A fleet that starts where the simulated agents start."""
-    found = compare.sampled(scenario(agents, duration, noisy, **more), 0.2)
-    made = compare.software_card(found, silent=silent)
-    return compare.fly(found, made, seed, faults=faults)
+    found = compare.with_metric_period(scenario(agents, duration, noisy, **more), 0.2)
+    made = compare.software_card(found, stop_for_lost=silent)
+    return compare.fly_in_lockstep(found, made, seed, faults=faults)
 
 
 # ------------------------------------------------------------------------------------------- beside the simulator
@@ -56,9 +56,9 @@ def in_the_air(agents, duration, seed=0, faults=(), noisy=False, silent=False, *
 def test_three_drones_fly_the_simulated_flight_for_a_minute():
     """No noise, signed packets of 0.04 mm, MAVLink setpoints: 1 cm after 60 s."""
     flown = in_the_air(3, 60.0)
-    apart = compare.departure(flown, [60.0])
+    apart = compare.divergence(flown, [60.0])
     assert apart.fleet[0] < 0.01
-    assert set(flown.phases()) == {Phase.FLOCK} and not flown.log
+    assert set(flown.phases()) == {MissionPhase.FLOCK} and not flown.log
     assert all(not any(node.refused.values()) for node in flown.nodes)
 
 
@@ -68,14 +68,14 @@ ODD = [{"radio.loss": 0.5, "radio.loss_at": 40.0}, {"radio.kind": "links"}, {"wo
 @pytest.mark.parametrize("settings", ODD, ids=str)
 def test_with_lossy_radios_and_in_space_too(settings):
     """The ether throws the simulator's dice, so both lose the same packets: 1 cm after 3 s."""
-    apart = compare.departure(in_the_air(3, 3.2, **settings), [3.0], device="python")
+    apart = compare.divergence(in_the_air(3, 3.2, **settings), [3.0], device="python")
     assert apart.fleet[0] < 0.01
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_ten_drones_are_within_a_centimetre_after_five_seconds(seed):
     """Also where an agent turns round; the simulation leaves itself by 2 to 12 cm after nudges of 1 cm."""
-    apart = compare.departure(in_the_air(10, 5.2, seed), [5.0])
+    apart = compare.divergence(in_the_air(10, 5.2, seed), [5.0])
     assert apart.fleet[0] < 0.01 < apart.nudged[0], apart
 
 
@@ -84,9 +84,9 @@ def test_the_recording_of_a_fleet_is_measured_like_any_other(tmp_path):
     from airflock.recordings.files import load_recording, save
 
     flown = in_the_air(4, 4.0, noisy=True)
-    made = compare.recording(flown)
+    made = compare.fleet_recording(flown)
     kept = load_recording(save(made, tmp_path / "fleet.nc"))
-    assert measure(kept)[0]["phi_vel"] == pytest.approx(measure(made)[0]["phi_vel"])
+    assert measure_recording(kept)[0]["phi_vel"] == pytest.approx(measure_recording(made)[0]["phi_vel"])
     assert set(kept.position.dims) == {"time", "space", "keypoint", "individual"} and "own_position" in kept
     ages = kept.age.values[:, ~np.eye(4, dtype=bool)]  # nobody knows itself from the radio
     assert np.isnan(kept.age.values[:, np.eye(4, dtype=bool)]).all() and np.nanmin(ages) >= 0.0
@@ -114,7 +114,7 @@ def test_the_same_seed_gives_the_same_bits_in_two_processes():
 def test_the_ether_loses_the_packets_that_the_simulator_loses(kind):
     """Counted by arrivals: the share that a radio of the simulator lets through at this distance."""
     k = links.Parameters(kind=kind, delay=0.2, loss=0.6 if kind == "constant" else 0.0, loss_at=80.0, far=60.0)
-    ether = Ether(RADIOS[kind], k, [1, 2], 3, 0.2)
+    ether = RadioChannel(RADIOS[kind], k, [1, 2], 3, 0.2)
     at, count = [(0.0, 0.0, 0.0), (70.0, 0.0, 0.0)], 4000
     heard = 0
     for step in range(count):
@@ -130,7 +130,7 @@ def test_the_ether_loses_the_packets_that_the_simulator_loses(kind):
 
 def test_the_ether_brings_packets_as_late_as_the_radio_says():
     k = jitter.Parameters(delay=0.2, jitter=0.3, longest=9.0)
-    ether, at, late = Ether(RADIOS["jitter"], k, [1, 2], 3, 0.1), [(0.0, 0.0, 0.0), (20.0, 0.0, 0.0)], []
+    ether, at, late = RadioChannel(RADIOS["jitter"], k, [1, 2], 3, 0.1), [(0.0, 0.0, 0.0), (20.0, 0.0, 0.0)], []
     for step in range(2000):
         ether.send(0.1 * step, 0, str(step).encode(), at)
     for tick in range(21_000):
@@ -141,25 +141,27 @@ def test_the_ether_brings_packets_as_late_as_the_radio_says():
 
 @pytest.mark.parametrize("three", [False, True])
 def test_outer_noise_of_a_block_is_that_of_each_step(three):
-    noise, seed = OuterNoise(2**40 + 7, 3, three), 2**40 + 7
+    noise, seed = MotionNoise(2**40 + 7, 3, three), 2**40 + 7
     for step in (0, 1, 2, 255, 256, 1001, 4096):
         for drone in range(3):
-            words = random.words(seed, random.OUTER, 0, step if three else step // 2, drone)
+            words = random.random_words(seed, random.OUTER, 0, step if three else step // 2, drone)
             four = (*random.normal_pair(*words[:2]), *random.normal_pair(*words[2:]))
             flat = (*(four[2:] if step % 2 else four[:2]), 0.0)
             assert noise(step, drone) == (four[:3] if three else flat)
 
 
 def test_words_of_a_block_are_those_of_each_measurement():
-    words = SensorDice(2**40 + 7, 3)
+    words = SensorWords(2**40 + 7, 3)
     for number in (0, 1, 15, 16, 4097):
         for drone in range(3):
             for draw in (0, 1):
-                assert words(number, draw, drone) == random.words(2**40 + 7, random.SENSOR, 0, number, drone, draw)
+                assert words(number, draw, drone) == random.random_words(
+                    2**40 + 7, random.SENSOR, 0, number, drone, draw
+                )
 
 
 def test_numbers_of_a_block_of_packets_are_those_of_each_pair():
-    drawn, seed = PacketDice(2**40 + 7, 6), 2**40 + 7
+    drawn, seed = PacketNumbers(2**40 + 7, 6), 2**40 + 7
     for number in (0, 1, 15, 16, 4097):
         for to in range(6):
             for who in range(6):
@@ -171,7 +173,7 @@ def test_numbers_of_a_block_of_packets_are_those_of_each_pair():
 
 def start_of(found, seed):
     """Where the simulated agents of a seed start, (component, agent)."""
-    return np.array([[*s[:2], *s[3:5]] for s in compare.first_states(found, seed)]).T
+    return np.array([[*s[:2], *s[3:5]] for s in compare.simulated_start(found, seed)]).T
 
 
 WEAK = [{"name": "slow", "agents": 1, "model": {"v_flock": 2.0}, "body": {"tau": {"value": 1.4, "spread": 0.1}}},
@@ -194,11 +196,11 @@ def test_groups_and_faults_of_a_scenario_act_on_a_fleet_as_in_the_simulator(name
     """Each changes the flight by more than 20 cm within 5 s, and the fleet is within 5 cm of the changed simulation."""
     seed, settings = 1, BEFALLEN[name]
     crowd = {"world.side": 60.0, "start.separation": 6.0}
-    found, plain = (compare.sampled(scenario(3, 5.2, **crowd, **more), 0.2) for more in (settings, {}))
-    flown = compare.fly(found, compare.software_card(found, silent=False, seed=seed), seed)
-    unlike = compare.fly(plain, compare.software_card(plain, silent=False), seed)
+    found, plain = (compare.with_metric_period(scenario(3, 5.2, **crowd, **more), 0.2) for more in (settings, {}))
+    flown = compare.fly_in_lockstep(found, compare.software_card(found, stop_for_lost=False, seed=seed), seed)
+    unlike = compare.fly_in_lockstep(plain, compare.software_card(plain, stop_for_lost=False), seed)
     assert np.abs(flown.array()[:, :, :2] - unlike.array()[:, :, :2]).max() > 0.2
-    assert compare.departure(flown, [5.0], device="python").fleet[0] < 0.05
+    assert compare.divergence(flown, [5.0], device="python").fleet[0] < 0.05
 
 
 def test_numbers_of_each_member_stand_on_the_card():
@@ -215,8 +217,8 @@ def test_numbers_of_each_member_stand_on_the_card():
 def test_each_drone_measures_by_the_numbers_of_its_group():
     groups = [{"name": "poor", "agents": [1], "sensors": {"noise": {"value": 1.0, "spread": 0.1}}}]
     found = scenario(3, groups=groups)
-    noise = [s.noise for s in sensors_of(found, 3, 5)]
-    assert noise == found.own_numbers("s", "noise", 5) and noise[0] == noise[2] != noise[1] != 1.0
+    noise = [s.noise for s in agent_sensors(found, 3, 5)]
+    assert noise == found.agent_values("s", "noise", 5) and noise[0] == noise[2] != noise[1] != 1.0
 
 
 def test_laws_of_members_stand_on_the_card():
@@ -231,10 +233,12 @@ def test_whoever_stays_flies_on_what_a_drone_sent_before_it_dropped_out():
     crowd = {"world.side": 60.0, "start.separation": 6.0}
 
     def without(at):
-        return compare.sampled(scenario(3, 6.0, **crowd, faults=[{"kind": "fails", "at": at, "agents": [1]}]), 0.2)
+        return compare.with_metric_period(
+            scenario(3, 6.0, **crowd, faults=[{"kind": "fails", "at": at, "agents": [1]}]), 0.2
+        )
 
     found = without(1.0)
-    flown = compare.fly(found, compare.software_card(found, silent=False), 1).array()[:, :, :2]
+    flown = compare.fly_in_lockstep(found, compare.software_card(found, stop_for_lost=False), 1).array()[:, :, :2]
     known = [
         simulate(without(1.0 + later), 1, precision=64, start=start_of(found, 1), device="python")
         .position.transpose("time", "individual", "space", "keypoint").values.reshape(-1, 3, 2)
@@ -246,30 +250,30 @@ def test_whoever_stays_flies_on_what_a_drone_sent_before_it_dropped_out():
 
 @pytest.mark.parametrize("fault", [{"kind": "fails", "at": 2.0}, {"kind": "battery", "at": 1.0, "endurance": 1.0}])
 def test_a_drone_that_drops_out_falls_silent_and_comes_down(fault):
-    found = compare.sampled(scenario(3, 12.0, faults=[{**fault, "agents": [1]}]), 0.2)
-    flown = compare.fly(found, compare.software_card(found, silent=False), 1)
+    found = compare.with_metric_period(scenario(3, 12.0, faults=[{**fault, "agents": [1]}]), 0.2)
+    flown = compare.fly_in_lockstep(found, compare.software_card(found, stop_for_lost=False), 1)
     rows = flown.array()
     assert np.isfinite(rows[:10, 1]).all() and np.isnan(rows[10:, 1]).all() and np.isfinite(rows[:, [0, 2]]).all()
     assert flown.vehicles[1].state.z == 0.0 and not flown.vehicles[1].armed and flown.vehicles[0].state.z > 5.0
-    assert flown.ages()[-1, [0, 2], 1].min() > 8.0, "nothing was sent after 2 s"
+    assert flown.packet_ages()[-1, [0, 2], 1].min() > 8.0, "nothing was sent after 2 s"
     assert [(t, who) for t, who, note in flown.log if "drops out" in note] == [(2.0, 2)]
-    assert measure(compare.recording(flown))[0]["present"] == pytest.approx(
+    assert measure_recording(compare.fleet_recording(flown))[0]["present"] == pytest.approx(
         (3 * 10 + 2 * (len(rows) - 10)) / (3 * len(rows))
     )
 
 
 def test_who_pretends_lies_to_the_others_alone():
     """The packet is signed and of the same time; only the position in it is another one."""
-    found = compare.sampled(
+    found = compare.with_metric_period(
         scenario(2, 3.0, faults=[{"kind": "pretender", "at": 1.0, "agents": [1], "east": 7.0}]), 0.2
     )
-    flown = compare.fly(found, compare.software_card(found, silent=False), 1)
-    peer, late = flown.nodes[0].peers.all[2], flown.ages()[-1, 0, 1]
+    flown = compare.fly_in_lockstep(found, compare.software_card(found, stop_for_lost=False), 1)
+    peer, late = flown.nodes[0].peers.all[2], flown.packet_ages()[-1, 0, 1]
     true = flown.array()[-1 - round(late / 0.2), 1]
     assert peer.state is not None and peer.state.x - true[0] == pytest.approx(7.0, abs=0.01)
     assert peer.state.y == pytest.approx(true[1], abs=0.01)
     assert flown.array()[-1, 1, 9] == pytest.approx(flown.array()[-1, 1, 0], abs=0.01), "it knows where it is"
-    assert sum(flown.nodes[0]._receive.refused.values()) == 0
+    assert sum(flown.nodes[0]._receiver.refused.values()) == 0
 
 
 def test_a_vehicle_without_motors_lies_on_the_ground_whatever_it_is_asked():
@@ -277,7 +281,7 @@ def test_a_vehicle_without_motors_lies_on_the_ground_whatever_it_is_asked():
     v = vehicle()
     v.state, v.armed, v.mode, v.motor = State(0.0, 0.0, 3.0, 0.0, 0.0, 0.0), True, "OURS", False
     for k in range(1500):
-        v.target, v.target_at = (0.0, 0.0, 2.0), 0.01 * k
+        v.target, v.setpoint_at = (0.0, 0.0, 2.0), 0.01 * k
         v.step(0.01 * k, 0.01)
     assert v.state.z == 0.0
 
@@ -289,19 +293,19 @@ def test_a_vehicle_without_motors_lies_on_the_ground_whatever_it_is_asked():
 def test_a_whole_mission_from_the_ground_and_back(kind):
     f = fleet(scenario(3, 300.0, **{"radio.delay": 0.2}), autopilot=kind)
     f.advance(10.0)
-    assert set(f.phases()) == {Phase.CLEARED} and not any(v.armed for v in f.vehicles)
-    f.order(Do.START, at=10.0)
+    assert set(f.phases()) == {MissionPhase.CLEARED} and not any(v.armed for v in f.vehicles)
+    f.order(OrderKind.START, at=10.0)
     f.advance(45.0)
-    assert set(f.phases()) == {Phase.FLOCK} and min(v.state.z for v in f.vehicles) > 15.0
-    f.order(Do.HOLD, target=2)
+    assert set(f.phases()) == {MissionPhase.FLOCK} and min(v.state.z for v in f.vehicles) > 15.0
+    f.order(OrderKind.HOLD, target=2)
     f.advance(6.0)
-    assert f.nodes[1].phase == Phase.HOLD and math.hypot(*f.vehicles[1].state[3:]) < 0.3
-    f.order(Do.RESUME, target=2)
+    assert f.nodes[1].phase == MissionPhase.HOLD and math.hypot(*f.vehicles[1].state[3:]) < 0.3
+    f.order(OrderKind.RESUME, target=2)
     f.advance(8.0)
-    assert f.nodes[1].phase == Phase.FLOCK
-    f.order(Do.RETURN)
+    assert f.nodes[1].phase == MissionPhase.FLOCK
+    f.order(OrderKind.RETURN)
     f.advance(110.0)
-    assert set(f.phases()) == {Phase.DONE} and not any(v.armed for v in f.vehicles)
+    assert set(f.phases()) == {MissionPhase.DONE} and not any(v.armed for v in f.vehicles)
     rows = f.array()
     gaps = np.linalg.norm(rows[:, :, None, :3] - rows[:, None, :, :3], axis=-1) + 1e9 * np.eye(3)
     assert gaps.min() > 1.5
@@ -313,17 +317,21 @@ def grounded(faults, seconds=60.0, **more):
     """A mission of three with faults, which begin after 55 s in the air; phases that each drone went through."""
     f = fleet(scenario(3, 600.0, **{"radio.delay": 0.2}), faults=faults, **more)
     f.advance(10.0)
-    f.order(Do.START, at=10.0)
+    f.order(OrderKind.START, at=10.0)
     f.advance(45.0 + seconds)
     return f
 
 
 FAULTS = [
-    (Fault("pilot", (2,), 56.0), {2: Phase.MANUAL}, "mode is not ours"),
-    (Fault("gnss", (2,), 56.0), {2: Phase.DONE}, "no position for too long"),
-    (Fault("battery", (2,), 56.0, amount=20.0), {2: Phase.DONE}, "just enough for the way home"),
-    (Fault("battery", (2,), 56.0, amount=5.0), {2: Phase.DONE}, "battery is critical"),
-    (Fault("outage", (), 56.0), {1: Phase.DONE, 2: Phase.DONE, 3: Phase.DONE}, "nobody has been heard for too long"),
+    (InjectedFault("pilot", (2,), 56.0), {2: MissionPhase.MANUAL}, "mode is not ours"),
+    (InjectedFault("gnss", (2,), 56.0), {2: MissionPhase.DONE}, "no position for too long"),
+    (InjectedFault("battery", (2,), 56.0, amount=20.0), {2: MissionPhase.DONE}, "just enough for the way home"),
+    (InjectedFault("battery", (2,), 56.0, amount=5.0), {2: MissionPhase.DONE}, "battery is critical"),
+    (
+        InjectedFault("outage", (), 56.0),
+        {1: MissionPhase.DONE, 2: MissionPhase.DONE, 3: MissionPhase.DONE},
+        "nobody has been heard for too long",
+    ),
 ]
 
 
@@ -334,12 +342,12 @@ def test_what_fails_ends_as_the_table_says(fault, ends, line):
     for who, phase in ends.items():
         assert f.nodes[who - 1].phase == phase, f.log[-9:]
     others = {node.phase for node in f.nodes if node.member not in ends}
-    assert others <= {Phase.FLOCK, Phase.HOLD, Phase.RETURN, Phase.LAND, Phase.DONE}
+    assert others <= {MissionPhase.FLOCK, MissionPhase.HOLD, MissionPhase.RETURN, MissionPhase.LAND, MissionPhase.DONE}
 
 
 def test_silence_does_not_end_in_a_collision():
     """15 s in which nobody hears anybody: with the rule of silence no two drones meet, without it they do."""
-    mute, lows = (Fault("outage", (), 5.0, 20.0),), {}
+    mute, lows = (InjectedFault("outage", (), 5.0, 20.0),), {}
     for silent in (True, False):
         rows = in_the_air(10, 20.0, 3, mute, noisy=True, silent=silent).array()[25:, :, :3]
         gaps = np.linalg.norm(rows[:, :, None] - rows[:, None], axis=-1) + 1e9 * np.eye(10)
@@ -349,7 +357,9 @@ def test_silence_does_not_end_in_a_collision():
 
 def test_a_drone_that_hovers_out_of_range_does_not_make_others_stop_in_the_flock():
     """Its clock is wrong, so it holds; who stopped for it 15 s after it was lost stood where others flew."""
-    rows = in_the_air(10, 34.2, 15, (Fault("clock", (2,), amount=0.5),), noisy=True, silent=True).array()[100:, :, :3]
+    rows = in_the_air(10, 34.2, 15, (InjectedFault("clock", (2,), amount=0.5),), noisy=True, silent=True).array()[
+        100:, :, :3
+    ]
     gaps = np.linalg.norm(rows[:, :, None] - rows[:, None], axis=-1) + 1e9 * np.eye(10)
     assert gaps.min() > 3.0, "0.73 m where it was taken to come at twice the flock's speed"
 
@@ -357,9 +367,9 @@ def test_a_drone_that_hovers_out_of_range_does_not_make_others_stop_in_the_flock
 @pytest.mark.parametrize(("kind", "seconds"), [("px4", 30.0), ("ardupilot", 36.0)])
 def test_whose_node_died_lands_while_the_others_stand(kind, seconds):
     """PX4 lands a second after the last setpoint, ArduPilot five after the last heartbeat; the others wait for 20 s."""
-    found = compare.sampled(scenario(4, seconds, noisy=True), 0.2)
-    card = compare.software_card(found, silent=True, vehicle=kind)
-    f = compare.fly(found, card, 3, faults=(Fault("node", (2,), 5.0),))
+    found = compare.with_metric_period(scenario(4, seconds, noisy=True), 0.2)
+    card = compare.software_card(found, stop_for_lost=True, vehicle=kind)
+    f = compare.fly_in_lockstep(found, card, 3, faults=(InjectedFault("node", (2,), 5.0),))
     at = f.array()[round(25.0 / card.period), 1]
     assert at[2] < 8.0, "when it is given up it is far below the flock"
     assert f.vehicles[1].mode == "LAND" and not f.vehicles[1].armed
@@ -368,24 +378,24 @@ def test_whose_node_died_lands_while_the_others_stand(kind, seconds):
 
 def test_who_holds_stays_where_it_came_to_stand():
     """A minute of outer noise does not carry it away: by its own navigation it is where it was."""
-    found = compare.sampled(scenario(2, 60.0, noisy=True), 0.2)
-    f = fleet(found, 1, start=compare.first_states(found, 1))
+    found = compare.with_metric_period(scenario(2, 60.0, noisy=True), 0.2)
+    f = fleet(found, 1, start=compare.simulated_start(found, 1))
     f.advance(1.0)
-    f.order(Do.HOLD)
+    f.order(OrderKind.HOLD)
     f.advance(10.0)
     stands = [v.measured for v in f.vehicles]
     f.advance(60.0)
-    assert set(f.phases()) == {Phase.HOLD}
+    assert set(f.phases()) == {MissionPhase.HOLD}
     for before, v in zip(stands, f.vehicles, strict=True):
         assert math.dist(before[:2], v.measured[:2]) < 1.5
 
 
 def test_a_clock_that_is_half_a_second_off_never_starts():
-    f = fleet(scenario(3, 300.0, **{"radio.delay": 0.2}), faults=[Fault("clock", (2,), amount=0.5)])
+    f = fleet(scenario(3, 300.0, **{"radio.delay": 0.2}), faults=[InjectedFault("clock", (2,), amount=0.5)])
     f.advance(10.0)
-    f.order(Do.START, at=10.0)
+    f.order(OrderKind.START, at=10.0)
     f.advance(20.0)
-    assert f.nodes[1].phase == Phase.READY and not f.vehicles[1].armed
+    assert f.nodes[1].phase == MissionPhase.READY and not f.vehicles[1].armed
     assert any("missing: clock: -0.50 s" in note for _, who, note in f.log if who == 2), f.log
 
 
@@ -393,31 +403,31 @@ def test_who_forges_packets_changes_nothing_without_the_key_and_little_with_it()
     """Without: the same bits. With: what jumps is refused, and the drone itself tells that it has a double."""
     settings = {"radio.delay": 0.2, "world.side": 60.0, "start.separation": 6.0}
     plain = in_the_air(3, 5.0, **settings)
-    rogue = in_the_air(3, 5.0, faults=(Fault("rogue", (2,), 1.0, amount=30.0),), **settings)
+    rogue = in_the_air(3, 5.0, faults=(InjectedFault("rogue", (2,), 1.0, amount=30.0),), **settings)
     assert rogue.digest() == plain.digest() and rogue.nodes[0].refused["signature"] > 10
-    impostor = in_the_air(3, 5.0, faults=(Fault("impostor", (2,), 1.0, amount=30.0),), **settings)
+    impostor = in_the_air(3, 5.0, faults=(InjectedFault("impostor", (2,), 1.0, amount=30.0),), **settings)
     assert impostor.nodes[0].refused["jump"] > 10 and impostor.nodes[0].peers.all[2].state is not None
     assert math.dist(impostor.nodes[0].peers.all[2].state[:2], impostor.vehicles[1].state[:2]) < 5.0
     assert any("another sender signs as member 2" in note for _, who, note in impostor.log if who == 2)
-    near = in_the_air(3, 5.0, faults=(Fault("impostor", (2,), 1.0, amount=3.0),), **settings)
+    near = in_the_air(3, 5.0, faults=(InjectedFault("impostor", (2,), 1.0, amount=3.0),), **settings)
     assert near.digest() != plain.digest(), "what is plausible is believed: the key is what is trusted"
 
 
 def test_faults_are_checked_at_once(tmp_path):
     path = tmp_path / "faults.toml"
     path.write_text('[[fault]]\nkind = "outage"\nwho = [1, 3]\nbegin = 5\nend = 9.5\n')
-    assert read_faults(path, (1, 2, 3)) == (Fault("outage", (1, 3), 5, 9.5),)
+    assert read_injected_faults(path, (1, 2, 3)) == (InjectedFault("outage", (1, 3), 5, 9.5),)
     path.write_text('x = 1\n[[fault]]\nkind = "storm"\n[[fault]]\nkind = "loss"\nwho = [9]\nwhom = 1\namount = 2.0\n')
     with pytest.raises(ScenarioError) as fault:
-        read_faults(path, (1, 2, 3))
-    for part in ("x is not known", f"none of {', '.join(KINDS)}", "who = [9]", "whom is not known"):
+        read_injected_faults(path, (1, 2, 3))
+    for part in ("x is not known", f"none of {', '.join(INJECTED_KINDS)}", "who = [9]", "whom is not known"):
         assert any(part in line for line in fault.value.faults), part
     path.write_text("[[fault")
     with pytest.raises(ScenarioError):
-        read_faults(path, (1,))
+        read_injected_faults(path, (1,))
     path.write_text('[[fault]]\nkind = "clock"\namount = 3.0\nbegin = 10\n')  # it would be wrong from 0 s on
     with pytest.raises(ScenarioError, match="leave out begin and end"):
-        read_faults(path, (1,))
+        read_injected_faults(path, (1,))
 
 
 # ------------------------------------------------------------------------------------------------------- vehicles
@@ -425,7 +435,7 @@ def test_faults_are_checked_at_once(tmp_path):
 
 def vehicle(kind="px4"):
     found = scenario(1)
-    return Vehicle(kind, 1, Site(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.vehicle, found.body)
+    return SoftwareVehicle(kind, 1, FlightSite(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.vehicle, found.body)
 
 
 @pytest.mark.parametrize(("kind", "travels"), [("px4", (6.0, 9.0)), ("ardupilot", (6.0, 9.0))])
@@ -433,7 +443,7 @@ def test_after_the_last_setpoint_a_vehicle_stops_within_its_time_out(kind, trave
     """At 4 m/s: 1 s of time-out and 1 s of relaxation."""
     v = vehicle(kind)
     v.state, v.armed, v.mode = State(0.0, 0.0, 20.0, 4.0, 0.0, 0.0), True, "OURS"
-    v.target, v.target_at = (4.0, 0.0, 0.0), 0.0
+    v.target, v.setpoint_at = (4.0, 0.0, 0.0), 0.0
     for k in range(1500):
         v.step(0.01 * k, 0.01)
     assert travels[0] < v.state.x < travels[1]
@@ -448,16 +458,16 @@ def test_an_autopilot_holds_its_place_where_it_hovers_or_lands(kind, mode):
     def noise(step):
         return tuple(rng.standard_normal(3).tolist())
 
-    v = Vehicle(kind, 1, Site(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.vehicle, found.body, noise)
+    v = SoftwareVehicle(kind, 1, FlightSite(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.vehicle, found.body, noise)
     v.state, v.armed, v.mode = State(0.0, 0.0, 900.0, 4.0, 0.0, 0.0), True, mode
     rows = []
     for k in range(40_000):
         v.step(0.01 * k, 0.01)
         rows.append(v.state)
-    stood = next(k for k, s in enumerate(rows) if math.hypot(s.vx, s.vy) < STOOD)
+    stood = next(k for k, s in enumerate(rows) if math.hypot(s.vx, s.vy) < STANDING_SPEED)
     assert 1.0 < rows[stood].x < 5.0
     off = np.array([(s.x - rows[stood].x, s.y - rows[stood].y) for s in rows[stood:]])
-    assert np.mean(off**2) == pytest.approx(found.body.noise * found.body.tau**2 / GAIN, rel=0.25)
+    assert np.mean(off**2) == pytest.approx(found.body.noise * found.body.tau**2 / POSITION_GAIN, rel=0.25)
     assert 900.0 - rows[-1].z == pytest.approx(400.0 if mode == "LAND" else 0.0, abs=60.0)
 
 
@@ -465,18 +475,18 @@ def test_an_autopilot_does_not_hold_a_place_by_a_navigation_that_stands_still():
     v = vehicle()
     v.state, v.armed, v.mode = State(0.0, 0.0, 90.0, 0.0, 0.0, 0.0), True, "HOLD"
     v.step(0.0, 0.01)
-    v.frozen = v.measured
+    v.frozen_state = v.measured
     v.state = v.state._replace(x=30.0)
-    assert v.wish() == (0.0, 0.0, 0.0)
-    v.frozen = None
-    assert v.wish() == pytest.approx((-1.0, 0.0, 0.0)), "back to its place, at most at a metre a second"
+    assert v.autopilot_velocity() == (0.0, 0.0, 0.0)
+    v.frozen_state = None
+    assert v.autopilot_velocity() == pytest.approx((-1.0, 0.0, 0.0)), "back to its place, at most at a metre a second"
 
 
 @pytest.mark.parametrize(("action", "mode"), [(3, "RTL"), (4, "LAND"), (5, "HOLD")])
 def test_px4_does_what_its_parameter_says_when_setpoints_end(action, mode):
     v = vehicle()
     v.parameters["COM_OBL_RC_ACT"] = action
-    v.state, v.armed, v.mode, v.target_at = State(0.0, 0.0, 20.0, 4.0, 0.0, 0.0), True, "OURS", 0.0
+    v.state, v.armed, v.mode, v.setpoint_at = State(0.0, 0.0, 20.0, 4.0, 0.0, 0.0), True, "OURS", 0.0
     v.step(0.9, 0.01)
     assert v.mode == "OURS"
     v.step(1.1, 0.01)
@@ -486,7 +496,11 @@ def test_px4_does_what_its_parameter_says_when_setpoints_end(action, mode):
 @pytest.mark.parametrize(("action", "mode"), [(0, "OURS"), (1, "RTL"), (5, "LAND"), (7, "HOLD")])
 def test_ardupilot_does_what_its_parameter_says_when_heartbeats_end(action, mode):
     """Five seconds after the last heartbeat of its own station, and of no other."""
-    v, say, stranger = vehicle("ardupilot"), Speaker(AUTOPILOTS["ardupilot"], 1), Speaker(AUTOPILOTS["ardupilot"], 9)
+    v, say, stranger = (
+        vehicle("ardupilot"),
+        AutopilotCommands(AUTOPILOTS["ardupilot"], 1),
+        AutopilotCommands(AUTOPILOTS["ardupilot"], 9),
+    )
     v.parameters["FS_GCS_ENABLE"] = action
     v.state, v.armed, v.mode = State(0.0, 0.0, 20.0, 0.0, 0.0, 0.0), True, "OURS"
     v.step(60.0, 0.01)
@@ -503,16 +517,16 @@ def test_a_vehicle_whose_navigation_is_frozen_still_stops():
     """Its controller keeps the velocity of inertial sensors; by the frozen one it would gain speed without end."""
     v = vehicle()
     v.state, v.armed, v.mode = State(0.0, 0.0, 20.0, 4.0, 0.0, 0.0), True, "OURS"
-    v.frozen = v.measured
+    v.frozen_state = v.measured
     for k in range(600):
-        v.target_at = 0.01 * k
+        v.setpoint_at = 0.01 * k
         v.step(0.01 * k, 0.01)
     assert v.measured == State(0.0, 0.0, 20.0, 4.0, 0.0, 0.0), "what it tells stands still"
     assert abs(v.state.vx) < 0.1 and 2.0 < v.state.x < 8.0
 
 
 def test_px4_takes_our_mode_only_after_a_second_of_setpoints():
-    v, say = vehicle(), Speaker(AUTOPILOTS["px4"], 1)
+    v, say = vehicle(), AutopilotCommands(AUTOPILOTS["px4"], 1)
 
     def result(data, now):
         return [f.values()["result"] for f in frames_in(v.receive(data, now)) if f.message == 77]
@@ -525,13 +539,13 @@ def test_px4_takes_our_mode_only_after_a_second_of_setpoints():
 
 
 def test_a_vehicle_takes_any_bytes_and_only_finite_setpoints():
-    v, rng, say = vehicle(), Random(4), Speaker(AUTOPILOTS["px4"], 1)
+    v, rng, say = vehicle(), Random(4), AutopilotCommands(AUTOPILOTS["px4"], 1)
     for _ in range(300):
         v.receive(rng.randbytes(rng.randrange(300)), 0.0)
-    pack = dialect.common()
+    pack = dialect.common_dialect()
     bad = pack.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x0DC7, 0, 0, 0, math.nan, 0, 0, 0, 0, 0, 0, 0)
     v.receive(bytes(600) + say._pack(bad), 0.0)
-    assert v.target == (0.0, 0.0, 0.0) and v.target_at < 0.0
+    assert v.target == (0.0, 0.0, 0.0) and v.setpoint_at < 0.0
 
 
 # ---------------------------------------------------------------------------------------------- on the real clock
@@ -553,7 +567,7 @@ def test_a_node_on_sockets_gets_ready_and_its_log_is_flown_again(tmp_path):
     made = card(found, members=[1])
     node_port, vehicle_port, radio_port, far_port = free_ports(4)
     craft = vehicle()
-    craft.started = time.time_ns() // 1000
+    craft.start_time = time.time_ns() // 1000
     begun, log, said = time.monotonic(), io.StringIO(), []
     line = open_port(f"udp:127.0.0.1:{vehicle_port}>127.0.0.1:{node_port}")
     ports = [
@@ -568,14 +582,14 @@ def test_a_node_on_sockets_gets_ready_and_its_log_is_flown_again(tmp_path):
             now = time.monotonic() - begun
             for data in line.read():
                 line.write(craft.receive(data, now))
-            line.write(craft.telemetry(now))
+            line.write(craft.due_telemetry(now))
 
     beside = threading.Thread(target=live)
     beside.start()
     try:
         fly_node(
-            made, 1, KEY, ports, tmp_path / "memory", log, said.append,
-            until=lambda: any("CLEARED" in s for s in said) or time.monotonic() - begun > 20.0,
+            made, 1, SOFTWARE_KEY, ports, tmp_path / "memory", log, said.append,
+            has_ended=lambda: any("CLEARED" in s for s in said) or time.monotonic() - begun > 20.0,
         )  # fmt: skip
     finally:
         over.set()
@@ -584,7 +598,7 @@ def test_a_node_on_sockets_gets_ready_and_its_log_is_flown_again(tmp_path):
         port.close()
     assert any("READY → CLEARED" in text for text in said), said
     assert not craft.armed
-    ticks = list(replay(log.getvalue().splitlines(), made, KEY))
+    ticks = list(replay(log.getvalue().splitlines(), made, SOFTWARE_KEY))
     assert ticks and all(tick.same for tick in ticks)
     assert (tmp_path / "memory").exists()
 
@@ -601,8 +615,8 @@ def test_a_full_disk_does_not_bring_a_drone_down(tmp_path):
     ports, said, log = [open_port(f"udp:127.0.0.1:{number}") for number in free_ports(2)], [], Full()
     begun = time.monotonic()
     fly_node(
-        card(scenario(1, 60.0), members=[1]), 1, KEY, ports, tmp_path / "absent" / "memory", log, said.append,
-        until=lambda: len([s for s in said if "goes on" in s]) >= 2
+        card(scenario(1, 60.0), members=[1]), 1, SOFTWARE_KEY, ports, tmp_path / "absent" / "memory", log, said.append,
+        has_ended=lambda: len([s for s in said if "goes on" in s]) >= 2
         or time.monotonic() - begun > 20.0,
     )  # fmt: skip
     for port in ports:
@@ -630,7 +644,7 @@ def test_a_fleet_in_python_is_that_of_the_command(monkeypatch):
     told = json.loads(CliRunner().invoke(app, ["fleet", *words.split()]).stdout)
     assert [run["sha256"] for run in told["runs"]] == [run["sha256"] for run in found.runs]
     assert [line["name"] for line in told["comparison"]] == [line.name for line in found.comparison]
-    assert found.table.attrs["units"]["phi_vel"] == "m/s" and found.departure.times
+    assert found.table.attrs["units"]["phi_vel"] == "m/s" and found.divergence.times
     with pytest.raises(
         ScenarioError, match=r"vehicle = 'px5' is none of px4, ardupilot; did you mean px4\?\n.*\n.*rad"
     ):

@@ -7,34 +7,35 @@ import sys
 from dataclasses import replace
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from airflock.core.agent import State
 from airflock.drones.mavlink import dialect, orders, status
-from airflock.drones.mavlink.frames import Packer, frames_in
-from airflock.drones.mavlink.orders import Do, Order, new_keys
-from airflock.drones.mavlink.signing import Signer
-from airflock.drones.mavlink.status import Status
-from airflock.drones.onboard.card import card_of, hash_of, read_card, write_card
-from airflock.drones.onboard.log import Logged, read_memory, replay
-from airflock.drones.onboard.mission import Phase
-from airflock.drones.onboard.node import Memory, Node
+from airflock.drones.mavlink.frames import FramePacker, frames_in
+from airflock.drones.mavlink.orders import OperatorOrder, OrderKind, new_operator_keys
+from airflock.drones.mavlink.signing import PacketSigner
+from airflock.drones.mavlink.status import DroneStatus
+from airflock.drones.onboard.card import card_hash, parse_card, read_card, write_card
+from airflock.drones.onboard.log import LoggingNode, read_node_memory, replay
+from airflock.drones.onboard.mission import MissionPhase
+from airflock.drones.onboard.node import Node, NodeMemory
 from airflock.drones.onboard.saying import own_status
-from airflock.fleets.lockstep import KEY, STARTED
-from airflock.fleets.vehicle import Vehicle
+from airflock.fleets.lockstep import SOFTWARE_KEY, START_TIME
+from airflock.fleets.vehicle import SoftwareVehicle
 from airflock.support.coordinates import Geodetic
 from airflock.support.errors import CardError, LinkError
 from fleets import PRIVATE, document, fleet, scenario
 
-common = dialect.common()
+common = dialect.common_dialect()
 SCENARIO = scenario(3)
-CARD = card_of({**(d := document(SCENARIO)), "hash": hash_of(d)})
+CARD = parse_card({**(d := document(SCENARIO)), "hash": card_hash(d)})
 
 
 def node_with_vehicle(**more):
-    node = Node(CARD, 1, KEY, now=0.0, utc=STARTED)
-    vehicle = Vehicle("px4", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=STARTED, **more)
+    node = Node(CARD, 1, SOFTWARE_KEY, now=0.0, utc=START_TIME)
+    vehicle = SoftwareVehicle(
+        "px4", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=START_TIME, **more
+    )
     return node, vehicle
 
 
@@ -42,7 +43,7 @@ def live(node, vehicle, begin, end):
     """Let both live from begin to end, s, without neighbours."""
     notes, t = [], begin
     while t < end:
-        node.autopilot(vehicle.telemetry(t), t)
+        node.autopilot(vehicle.due_telemetry(t), t)
         out = node.tick(t)
         for data in out.autopilot:
             node.autopilot(vehicle.receive(data, t), t)
@@ -53,14 +54,18 @@ def live(node, vehicle, begin, end):
     return notes
 
 
-def told(who=2, at=(10.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), utc=STARTED, phase=Phase.READY, flies=False, **more):
-    made = Status(utc, at, velocity, 1.0, int(phase), flies, CARD.mission, bytes.fromhex(CARD.hash)[:4], 90)
-    return Signer(KEY, who)(status.message(made._replace(**more), CARD.site), utc)
+def told(
+    who=2, at=(10.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), utc=START_TIME, phase=MissionPhase.READY, flies=False, **more
+):
+    made = DroneStatus(utc, at, velocity, 1.0, int(phase), flies, CARD.mission, bytes.fromhex(CARD.hash)[:4], 90)
+    return PacketSigner(SOFTWARE_KEY, who)(status.status_message(made._replace(**more), CARD.site), utc)
 
 
 def state(node):
     """Everything that bytes could change."""
-    wire = {k: v for k, v in vars(node.wire).items() if k not in ("refused", "_stream", "_site", "_kind", "_jump")}
+    wire = {
+        k: v for k, v in vars(node.autopilot_link).items() if k not in ("refused", "_stream", "_site", "_kind", "_jump")
+    }
     peers = {w: (p.status, p.at, p.heard_at) for w, p in node.peers.all.items()}
     return repr((node.phase, wire, peers, node.memory, {w: p.state for w, p in node.pilot.packets.items()}))
 
@@ -88,94 +93,106 @@ odd = st.one_of(st.floats(width=32), st.sampled_from([math.nan, math.inf, -math.
 def test_an_absurd_own_position_is_not_believed(numbers):
     node, vehicle = node_with_vehicle()
     live(node, vehicle, 0.0, 1.0)
-    before = node.wire.state
-    node.autopilot(Packer(1, 1)(common.MAVLink_local_position_ned_message(0, *numbers)), 1.0)
+    before = node.autopilot_link.state
+    node.autopilot(FramePacker(1, 1)(common.MAVLink_local_position_ned_message(0, *numbers)), 1.0)
     sound = all(math.isfinite(v) and abs(v) < 1e5 for v in numbers)
-    assert sound or node.wire.state == before
-    assert all(map(math.isfinite, node.wire.state))
+    assert sound or node.autopilot_link.state == before
+    assert all(map(math.isfinite, node.autopilot_link.state))
     node.tick(1.0)
 
 
 @pytest.mark.parametrize("told_", [
     {"at": (1e6, 0.0, 0.0)}, {"velocity": (300.0, 0.0, 0.0)}, {"phase": 200}, {"mission": 8}, {"card": b"othe"},
-    {"who": 1}, {"who": 9}, {"utc": STARTED + 2_400_000_000_000_000}, {"at": (0.0, 0.0, -5000.0)},
+    {"who": 1}, {"who": 9}, {"utc": START_TIME + 2_400_000_000_000_000}, {"at": (0.0, 0.0, -5000.0)},
 ])  # fmt: skip
 def test_a_signed_but_absurd_status_is_not_believed(told_):
     node, _ = node_with_vehicle()
     before = state(node)
-    node.radio(told(**({"utc": STARTED + 100_000} | told_)), 0.1)
+    node.radio(told(**({"utc": START_TIME + 100_000} | told_)), 0.1)
     assert [p.status for p in node.peers.all.values()] == [None, None] and not node.pilot.packets
-    assert node.phase == Phase.BOOT and state(node).split("Memory")[0] == before.split("Memory")[0]
+    assert node.phase == MissionPhase.BOOT and state(node).split("Memory")[0] == before.split("Memory")[0]
 
 
 def test_a_neighbour_that_jumps_is_not_believed():
     node, _ = node_with_vehicle()
-    sign = Signer(KEY, 2)
+    sign = PacketSigner(SOFTWARE_KEY, 2)
     for k, x in enumerate((10.0, 10.5, 90.0, 11.5)):
-        utc = STARTED + 100_000 * (k + 1)
-        made = Status(utc, (x, 0.0, 20.0), (4.0, 0.0, 0.0), 1.0, 6, True, 7, bytes.fromhex(CARD.hash)[:4])
-        node.radio(sign(status.message(made, CARD.site), utc), 0.1 * (k + 1))
+        utc = START_TIME + 100_000 * (k + 1)
+        made = DroneStatus(utc, (x, 0.0, 20.0), (4.0, 0.0, 0.0), 1.0, 6, True, 7, bytes.fromhex(CARD.hash)[:4])
+        node.radio(sign(status.status_message(made, CARD.site), utc), 0.1 * (k + 1))
     assert node.peers.refused["jump"] == 1 and node.peers.all[2].status.position[0] == pytest.approx(11.5, abs=0.02)
 
 
 # -------------------------------------------------------------------------------------------------- who is obeyed
 
 
-@pytest.mark.parametrize("phase", [Phase.FLOCK, Phase.GOTO, Phase.MANUAL, Phase.LAND, Phase.HOLD, Phase.RETURN])
+@pytest.mark.parametrize(
+    "phase",
+    [
+        MissionPhase.FLOCK,
+        MissionPhase.GOTO,
+        MissionPhase.MANUAL,
+        MissionPhase.LAND,
+        MissionPhase.HOLD,
+        MissionPhase.RETURN,
+    ],
+)
 def test_whom_it_lost_is_feared_less_if_its_last_packet_said_that_it_does_not_fly_with_the_flock(phase):
     """60 m away, 8 s ago: at twice the flock's 4 m/s it could be near by now, at half of that it could not."""
     found = scenario(3, **{"silence.rule": "stop"})
     made = document(found)
-    card = card_of({**made, "hash": hash_of(made)})
-    node = Node(card, 1, KEY, now=0.0, utc=STARTED)
-    sent, told_hash = STARTED + 1000, bytes.fromhex(card.hash)[:4]
-    said = Status(sent, (60.0, 0.0, 20.0), (0.0, 0.0, 0.0), 1.0, int(phase), True, card.mission, told_hash)
-    node.radio(Signer(KEY, 2)(status.message(said, card.site), sent), 0.01)
+    card = parse_card({**made, "hash": card_hash(made)})
+    node = Node(card, 1, SOFTWARE_KEY, now=0.0, utc=START_TIME)
+    sent, told_hash = START_TIME + 1000, bytes.fromhex(card.hash)[:4]
+    said = DroneStatus(sent, (60.0, 0.0, 20.0), (0.0, 0.0, 0.0), 1.0, int(phase), True, card.mission, told_hash)
+    node.radio(PacketSigner(SOFTWARE_KEY, 2)(status.status_message(said, card.site), sent), 0.01)
     assert 1 in node.pilot.packets
-    assert node.pilot.lost_near(State(*(0.0,) * 6), 8.0) is (phase in (Phase.FLOCK, Phase.GOTO, Phase.LAND))
+    assert node.pilot.lost_near(State(*(0.0,) * 6), 8.0) is (
+        phase in (MissionPhase.FLOCK, MissionPhase.GOTO, MissionPhase.LAND)
+    )
 
 
-def order(do, private=PRIVATE, given=STARTED + 100_000, mission=7, sender=orders.OPERATOR, **more):
-    made = orders.message(Order(do, more.get("target", 0), mission, given, more.get("at", 0)), private)
-    return Signer(KEY, sender)(made, given)
+def order(do, private=PRIVATE, given=START_TIME + 100_000, mission=7, sender=orders.OPERATOR_SYSTEM, **more):
+    made = orders.order_message(OperatorOrder(do, more.get("target", 0), mission, given, more.get("at", 0)), private)
+    return PacketSigner(SOFTWARE_KEY, sender)(made, given)
 
 
 def test_only_a_fresh_order_of_the_operator_counts_and_only_once():
     node, _ = node_with_vehicle()
-    other, _ = new_keys()
-    node.radio(order(Do.HOLD, private=other), 0.1)
-    node.radio(order(Do.HOLD, sender=2, given=STARTED + 110_000), 0.2)
-    node.radio(order(Do.HOLD, mission=8, given=STARTED + 120_000), 0.2)
+    other, _ = new_operator_keys()
+    node.radio(order(OrderKind.HOLD, private=other), 0.1)
+    node.radio(order(OrderKind.HOLD, sender=2, given=START_TIME + 110_000), 0.2)
+    node.radio(order(OrderKind.HOLD, mission=8, given=START_TIME + 120_000), 0.2)
     assert not node.operator.held and node.operator.refused["seal"] == node.operator.refused["mission"] == 1
-    genuine = order(Do.HOLD, given=STARTED + 130_000)
+    genuine = order(OrderKind.HOLD, given=START_TIME + 130_000)
     node.radio(genuine, 0.2)
     assert node.operator.held
-    again = Node(CARD, 1, KEY, now=0.0, utc=STARTED, memory=node.memory)
+    again = Node(CARD, 1, SOFTWARE_KEY, now=0.0, utc=START_TIME, memory=node.memory)
     again.radio(genuine, 0.2)
     assert not again.operator.held, "the same order after a restart"
 
 
 def test_a_kill_takes_two_steps():
     node, _ = node_with_vehicle()
-    node.radio(order(Do.CONFIRM_KILL, given=STARTED + 100_000), 0.1)
-    assert not node.operator.killed
-    node.radio(order(Do.KILL, given=STARTED + 200_000), 0.2)
-    node.radio(order(Do.CONFIRM_KILL, given=STARTED + 300_000, target=2), 0.3)
-    assert not node.operator.killed
-    node.radio(order(Do.CONFIRM_KILL, given=STARTED + 400_000, target=1), 0.4)
-    assert node.operator.killed
+    node.radio(order(OrderKind.CONFIRM_KILL, given=START_TIME + 100_000), 0.1)
+    assert not node.operator.kill_confirmed
+    node.radio(order(OrderKind.KILL, given=START_TIME + 200_000), 0.2)
+    node.radio(order(OrderKind.CONFIRM_KILL, given=START_TIME + 300_000, target=2), 0.3)
+    assert not node.operator.kill_confirmed
+    node.radio(order(OrderKind.CONFIRM_KILL, given=START_TIME + 400_000, target=1), 0.4)
+    assert node.operator.kill_confirmed
 
 
 def test_nothing_arms_without_a_start_and_nothing_starts_with_something_missing():
     node, vehicle = node_with_vehicle()
     notes = live(node, vehicle, 0.0, 3.0)
-    assert node.phase == Phase.READY and not vehicle.armed
+    assert node.phase == MissionPhase.READY and not vehicle.armed
     assert {n for n in notes if n.startswith("missing")} == {
         "missing: drone 2 is not heard", "missing: drone 3 is not heard",
     } | {n for n in notes if "autopilot has not reported" in n}  # fmt: skip
-    node.radio(order(Do.START, given=STARTED + 3_000_000, at=STARTED + 3_000_000), 3.0)
+    node.radio(order(OrderKind.START, given=START_TIME + 3_000_000, at=START_TIME + 3_000_000), 3.0)
     live(node, vehicle, 3.2, 10.0)
-    assert node.phase == Phase.READY and not vehicle.armed
+    assert node.phase == MissionPhase.READY and not vehicle.armed
 
 
 def test_an_autopilot_that_is_not_heard_is_told_until_it_is():
@@ -183,7 +200,7 @@ def test_an_autopilot_that_is_not_heard_is_told_until_it_is():
     early, late = ([note for k in range(*span) for note in node.tick(0.2 * k).notes] for span in ((0, 15), (15, 30)))
     assert early == [] and [note.startswith("missing: no heartbeat from the autopilot") for note in late] == [True]
     live(node, vehicle, 6.0, 8.0)
-    assert node.phase == Phase.READY
+    assert node.phase == MissionPhase.READY
 
 
 @pytest.mark.parametrize(("change", "line"), [
@@ -195,7 +212,7 @@ def test_an_autopilot_that_is_not_heard_is_told_until_it_is():
     (lambda v: setattr(v, "state", v.state._replace(y=2e6)), r"is 2000 km away from the card's site"),
     (lambda v: setattr(v, "battery", 20.0), "battery: 20 %"),
     (lambda v: setattr(v, "accuracy", 9.0), "accuracy 9.0 m"),
-    (lambda v: setattr(v, "started", STARTED + 700_000), r"clock: \+0.70 s .* start the node anew"),
+    (lambda v: setattr(v, "started", START_TIME + 700_000), r"clock: \+0.70 s .* start the node anew"),
     (lambda v: setattr(v, "state", v.state._replace(x=500.0)), "outside the fence: is the card's site right"),
 ])  # fmt: skip
 def test_each_miss_is_told_in_a_line(change, line):
@@ -203,7 +220,7 @@ def test_each_miss_is_told_in_a_line(change, line):
 
     node, vehicle = node_with_vehicle()
     change(vehicle)
-    vehicle.origin = CARD.site.geodetic(*vehicle.state[:2], 0.0)
+    vehicle.origin = CARD.site.to_geodetic(*vehicle.state[:2], 0.0)
     notes = live(node, vehicle, 0.0, 2.0)
     assert [n for n in notes if re.search(line, n)], notes
 
@@ -211,10 +228,10 @@ def test_each_miss_is_told_in_a_line(change, line):
 def test_no_site_is_doubted_before_there_are_satellites():
     """An autopilot without a fix may say that it is where the equator meets Greenwich."""
     node, vehicle = node_with_vehicle()
-    vehicle.origin = CARD.site.geodetic(0.0, 0.0, 0.0)
+    vehicle.origin = CARD.site.to_geodetic(0.0, 0.0, 0.0)
     vehicle.state = vehicle.state._replace(y=-5e6)
     heard = node.autopilot
-    node.autopilot = lambda data, now: (heard(data, now), setattr(node.wire, "fix", 1))[0]
+    node.autopilot = lambda data, now: (heard(data, now), setattr(node.autopilot_link, "fix", 1))[0]
     notes = live(node, vehicle, 0.0, 2.0)
     assert any("no own position" in note for note in notes) and not any("away from the card" in note for note in notes)
 
@@ -223,22 +240,28 @@ def test_an_autopilot_that_is_started_anew_on_the_ground_is_asked_once_more():
     """By hand its parameters and its streams may have changed meanwhile, and its origin has."""
     node, vehicle = node_with_vehicle()
     live(node, vehicle, 0.0, 5.0)
-    assert node.wire.parameters["GF_ACTION"] == 3.0 and node.wire.origin is not None
-    usual, vehicle.booted = dict(vehicle.rates), 8.0
+    assert node.autopilot_link.parameters["GF_ACTION"] == 3.0 and node.autopilot_link.origin is not None
+    usual, vehicle.booted_at = dict(vehicle.rates), 8.0
     vehicle.rates = usual | dict.fromkeys(("local", "global", "gps", "landed"), 0.0)  # what was asked for is forgotten
     vehicle.parameters["GF_ACTION"] = 0
     notes = live(node, vehicle, 8.0, 14.0)
     assert any("GF_ACTION = 0 is not within" in note for note in notes), notes
-    assert node.wire.state is not None and node.wire.state_at > 13.0 and node.wire.origin is not None
+    assert (
+        node.autopilot_link.state is not None
+        and node.autopilot_link.state_at > 13.0
+        and node.autopilot_link.origin is not None
+    )
 
 
 def test_another_autopilot_is_a_fault():
     node, _ = node_with_vehicle()
-    other = Vehicle("ardupilot", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=STARTED)
-    assert any("the card is for px4" in n for n in live(node, other, 0.0, 1.0)) and node.phase == Phase.FAULT
+    other = SoftwareVehicle(
+        "ardupilot", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=START_TIME
+    )
+    assert any("the card is for px4" in n for n in live(node, other, 0.0, 1.0)) and node.phase == MissionPhase.FAULT
     node, _ = node_with_vehicle()
-    other = Vehicle("px4", 4, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=STARTED)
-    assert any("calls itself system 4" in n for n in live(node, other, 0.0, 1.0)) and node.phase == Phase.FAULT
+    other = SoftwareVehicle("px4", 4, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=START_TIME)
+    assert any("calls itself system 4" in n for n in live(node, other, 0.0, 1.0)) and node.phase == MissionPhase.FAULT
 
 
 def test_two_drones_with_one_number_do_not_start():
@@ -247,28 +270,37 @@ def test_two_drones_with_one_number_do_not_start():
     for datagram in node.tick(1.0).radios[0] + node.tick(1.2).radios[0]:
         node.radio(datagram, 1.2)  # a radio that hears itself
     node.radio(
-        Signer(bytes(32), 1)(status.message(own_status(CARD, node.wire, node.wire.state, STARTED, node.phase, peers=0),
-                                            CARD.site), STARTED + 10**6), 1.2,
-    )  # fmt: skip
+        PacketSigner(bytes(32), 1)(
+            status.status_message(
+                own_status(CARD, node.autopilot_link, node.autopilot_link.state, START_TIME, node.phase, peers=0),
+                CARD.site,
+            ),
+            START_TIME + 10**6,
+        ),
+        1.2,
+    )
     live(node, vehicle, 1.4, 2.0)
-    assert node.phase == Phase.READY, "neither an echo nor a forgery is a twin"
-    node.radio(told(who=1, utc=STARTED + 2_050_123), 2.1)
-    assert any("two drones with one number" in n for n in live(node, vehicle, 2.2, 3.0)) and node.phase == Phase.FAULT
+    assert node.phase == MissionPhase.READY, "neither an echo nor a forgery is a twin"
+    node.radio(told(who=1, utc=START_TIME + 2_050_123), 2.1)
+    assert (
+        any("two drones with one number" in n for n in live(node, vehicle, 2.2, 3.0))
+        and node.phase == MissionPhase.FAULT
+    )
 
 
 def test_a_node_that_starts_in_the_air_leaves_it_to_the_pilot():
     node, vehicle = node_with_vehicle()
     vehicle.state, vehicle.armed, vehicle.mode = vehicle.state._replace(z=20.0), True, "HOLD"
     live(node, vehicle, 0.0, 2.0)
-    assert node.phase == Phase.MANUAL and node.command == (0.0, 0.0, 0.0) and vehicle.target_at < 0.0
+    assert node.phase == MissionPhase.MANUAL and node.command == (0.0, 0.0, 0.0) and vehicle.setpoint_at < 0.0
 
 
 def test_a_law_that_fails_in_flight_holds_and_then_returns(monkeypatch):
     f = fleet(SCENARIO)
     f.advance(1.0)
     node, vehicle = f.nodes[0], f.vehicles[0]
-    node.phase, node.home, vehicle.armed, vehicle.mode = Phase.FLOCK, (0.0, 0.0, 10.0), True, "OURS"
-    vehicle.state, vehicle.target_at = vehicle.state._replace(z=20.0), 1.0
+    node.phase, node.home, vehicle.armed, vehicle.mode = MissionPhase.FLOCK, (0.0, 0.0, 10.0), True, "OURS"
+    vehicle.state, vehicle.setpoint_at = vehicle.state._replace(z=20.0), 1.0
     monkeypatch.setattr(node.pilot, "decide", lambda *a, **k: 1 / 0)
     f.advance(20.0)
     notes = [note for _, who, note in f.log if who == 1]
@@ -317,7 +349,7 @@ def test_a_card_is_written_and_read_and_its_change_is_seen(tmp_path):
 def test_what_is_wrong_with_a_card_is_one_line(change, line):
     made = {**document(SCENARIO), **change}
     with pytest.raises(CardError, match=line) as fault:
-        card_of({**made, "hash": hash_of(made)})
+        parse_card({**made, "hash": card_hash(made)})
     assert all(text.startswith("card: ") for text in fault.value.faults)
 
 
@@ -331,12 +363,12 @@ def test_a_card_of_anything_is_refused_or_sound(data):
     anything = row | st.lists(row, max_size=3) | st.dictionaries(st.text(max_size=5), row, max_size=3)
     made[key] = data.draw(anything)
     try:
-        card_of({**made, "hash": hash_of(made)})
+        parse_card({**made, "hash": card_hash(made)})
     except CardError as fault:
         assert fault.faults
 
 
-class Watched(Logged):
+class Watched(LoggingNode):
     """A logged node that a fleet can ask for its state."""
 
     def __getattr__(self, name):
@@ -346,28 +378,30 @@ class Watched(Logged):
 def test_a_log_is_flown_again_to_the_bit():
     f = fleet(replace(SCENARIO), autopilot="px4")
     lines = []
-    f.nodes[0] = Watched(f.nodes[0], lines.append, now=0.0, memory=Memory(), radios=(0.2,))
+    f.nodes[0] = Watched(f.nodes[0], lines.append, now=0.0, memory=NodeMemory(), radios=(0.2,))
     f.advance(12.0)
-    f.order(Do.START, at=12.2)
+    f.order(OrderKind.START, at=12.2)
     f.advance(25.0)
-    assert f.nodes[0].phase == Phase.FLOCK
-    ticks = list(replay(lines, f.card, KEY))
+    assert f.nodes[0].phase == MissionPhase.FLOCK
+    ticks = list(replay(lines, f.card, SOFTWARE_KEY))
     assert len(ticks) == 185 and all(tick.same for tick in ticks)
     bent = [line.replace('"a":"fd', '"a":"fe') if k == 900 else line for k, line in enumerate(lines)]
-    assert not all(tick.same for tick in replay([bent[0], *bent[40:]], f.card, KEY)), "inputs that are missing are seen"
+    assert not all(tick.same for tick in replay([bent[0], *bent[40:]], f.card, SOFTWARE_KEY)), (
+        "inputs that are missing are seen"
+    )
     with pytest.raises(LinkError, match="another card"):
-        next(replay(lines, replace(f.card, hash="0" * 64), KEY))
+        next(replay(lines, replace(f.card, hash="0" * 64), SOFTWARE_KEY))
     with pytest.raises(LinkError, match="not a log"):
-        next(replay(["{}"], f.card, KEY))
+        next(replay(["{}"], f.card, SOFTWARE_KEY))
 
 
 def test_the_memory_of_a_node_is_read_or_refused(tmp_path):
     path = tmp_path / "memory"
-    assert read_memory(path) == Memory()
+    assert read_node_memory(path) == NodeMemory()
     for text in ("", "[]", '{"sent": "x"}'):
         path.write_text(text)
         with pytest.raises(LinkError, match="cannot be read"):
-            read_memory(path)
+            read_node_memory(path)
 
 
 # ---------------------------------------------------------------------------------------------------- packaging
@@ -399,7 +433,7 @@ def test_a_node_needs_neither_numpy_nor_numba_nor_pydantic_nor_typer(tmp_path):
     from airflock.drones.mavlink.keys import write_key
 
     write_card(tmp_path / "m.json", document(SCENARIO, expires=2**39))
-    write_key(tmp_path / "m.key", KEY)
+    write_key(tmp_path / "m.key", SOFTWARE_KEY)
     given = [
         "m.json",
         "--member",
@@ -436,21 +470,21 @@ def test_the_command_tells_all_that_is_wrong_at_once(tmp_path, capsys):
 def test_a_goal_outside_the_fence_is_not_followed():
     f = fleet(scenario(3, duration=300.0))
     f.advance(12.0)
-    f.order(Do.START, at=12.0)
+    f.order(OrderKind.START, at=12.0)
     f.advance(25.0)
-    far = CARD.site.geodetic(900.0, 0.0, 20.0)
-    f.order(Do.GOTO, point=Geodetic(*far))
+    far = CARD.site.to_geodetic(900.0, 0.0, 20.0)
+    f.order(OrderKind.GOTO, point=Geodetic(*far))
     f.advance(1.0)
-    assert set(f.phases()) == {Phase.FLOCK} and any("outside the fence; not followed" in n for _, _, n in f.log)
-    f.order(Do.GOTO, point=CARD.site.geodetic(25.0, 25.0, 20.0))
+    assert set(f.phases()) == {MissionPhase.FLOCK} and any("outside the fence; not followed" in n for _, _, n in f.log)
+    f.order(OrderKind.GOTO, point=CARD.site.to_geodetic(25.0, 25.0, 20.0))
     f.advance(40.0)
     centre = [sum(v.state[c] for v in f.vehicles) / 3 for c in (0, 1)]
-    assert set(f.phases()) == {Phase.GOTO} and math.dist(centre, (25.0, 25.0)) < 12.0
-    f.order(Do.GOTO, point=Geodetic(*far))
-    f.order(Do.HOLD)
+    assert set(f.phases()) == {MissionPhase.GOTO} and math.dist(centre, (25.0, 25.0)) < 12.0
+    f.order(OrderKind.GOTO, point=Geodetic(*far))
+    f.order(OrderKind.HOLD)
     f.advance(6.0)
-    assert set(f.phases()) == {Phase.HOLD}, "ordered to hold, they hold"
-    f.order(Do.GOTO, point=CARD.site.geodetic(-25.0, 0.0, 20.0))
+    assert set(f.phases()) == {MissionPhase.HOLD}, "ordered to hold, they hold"
+    f.order(OrderKind.GOTO, point=CARD.site.to_geodetic(-25.0, 0.0, 20.0))
     f.advance(20.0)
     moved = [sum(v.state[c] for v in f.vehicles) / 3 for c in (0, 1)]
-    assert set(f.phases()) == {Phase.GOTO} and moved[0] < centre[0] - 10.0
+    assert set(f.phases()) == {MissionPhase.GOTO} and moved[0] < centre[0] - 10.0

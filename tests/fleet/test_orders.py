@@ -2,10 +2,10 @@
 
 import pytest
 
-from airflock.drones.mavlink.orders import Do
-from airflock.drones.onboard.mission import Phase
-from airflock.drones.onboard.node import KILLING
-from airflock.fleets.modes import OURS, PILOT
+from airflock.drones.mavlink.orders import OrderKind
+from airflock.drones.onboard.mission import MissionPhase
+from airflock.drones.onboard.node import KILL_SECONDS
+from airflock.fleets.modes import GUIDED, PILOT_MODE
 from fleets import fleet, scenario
 
 
@@ -19,9 +19,9 @@ def on_the_ground(**more):
 def in_the_air():
     """Two drones that flock."""
     made = on_the_ground()
-    made.order(Do.START, at=6.0)
+    made.order(OrderKind.START, at=6.0)
     made.advance(22.0)
-    assert made.phases() == [Phase.FLOCK] * 2
+    assert made.phases() == [MissionPhase.FLOCK] * 2
     return made
 
 
@@ -29,75 +29,77 @@ def told(found, words):
     return [(now, who) for now, who, note in found.log if words in note]
 
 
-@pytest.mark.parametrize("do", [Do.HOLD, Do.LAND, Do.RETURN])
+@pytest.mark.parametrize("do", [OrderKind.HOLD, OrderKind.LAND, OrderKind.RETURN])
 def test_who_is_arming_does_not_take_off_once_the_start_is_called_off(do):
     found = on_the_ground()
-    found.order(Do.START, at=6.0)
+    found.order(OrderKind.START, at=6.0)
     found.advance(2.0)
-    assert Phase.ARMING in found.phases()
+    assert MissionPhase.ARMING in found.phases()
     found.order(do)
     found.advance(20.0)
-    assert found.phases() == [Phase.CLEARED] * 2 and not any(v.armed or v.flying for v in found.vehicles)
-    found.order(Do.START, at=found.now)
+    assert found.phases() == [MissionPhase.CLEARED] * 2 and not any(v.armed or v.flying for v in found.vehicles)
+    found.order(OrderKind.START, at=found.now)
     found.advance(30.0)
-    assert all(phase in (Phase.GATHER, Phase.FLOCK) for phase in found.phases()), "a new start is followed"
+    assert all(phase in (MissionPhase.GATHER, MissionPhase.FLOCK) for phase in found.phases()), (
+        "a new start is followed"
+    )
 
 
-@pytest.mark.parametrize(("do", "ready"), [(Do.HOLD, 4.0), (Do.LAND, 4.0), (None, 15.0)])
+@pytest.mark.parametrize(("do", "ready"), [(OrderKind.HOLD, 4.0), (OrderKind.LAND, 4.0), (None, 15.0)])
 def test_a_drone_that_gets_ready_after_its_turn_does_not_arm_by_an_old_start(do, ready):
     """Whoever changes its battery stands beside it."""
     found = fleet(scenario(2))
     found.vehicles[1].battery = 10.0
     found.advance(5.0)
-    found.order(Do.START, at=5.0)
+    found.order(OrderKind.START, at=5.0)
     found.advance(1.0)
     if do is not None:
         found.order(do)
     found.advance(ready)
     found.vehicles[1].battery = 100.0
     found.advance(40.0)
-    assert not found.vehicles[1].armed and found.phases()[1] == Phase.CLEARED
+    assert not found.vehicles[1].armed and found.phases()[1] == MissionPhase.CLEARED
     assert len(told(found, "not started: something was missing")) == (do is None)
 
 
 def test_a_kill_of_a_drone_that_its_pilot_has_is_not_kept_for_later():
     found = in_the_air()
-    found.vehicles[0].mode = PILOT
+    found.vehicles[0].mode = PILOT_MODE
     found.advance(1.0)
-    found.order(Do.KILL, target=1)
-    found.order(Do.CONFIRM_KILL, target=1)
+    found.order(OrderKind.KILL, target=1)
+    found.order(OrderKind.CONFIRM_KILL, target=1)
     found.advance(20.0)
-    assert found.phases()[0] == Phase.MANUAL and told(found, "not killed: in MANUAL")
-    found.order(Do.RESUME, target=1)
+    assert found.phases()[0] == MissionPhase.MANUAL and told(found, "not killed: in MANUAL")
+    found.order(OrderKind.RESUME, target=1)
     found.advance(3.0)
-    found.vehicles[0].mode = OURS
+    found.vehicles[0].mode = GUIDED
     found.advance(5.0)
-    assert found.vehicles[0].armed and found.phases()[0] not in (Phase.MANUAL, Phase.DONE)
+    assert found.vehicles[0].armed and found.phases()[0] not in (MissionPhase.MANUAL, MissionPhase.DONE)
 
 
 def test_a_kill_is_repeated_until_the_autopilot_follows_and_no_longer():
     found = in_the_air()
     vehicle, obeys = found.vehicles[0], found.vehicles[0].receive
     vehicle.receive = lambda data, now: b""  # the line is cut
-    found.order(Do.KILL)
-    found.order(Do.CONFIRM_KILL)
+    found.order(OrderKind.KILL)
+    found.order(OrderKind.CONFIRM_KILL)
     found.advance(2.0)
-    assert found.phases() == [Phase.DONE] * 2 and [v.armed for v in found.vehicles] == [True, False]
+    assert found.phases() == [MissionPhase.DONE] * 2 and [v.armed for v in found.vehicles] == [True, False]
     vehicle.receive = obeys
     found.advance(2.0)
     assert not vehicle.armed
-    found.advance(2.0 * KILLING)
+    found.advance(2.0 * KILL_SECONDS)
     vehicle.armed = True  # somebody else has another flight in mind
     found.advance(5.0)
     assert vehicle.armed
 
 
-@pytest.mark.parametrize("do", [Do.LAND, Do.RETURN])
+@pytest.mark.parametrize("do", [OrderKind.LAND, OrderKind.RETURN])
 def test_an_order_that_comes_with_another_event_is_not_lost(do):
     """At each of the ticks around the end of a climb, where the table has something else to do as well."""
     found = on_the_ground()
-    found.order(Do.START, at=6.0)
-    while found.phases()[0] != Phase.TAKEOFF or abs(found.vehicles[0].state.z - found.card.layer(1)) >= 0.5:
+    found.order(OrderKind.START, at=6.0)
+    while found.phases()[0] != MissionPhase.TAKEOFF or abs(found.vehicles[0].state.z - found.card.layer(1)) >= 0.5:
         found.advance(0.01)
     found.order(do, target=1)
     found.advance(1.0)

@@ -9,15 +9,15 @@ import time
 import pytest
 
 from airflock.drones.onboard import ports as ports_module
-from airflock.drones.onboard.ports import Place, Serial, Udp
-from airflock.drones.onboard.resting import Rest, alone
+from airflock.drones.onboard.ports import SerialPort, UdpAddresses, UdpPort
+from airflock.drones.onboard.resting import TaskRest, run_alone
 
 HOST = "127.0.0.1"
 
 
 @pytest.fixture
 def port():
-    found = Udp(Place((HOST, 0), None))
+    found = UdpPort(UdpAddresses((HOST, 0), None))
     yield found
     found.close()
 
@@ -29,11 +29,11 @@ def test_a_life_that_is_late_hears_its_ports_at_each_rest(port):
         hears = [(port, lambda data, now: heard.append((data, now)))]
         for number in range(count):
             port.send(bytes([number]), port.here)
-            yield Rest(time.monotonic() - 1.0, hears)
+            yield TaskRest(time.monotonic() - 1.0, hears)
             assert len(heard) == number + 1, "loopback delivers before it returns"
         return "ended"
 
-    assert alone(life()) == "ended"
+    assert run_alone(life()) == "ended"
     assert [data for data, _ in heard] == [bytes([number]) for number in range(count)]
     assert [now for _, now in heard] == sorted(now for _, now in heard)
 
@@ -42,15 +42,15 @@ def test_a_rest_ends_at_its_time_and_no_sooner(port):
     def life():
         for rest in (0.0, 0.003, 0.02):
             until = time.monotonic() + rest
-            yield Rest(until)
+            yield TaskRest(until)
             assert time.monotonic() >= until
 
-    alone(life())
+    run_alone(life())
 
 
 def test_a_flood_is_read_in_portions(port, monkeypatch):
     """Whoever sends faster than a node reads must not keep it from its tick."""
-    monkeypatch.setattr(ports_module, "MOST", 10)
+    monkeypatch.setattr(ports_module, "MAX_DATAGRAMS", 10)
     for number in range(25):
         port.send(bytes([number]), port.here)
     portions = [[data[0] for data in port.read()] for _ in range(4)]
@@ -68,13 +68,13 @@ def test_while_somebody_floods_a_port_a_life_goes_on(port):
     def life():
         hears = [(port, lambda data, now: None)]
         for _ in range(ticks):
-            yield Rest(time.monotonic() + 0.01, hears)
+            yield TaskRest(time.monotonic() + 0.01, hears)
         return ticks
 
     beside = threading.Thread(target=flood)
     beside.start()
     try:
-        assert alone(life()) == ticks
+        assert run_alone(life()) == ticks
     finally:
         over.set()
         beside.join()
@@ -82,7 +82,7 @@ def test_while_somebody_floods_a_port_a_life_goes_on(port):
 
 def test_a_serial_line_that_is_pulled_out_says_nothing_and_wakes_nobody():
     master, slave = pty.openpty()
-    line = Serial(f"{os.ttyname(slave)}:57600", "serial:")
+    line = SerialPort(f"{os.ttyname(slave)}:57600", "serial:")
     heard, looks = [], []
     read = line.read
 
@@ -95,13 +95,13 @@ def test_a_serial_line_that_is_pulled_out_says_nothing_and_wakes_nobody():
     def life():
         hears = [(line, lambda data, now: heard.append(data))]
         os.write(master, b"last words")
-        yield Rest(time.monotonic(), hears)
+        yield TaskRest(time.monotonic(), hears)
         os.close(slave)
         os.close(master)
         for _ in range(20):
-            yield Rest(time.monotonic() + 0.002, hears)
+            yield TaskRest(time.monotonic() + 0.002, hears)
 
-    alone(life())
+    run_alone(life())
     line.close()
     assert b"".join(heard) == b"last words"
     assert len(looks) <= 4, "an end that is told again and again would take the whole processor"

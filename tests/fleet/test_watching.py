@@ -14,37 +14,37 @@ from airflock.cli.main import app
 from airflock.core.agent import State
 from airflock.drones.mavlink import witness
 from airflock.drones.mavlink.keys import write_key
-from airflock.drones.mavlink.orders import Do
-from airflock.drones.mavlink.signing import Signer
+from airflock.drones.mavlink.orders import OrderKind
+from airflock.drones.mavlink.signing import PacketSigner
 from airflock.drones.onboard.card import read_card
-from airflock.drones.onboard.mission import Phase
-from airflock.drones.onboard.peers import FRESH
-from airflock.drones.onboard.ports import Place, Udp
+from airflock.drones.onboard.mission import MissionPhase
+from airflock.drones.onboard.peers import HEARD_WITHIN
+from airflock.drones.onboard.ports import UdpAddresses, UdpPort
 from airflock.fleets import compare, realtime
-from airflock.fleets.befalling import Faults
-from airflock.fleets.faults import KINDS, Fault
-from airflock.fleets.lockstep import STARTED
-from airflock.fleets.observer import Observer
-from airflock.fleets.starting import KEY, Station, write_for_watching
-from airflock.fleets.teller import OF_SCENARIO, Teller
-from airflock.studio.fleet_tables import about, faults_of, members_table, notes_of, trouble_of
-from airflock.studio.fleet_watch import opened
+from airflock.fleets.befalling import DroneFaults
+from airflock.fleets.faults import INJECTED_KINDS, InjectedFault
+from airflock.fleets.lockstep import START_TIME
+from airflock.fleets.observer import FleetObserver
+from airflock.fleets.starting import SOFTWARE_KEY, OperatorStation, write_card_and_key
+from airflock.fleets.teller import SCENARIO_FAULT_NAMES, TelemetryBroadcast
+from airflock.studio.fleet_tables import drone_html, faults_html, fleet_warning, members_html, notes_html
+from airflock.studio.fleet_watch import open_card_and_radios
 from airflock.support.errors import AirflockError, CardError, StudioError
-from airflock.view.stage.field import field_of
+from airflock.view.stage.field import card_scene
 from fleets import PRIVATE, card, fleet, scenario
 
 START = [State(20.0 * i, 0.0, 0.0, 2.0, 0.0, 0.0) for i in range(3)]
 
 
-def watched(seconds=0.0, key=KEY, **more):
+def watched(seconds=0.0, key=SOFTWARE_KEY, **more):
     """A fleet of three in lock-step, and somebody who will watch it from now on."""
     f = fleet(scenario(3), start=START, **more)
     f.advance(seconds)
-    return f, Observer(f.card, key, now=f.now, utc=STARTED + round(f.now * 1e6) - 1)
+    return f, FleetObserver(f.card, key, now=f.now, utc=START_TIME + round(f.now * 1e6) - 1)
 
 
 def said(f):
-    return [datagram for node in f.nodes for datagram in node.say_status(f.now)]
+    return [datagram for node in f.nodes for datagram in node.status_datagrams(f.now)]
 
 
 def listen(f, observer, seconds):
@@ -62,7 +62,7 @@ def test_drones_are_where_they_say_and_carried_on_between_packets():
     for vehicle, member in zip(f.vehicles, f.card.members, strict=True):
         place = observer.place(member, f.now)
         assert np.linalg.norm(np.subtract(place, vehicle.state[:3])) < 0.5
-        assert observer.peers[member].phase == Phase.FLOCK
+        assert observer.peers[member].phase == MissionPhase.FLOCK
     assert observer.heard(f.now) == [1, 2, 3] and observer.flying(f.now) == [1, 2, 3] and not observer.refused
     assert [note.text for note in observer.notes] == ["heard, FLOCK"] * 3
 
@@ -95,17 +95,17 @@ def test_any_bytes_are_refused_without_a_change(n=300):
             data[rng.randrange(len(data))] = rng.randrange(256)
         if bytes(data) not in genuine:
             observer.take(bytes(data), f.now)
-    assert not observer.accepted and not observer.notes, "seed 7"
+    assert not observer.accepted_count and not observer.notes, "seed 7"
     for datagram in genuine:
         observer.take(datagram, f.now)
-    assert observer.accepted == 3
+    assert observer.accepted_count == 3
 
 
 def test_another_key_is_told():
     f, observer = watched(key=bytes(32))
-    assert trouble_of(observer, f.now) == ""
+    assert fleet_warning(observer, f.now) == ""
     listen(f, observer, 3.0)
-    assert "signed with a different key" in trouble_of(observer, f.now) and not observer.accepted
+    assert "signed with a different key" in fleet_warning(observer, f.now) and not observer.accepted_count
 
 
 def test_who_falls_silent_is_told_once_and_told_again_when_heard():
@@ -116,7 +116,7 @@ def test_who_falls_silent_is_told_once_and_told_again_when_heard():
         for datagram in said(f)[1:]:
             observer.take(datagram, f.now)
         observer.look(f.now)
-    assert observer.heard(f.now) == [2, 3] and f.now - observer.peers[1].heard_at > FRESH
+    assert observer.heard(f.now) == [2, 3] and f.now - observer.peers[1].heard_at > HEARD_WITHIN
     stays = observer.place(1, f.now)
     assert stays == observer.place(1, f.now + 100.0), "who is silent is not carried on for ever"
     listen(f, observer, 0.4)
@@ -125,22 +125,22 @@ def test_who_falls_silent_is_told_once_and_told_again_when_heard():
 
 def test_an_order_of_the_operator_is_told_and_one_of_another_key_is_not():
     f, observer = watched()
-    utc = STARTED + round(f.now * 1e6)
-    genuine = Station(f.card, PRIVATE)
-    observer.take(genuine.order(Do.RETURN, utc), f.now)
+    utc = START_TIME + round(f.now * 1e6)
+    genuine = OperatorStation(f.card, PRIVATE)
+    observer.take(genuine.order(OrderKind.RETURN, utc), f.now)
     assert [note.text for note in observer.notes] == ["the operator orders return"]
-    other = Station(f.card, bytes(range(32)))
-    observer.take(other.order(Do.LAND, utc + 10), f.now)
+    other = OperatorStation(f.card, bytes(range(32)))
+    observer.take(other.order(OrderKind.LAND, utc + 10), f.now)
     assert len(observer.notes) == 1
 
 
 def test_whom_the_ether_says_to_be_heard_is_a_link_for_a_while_both_ways_or_one():
     f, observer = watched()
-    teller = Teller(f.card.members, [Fault("loss", (2, 3), 0.0, 5.0, 0.5)])
+    teller = TelemetryBroadcast(f.card.members, [InjectedFault("loss", (2, 3), 0.0, 5.0, 0.5)])
     one, two, _ = said(f)
     for to, datagram in ((1, one), (0, two), (2, one)):
-        teller.arrived(to, datagram, f.now)
-    utc = STARTED + round(f.now * 1e6)
+        teller.note_arrival(to, datagram, f.now)
+    utc = START_TIME + round(f.now * 1e6)
     for datagram in teller.report(f.now, utc):
         observer.take(datagram, f.now)
     assert observer.links(f.now) == {(1, 2): True, (3, 1): False}
@@ -152,56 +152,56 @@ def test_whom_the_ether_says_to_be_heard_is_a_link_for_a_while_both_ways_or_one(
 
 def test_several_faults_of_one_kind_are_told_with_all_whom_they_befall():
     f, observer = watched()
-    teller = Teller(f.card.members, [Fault("loss", (who,), 0.0, 5.0, 0.5) for who in (1, 3)])
-    for datagram in teller.report(f.now, STARTED + round(f.now * 1e6)):
+    teller = TelemetryBroadcast(f.card.members, [InjectedFault("loss", (who,), 0.0, 5.0, 0.5) for who in (1, 3)])
+    for datagram in teller.report(f.now, START_TIME + round(f.now * 1e6)):
         observer.take(datagram, f.now)
     assert observer.faults == {"loss": {1, 3}}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", INJECTED_KINDS)
 def test_a_fault_is_told_without_an_amount_that_nobody_knows(kind):
     f, observer = watched()
-    teller = Teller(f.card.members, [Fault(kind, (2,), 0.0, 5.0, 0.5)])
-    for datagram in teller.report(f.now, STARTED + round(f.now * 1e6)):
+    teller = TelemetryBroadcast(f.card.members, [InjectedFault(kind, (2,), 0.0, 5.0, 0.5)])
+    for datagram in teller.report(f.now, START_TIME + round(f.now * 1e6)):
         observer.take(datagram, f.now)
-    assert f"<b>{kind}</b>, drone 2: " in faults_of(observer) and "amount" not in faults_of(observer)
+    assert f"<b>{kind}</b>, drone 2: " in faults_html(observer) and "amount" not in faults_html(observer)
 
 
-@pytest.mark.parametrize("kind", OF_SCENARIO)
+@pytest.mark.parametrize("kind", SCENARIO_FAULT_NAMES)
 def test_a_fault_of_the_scenario_is_told_by_what_its_kind_does(kind):
     """Three kinds are called as other faults of fleets are: these say that they are of the scenario."""
     f, observer = watched()
-    befalls = Faults(scenario(3, faults=[{"kind": kind, "at": 0.2, "agents": [0, 2]}]), 0)
-    teller = Teller(f.card.members, [Fault("motor", (2,), 0.0, 5.0)])
+    befalls = DroneFaults(scenario(3, faults=[{"kind": kind, "at": 0.2, "agents": [0, 2]}]), 0)
+    teller = TelemetryBroadcast(f.card.members, [InjectedFault("motor", (2,), 0.0, 5.0)])
     for now in (0.0, 1.0):
         befalls.until(now)
-        for datagram in teller.report(now, STARTED + round((f.now + now) * 1e6), befalls.holding(now)):
+        for datagram in teller.report(now, START_TIME + round((f.now + now) * 1e6), befalls.active_kinds(now)):
             observer.take(datagram, f.now + now)
-    told = OF_SCENARIO[kind]
+    told = SCENARIO_FAULT_NAMES[kind]
     assert observer.faults == {"motor": {2}, told: {1, 3}} and told != "motor"
-    assert f"<b>{told}</b>, drones 1, 3: " in faults_of(observer) and not faults_of(observer).endswith(": </p>")
+    assert f"<b>{told}</b>, drones 1, 3: " in faults_html(observer) and not faults_html(observer).endswith(": </p>")
 
 
 def test_what_the_ether_tells_needs_the_key_and_its_own_system():
     f, observer = watched()
-    utc = STARTED + round(f.now * 1e6)
-    told = witness.message(witness.HEARS, 1, {2, 3})
-    for key, system in ((bytes(32), witness.WITNESS), (KEY, 2)):
-        observer.take(Signer(key, system)(told, utc), f.now)
-    assert not observer.links(f.now) and not observer.accepted
+    utc = START_TIME + round(f.now * 1e6)
+    told = witness.report_message(witness.HEARS_REPORT, 1, {2, 3})
+    for key, system in ((bytes(32), witness.CHANNEL_SYSTEM), (SOFTWARE_KEY, 2)):
+        observer.take(PacketSigner(key, system)(told, utc), f.now)
+    assert not observer.links(f.now) and not observer.accepted_count
 
 
 @pytest.mark.parametrize("systems", [set(), {1}, set(range(1, 251))])
-@pytest.mark.parametrize("what", [witness.HEARS, len(KINDS)])
+@pytest.mark.parametrize("what", [witness.HEARS_REPORT, len(INJECTED_KINDS)])
 def test_what_is_told_comes_back(what, systems):
-    made = witness.message(what, 7, systems)
-    back = witness.told_of({"payload": made.payload, "payload_length": made.payload_length})
+    made = witness.report_message(what, 7, systems)
+    back = witness.parse_report({"payload": made.payload, "payload_length": made.payload_length})
     assert back == (what, 7, systems)
 
 
 def test_the_field_of_a_card_holds_fence_and_walls_at_their_heights():
     made = card(scenario(3))
-    field = field_of(made)
+    field = card_scene(made)
     lines = {line.name: line.points for line in field.lines}
     assert np.ptp(lines["fence"][..., 2]) == pytest.approx(made.high - made.low)
     assert np.abs(lines["arena"][..., :2]).max() == 60.0 and set(lines["arena"][..., 2].ravel()) == {made.height}
@@ -210,19 +210,19 @@ def test_the_field_of_a_card_holds_fence_and_walls_at_their_heights():
 
 def test_tables_name_every_drone_and_what_it_is_at():
     f, observer = watched()
-    assert members_table(observer, f.now).count("not heard") == 3
+    assert members_html(observer, f.now).count("not heard") == 3
     listen(f, observer, 1.0)
-    table = members_table(observer, f.now)
+    table = members_html(observer, f.now)
     assert table.count("<td>flock</td>") == 3 and "20.0" in table
-    assert "hears 2 of 2" in about(observer, 2, f.now) and "drone 3: heard" in notes_of(observer)
+    assert "hears 2 of 2" in drone_html(observer, 2, f.now) and "drone 3: heard" in notes_html(observer)
 
 
 def test_a_fleet_on_the_real_clock_is_heard_where_it_flies():
     """Its packets, who hears whom and which faults hold come over UDP, and say what the recording says."""
-    port = Udp(Place(("127.0.0.1", 0), None))
-    found = compare.sampled(scenario(2, 1.5, **{"radio.delay": 0.1}), 0.2)
-    made = compare.software_card(found, silent=True, live=True)
-    observer = Observer(made, KEY, now=time.monotonic(), utc=time.time_ns() // 1000)
+    port = UdpPort(UdpAddresses(("127.0.0.1", 0), None))
+    found = compare.with_metric_period(scenario(2, 1.5, **{"radio.delay": 0.1}), 0.2)
+    made = compare.software_card(found, stop_for_lost=True, realtime=True)
+    observer = FleetObserver(made, SOFTWARE_KEY, now=time.monotonic(), utc=time.time_ns() // 1000)
     over = threading.Event()
 
     def hear():
@@ -233,15 +233,15 @@ def test_a_fleet_on_the_real_clock_is_heard_where_it_flies():
     ears = threading.Thread(target=hear)
     ears.start()
     try:
-        flown = realtime.fly(
-            found, made, 1, "tasks", start=compare.first_states(found, 1), watcher=port.here,
-            faults=(Fault("outage", (2,), 0.0, 1e6),),
+        flown = realtime.fly_in_realtime(
+            found, made, 1, "tasks", start=compare.simulated_start(found, 1), watcher=port.here,
+            faults=(InjectedFault("outage", (2,), 0.0, 1e6),),
         )  # fmt: skip
     finally:
         over.set()
         ears.join()
         port.close()
-    assert observer.accepted > 10
+    assert observer.accepted_count > 10
     assert observer.faults == {"outage": {2}} and not observer.links(time.monotonic()), "links of a drone without radio"
     path = flown.array()[:, :, :3]
     for place, member in enumerate(made.members):
@@ -251,22 +251,22 @@ def test_a_fleet_on_the_real_clock_is_heard_where_it_flies():
 
 def test_the_card_of_a_fleet_in_software_is_written_and_never_over_a_real_one(tmp_path):
     made, path = card(scenario(2)), tmp_path / "fleet.json"
-    write_for_watching(path, made)
-    write_for_watching(path, made)
+    write_card_and_key(path, made)
+    write_card_and_key(path, made)
     assert read_card(path).hash == made.hash and os.stat(tmp_path / "fleet.key").st_mode & 0o777 == 0o600
-    found, key, radios = opened(path, None, ["udp:127.0.0.1:14699"])
+    found, key, radios = open_card_and_radios(path, None, ["udp:127.0.0.1:14699"])
     radios.close()
-    assert key == KEY and found.members == (1, 2)
+    assert key == SOFTWARE_KEY and found.members == (1, 2)
     real = tmp_path / "mission.json"
     write_key(real.with_suffix(".key"), bytes(range(32)))
     with pytest.raises(CardError, match="is of a real mission"):
-        write_for_watching(real, made)
+        write_card_and_key(real, made)
     assert not real.exists()
 
 
 def test_what_is_wrong_with_card_key_and_radios_is_told_at_once(tmp_path):
     with pytest.raises(CardError) as told:
-        opened(tmp_path / "none.json", None, ["udp:nowhere", "wifi:1"])
+        open_card_and_radios(tmp_path / "none.json", None, ["udp:nowhere", "wifi:1"])
     lines = str(told.value).splitlines()
     assert len(lines) == 4 and "none.json" in lines[0] and "none.key" in lines[1] and "wifi:1" in lines[3]
 

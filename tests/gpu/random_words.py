@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import simulator  # noqa: E402
 
 from airflock.core import random  # noqa: E402
-from airflock.engine.text.generate import Source  # noqa: E402
+from airflock.engine.text.generate import DriverSource  # noqa: E402
 from inside import Shape, head, load_driver  # noqa: E402
 
 LOOP = """
@@ -36,7 +36,7 @@ if __name__ == "__main__":
     rng, n = np.random.default_rng(int(sys.argv[1])), 200
     counters = rng.integers(0, 2**32, (6, n))
     counters[:, :2] = [[0, 0xFFFFFFFF]] * 6
-    source = Source("@njit(**JIT)", {})
+    source = DriverSource("@njit(**JIT)", {})
     loop = LOOP.format(philox=source.name(random.philox))
     text = [head("random numbers", 64, Shape(32, 1, 32, simulated=True)), *source.blocks, loop]
     driver = load_driver("\n\n".join(text), "random_cuda")

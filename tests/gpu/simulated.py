@@ -20,9 +20,9 @@ import covering  # noqa: E402
 import several_terms  # noqa: E402
 import wary  # noqa: E402
 from airflock.engine import plan_of  # noqa: E402
-from airflock.scenarios.families import Given  # noqa: E402
+from airflock.scenarios.families import CallerParts  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
-from airflock.scenarios.making import make  # noqa: E402
+from airflock.scenarios.making import build_scenario  # noqa: E402
 from covering import fault  # noqa: E402
 from flocks import IDEAL, ISLANDS, scenario  # noqa: E402
 from inside import (
@@ -168,7 +168,7 @@ def build(name):
         )
     kind, keys, per_agent, registers = CASES[name]
     if not isinstance(kind, str):
-        found = make({}, name, COMMON | keys, given=Given(law=airflock.model(vars(kind))))
+        found = build_scenario({}, name, COMMON | keys, caller_parts=CallerParts(law=airflock.model(vars(kind))))
     elif "/" in kind:
         found = load(kind, keys)
     else:

@@ -100,9 +100,9 @@ class Block:
 
 def littered():
     """Let memory that a launch asks for hold numbers, so that whoever reads what nobody has written is found out."""
-    from airflock.support.gpu import runtime
+    from airflock.support.gpu import cuda_runtime
 
-    cuda = runtime()
+    cuda = cuda_runtime()
     made = cuda.device_array
 
     def full(*given, **named):

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np  # noqa: E402
 
 import covering  # noqa: E402
-from airflock.engine import fly  # noqa: E402
+from airflock.engine import fly_world  # noqa: E402
 from reference.flight import fly_plainly  # noqa: E402
 
 NEAR = 1e-9  # m, m/s; order parameters relative above 1
@@ -32,7 +32,7 @@ def compiled(number):
     """How far the compiled flight of a combination lies from the reference."""
     warnings.simplefilter("ignore", RuntimeWarning)
     found = covering.flight(covering.pairs()[number])
-    known, flown = fly_plainly(found, number), fly(found, number, precision=64, record=True)
+    known, flown = fly_plainly(found, number), fly_world(found, number, precision=64, record=True)
     frames = [apart(flown.frames, known.frames), apart(flown.state, known.state)]
     values = [apart(flown.values[name], known.values[name]) for name in known.values]
     return max(frames), max(values)

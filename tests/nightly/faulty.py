@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 import airflock
-from airflock.engine import fly
+from airflock.engine import fly_world
 
 PRESET = "vasarhelyi_2018/faulty"
 FIELDS = ("line", "seed", "n_coll", "r_min")
@@ -59,7 +59,7 @@ def flown(folder: Path, hours: float, preset: str) -> dict[str, dict[int, float]
         for line, scenario in lines(preset).items():
             for seed in range(round(hours * 3600.0 / scenario.flight.duration)):
                 if seed not in found[line]:
-                    values = fly(scenario, seed).values
+                    values = fly_world(scenario, seed).values
                     found[line][seed] = values["n_coll"]
                     rows.writerow({"line": line, "seed": seed, "n_coll": values["n_coll"], "r_min": values["r_min"]})
             file.flush()

@@ -28,7 +28,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from airflock.fleets import compare  # noqa: E402
-from airflock.fleets.faults import KINDS, Fault  # noqa: E402
+from airflock.fleets.faults import INJECTED_KINDS, InjectedFault  # noqa: E402
 from fleets import scenario  # noqa: E402
 
 HOURS, SECONDS, AGENTS, SIDE = 24.0, 360.0, 10, 120.0
@@ -48,22 +48,25 @@ CLASSES = ("motor", "gnss", "blind", "crowding", "logic", "impostor", "other")
 def drawn(number):
     """Faults of one flight."""
     rng, found = Random(f"a day of faults, flight {number}"), []
-    for place, kind in enumerate(KINDS):
+    for place, kind in enumerate(INJECTED_KINDS):
         if (number + place) % 2:
             continue
         count = 1 if kind in FEW else rng.randint(1, AGENTS)
         who = () if count == AGENTS else tuple(sorted(rng.sample(range(1, AGENTS + 1), count)))
         begin = 0.0 if kind == "clock" else rng.uniform(20.0, SECONDS - 60.0)
         end = 1e9 if kind in (*LASTING, "clock") else begin + rng.uniform(5.0, 60.0)
-        found.append(Fault(kind, who, begin, end, rng.uniform(*AMOUNTS.get(kind, (0.0, 0.0)))))
+        found.append(InjectedFault(kind, who, begin, end, rng.uniform(*AMOUNTS.get(kind, (0.0, 0.0)))))
     return tuple(found)
 
 
 def flown(number):
     """One flight: its row, and a row for each collision."""
-    found, faults = compare.sampled(scenario(AGENTS, SECONDS, noisy=True, **{"world.side": SIDE}), 0.2), drawn(number)
-    card = compare.software_card(found, silent=True)
-    fleet = compare.fly(found, card, number, faults=faults)
+    found, faults = (
+        compare.with_metric_period(scenario(AGENTS, SECONDS, noisy=True, **{"world.side": SIDE}), 0.2),
+        drawn(number),
+    )
+    card = compare.software_card(found, stop_for_lost=True)
+    fleet = compare.fly_in_lockstep(found, card, number, faults=faults)
     kinds = " ".join(fault.kind for fault in faults)
     row = dict(zip(FLIGHTS, (number, SECONDS / 3600.0, kinds, fleet.digest()[:16]), strict=True))
     return row, [dict(zip(COLLISIONS, (number, *values), strict=True)) for values in collisions(fleet, faults)]
@@ -83,7 +86,7 @@ def nearest(rows):
 
 def collisions(fleet, faults):
     """When (s), who (members), how near (m), of which class, in which phases, with which faults of the two."""
-    rows, ages, period = fleet.array(), fleet.ages(), fleet.card.period
+    rows, ages, period = fleet.array(), fleet.packet_ages(), fleet.card.period
     least, members = nearest(rows), fleet.card.members
     for a in range(AGENTS):
         for b in range(a):
@@ -132,7 +135,7 @@ def table(flights, hits):
     hours = sum(float(row["hours"]) for row in flights)
     kinds, classes = Counter(" ".join(row["faults"] for row in flights).split()), Counter(row["class"] for row in hits)
     yield f"{hours:.1f} hours of {AGENTS} drones: {len(hits)} collisions, {len(hits) / hours:.2f} in an hour of flight"
-    yield "faults: " + ", ".join(f"{kind} {kinds[kind]}" for kind in KINDS)
+    yield "faults: " + ", ".join(f"{kind} {kinds[kind]}" for kind in INJECTED_KINDS)
     yield "collisions: " + ", ".join(f"{name} {classes[name]}" for name in CLASSES)
 
 
@@ -175,7 +178,7 @@ def main():
         print(*lines, f"{len(waiting)} flights still to fly", sep="\n")
         return 3
     print(*lines[::-1], sep="\n")
-    few = [k for k in KINDS if sum(k in row["faults"].split() for row in flights) < LEAST]
+    few = [k for k in INJECTED_KINDS if sum(k in row["faults"].split() for row in flights) < LEAST]
     return 1 if any(row["class"] == "other" for row in hits) or few else 0
 
 

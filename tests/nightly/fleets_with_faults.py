@@ -22,21 +22,21 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from airflock.fleets import compare  # noqa: E402
-from airflock.fleets.faults import Fault  # noqa: E402
+from airflock.fleets.faults import InjectedFault  # noqa: E402
 from fleets import scenario  # noqa: E402
 
 SEEDS = 40
 AGENTS, DURATION, BEGIN = 10, 60.0, 20.0
 CONDITIONS = {
     "none": (),
-    "blackout of 15 s": (Fault("outage", (), BEGIN, BEGIN + 15.0),),
-    "blackout of 15 s, no rule of silence": (Fault("outage", (), BEGIN, BEGIN + 15.0),),
-    "partition of 15 s": (Fault("partition", (1, 2, 3, 4, 5), BEGIN, BEGIN + 15.0),),
-    "60 % of all packets lost": (Fault("loss", (), BEGIN, amount=0.6),),
-    "clock 0.5 s ahead": (Fault("clock", (2,), amount=0.5),),
-    "frozen navigation": (Fault("gnss", (2,), BEGIN),),
-    "node killed": (Fault("node", (2,), BEGIN),),
-    "motors off": (Fault("motor", (2,), BEGIN),),
+    "blackout of 15 s": (InjectedFault("outage", (), BEGIN, BEGIN + 15.0),),
+    "blackout of 15 s, no rule of silence": (InjectedFault("outage", (), BEGIN, BEGIN + 15.0),),
+    "partition of 15 s": (InjectedFault("partition", (1, 2, 3, 4, 5), BEGIN, BEGIN + 15.0),),
+    "60 % of all packets lost": (InjectedFault("loss", (), BEGIN, amount=0.6),),
+    "clock 0.5 s ahead": (InjectedFault("clock", (2,), amount=0.5),),
+    "frozen navigation": (InjectedFault("gnss", (2,), BEGIN),),
+    "node killed": (InjectedFault("node", (2,), BEGIN),),
+    "motors off": (InjectedFault("motor", (2,), BEGIN),),
 }
 FIRST = ("none", "blackout of 15 s")
 FREE = "blackout of 15 s, no rule of silence"  # flown to show what the rule is for
@@ -50,9 +50,9 @@ FIELDS = ("condition", "seed", "smallest_m", "at_s", "one", "other", "phases")
 
 def flown(condition, seed):
     """One flight: the smallest distance of two drones in the air from the fault on, when, and of whom."""
-    found = compare.sampled(scenario(AGENTS, DURATION, noisy=True), 0.2)
-    card = compare.software_card(found, silent=condition != FREE)
-    fleet = compare.fly(found, card, seed, faults=CONDITIONS[condition])
+    found = compare.with_metric_period(scenario(AGENTS, DURATION, noisy=True), 0.2)
+    card = compare.software_card(found, stop_for_lost=condition != FREE)
+    fleet = compare.fly_in_lockstep(found, card, seed, faults=CONDITIONS[condition])
     rows = fleet.array()[round(BEGIN / card.period) :, :, :3]
     gaps = np.linalg.norm(rows[:, :, None] - rows[:, None], axis=-1)
     down = rows[:, :, 2] < GROUND

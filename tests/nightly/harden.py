@@ -23,14 +23,14 @@ import numpy as np
 
 import airflock
 from airflock import __version__
-from airflock.runs.folder import STUDY
-from airflock.scenarios.making import make
+from airflock.runs.folder import STUDY_FILE
+from airflock.scenarios.making import build_scenario
 from airflock.scenarios.scenario import Scenario
 from airflock.search.harden import COST, harden
 from airflock.search.held import SAFETY, SLACK
-from airflock.search.intervals import interval
-from airflock.search.steps import Table, flown
-from airflock.search.tune.start import start_of
+from airflock.search.intervals import mean_interval
+from airflock.search.steps import ScoreColumns, fly_parameters
+from airflock.search.tune.start import prepare_start
 from airflock.support import atomic
 from airflock.support.errors import ScenarioError, StudyError
 
@@ -60,14 +60,14 @@ def drawn(seed: int) -> Scenario:
         "radio": {"delay": round(rng.uniform(0.1, 1.0), 2), "range": round(rng.uniform(80.0, 200.0), 0)},
         "world": {**world, **({"obstacles": trees} if trees else {})},
     }  # fmt: skip
-    return start_of(make(document, f"drawn {seed}"))[0]
+    return prepare_start(build_scenario(document, f"drawn {seed}"))[0]
 
 
 def evolved(seed: int, folder: Path) -> Scenario:
     """The optimum of a short search, which is continued where it was cut off."""
-    found = airflock.evolve(drawn(seed), folder, threads=1, resume=(folder / STUDY).is_file(), **SHORT)
-    if found.dead:
-        raise StudyError(found.dead)
+    found = airflock.evolve(drawn(seed), folder, threads=1, resume=(folder / STUDY_FILE).is_file(), **SHORT)
+    if found.dead_reason:
+        raise StudyError(found.dead_reason)
     return found.scenario
 
 
@@ -83,7 +83,7 @@ def judged(seed: int, folder: Path | None) -> dict[str, Any]:
     except ScenarioError as fault:
         return {**told, "refused": fault.faults[0], "held": True, "grown": False}
     fresh = range(FIRST, FIRST + JUDGED)
-    before, after = flown(scenario, [steps[0].parameters, steps[-1].parameters], fresh, 1, None)
+    before, after = fly_parameters(scenario, [steps[0].parameters, steps[-1].parameters], fresh, 1, None)
     walls = contacts(before) > float((before["n_coll"] > 0.0).mean())
     cost = float((before["fitness"] - after["fitness"]).mean())
     margin = [1.0 - contacts(table) if walls else float(table["r_min"].mean()) for table in (before, after)]
@@ -97,21 +97,21 @@ def judged(seed: int, folder: Path | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def contacts(table: Table) -> float:
+def contacts(table: ScoreColumns) -> float:
     """Share of flights in which somebody left the field or entered an obstacle."""
     return float((table["phi_wall"] > 0.0).mean())
 
 
-def broken(before: Table, after: Table) -> list[str]:
+def broken(before: ScoreColumns, after: ScoreColumns) -> list[str]:
     """Constraints that held before and do not hold after, both with what hardening allows to chance."""
     found = []
     for name in SAFETY:
-        drop, _, low, _ = interval((before[name] - after[name]).tolist())
+        drop, _, low, _ = mean_interval((before[name] - after[name]).tolist())
         if drop > SLACK and low > 0.0:
             found.append(f"{name} {before[name].mean():.3f} to {after[name].mean():.3f}")
     for name in ("phi_wall", "n_coll"):
         more = 1.0 * (after[name] > 0.0) - 1.0 * (before[name] > 0.0)
-        rise, _, low, _ = interval(more.tolist())
+        rise, _, low, _ = mean_interval(more.tolist())
         if rise > SLACK and low > 0.0:
             found.append(f"{name}: {np.mean(before[name] > 0.0):.3f} to {np.mean(after[name] > 0.0):.3f} of flights")
     return found
@@ -132,7 +132,7 @@ def main() -> int:
         if not path.is_file():
             began = time.process_time()
             found = judged(seed, None if asked.start else folder / f"study_{seed}")
-            atomic.write(path, json.dumps({**found, "seconds": time.process_time() - began}))
+            atomic.write_file(path, json.dumps({**found, "seconds": time.process_time() - began}))
         rows.append(json.loads(path.read_text()))
     print("| seed | drones | fitness | short | before | after | gain | cost | held | what hardening says |")
     print("|---|---|---|---|---|---|---|---|---|---|")

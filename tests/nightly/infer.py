@@ -21,9 +21,9 @@ import numpy as np
 import xarray as xr
 
 import airflock
-from airflock.estimate.infer.result import Inferred, between
-from airflock.estimate.infer.run import LAWS
-from airflock.scenarios.making import make
+from airflock.estimate.inference.result import InferResult, ends_text
+from airflock.estimate.inference.run import LAWS
+from airflock.scenarios.making import build_scenario
 
 NOISE, MISSING = 0.02, 0.02
 AGENTS, SECONDS, PERIOD = 20, 120.0, 0.1
@@ -98,7 +98,7 @@ FIFTH = {"viragh not offered": "viragh_2014", "couzin not offered": "couzin_2002
 
 def tracks_of(flown: dict[str, Any], seed: int) -> xr.Dataset:
     """What a camera makes of a flight: positions alone, with noise and gaps."""
-    recording = airflock.simulate(make(flown, flown["model"]["kind"]), seed=seed)
+    recording = airflock.simulate(build_scenario(flown, flown["model"]["kind"]), seed=seed)
     return seen(recording["position"], np.random.default_rng(seed))
 
 
@@ -138,7 +138,7 @@ def fifth(kind: str, seed: int) -> tuple[xr.Dataset, list[str], dict[str, Any]]:
     return tracks_of(flown, seed), list(LAWS), settings_of(flown)
 
 
-def told(found: Inferred, flown: dict[str, Any]) -> dict[str, Any]:
+def told(found: InferResult, flown: dict[str, Any]) -> dict[str, Any]:
     """How many numbers are told, how many lie inside their own 95 %, and inside the intervals of all together."""
     truth = OTHERS | {f"{s}.{k}": v for s in ("model", "body") for k, v in flown[s].items() if k != "kind"}
     count, alone, joint, missed = 0, 0, 0, []
@@ -151,7 +151,7 @@ def told(found: Inferred, flown: dict[str, Any]) -> dict[str, Any]:
         held = holds(truth[key], number.least, number.most)
         joint += held
         if not held:
-            missed.append(f"{key} = {truth[key]:g}: {number.value:.4g}, {between(number.least, number.most)}")
+            missed.append(f"{key} = {truth[key]:g}: {number.value:.4g}, {ends_text(number.least, number.most)}")
     return {"told": count, "alone": alone, "inside": joint, "missed": missed}
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.drones.onboard.ports import Place, Udp  # noqa: E402
+from airflock.drones.onboard.ports import UdpAddresses, UdpPort  # noqa: E402
 from airflock.fleets import compare, live, realtime  # noqa: E402
 from fleets import scenario  # noqa: E402
 
@@ -26,7 +26,7 @@ LONGEST = 300.0  # s of one flight
 
 def free():
     """A port where nobody listens."""
-    port = Udp(Place((live.HOST, 0), None))
+    port = UdpPort(UdpAddresses((live.LOCAL_HOST, 0), None))
     number = port.here[1]
     port.close()
     return number
@@ -35,11 +35,11 @@ def free():
 async def flown(kind, python, patience):
     """What MAVSDK says of its flight with one vehicle, and the status that it ends with."""
     found, join = scenario(1, 60.0), free()
-    card = compare.software_card(found, vehicle=kind, live=True)
-    ports, now = live.Ports.opened(1, (live.HOST, join)), time.monotonic()
+    card = compare.software_card(found, vehicle=kind, realtime=True)
+    ports, now = live.FleetPorts.open(1, (live.LOCAL_HOST, join)), time.monotonic()
     epoch = time.time_ns() // 1000 - round(now * 1e6)
-    plan = live.Plan(found, card, 0, None, (), ports, [now, now + LONGEST, 0.0], [0.0] * 4, epoch)
-    vehicle = asyncio.create_task(realtime.together(live.craft_life(plan, 0)))
+    plan = live.RealtimePlan(found, card, 0, None, (), ports, [now, now + LONGEST, 0.0], [0.0] * 4, epoch)
+    vehicle = asyncio.create_task(realtime.run_in_event_loop(live.vehicle_task(plan, 0)))
     try:
         client = await asyncio.create_subprocess_exec(
             python, str(FLIGHT), str(join), str(patience), stdout=subprocess.PIPE, stderr=subprocess.STDOUT

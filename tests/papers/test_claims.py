@@ -5,8 +5,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from airflock.support.errors import AirflockError
 from airflock_papers import PAPERS, bounds, statistics

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.parts.metrics import fitness_dimock
 from airflock.scenarios.files import load
 from airflock_papers.dimock_2003 import flights, ga, ga_claims, robust, robust_claims, static
@@ -123,7 +123,7 @@ def test_a_row_is_longer_than_wide_and_a_span_wide_at_most(aside, behind, row):
 def test_one_horseshoe_is_solved_as_the_dense_system_is():
     keys = {"wing.segments": "1", "wing.positions": "free", "model.gradient": "none", "duration": 0.1}
     scenario = load("dimock_2003/published", {**keys, "model.k_c": 0.0, "model.k_a": 0.0})
-    found = fly(scenario, record=True, device="python")
+    found = fly_world(scenario, record=True, device="python")
     places = found.frames[0, :3].T.astype(float)
     assert found.values["power"] == pytest.approx(static.Air(scenario.wing, 1).powers(places).mean(), rel=1e-3)
 

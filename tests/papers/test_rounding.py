@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from airflock.core.maths import FAR
-from airflock.support.many_tests import holm
+from airflock.support.many_tests import holm_correction
 from airflock_papers import statistics
 from airflock_papers.flights import Flights
 from airflock_papers.vasarhelyi_2018 import program_wall, rounding, rounding_search
@@ -55,7 +54,7 @@ def test_the_joint_p_is_the_least_after_holm_and_the_walls_are_taken_by_either_a
         statistics.welch(statistics.mean(flown[r]), optimum(8).published[r][0], optimum(8).published[r][1] or 0.0, 100)
         for r in COLUMNS
     ]
-    assert list(rows.values()) == pytest.approx(holm(alone)) and joint == min(rows.values()) > 0.05
+    assert list(rows.values()) == pytest.approx(holm_correction(alone)) and joint == min(rows.values()) > 0.05
     other, rows = rounding.judged(8, flown, Target("program", False))
     assert other == rows["f_wall"] < 1e-6 and list(rows.values()).count(other) == 1
 

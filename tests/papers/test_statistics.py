@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from airflock_papers import bounds, statistics
 from airflock_papers.claims import Claim, Measured, header, judge, read_claims, write_claims

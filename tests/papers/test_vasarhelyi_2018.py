@@ -37,7 +37,7 @@ def recomputed(speed):
     s2 = scenario.published
     score = {"phi_vel": s2["phi_vel"][0], "phi_coll": s2["phi_coll"][0], "phi_corr": s2["f_corr"][0]}
     score |= {"phi_wall": 0.0, "n_disc": 0.0, "n_min": float(scenario.agents)}
-    return fitness(score, scenario.agents, scenario.measured_by())
+    return fitness(score, scenario.agents, scenario.resolved_metrics())
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ import pytest
 
 from airflock.core.maths import angle_between, arc_cosine
 from airflock.engine import plan_of, score_flight
-from airflock.parts.bodies.turning import Parameters as Turning
-from airflock.parts.bodies.turning import move as turn
+from airflock.parts.bodies.turning import Parameters as Turning, move as turn
 from airflock.parts.laws import reynolds_1987 as boids
 from airflock.scenarios.files import load
 from airflock.world import edges, rays
@@ -97,7 +96,7 @@ def both(found, seed, start=None, by_cells="python"):
     for grid, device in ((False, "python"), (True, by_cells)):
         plan = plan_of(found, precision=64, grid=grid, near=grid, given_start=start is not None)
         assert plan.grid == plan.near == grid
-        done = cpu.fly(plan, tables(found, plan, seed), start, device)
+        done = cpu.fly_on_cpu(plan, tables(found, plan, seed), start, device)
         flown.append(done.state)
         values.append(done.values)
     assert values[1] == pytest.approx(values[0], rel=1e-9, abs=1e-9, nan_ok=True)
@@ -153,7 +152,7 @@ def test_groups_by_cells_are_those_of_all_pairs(together, seed):
     place = (centres + rng.normal(0.0, 0.1, (3, 300)) + 2.0) % 4.0 - 2.0
     frames = np.concatenate([place, rng.normal(0.0, 0.1, (3, 300))])[None]
     plans = [plan_of(found, precision=64, grid=near, near=near) for near in (False, True)]
-    one, two = (measuring.measured(plan, tables(found, plan, 0), frames, device="python")[0] for plan in plans)
+    one, two = (measuring.score_tables(plan, tables(found, plan, 0), frames, device="python")[0] for plan in plans)
     assert one["n_groups"] > 5.0 and one["share_alone"] > 0.0
     assert two == pytest.approx(one, rel=1e-9, abs=1e-9)
 
@@ -165,7 +164,7 @@ def test_the_number_of_threads_changes_no_bit_of_a_grid(seed):
     states, values = [], []
     for threads in sorted({1, min(2, most), most}):
         numba.set_num_threads(threads)
-        flown = cpu.fly(plan, tables(found, plan, seed), start)
+        flown = cpu.fly_on_cpu(plan, tables(found, plan, seed), start)
         states.append(flown.state)
         values.append(flown.values)
     numba.set_num_threads(most)

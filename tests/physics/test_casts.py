@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from airflock.core.maths import FAR
 from airflock.world import bvh, casts, shapes
 from airflock.world.scenery import Parameters
 from airflock.world.scenes.build import scene_of
-from airflock.world.scenes.tree import boxes, cylinders, scene, segments, triangles
+from airflock.world.scenes.tree import box_rows, cylinder_rows, make_scene, segment_rows, triangle_rows
 from kernels import compiled
 
 coordinate = st.floats(-20.0, 20.0, allow_subnormal=False)
@@ -43,7 +42,7 @@ def unit(*v):
 
 
 def alone(rows, *ray, radius=0.0, length=100.0):
-    return bvh.cast(*ray, length, radius, *scene([rows]).lists)
+    return bvh.cast(*ray, length, radius, *make_scene([rows]).as_lists)
 
 
 def mixed(seed=0, count=25):
@@ -53,16 +52,16 @@ def mixed(seed=0, count=25):
     middle = rng.uniform(-40.0, 40.0, (count, 1, 3))
     tubes = np.column_stack([rng.uniform(-40.0, 40.0, (count, 2)), rng.uniform(0.3, 3.0, count), np.zeros(count)])
     ends = rng.uniform(-40.0, 40.0, (count // 4, 2))
-    return scene([
-        boxes(np.hstack([low, low + rng.uniform(1.0, 8.0, (count, 3))])),
-        cylinders(np.column_stack([tubes, rng.uniform(2.0, 20.0, count)])),
-        triangles(middle + rng.uniform(-5.0, 5.0, (count, 3, 3))),
-        segments(np.hstack([ends, ends + rng.uniform(-6.0, 6.0, ends.shape)])),
+    return make_scene([
+        box_rows(np.hstack([low, low + rng.uniform(1.0, 8.0, (count, 3))])),
+        cylinder_rows(np.column_stack([tubes, rng.uniform(2.0, 20.0, count)])),
+        triangle_rows(middle + rng.uniform(-5.0, 5.0, (count, 3, 3))),
+        segment_rows(np.hstack([ends, ends + rng.uniform(-6.0, 6.0, ends.shape)])),
     ])  # fmt: skip
 
 
 def test_sphere_meets_face_edge_and_corner_of_a_box():
-    cube = boxes([0.0, 0.0, 0.0, 2.0, 2.0, 2.0])
+    cube = box_rows([0.0, 0.0, 0.0, 2.0, 2.0, 2.0])
     assert alone(cube, -5.0, 1.0, 1.0, 1.0, 0.0, 0.0, radius=0.5) == pytest.approx(4.5, abs=2e-4)
     # flying along x, 0.3 m beside the upright edge at x = 0, y = 2: contact where the distance to the edge is 0.5
     assert alone(cube, -5.0, 2.3, 1.0, 1.0, 0.0, 0.0, radius=0.5) == pytest.approx(5.0 - 0.4, abs=3e-4)
@@ -75,7 +74,7 @@ def test_sphere_meets_face_edge_and_corner_of_a_box():
 
 
 def test_sphere_meets_a_cylinder_where_two_circles_touch():
-    trunk = cylinders([0.0, 0.0, 1.0, 0.0, 10.0])
+    trunk = cylinder_rows([0.0, 0.0, 1.0, 0.0, 10.0])
     offset = 1.2
     assert alone(trunk, -8.0, offset, 5.0, 1.0, 0.0, 0.0, radius=0.5) == pytest.approx(
         8.0 - math.sqrt(1.5**2 - offset**2), abs=5e-4
@@ -85,7 +84,7 @@ def test_sphere_meets_a_cylinder_where_two_circles_touch():
 
 
 def test_thin_triangle_stops_a_ray_and_a_sphere_from_both_sides():
-    wall = triangles([[[0.0, -5.0, -5.0], [0.0, 5.0, -5.0], [0.0, 0.0, 5.0]]])
+    wall = triangle_rows([[[0.0, -5.0, -5.0], [0.0, 5.0, -5.0], [0.0, 0.0, 5.0]]])
     for side in (-1.0, 1.0):
         assert alone(wall, 3.0 * side, 0.0, -1.0, -side, 0.0, 0.0) == pytest.approx(3.0, rel=1e-12)
         assert alone(wall, 3.0 * side, 0.0, -1.0, -side, 0.0, 0.0, radius=0.5) == pytest.approx(2.5, abs=2e-4)
@@ -98,10 +97,12 @@ def test_a_sphere_touches_where_its_cast_ends_and_nowhere_before(x, y, z, a, b, 
         return
     place = mixed()
     ux, uy, uz = unit(a, b, c)
-    if bvh.nearest(x, y, z, 1e6, *place.lists).distance <= radius:
+    if bvh.nearest(x, y, z, 1e6, *place.as_lists).distance <= radius:
         return
-    t = bvh.cast(x, y, z, ux, uy, uz, 60.0, radius, *place.lists)
-    at = [bvh.nearest(x + s * ux, y + s * uy, z + s * uz, 1e6, *place.lists).distance for s in np.linspace(0.0, t, 40)]
+    t = bvh.cast(x, y, z, ux, uy, uz, 60.0, radius, *place.as_lists)
+    at = [
+        bvh.nearest(x + s * ux, y + s * uy, z + s * uz, 1e6, *place.as_lists).distance for s in np.linspace(0.0, t, 40)
+    ]
     assert min(at) > radius - 1e-6
     if t < 60.0:
         assert at[-1] < radius + 2.0 * casts.SKIN + 1e-9
@@ -112,11 +113,11 @@ def test_a_sphere_touches_where_its_cast_ends_and_nowhere_before(x, y, z, a, b, 
 def test_the_unit_vector_of_a_distance_is_its_gradient(x, y, z):
     place, h = mixed(3, 8), 1e-6
     for k in range(len(place.shapes)):
-        s = shapes.from_shape(x, y, z, place.lists[0], k)
+        s = shapes.from_shape(x, y, z, place.as_lists[0], k)
         if s.distance < 0.01:
             continue
         slope = [
-            (shapes.from_shape(*(np.array([x, y, z]) + h * e), place.lists[0], k).distance - s.distance) / h
+            (shapes.from_shape(*(np.array([x, y, z]) + h * e), place.as_lists[0], k).distance - s.distance) / h
             for e in np.eye(3)
         ]
         assert slope == pytest.approx([s.nx, s.ny, s.nz], abs=2e-3)
@@ -127,15 +128,15 @@ def test_gathered_shapes_answer_like_the_tree():
     for _ in range(300):
         o, u = rng.uniform(-40.0, 40.0, 3), unit(*rng.normal(size=3))
         near = [0] * 300
-        n = bvh.gather(*o, 20.6, *place.lists, near)
+        n = bvh.gather(*o, 20.6, *place.as_lists, near)
         for radius in (0.0, 0.6):
-            fast = bvh.cast_near(*o, *u, 20.0, radius, place.lists[0], near, n)
-            assert fast == bvh.cast(*o, *u, 20.0, radius, *place.lists)
-    assert bvh.gather(0.0, 0.0, 0.0, 1e3, *place.lists, [0] * 5) == -1
+            fast = bvh.cast_near(*o, *u, 20.0, radius, place.as_lists[0], near, n)
+            assert fast == bvh.cast(*o, *u, 20.0, radius, *place.as_lists)
+    assert bvh.gather(0.0, 0.0, 0.0, 1e3, *place.as_lists, [0] * 5) == -1
 
 
 def test_a_sphere_that_touches_may_leave_but_not_come_nearer():
-    cube = boxes([0.0, 0.0, 0.0, 2.0, 2.0, 2.0])
+    cube = box_rows([0.0, 0.0, 0.0, 2.0, 2.0, 2.0])
     for x in (-0.3, 0.2):  # overlapping from outside, and the centre inside
         assert alone(cube, x, 1.0, 1.0, -1.0, 0.0, 0.0, radius=0.5) == 100.0
         assert alone(cube, x, 1.0, 1.0, 1.0, 0.0, 0.0, radius=0.5) == 0.0
@@ -146,9 +147,9 @@ def test_nothing_thin_is_crossed(bits):
     """10,000 random approaches to thin walls and corners at up to the length of a ray per frame."""
     rng = np.random.default_rng(9)
     real = np.float32 if bits == 32 else np.float64
-    thin = [boxes([-10.0, 0.0, 0.0, 10.0, 0.01, 20.0]), boxes([0.0, 0.0, 0.0, 0.01, 10.0, 20.0])]
-    thin += [triangles([[[-10.0, -10.0, 0.0], [10.0, -10.0, 0.0], [0.0, -10.0, 20.0]]])]
-    place = scene([*thin, segments([[15.0, -10.0, 15.0, 10.0], [15.0, 10.0, 25.0, 10.0]])])
+    thin = [box_rows([-10.0, 0.0, 0.0, 10.0, 0.01, 20.0]), box_rows([0.0, 0.0, 0.0, 0.01, 10.0, 20.0])]
+    thin += [triangle_rows([[[-10.0, -10.0, 0.0], [10.0, -10.0, 0.0], [0.0, -10.0, 20.0]]])]
+    place = make_scene([*thin, segment_rows([[15.0, -10.0, 15.0, 10.0], [15.0, 10.0, 25.0, 10.0]])])
     arrays = place.shapes.astype(real), place.nodes.astype(real), place.links
     cast, touches, nearest = (compiled(rule, bits, LOOPS[name]) for name, rule in RULES.items())
     count, radius, length = 12_000, 0.6, 20.0
@@ -164,9 +165,9 @@ def test_nothing_thin_is_crossed(bits):
 
 
 def test_nothing_stands_in_an_empty_scene():
-    empty = scene([])
-    assert bvh.cast(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 20.0, 0.6, *empty.lists) == 20.0
-    assert bvh.nearest(0.0, 0.0, 0.0, 1e6, *empty.lists).distance == FAR
+    empty = make_scene([])
+    assert bvh.cast(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 20.0, 0.6, *empty.as_lists) == 20.0
+    assert bvh.nearest(0.0, 0.0, 0.0, 1e6, *empty.as_lists).distance == FAR
 
 
 def test_city_and_forest_follow_their_numbers_and_seed():
@@ -174,10 +175,10 @@ def test_city_and_forest_follow_their_numbers_and_seed():
     assert len(city.shapes) == 101  # and the ground
     heights = city.shapes[city.shapes[:, 5] > 0.0][:, 5]
     assert 15.0 <= heights.min() < 20.0 and 55.0 < heights.max() <= 60.0
-    assert bvh.nearest(0.0, 0.0, 1.0, 1e6, *city.lists).distance == pytest.approx(
+    assert bvh.nearest(0.0, 0.0, 1.0, 1e6, *city.as_lists).distance == pytest.approx(
         1.0
     )  # a crossing; the ground is nearest
-    assert bvh.nearest(0.0, 0.0, 50.0, 8.0, *city.lists).distance == FAR
+    assert bvh.nearest(0.0, 0.0, 50.0, 8.0, *city.as_lists).distance == FAR
     forest = scene_of(Parameters(kind="forest"), 3)
     assert len(forest.shapes) == 801
     other = scene_of(Parameters(kind="forest", seed=1), 3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.parts.bodies import dryden, wind
 from airflock.scenarios.files import load
 from reference.flight import fly_plainly
@@ -88,5 +88,5 @@ def test_a_flock_in_turbulence_flies_as_the_reference_does(dims, body, seed):
     keys = {"wind.kind": "dryden", "wind.east": 4.0, "wind.at_6m": 15.0, "world.dimensions": dims, "agents": 3,
             "body.kind": body, "duration": 4.0, "start.separation": 5.0, "dt": 0.02}  # fmt: skip
     scenario = load("vasarhelyi_2018/4ms", keys)
-    frames = fly(scenario, seed, precision=64, record=True, device="python").frames
+    frames = fly_world(scenario, seed, precision=64, record=True, device="python").frames
     np.testing.assert_allclose(frames, fly_plainly(scenario, seed).frames, rtol=0.0, atol=1e-10)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.parts.aero.wing import Parameters as Wing
 from airflock.parts.bodies.fixed_wing import Memory, Parameters, drag_of, move, stall_speed
 from airflock.scenarios.files import load
@@ -143,7 +143,7 @@ KEYS = {
 @pytest.mark.parametrize("dims", ["2", "3"])
 def test_it_flies_as_the_reference_does(dims, seed):
     scenario = load("vasarhelyi_2018/4ms", KEYS | {"world.dimensions": dims})
-    flight = fly(scenario, seed, precision=64, record=True, device="python")
+    flight = fly_world(scenario, seed, precision=64, record=True, device="python")
     np.testing.assert_allclose(flight.frames, fly_plainly(scenario, seed).frames, rtol=0.0, atol=1e-9)
     speed = np.linalg.norm(flight.frames[:, int(dims) : 2 * int(dims)], axis=1)
     assert speed.min() > 9.0 and np.isfinite(flight.frames).all()

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.core.agent import Heard, State, decide, meet_neighbours
+from airflock.core.agent import HeardNeighbour, State, decide, sum_neighbours
 from airflock.core.contract import model
 from airflock.core.maths import bell, braking_curve, braking_distance, excess, peak, rising
 from airflock.parts.laws import vasarhelyi_2018, viragh_2014
@@ -107,7 +107,7 @@ def test_excess_is_the_share_above():
 
 def pair(law, p, own, other):
     """Sums of one agent that hears one neighbour."""
-    return np.array(meet_neighbours(law, p, own, [Heard(1, other, 0.0)], 0))
+    return np.array(sum_neighbours(law, p, own, [HeardNeighbour(1, other, 0.0)], 0))
 
 
 def states(seed, count=200):
@@ -156,7 +156,7 @@ def test_the_desired_velocity_is_rescaled_or_capped(seed):
     for limit, low, high in (("rescale", 4.0, 4.0), ("cap", 0.0, 6.0)):
         p = law.Parameters(limit=limit, r0_rep=40.0, p_rep=0.5)
         lengths = [
-            np.linalg.norm(decide(law, p, own, [Heard(1, other, 0.0)], [], time=0.0, period=0.2).command)
+            np.linalg.norm(decide(law, p, own, [HeardNeighbour(1, other, 0.0)], [], time=0.0, period=0.2).command)
             for own, other in states(seed)
         ]
         assert low - 1e-9 <= min(lengths) <= max(lengths) <= high + 1e-9

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.parts.laws.couzin_2005 import Parameters, neighbour
 from airflock.scenarios.files import load
 
@@ -15,7 +15,7 @@ PRESET = "couzin_2005/informed"
 def flown(seed, start=None, **keys):
     settings = {name.replace("__", "."): value for name, value in keys.items()}
     scenario = load(PRESET, {"duration": 20.0, **settings})
-    return fly(scenario, seed, record=True, start=start, device="python").frames
+    return fly_world(scenario, seed, record=True, start=start, device="python").frames
 
 
 @pytest.mark.parametrize("direction", [0.0, 1.0, -2.5])

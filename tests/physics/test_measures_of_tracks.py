@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from airflock.recordings.flights import simulate
 from airflock.recordings.imports.load import load_tracks
-from airflock.recordings.layout import dataset, frames_of
+from airflock.recordings.layout import make_dataset, recording_frames
 from airflock.recordings.measures import bursts, correlation, delays, milling, neighbours, shape, surroundings, turning
-from airflock.recordings.measures.states import states
+from airflock.recordings.measures.states import track_arrays
 from airflock.recordings.scores import score
 from airflock.scenarios.files import load
 from airflock.support.errors import ParameterError
@@ -21,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("scored_plainly")
 def recording(place, speed, period=0.1):
     """From position and velocity (time, axis, individual)."""
     frames = np.concatenate([place, speed, speed], axis=1)
-    return dataset(frames, place.shape[1], period, {}, "velocity")
+    return make_dataset(frames, place.shape[1], period, {}, "velocity")
 
 
 def crowd(seed, frames=5, n=12, axes=2):
@@ -299,7 +298,7 @@ def test_one_who_stands_has_no_heading():
     """Differences of equal positions are 0, not the rounding error of their weights."""
     place = np.broadcast_to(np.random.default_rng(3).normal(0.0, 5.0, (1, 2, 6)), (300, 2, 6))
     found = tracks(place)
-    assert (states(found).velocity == 0.0).all() and np.isnan(milling.milling(found)).all()
+    assert (track_arrays(found).velocity == 0.0).all() and np.isnan(milling.milling(found)).all()
     imported = load_tracks(place.transpose(0, 2, 1), unit="m", fps=10.0)
     assert (imported["velocity"] == 0.0).all() and len(delays.leadership(imported)) == 0
 
@@ -338,8 +337,8 @@ def test_velocities_beside_a_gap_are_those_of_the_scores():
     g = np.random.default_rng(5)
     place = np.cumsum(g.normal(0.0, 0.1, (40, 2, 3)), axis=0)
     place[10:15, :, 1] = np.nan
-    frames, _, present = frames_of(tracks(place))
-    found = states(tracks(place))
+    frames, _, present = recording_frames(tracks(place))
+    found = track_arrays(tracks(place))
     assert (found.present == present).all() and np.array_equal(found.velocity, frames[:, 2:], equal_nan=True)
 
 

@@ -9,7 +9,7 @@ from airflock.core import random
 from airflock.parts.bodies import jostled, motion, wind
 from airflock.parts.sensors import langevin
 from airflock.scenarios.files import load
-from airflock.scenarios.surroundings import Place
+from airflock.scenarios.surroundings import FlightWorld
 from airflock.world import start
 from flocks import flown, from_start, ideal, scenario
 from reference.begin import begin
@@ -44,7 +44,7 @@ def test_sensor_error_in_random_numbers(seed):
     for agent in range(400):
         q = u = 0.0
         for step in range(100):
-            g, _ = random.normal_pair(*random.words(seed, random.SENSOR, 0, step, agent)[:2])
+            g, _ = random.normal_pair(*random.random_words(seed, random.SENSOR, 0, step, agent)[:2])
             q, u = langevin.error(q, u, g, h, s)
         ends.append((q, u))
     expected = error_statistics(h, damping=1.0)
@@ -72,7 +72,7 @@ def test_gusts_keep_their_deviation_and_forget_with_their_time(seed):
     assert push * push / (1.0 - keep * keep) == pytest.approx(2.5**2, rel=1e-12)  # exact stationary variance
     w, course = 0.0, []
     for step in range(20_000):
-        w = wind.gusting(w, random.normal_pair(*random.words(seed, random.GUST, 0, step, 0)[:2])[0], dt, a)
+        w = wind.gusting(w, random.normal_pair(*random.random_words(seed, random.GUST, 0, step, 0)[:2])[0], dt, a)
         course.append(w)
     course = np.array(course[400:])
     assert course.std() == pytest.approx(2.5, rel=0.12)  # about 250 independent gusts
@@ -140,7 +140,7 @@ def test_turbulence_makes_a_jostled_body_walk_at_random_about_its_command(seed):
 
 def test_a_formation_starts_straight_ahead_at_the_speed_of_the_start():
     found = load("vasarhelyi_2018/fixed_wing", {"duration": 0.0, "start.speed": 7.0})
-    states = begin(found, 0, Place(found))
+    states = begin(found, 0, FlightWorld(found))
     assert [(s.vx, s.vy, s.vz) for s in states] == [(7.0, 0.0, 0.0)] * 7
 
 

@@ -142,7 +142,7 @@ def test_the_order_of_agents_and_a_turned_or_moved_world_change_nothing(seed):
 
 def test_fitness_is_the_product_of_its_parts_and_perfect_for_a_perfect_flock():
     found = flock(agents=100, start__separation=1.0)
-    q = found.measured_by()
+    q = found.resolved_metrics()
     perfect = {"phi_vel": q.v_flock, "phi_corr": 1.0, "phi_coll": 0.0, "phi_wall": 0.0, "n_disc": 0.0, "n_min": 100.0}
     assert found.judged(perfect)["fitness"] == pytest.approx(1.0, abs=1e-9)
     poor = {

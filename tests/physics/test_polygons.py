@@ -5,15 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from shapely.geometry import LineString, Point, Polygon
 
-from airflock.scenarios.surroundings import Place as Seen
+from airflock.scenarios.surroundings import FlightWorld as Seen
 from airflock.support.errors import ScenarioError
-from airflock.view.stage.scene import prism as drawn_prism
+from airflock.view.stage.scene import prism_solid as drawn_prism
 from airflock.world import arena, polygon
-from airflock.world.place import Place, edge_rows
+from airflock.world.place import WorldMap, edge_rows
 from airflock.world.shapes import from_triangle
 from flocks import from_start, ideal, interpreted, scenario
 
@@ -50,7 +49,9 @@ def test_distances_to_polygons_are_those_of_shapely(corners, at):
 
 @given(sites)
 def test_an_arena_with_a_hole_is_a_polygon_with_a_hole(at):
-    place = Place(arena.Parameters(arena="polygon", corners=tuple(map(tuple, L)), obstacles=(tuple(map(tuple, POND)),)))
+    place = WorldMap(
+        arena.Parameters(arena="polygon", corners=tuple(map(tuple, L)), obstacles=(tuple(map(tuple, POND)),))
+    )
     field, point = Polygon(L, [POND]), Point(at)
     signed = (-1.0 if field.contains(point) else 1.0) * field.boundary.distance(point)
     assert place.excursion(*at, 0.0) == pytest.approx(signed, abs=1e-5)
@@ -97,7 +98,7 @@ def test_whoever_is_outside_is_called_back_to_the_nearest_point(corners, at):
 
 
 def test_the_normal_at_a_reentrant_corner_is_the_direction_from_it_and_turns_steadily():
-    place = Place(arena.Parameters(arena="polygon", corners=tuple(map(tuple, L))), look=5.0)
+    place = WorldMap(arena.Parameters(arena="polygon", corners=tuple(map(tuple, L))), look=5.0)
     before = None
     for turn in np.linspace(0.99 * math.pi, -0.49 * math.pi, 400):  # from one edge of the notch to the other
         at = 3.0 * math.cos(turn), 3.0 * math.sin(turn)
@@ -202,12 +203,12 @@ def test_a_geofence_in_height_holds(seed):
     )  # fmt: skip
     heights = interpreted(found, seed).frames[:, 2]
     assert heights.min() > 10.0 and heights.max() < 62.0 and heights.max() - heights.min() > 1.0
-    place = Place(found.world)
+    place = WorldMap(found.world)
     assert place.excursion(0.0, 0.0, 8.0) == pytest.approx(4.0)
     assert place.excursion(0.0, 0.0, 36.0) == pytest.approx(-24.0)
     assert place.ray(0.0, 0.0, 20.0, 0.0, 0.0, -1.0, 99.0) == pytest.approx(8.0)
     same = replace(found.world, floor=None, ceiling=None, height=48.0)
-    assert Place(same).excursion(3.0, 40.0, -30.0) == Place(found.world).excursion(3.0, 40.0, 6.0)
+    assert WorldMap(same).excursion(3.0, 40.0, -30.0) == WorldMap(found.world).excursion(3.0, 40.0, 6.0)
 
 
 def test_a_law_that_casts_sees_a_prism_between_its_heights():
@@ -232,7 +233,7 @@ def test_nobody_starts_nearer_than_the_wall_clearance(seed):
         spots = [Point(spot) for spot in interpreted(found, seed).frames[0, :2].T]
         near.append(min(solid.distance(spot) for spot in spots for solid in solids))
         assert near[-1] >= room * (1.0 - 1e-12) and all(map(Polygon(L, [POND]).contains, spots))
-        assert all(Place(found.world).excursion(*spot.coords[0], 0.0) <= -room for spot in spots)
+        assert all(WorldMap(found.world).excursion(*spot.coords[0], 0.0) <= -room for spot in spots)
     assert near[0] < 4.0 and near[1] < 9.0  # who is not asked for room comes nearer
 
 

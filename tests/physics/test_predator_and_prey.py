@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.scenarios.files import load
 
 
@@ -17,7 +17,7 @@ def hunted(prey, v_hunt, place, **numbers):
     turn, start = 2.0 * np.pi * np.arange(prey) / prey, np.zeros((4, prey + 1))
     start[:2, :prey], start[0, prey] = 0.7 * np.array([np.cos(turn), np.sin(turn)]), place
     scenario = load("chen_2014/hunt", {**settings, **numbers})
-    x = fly(scenario, 1, record=True, start=start, device="python").frames[-1, :2]
+    x = fly_world(scenario, 1, record=True, start=start, device="python").frames[-1, :2]
     return x[:, :-1] - x[:, -1:]
 
 

@@ -5,11 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import airflock
-from airflock.core.vocabulary import answer
+from airflock.core.vocabulary import call_rule
 from airflock.parts.bodies import quadrotor
 from airflock.parts.bodies.battery import hovering, left
 from airflock.parts.bodies.quadrotor import Memory, Parameters, move
@@ -196,7 +195,7 @@ def test_a_body_that_is_changed_in_flight_begins_to_remember_anew(seed):
     flight.change({"body.kind": "quadrotor"})
     assert flight._state.rows(["body2", "body9"]).tolist() == [[1.0] * 3] * 2
     flight.advance(steps=50)
-    assert flight._state.finite and (flight._state.rows(["body2"]) < 1.0).any()
+    assert flight._state.is_finite and (flight._state.rows(["body2"]) < 1.0).any()
 
 
 SLOW = """
@@ -224,19 +223,19 @@ def move(cx, cy, cz, memory, dt, b):
 
 def test_a_body_of_ones_own_remembers_from_one_file(tmp_path, seed):
     """Nothing inside changes: a lag of half a second, as the reference flies it and by its closed form."""
-    from airflock.engine import fly
+    from airflock.engine import fly_world
     from reference.flight import fly_plainly
 
     (tmp_path / "slow.py").write_text(SLOW)
     keys = {"agents": 3, "duration": 3.0, "start.separation": 5.0}
     scenario = load("vasarhelyi_2018/4ms", keys, body=str(tmp_path / "slow.py"))
-    assert airflock.check_body(scenario.vehicle).broken == ()
-    ours = fly(scenario, seed, precision=64, record=True, device="python")
+    assert airflock.check_body(scenario.vehicle).broken_names == ()
+    ours = fly_world(scenario, seed, precision=64, record=True, device="python")
     np.testing.assert_array_equal(ours.frames, fly_plainly(scenario, seed).frames)
     memory, b = scenario.vehicle.Memory(), scenario.body
     for _ in range(100):
         given = {"cx": 2.0, "cy": 0.0, "cz": 0.0, "memory": memory, "dt": 0.01, "b": b}
-        *velocity, memory = answer(scenario.vehicle.move, "move", given)
+        *velocity, memory = call_rule(scenario.vehicle.move, "move", given)
     assert velocity[0] == pytest.approx(2.0 * (1.0 - (1.0 - 0.01 / 0.5) ** 100), rel=1e-12)
 
 

@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from airflock.core.radio import FEW, either, lost, packets
-from airflock.core.reception import unheard
+from airflock.core.radio import FEW_PACKETS, either, lost, packets
+from airflock.core.reception import loss_probability
 from airflock.parts.radios.links import Parameters, missed, missed_few, power, received, thrice
 from airflock.parts.radios.registry import RADIOS
 
@@ -45,7 +44,7 @@ def test_powers_by_products_are_powers(x, n):
     assert thrice(x, n & 3) == pytest.approx(x ** (n & 3), rel=1e-12)
 
 
-@given(st.floats(0.0, 500.0), st.integers(0, FEW), st.integers(0, FEW))
+@given(st.floats(0.0, 500.0), st.integers(0, FEW_PACKETS), st.integers(0, FEW_PACKETS))
 def test_nothing_arrives_where_every_packet_is_missed(distance, fast, slow):
     each = [1.0 - received(distance, 0.0, K)] * fast + [1.0 - received(distance, 1.0, K)] * slow
     assert missed(distance, fast, slow, K) == pytest.approx(math.prod(each), rel=1e-9)
@@ -55,11 +54,11 @@ def test_nothing_arrives_where_every_packet_is_missed(distance, fast, slow):
 @given(st.floats(0.0, 500.0), st.integers(0, 2000))
 def test_nothing_arrives_where_one_of_two_mishaps_happens(distance, step):
     known = {"distance": distance}
-    assert unheard(RADIOS["constant"], K, step, 0.2, known) == lost(distance, K)  # a constant radio sends once
+    assert loss_probability(RADIOS["constant"], K, step, 0.2, known) == lost(distance, K)  # a constant radio sends once
     linked = Parameters(kind="links", loss=0.3)
     sent = packets(step, linked.fast_rate, 0.2), packets(step, linked.slow_rate, 0.2)
     arrives = (1.0 - lost(distance, linked)) * (1.0 - missed(distance, *sent, linked))
-    assert unheard(RADIOS["links"], linked, step, 0.2, known) == pytest.approx(1.0 - arrives, abs=1e-12)
+    assert loss_probability(RADIOS["links"], linked, step, 0.2, known) == pytest.approx(1.0 - arrives, abs=1e-12)
     assert either(0.4, 1.0) == pytest.approx(1.0) and either(0.0, 0.4) == 0.4
 
 

@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from airflock.core.radio import packets
-from airflock.core.reception import Reception, share
-from airflock.estimate.identify.packets import table_of
+from airflock.core.reception import PacketReception, arrival_probability
+from airflock.estimate.identification.packets import table_entries
 from airflock.parts.radios import bursts, congestion, jitter, links, shadow, table
 from airflock.parts.radios.registry import RADIOS
 from airflock.support.errors import RecordingError
@@ -31,15 +30,15 @@ def test_a_table_is_found_again_in_the_packets_that_it_let_through():
     k = table.Parameters(spacing=8.0, **dict(zip(ENTRIES, shares.tolist(), strict=True)))
     distance = rng.uniform(0.0, 15 * 8.0, 200_000)
     got = rng.uniform(size=len(distance)) >= np.vectorize(table.missed, excluded=[1])(distance, k)
-    found = table_of(pd.DataFrame({"distance": distance, "got": got.astype(int)}), 8.0)
+    found = table_entries(pd.DataFrame({"distance": distance, "got": got.astype(int)}), 8.0)
     assert found.pop("spacing") == 8.0
     np.testing.assert_allclose(list(found.values()), shares, atol=0.02)
-    near = table_of(pd.DataFrame({"distance": distance[distance < 40.0], "got": got[distance < 40.0]}), 8.0)
+    near = table_entries(pd.DataFrame({"distance": distance[distance < 40.0], "got": got[distance < 40.0]}), 8.0)
     assert near["received_15"] == near["received_5"]  # nobody flew farther apart
     with pytest.raises(RecordingError, match="no column got"):
-        table_of(pd.DataFrame({"distance": distance}), 8.0)
+        table_entries(pd.DataFrame({"distance": distance}), 8.0)
     with pytest.raises(RecordingError, match="no pair within 0.016 m"):
-        table_of(pd.DataFrame({"distance": distance + 1.0, "got": got}), 0.001)
+        table_entries(pd.DataFrame({"distance": distance + 1.0, "got": got}), 0.001)
 
 
 def test_packets_meet_as_often_as_random_packets_do():
@@ -69,8 +68,8 @@ def test_a_wall_is_a_distance_at_which_the_signal_has_lost_as_many_decibels(dist
 def test_bursts_have_their_share_and_their_length():
     """Of a chain of two states: rates per period are those of exponential times."""
     k, period = bursts.Parameters(outage_rate=0.5, outage_time=1.0, received_good=1.0, received_bad=0.0), 0.05
-    ether = Reception(RADIOS["bursts"], k, 7, 2, period)
-    came = np.array([ether.passes(0, 1, number, {"distance": 10.0}) for number in range(60_000)])
+    ether = PacketReception(RADIOS["bursts"], k, 7, 2, period)
+    came = np.array([ether.any_arrives(0, 1, number, {"distance": 10.0}) for number in range(60_000)])
     assert 1.0 - came.mean() == pytest.approx(0.5 / 1.5, rel=0.1)
     ends = np.flatnonzero(np.diff(came.astype(int)) == 1)
     begins = np.flatnonzero(np.diff(came.astype(int)) == -1)
@@ -80,7 +79,7 @@ def test_bursts_have_their_share_and_their_length():
 
 def test_jitter_has_its_mean_and_its_longest():
     k = jitter.Parameters(jitter=0.3, longest=50.0)
-    ether = Reception(RADIOS["jitter"], k, 11, 2, 0.2)
+    ether = PacketReception(RADIOS["jitter"], k, 11, 2, 0.2)
     waits = np.array([ether.late(1, 0, number, {"distance": 5.0}) for number in range(20_000)])
     assert waits.mean() == pytest.approx(0.3, rel=0.03) and np.median(waits) == pytest.approx(
         0.3 * math.log(2), rel=0.04
@@ -91,6 +90,6 @@ def test_jitter_has_its_mean_and_its_longest():
 def test_shares_of_all_kinds_fall_with_the_distance_or_not_at_all():
     for name, radio in RADIOS.items():
         k = radio.Parameters(loss=0.2)
-        shares = [share(radio, k, float(r)) for r in (1.0, 30.0, 60.0)]
+        shares = [arrival_probability(radio, k, float(r)) for r in (1.0, 30.0, 60.0)]
         assert all(0.0 <= one <= 1.0 for one in shares), name
         assert shares[0] >= shares[1] - 0.1 >= shares[2] - 0.3, name

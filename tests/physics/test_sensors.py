@@ -7,7 +7,7 @@ import pytest
 
 import airflock
 from airflock.core.agent import State
-from airflock.core.sensing import Sensing
+from airflock.core.sensing import SensorState
 from airflock.parts.sensors.registry import SENSORS
 
 PERIOD = 0.2
@@ -18,7 +18,7 @@ def errors(kind, agents, steps, seed=5, period=PERIOD, **numbers):
     """What agents at rest measure: (measurement, component, agent), m and m/s."""
     sensor = SENSORS[kind]
     s = sensor.Parameters(**numbers)
-    sensing = [Sensing(sensor, s, seed, agent, flat=False) for agent in range(agents)]
+    sensing = [SensorState(sensor, s, seed, agent, flat=False) for agent in range(agents)]
     return np.array([[one.measure(k, REST, period) for one in sensing] for k in range(steps)]).transpose(0, 2, 1)
 
 
@@ -78,7 +78,7 @@ def test_the_langevin_error_has_its_stationary_standard_deviations():
 def test_a_delayed_state_is_that_of_so_long_ago(delay):
     """Exact for any cubic of time: positions and velocities between two measurements are interpolated."""
     sensor = SENSORS["delayed"]
-    sensing = Sensing(sensor, sensor.Parameters(lag=delay), 0, 0, flat=False)
+    sensing = SensorState(sensor, sensor.Parameters(lag=delay), 0, 0, flat=False)
 
     def true(t):
         return State(

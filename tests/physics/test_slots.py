@@ -27,7 +27,7 @@ def test_agents_of_a_grid_fly_and_are_recorded_as_those_of_all_pairs(seed):
     found = load(DISPLAY, DRONES)
     pairs, cells = (plan_of(found, precision=64, record=True, grid=grid) for grid in (False, True))
     assert slotted(cells) and not slotted(pairs)
-    one, two = (cpu.fly(plan, tables(found, plan, seed), device="python") for plan in (pairs, cells))
+    one, two = (cpu.fly_on_cpu(plan, tables(found, plan, seed), device="python") for plan in (pairs, cells))
     assert one.status == two.status == 0
     assert one.frames is not None and two.frames is not None and len(one.frames) > EVERY
     np.testing.assert_allclose(one.frames, two.frames, rtol=0.0, atol=1e-8)
@@ -43,6 +43,6 @@ def test_agents_that_decide_side_by_side_gather_shapes_of_their_own(seed):
     flown = []
     for threads in (1, most, most):
         numba.set_num_threads(threads)
-        flown.append(cpu.fly(plan, tables(found, plan, seed)))
+        flown.append(cpu.fly_on_cpu(plan, tables(found, plan, seed)))
     numba.set_num_threads(most)
     assert all((one.state == flown[0].state).all() for one in flown)

@@ -5,14 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.spatial import Delaunay, Voronoi, cKDTree
 
-from airflock.core.agent import Heard, State
-from airflock.core.topology import met_of
+from airflock.core.agent import HeardNeighbour, State
+from airflock.core.topology import met_neighbours
 from airflock.parts.topologies.parameters import Parameters
-from airflock.parts.topologies.ranking import HEARD, kth_least
+from airflock.parts.topologies.ranking import HEARD_LIMIT, kth_least
 from airflock.parts.topologies.registry import TOPOLOGIES
 from airflock.parts.topologies.strongest import loss
 
@@ -26,10 +25,10 @@ def met(kind, offsets, place=None, fade=None, **numbers):
     pad = (0.0,) * (3 - offsets.shape[1])
     drawn = np.zeros(len(offsets)) if fade is None else fade
     heard = [
-        Heard(j, State(*map(float, d), *pad, 0.0, 0.0, 0.0), 0.0, float(f))
+        HeardNeighbour(j, State(*map(float, d), *pad, 0.0, 0.0, 0.0), 0.0, float(f))
         for j, (d, f) in enumerate(zip(offsets, drawn, strict=True))
     ]
-    return {h.who for h in met_of(TOPOLOGIES[kind], Parameters(kind=kind, **numbers), HERE, heard, place)}
+    return {h.who for h in met_neighbours(TOPOLOGIES[kind], Parameters(kind=kind, **numbers), HERE, heard, place)}
 
 
 # ------------------------------------------------------------------------------------------------------- k nearest
@@ -47,7 +46,7 @@ def test_the_nearest_are_those_of_a_tree(number, count, k, axes):
 @settings(max_examples=200, deadline=None)
 def test_the_kth_least_is_that_of_a_sorted_list(values, k):
     given_, heap = [float(v) for v in values] + [1e30], [0.0] * (len(values) + 1)
-    assert kth_least(len(given_), given_, heap, k) == (sorted(values)[k - 1] if k <= len(values) else HEARD)
+    assert kth_least(len(given_), given_, heap, k) == (sorted(values)[k - 1] if k <= len(values) else HEARD_LIMIT)
 
 
 def test_all_who_are_as_near_as_the_kth_are_met():

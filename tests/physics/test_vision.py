@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import airflock
-from airflock.engine import fly, plan_of
+from airflock.engine import fly_world, plan_of
 from airflock.parts.radios import vision
 from airflock.parts.radios.vision import Packet, Parameters, gains, lasts, receive, see
 from airflock.scenarios.files import load
@@ -118,7 +117,8 @@ def test_what_an_agent_tells_does_not_matter_to_those_who_see_it(fault, seed):
     plain = load(PAPER, SEEN)
     ill = load(PAPER, SEEN | {"faults": [{"kind": fault, "at": 0.0, "agents": [2]}]})
     assert np.array_equal(
-        fly(ill, seed, record=True, device="python").frames, fly(plain, seed, record=True, device="python").frames
+        fly_world(ill, seed, record=True, device="python").frames,
+        fly_world(plain, seed, record=True, device="python").frames,
     )
     assert any(note.endswith(f"have no effect: {fault}") for note in ill.notes)
 
@@ -137,6 +137,8 @@ def test_a_neighbour_out_of_view_is_believed_in_for_so_long_and_then_forgotten()
 
 def test_vision_flies_compiled_as_it_is_written(seed):
     scenario = load(PAPER, SEEN | {"radio.field": 4.0, "radio.hold": 0.5, "metrics.kind": "order"})
-    plain = fly(scenario, seed, record=True, device="python").frames
-    np.testing.assert_allclose(fly(scenario, seed, record=True, device="cpu", precision=64).frames, plain, atol=1e-9)
+    plain = fly_world(scenario, seed, record=True, device="python").frames
+    np.testing.assert_allclose(
+        fly_world(scenario, seed, record=True, device="cpu", precision=64).frames, plain, atol=1e-9
+    )
     assert plan_of(scenario).sees and vision.carry is not None

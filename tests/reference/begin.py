@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from airflock.core import random
 from airflock.core.agent import State
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.surroundings import Place
+from airflock.scenarios.surroundings import FlightWorld
 from airflock.scenarios.wings import FORMATIONS
 from airflock.world import start as start_rules
 from inside import extents
@@ -25,7 +25,7 @@ def given(start: NDArray[Any], dims: int) -> list[State]:
     return [State(*c[:dims], *pad, *c[dims:], *pad) for c in columns]
 
 
-def begin(scenario: Scenario, seed: int, place: Place) -> list[State]:
+def begin(scenario: Scenario, seed: int, place: FlightWorld) -> list[State]:
     """Agents at random places in the arena, far enough apart; fewer than asked for if one finds no room."""
     flock: list[State] = []
     if scenario.start.kind in FORMATIONS:
@@ -47,18 +47,18 @@ def in_formation(scenario: Scenario, seed: int, i: int) -> State:
     return State(place[0] + s.jitter * gx, place[1] + s.jitter * gy, z, s.speed, 0.0, 0.0)
 
 
-def find_room(scenario: Scenario, seed: int, place: Place, i: int, flock: Sequence[State]) -> Vector | None:
+def find_room(scenario: Scenario, seed: int, place: FlightWorld, i: int, flock: Sequence[State]) -> Vector | None:
     """Position (m) for agent i inside the arena and away from those already placed; None if there is none."""
     reach, apart = extents(scenario), scenario.separation()
     for attempt in range(ATTEMPTS):
-        words = random.words(seed, random.START, 0, attempt, i)
+        words = random.random_words(seed, random.START, 0, attempt, i)
         x, y, z = (start_rules.spread(random.uniform(w), -half, half) for w, half in zip(words, reach, strict=False))
         z = z if scenario.dimensions == 3 else 0.0
         if scenario.start.kind == "ball" and not start_rules.in_ball(x, y, z, reach[0]):
             continue
         gaps = ((x - s.x) ** 2 + (y - s.y) ** 2 + (z - s.z) ** 2 for s in flock)
         near = apart > 0.0 and any(gap < apart * apart for gap in gaps)
-        if not near and place.roomy(x, y, z):
+        if not near and place.is_free(x, y, z):
             return x, y, z
     return None
 
@@ -75,5 +75,5 @@ def start_velocity(scenario: Scenario, seed: int, i: int) -> Vector:
 
 def normals(seed: int, stream: int, step: int, agent: int, draw: int = 0) -> tuple[float, float, float, float]:
     """Four normal random numbers of one consumer."""
-    a, b, c, d = random.words(seed, stream, 0, step, agent, draw)
+    a, b, c, d = random.random_words(seed, stream, 0, step, agent, draw)
     return *random.normal_pair(a, b), *random.normal_pair(c, d)

@@ -12,19 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.flock import of_model
+from airflock.check.flock import flock_solver
 from airflock.core import radio, random
 from airflock.core.agent import State
 from airflock.core.contract import Metric
-from airflock.core.hearing import Hearing
+from airflock.core.hearing import PacketPolicy
 from airflock.core.maths import norm
 from airflock.core.parameters import choices
 from airflock.core.pilot import Pilot
-from airflock.core.vocabulary import answer
+from airflock.core.vocabulary import call_rule
 from airflock.parts.bodies import dryden, wind
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.surroundings import Course, Place, reach_of_walls
-from airflock.scenarios.timing import clock
+from airflock.scenarios.surroundings import FlightWorld, GoalCourse, wall_range
+from airflock.scenarios.timing import step_counts
 from inside import Flown
 from reference.begin import ZERO, Vector, begin, given, normals
 from reference.individuals import Suffering, ahead, begins, groups_of, law_of, misled, own_parameters, radio_of
@@ -94,27 +94,27 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
     Returns what a compiled driver returns: order parameters over time, frames (time, component, agent), the state at
     the end, and minus the number of the agent that found no room to start in.
     """
-    scenario = scenario.in_flight(seed)
-    place, times = Place(scenario), clock(scenario)
+    scenario = scenario.with_drawn_scene(seed)
+    place, times = FlightWorld(scenario), step_counts(scenario)
     dims, dt, delay, every = scenario.dimensions, scenario.flight.dt, times["delay"], times["decide_every"]
     begun = begin(scenario, seed, place) if start is None else given(start, dims)
     flock = [boarded(scenario, seed, place, i, state) for i, state in enumerate(begun)]
     due, here = begins(scenario, seed), 0
-    may_leave = scenario.lands or any(
+    may_leave = scenario.can_land or any(
         entry.fault.leaves for entry in scenario.faults if entry.fault in scenario.fault_kinds
     )
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
     chosen = scenario.order_parameters if metrics is None else metrics
-    scores, course = Scores(chosen, scenario.measured_by(), place, dims, scenario.wing), Course(scenario)
-    solve = of_model(scenario)
+    scores, course = Scores(chosen, scenario.resolved_metrics(), place, dims, scenario.wing), GoalCourse(scenario)
+    solve = flock_solver(scenario)
     if len(flock) < scenario.agents:
         return Flown(scores.totals(), frames, np.zeros((2 * dims, scenario.agents)), -(len(flock) + 1))
     at_start, gust = states(flock), ZERO
     past: dict[int, list[State]] = {}  # by the number of the decision that hears them
     for step in range(times["steps"] + 1):
         if befall(scenario, step, flock, due):
-            solve = of_model(scenario)
+            solve = flock_solver(scenario)
         there = [i for i, agent in enumerate(flock) if agent.present]
         here += len(there)
         if not there:
@@ -123,7 +123,7 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
             continue
         count = len(there) >= min(2, len(flock))
         course.advance(step * dt, dt, states(flock, None if scenario.goals.kind == "own" else there))
-        place.appear(step * dt, states(flock, there))
+        place.update_appearing(step * dt, states(flock, there))
         if (step + delay) % every == 0:
             past[(step + delay) // every] = told_of(scenario, flock)
         if step % every == 0 and scenario.flight.update == "synchronous":
@@ -151,18 +151,18 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
     return Flown(scores.totals() | course.values() | told, frames, components(flock, dims)[: 2 * dims], 0)
 
 
-def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -> Agent:
+def boarded(scenario: Scenario, seed: int, place: FlightWorld, i: int, state: State) -> Agent:
     """Agent i with its pilot, which carries the map, its own numbers, and its seed."""
     law = law_of(scenario, i)
     p = own_parameters(scenario, "model", law[1], i, seed)
     b = own_parameters(scenario, "body", scenario.body, i, seed)
-    period = clock(scenario)["decide_every"] * scenario.flight.dt
+    period = step_counts(scenario)["decide_every"] * scenario.flight.dt
     pilot = Pilot(
-        law[0], p, place.seen(reach_of_walls(law[0], p)), index=i, period=period, groups=groups_of(scenario),
-        hearing=Hearing.simulated(scenario.transceiver, scenario.radio), silence=scenario.silent_by(),
+        law[0], p, place.seen(wall_range(law[0], p)), index=i, period=period, groups=groups_of(scenario),
+        hearing=PacketPolicy.simulated(scenario.transceiver, scenario.radio), silence=scenario.resolved_silence(),
         body=scenario.vehicle, b=b,
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
-        told=scenario.model.flock is not None, topology=scenario.meets, t=scenario.topology,
+        gets_flock_solution=scenario.model.flock is not None, topology=scenario.topology_rule, t=scenario.topology,
     )  # fmt: skip
     kept, sensed = (each() if each else None for each in (scenario.vehicle.Memory, scenario.sensor.Memory))
     s = own_parameters(scenario, "sensors", scenario.sensors, i, seed)
@@ -188,7 +188,7 @@ def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any
         agent.faults.setdefault(entry.fault.name, []).append(suffering)
         order = [kind.name for kind in scenario.fault_kinds]  # a later kind disturbs what an earlier one has left
         agent.faults = dict(sorted(agent.faults.items(), key=lambda item: order.index(item[0])))
-    for number, agent in enumerate(flock if scenario.lands else ()):
+    for number, agent in enumerate(flock if scenario.can_land else ()):
         low = agent.present and agent.state.z <= scenario.ground
         if low and scenario.vehicle.lasts(memory=agent.remembered, b=agent.b, wing=scenario.wing) <= 0.0:
             agent.present, left = False, True
@@ -226,14 +226,21 @@ def plus(state: State, error: State) -> State:
 
 
 def decisions(
-    scenario: Scenario, seed: int, world: tuple[Place, Course], flock: list[Agent], number: int, past: list[State],
-    time: float, turn: Sequence[int] | None = None, shared: Sequence[Any] | None = None,
-) -> None:  # fmt: skip
+    scenario: Scenario,
+    seed: int,
+    world: tuple[FlightWorld, GoalCourse],
+    flock: list[Agent],
+    number: int,
+    past: list[State],
+    time: float,
+    turn: Sequence[int] | None = None,
+    shared: Sequence[Any] | None = None,
+) -> None:
     """Decision `number` of all agents, or of those in turn, from true states now and the `past` ones heard now."""
-    if scenario.errs:
+    if scenario.has_sensor_error:
         for i, agent in enumerate(flock):
             drift(scenario, seed, number, i, agent, time)
-    times, dt, (place, course) = clock(scenario), scenario.flight.dt, world
+    times, dt, (place, course) = step_counts(scenario), scenario.flight.dt, world
     sent = (number * times["decide_every"] - times["delay"]) * dt
     kinds, dims, of_sent = scenario.fault_kinds, scenario.dimensions, (("sense", "sent"), ("tell", "told"))
     said = [
@@ -247,7 +254,7 @@ def decisions(
         own = misled(agent, kinds, (("sense", "believed"),), time, plus(agent.state, agent.own), dims)
         near = hear(scenario, seed, number, i, flock, said, time, place, own)
         made = pilot.decide(
-            own, time + ahead(agent, time), goal=course.of(i), time=time, only=near,
+            own, time + ahead(agent, time), goal=course.of(i), time=time, visible=near,
             shared=shared[i] if shared else None, fades=fading(scenario, seed, number, i, len(flock)),
         )  # fmt: skip
         agent.rays = float(pilot.senses.rays)
@@ -260,10 +267,10 @@ def decisions(
 
 def fading(scenario: Scenario, seed: int, number: int, i: int, n: int) -> dict[int, float]:
     """Normal numbers of the signals between agent i and each other one, the same both ways."""
-    if scenario.meets is None or not scenario.meets.asks("fade"):
+    if scenario.topology_rule is None or not scenario.topology_rule.asks_for("fade"):
         return {}
     pairs = {j: min(i, j) * n + max(i, j) for j in range(n) if j != i}
-    words = {j: random.words(seed, random.FADE, 0, number, pair) for j, pair in pairs.items()}
+    words = {j: random.random_words(seed, random.FADE, 0, number, pair) for j, pair in pairs.items()}
     return {j: random.normal_pair(*found[:2])[0] for j, found in words.items()}
 
 
@@ -272,7 +279,7 @@ def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time
     if scenario.sensor.measure is not None:
         agent.own, agent.sensed = sensed(scenario, seed, number, i, agent, time)
         return
-    s, period = agent.s, clock(scenario)["decide_every"] * scenario.flight.dt
+    s, period = agent.s, step_counts(scenario)["decide_every"] * scenario.flight.dt
     own_x, own_y, sent_x, sent_y = normals(seed, random.SENSOR, number, i)
     own_z, sent_z = normals(seed, random.SENSOR, number, i, draw=1)[:2] if scenario.dimensions == 3 else (0.0, 0.0)
     rule = scenario.sensor.error
@@ -282,13 +289,13 @@ def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time
 
 def sensed(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time: float) -> tuple[State, Any]:
     """How far what an agent measures is off, and what its sensor remembers."""
-    sensor, period = scenario.sensor, clock(scenario)["decide_every"] * scenario.flight.dt
+    sensor, period = scenario.sensor, step_counts(scenario)["decide_every"] * scenario.flight.dt
     drawn = [g for block in (8, 9, 10) for g in normals(seed, random.SENSOR, number, i, draw=block)]
-    chances = [random.uniform(word) for word in random.words(seed, random.SENSOR, 0, number, i, draw=11)]
+    chances = [random.uniform(word) for word in random.random_words(seed, random.SENSOR, 0, number, i, draw=11)]
     given = agent.state._asdict() | {f"g{c}": g for c, g in enumerate(drawn)}
     given |= {f"u{c}": u for c, u in enumerate(chances)}
     given |= {"memory": agent.sensed, "time": time, "period": period, "s": agent.s}
-    found = answer(sensor.measure, "measure", given, sensor.name)
+    found = call_rule(sensor.measure, "measure", given, sensor.name)
     off = [a - b for a, b in zip(found[:6], agent.state, strict=True)]
     if scenario.dimensions == 2:
         off[2] = off[5] = 0.0
@@ -298,7 +305,7 @@ def sensed(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, tim
 def swing(rule: Any, error: State, g: Vector, period: float, s: Any) -> State:
     """One step of an error on all axes."""
     steps = [
-        answer(rule, "error", {"dx": error[c], "dv": error[3 + c], "g": g[c], "period": period, "s": s})
+        call_rule(rule, "error", {"dx": error[c], "dv": error[3 + c], "g": g[c], "period": period, "s": s})
         for c in range(3)
     ]
     return State(*(dx for dx, _ in steps), *(dv for _, dv in steps))
@@ -306,10 +313,10 @@ def swing(rule: Any, error: State, g: Vector, period: float, s: Any) -> State:
 
 def hear(
     scenario: Scenario, seed: int, number: int, i: int, flock: list[Agent], said: list[State], time: float,
-    place: Place, own_believed: State,
+    place: FlightWorld, own_believed: State,
 ) -> set[int]:  # fmt: skip
     """Hand the pilot of agent i the packets that arrive at decision `number`; returns who is in range, truly."""
-    k, late, found = scenario.radio, clock(scenario)["delay"] * scenario.flight.dt, set()
+    k, late, found = scenario.radio, step_counts(scenario)["delay"] * scenario.flight.dt, set()
     for j, other in enumerate(flock):
         if j == i or not other.present:
             continue
@@ -333,45 +340,53 @@ def hear(
             if link.way is None:  # one packet at a time is under way
                 link.way = time + wait, said[j], time - late + theirs
         if link.way is not None and link.way[0] <= time + 0.5 * scenario.flight.dt:
-            flock[i].pilot.hear(j, link.way[1], link.way[2], time + mine)
+            flock[i].pilot.receive(j, link.way[1], link.way[2], time + mine)
             link.way = None
     return found
 
 
 def glimpsed(
-    scenario: Scenario, seed: int, number: int, place: Place, i: int, j: int, flock: list[Agent], said: list[State],
-    own: State, taken: float,
-) -> State:  # fmt: skip
+    scenario: Scenario,
+    seed: int,
+    number: int,
+    place: FlightWorld,
+    i: int,
+    j: int,
+    flock: list[Agent],
+    said: list[State],
+    own: State,
+    taken: float,
+) -> State:
     """Where agent i believes agent j by a picture that was taken so long after the start by its clock, s."""
     state, kind, pair = flock[i].state, scenario.transceiver, i * len(flock) + j
-    here = place.image(*(a - b for a, b in zip(state[:3], said[i][:3], strict=True)))
+    here = place.image_offset(*(a - b for a, b in zip(state[:3], said[i][:3], strict=True)))
     base = [a - b for a, b in zip(own[:3], here, strict=True)]
-    off = place.image(*(a - b for a, b in zip(said[j][:3], said[i][:3], strict=True)))
+    off = place.image_offset(*(a - b for a, b in zip(said[j][:3], said[i][:3], strict=True)))
     known = flock[i].pilot.packets.get(j)
     before, since = (known.state, taken - known.sent_at) if known else (State(*ZERO, *ZERO), taken + 1e9)
-    expected = place.image(*(x + v * since - b for x, v, b in zip(before[:3], before[3:], base, strict=True)))
-    chances = [random.uniform(word) for word in random.words(seed, random.AIR, 0, number, pair)]
+    expected = place.image_offset(*(x + v * since - b for x, v, b in zip(before[:3], before[3:], base, strict=True)))
+    chances = [random.uniform(word) for word in random.random_words(seed, random.AIR, 0, number, pair)]
     given = dict(zip(("dx", "dy", "dz", "ex", "ey", "ez"), (*off, *expected), strict=True))
     given |= dict(zip(("evx", "evy", "evz", "vx", "vy", "vz"), (*before[3:], *own[3:]), strict=True))
     given |= {f"u{c}": u for c, u in enumerate(chances)}
     given |= {f"g{c}": g for c, g in enumerate(normals(seed, random.AIR, number, pair, draw=1))}
-    period = clock(scenario)["decide_every"] * scenario.flight.dt
-    found = answer(kind.see, "see", given | {"since": since, "period": period, "k": scenario.radio}, kind.name)
+    period = step_counts(scenario)["decide_every"] * scenario.flight.dt
+    found = call_rule(kind.see, "see", given | {"since": since, "period": period, "k": scenario.radio}, kind.name)
     flat = {} if scenario.dimensions == 3 else {"z": 0.0, "vz": 0.0}
     return State(*(a + b for a, b in zip(base, found[:3], strict=True)), *found[3:])._replace(**flat)
 
 
 def asked_of_radio(
-    scenario: Scenario, seed: int, number: int, place: Place, i: int, j: int, flock: list[Agent]
+    scenario: Scenario, seed: int, number: int, place: FlightWorld, i: int, j: int, flock: list[Agent]
 ) -> dict[str, Any]:
     """What rules of the radio may ask for of what agent j sends agent i."""
-    own, n, period = flock[i].state, len(flock), clock(scenario)["decide_every"] * scenario.flight.dt
+    own, n, period = flock[i].state, len(flock), step_counts(scenario)["decide_every"] * scenario.flight.dt
     there = [k for k, agent in enumerate(flock) if agent.present]
     seen = {k: place.beside(own, flock[k].state) for k in there}
     apart = {k: norm(s.x - own.x, s.y - own.y, s.z - own.z) for k, s in seen.items()}
     reach, true = norm(min(scenario.radio.range, LIMIT), 0.0, 0.0), seen[j]
     pair = i * n + j
-    chances = [random.uniform(word) for word in random.words(seed, random.AIR, 0, number, pair)]
+    chances = [random.uniform(word) for word in random.random_words(seed, random.AIR, 0, number, pair)]
     sent = {
         link: radio.packets(float(number), getattr(scenario.radio, rate), period)
         for link, rate in zip(("fast", "slow"), scenario.transceiver.rates, strict=False)
@@ -380,7 +395,7 @@ def asked_of_radio(
         "distance": apart[j], "vx": own.vx, "vy": own.vy, "vz": own.vz,
         "dx": true.x - own.x, "dy": true.y - own.y, "dz": true.z - own.z,
         "talkers": float(sum(apart[k] <= reach for k in there if k != i)),
-        "clear": 0.0 if place.blocked(*own[:3], *true[:3]) else 1.0, "step": float(number), "period": period,
+        "clear": 0.0 if place.is_blocked(*own[:3], *true[:3]) else 1.0, "step": float(number), "period": period,
         **{f"u{c}": u for c, u in enumerate(chances)},
         **{f"g{c}": g for c, g in enumerate(normals(seed, random.AIR, number, pair, draw=1))},
         "k": scenario.radio,
@@ -388,7 +403,15 @@ def asked_of_radio(
 
 
 def arrives(
-    scenario: Scenario, seed: int, number: int, place: Place, i: int, j: int, flock: list[Agent], link: Link, now: float
+    scenario: Scenario,
+    seed: int,
+    number: int,
+    place: FlightWorld,
+    i: int,
+    j: int,
+    flock: list[Agent],
+    link: Link,
+    now: float,
 ) -> bool:
     """Whether anything of what agent j sends agent i in a decision arrives; `now` by the clock of agent i."""
     kind, k = scenario.transceiver, scenario.radio
@@ -397,21 +420,23 @@ def arrives(
         newest = flock[i].pilot.packets.get(j)
         asked |= {"age": now - newest.sent_at if newest else now + 1e9}
         asked["packet"] = link.packet or (kind.Packet() if kind.Packet else None)
-        found = answer(kind.receive, "receive", asked, kind.name)
+        found = call_rule(kind.receive, "receive", asked, kind.name)
         hit, link.packet = found if kind.Packet else (found, None)
         if hit <= 0.5:
             return False
-    missed = answer(kind.missed, "missed", asked, kind.name) if kind.missed is not None else 0.0
+    missed = call_rule(kind.missed, "missed", asked, kind.name) if kind.missed is not None else 0.0
     u = random.pair_uniform(seed, random.PACKET, 0, number, i, j, len(flock))
     return u >= missed + (1.0 - missed) * radio.lost(asked["distance"], k)
 
 
-def lateness(scenario: Scenario, seed: int, number: int, place: Place, i: int, j: int, flock: list[Agent]) -> float:
+def lateness(
+    scenario: Scenario, seed: int, number: int, place: FlightWorld, i: int, j: int, flock: list[Agent]
+) -> float:
     """How late what agent j sends agent i in a decision comes, s; 0.0 over a radio that brings all in time."""
     kind = scenario.transceiver
     if kind.late is None:
         return 0.0
-    return max(0.0, answer(kind.late, "late", asked_of_radio(scenario, seed, number, place, i, j, flock), kind.name))
+    return max(0.0, call_rule(kind.late, "late", asked_of_radio(scenario, seed, number, place, i, j, flock), kind.name))
 
 
 # --------------------------------------------------------------------------------------------------------- motion
@@ -449,7 +474,7 @@ class Turbulent(tuple):
     states: tuple[float, ...]
 
 
-def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust: Vector, place: Place) -> None:
+def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust: Vector, place: FlightWorld) -> None:
     """One motion step: position by the old or the new velocity, velocity by the body; then the edges of the arena."""
     s, dt, three, body = agent.state, scenario.flight.dt, scenario.dimensions == 3, scenario.vehicle
     if three:
@@ -461,7 +486,7 @@ def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust
     w = (a.east + gust[0], a.north + gust[1], a.up + gust[2] if three else 0.0)
     known = {"v": s[3:], "m": plus(s, agent.own)[3:], "c": agent.command, "g": g, "w": w}
     given = {letter + axis: vector[c] for letter, vector in known.items() for c, axis in enumerate("xyz")}
-    moved = answer(
+    moved = call_rule(
         body.move,
         "move",
         given | {"dt": dt, "b": agent.b, "memory": agent.remembered, "wing": scenario.wing},

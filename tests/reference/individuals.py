@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 from airflock.core import random
 from airflock.core.agent import State
 from airflock.core.parameters import Quantity, declarations
-from airflock.core.vocabulary import answer
+from airflock.core.vocabulary import call_rule
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.spreads import Share
+from airflock.scenarios.spreads import RelativeSpread
 
 
 @dataclass
@@ -35,7 +35,7 @@ class Suffering:
         if found is None or not now:
             return None
         known = {**self.known, "since": max(time - self.begin, 0.0), "f": self.numbers, **given}
-        return answer(found, rule, known, self.kind.name)
+        return call_rule(found, rule, known, self.kind.name)
 
 
 def begins(scenario: Scenario, seed: int) -> dict[int, list[tuple[int, Any, float, bool]]]:
@@ -52,7 +52,7 @@ def begins(scenario: Scenario, seed: int) -> dict[int, list[tuple[int, Any, floa
             for agent in hit(entry, number, occurrence, seed):
                 found.append(Hit(step, number, occurrence, agent, False, entry, lasts, step))
                 if entry.fault.leaves is not None:
-                    gone = answer(entry.fault.leaves, "leaves", {"f": entry.numbers}, entry.fault.name)
+                    gone = call_rule(entry.fault.leaves, "leaves", {"f": entry.numbers}, entry.fault.name)
                     if gone < lasts:
                         found.append(Hit(step + round(gone / dt), number, occurrence, agent, True, entry, lasts, step))
     by_step: dict[int, list[tuple[int, Any, float, bool]]] = {}
@@ -90,7 +90,7 @@ def times(entry: Any, number: int, seed: int, duration: float) -> Iterator[float
         return
     time = 0.0
     for occurrence in range(10_000):
-        u = random.uniform(random.words(seed, random.FAULT, 0, occurrence, number)[0])
+        u = random.uniform(random.random_words(seed, random.FAULT, 0, occurrence, number)[0])
         time += 3600.0 / entry.per_hour * -math.log(u)
         if time >= min(duration, entry.until):
             return
@@ -101,7 +101,7 @@ def hit(entry: Any, number: int, occurrence: int, seed: int) -> list[int]:
     """Whom it hits: those with the least random words."""
     if entry.number is None:
         return list(entry.agents)
-    lots = [(random.words(seed, random.FAULT, 0, occurrence, a, 1 + number)[0], a) for a in entry.agents]
+    lots = [(random.random_words(seed, random.FAULT, 0, occurrence, a, 1 + number)[0], a) for a in entry.agents]
     return sorted(agent for _, agent in sorted(lots)[: entry.number])
 
 
@@ -124,9 +124,9 @@ def own_parameters(scenario: Scenario, section: str, record: Any, agent: int, se
             if agent in group.agents and isinstance(declared, Quantity):
                 value = group.numbers.get((letter, name), getattr(record, name))
                 spread = group.spread.get((letter, name), 0.0)
-                spread *= abs(value) if isinstance(spread, Share) else 1.0
+                spread *= abs(value) if isinstance(spread, RelativeSpread) else 1.0
                 if spread > 0.0:
-                    words = random.words(seed, random.SPREAD, 0, place, agent, "pbs".index(letter))
+                    words = random.random_words(seed, random.SPREAD, 0, place, agent, "pbs".index(letter))
                     value += spread * random.normal_pair(*words[:2])[0]
                 if value is not None:
                     changed[name] = min(max(value, declared.low), declared.high)

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from airflock.check.flock import Survey, solver
-from airflock.core.agent import START, State, combined, reduced
+from airflock.check.flock import FlockSolver, rule_solver
+from airflock.core.agent import START, State, reduce_records, reduce_values
 from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
-from airflock.core.vocabulary import Mean, answer
-from airflock.engine.text.probe import shapes_of
-from airflock.scenarios.surroundings import Place
+from airflock.core.vocabulary import Mean, call_rule
+from airflock.engine.text.probe import scratch_shapes
+from airflock.scenarios.surroundings import FlightWorld
 
 Record = Any  # a NamedTuple of floats that a metric declares
 
@@ -26,14 +26,14 @@ class Scores:
         self,
         metrics: Sequence[Metric],
         q: Any,
-        place: Place,
+        place: FlightWorld,
         dimensions: int = 2,
         wing: Any = None,
     ):
         self.wing = wing
-        self.surveys: dict[str, Survey | None] = {}
+        self.surveys: dict[str, FlockSolver | None] = {}
         self.place = place
-        self.image = place.image
+        self.image = place.image_offset
         self.dimensions = float(dimensions)
         self.metrics = tuple(metrics)
         self.q = q
@@ -67,7 +67,7 @@ class Scores:
             sample = self._sample(metric, flock)
             for (name, how), value in zip(_over_time(metric), sample, strict=True):
                 if count:
-                    self.sums[name] = combined("sum" if how == "mean" else how, self.sums[name], value)
+                    self.sums[name] = reduce_values("sum" if how == "mean" else how, self.sums[name], value)
                 values[name] = value
         if clock == "collision":
             self.before = dict(zip(who, flock, strict=True))
@@ -91,15 +91,15 @@ class Scores:
             given["agents"] = self._agents(metric, metric.agent, flock, given["mean"])
         if metric.cluster is not None:
             given["clusters"] = self._clusters(metric, metric.cluster, flock)
-        return answer(metric.sample, "sample", given, metric.name)
+        return call_rule(metric.sample, "sample", given, metric.name)
 
-    def _survey(self, metric: Metric, agents: int) -> Survey | None:
+    def _survey(self, metric: Metric, agents: int) -> FlockSolver | None:
         """A metric's rule of the whole flock, with scratch that lasts for the flight; None if it has none."""
         if metric.survey is None:
             return None
         given = {"q": self.q, "wing": self.wing}
-        shapes = shapes_of(metric.workspace, agents, given)
-        return solver(metric.survey, "survey", metric.Shared, shapes, given, metric.name)
+        shapes = scratch_shapes(metric.workspace, agents, given)
+        return rule_solver(metric.survey, "survey", metric.Shared, shapes, given, metric.name)
 
     def _agents(self, metric: Metric, rule: Callable[..., Any], flock: Sequence[State], mean: Mean) -> Record:
         if metric.Memory is not None:
@@ -125,14 +125,14 @@ class Scores:
                 "q": self.q,
             }
             if metric.Memory is None:
-                terms.append(answer(rule, "agent", given, metric.name))
+                terms.append(call_rule(rule, "agent", given, metric.name))
             else:
                 memories, number = self.memories[metric.name], self.who[i]
                 given["memory"] = memories.get(number, metric.Memory())
-                term, memories[number] = answer(rule, "agent", given, metric.name)
+                term, memories[number] = call_rule(rule, "agent", given, metric.name)
                 terms.append(term)
         assert metric.Agent is not None
-        return reduced(metric.Agent, metric.reduce, terms)
+        return reduce_records(metric.Agent, metric.reduce, terms)
 
     def _touches(self, metric: Metric, state: State, i: int) -> float:
         if metric.clock != "collision":
@@ -149,16 +149,16 @@ class Scores:
             dx, dy, dz, r2 = self._offset(flock[i], flock[j])
             given = {"dx": dx, "dy": dy, "dz": dz, "r2": r2, "r": norm(dx, dy, dz), "q": self.q}
             given["lower"] = 1.0 if j < i else 0.0
-            terms.append(answer(metric.pair, "pair", given, metric.name))
+            terms.append(call_rule(metric.pair, "pair", given, metric.name))
         assert metric.Pair is not None
-        return reduced(metric.Pair, metric.reduce, terms)
+        return reduce_records(metric.Pair, metric.reduce, terms)
 
     def _clusters(self, metric: Metric, rule: Callable[..., Any], flock: Sequence[State]) -> Record:
         def linked(i: int, j: int) -> bool:
             dx, dy, dz, r2 = self._offset(flock[i], flock[j])
             given = {"r": norm(dx, dy, dz), "r2": r2, "q": self.q}
             assert metric.linked is not None
-            return bool(answer(metric.linked, "linked", given, metric.name))
+            return bool(call_rule(metric.linked, "linked", given, metric.name))
 
         terms = []
         for members in connected(len(flock), linked):
@@ -168,9 +168,9 @@ class Scores:
             given = {"n": float(len(members)), "hx": hx, "hy": hy, "hz": hz, "hh": hh, "q": self.q}
             if metric.member is not None:
                 given |= self._members(metric, metric.member, flock, members)
-            terms.append(answer(rule, "cluster", given, metric.name))
+            terms.append(call_rule(rule, "cluster", given, metric.name))
         assert metric.Cluster is not None
-        return reduced(metric.Cluster, metric.reduce, terms)
+        return reduce_records(metric.Cluster, metric.reduce, terms)
 
     def _members(
         self, metric: Metric, rule: Callable[..., Any], flock: Sequence[State], members: list[int]
@@ -181,9 +181,9 @@ class Scores:
             hx, hy, hz = heading(flock[i])
             given = {**flock[i]._asdict(), "hx": hx, "hy": hy, "hz": hz, "mean": mean, "q": self.q}
             given |= {"speed": norm(*flock[i][3:]), "pair": self._pairs(metric, flock, i)}
-            terms.append(answer(rule, "member", given, metric.name))
+            terms.append(call_rule(rule, "member", given, metric.name))
         assert metric.Member is not None
-        return {"mean": mean, "members": reduced(metric.Member, metric.reduce, terms)}
+        return {"mean": mean, "members": reduce_records(metric.Member, metric.reduce, terms)}
 
     def _offset(self, own: State, other: State) -> tuple[float, float, float, float]:
         """Other minus own, m, and the squared distance, m²."""

@@ -170,9 +170,9 @@ def _export(target):
 
 
 def _document(target):
-    from airflock.runs.folder import write
+    from airflock.runs.folder import write_toml_file
 
-    write(target, results()[3])
+    write_toml_file(target, results()[3])
 
 
 def _certificate(target):
@@ -182,16 +182,16 @@ def _certificate(target):
 
 
 def _store(target):
-    from airflock.runs.executors import Flight, Landed
-    from airflock.runs.store import Batch, Store
+    from airflock.runs.executors import Flight, FlightResult
+    from airflock.runs.store import CandidateBatch, FlightStore
 
     target.mkdir()
-    with Store(target) as store:
+    with FlightStore(target) as store:
         store.begin({})
-        batch = Batch("search", 0, 0)
+        batch = CandidateBatch("search", 0, 0)
         for i in range(200):
             store.ask(batch, [[0.5]] * (i + 1), [{"model.p_rep": 0.1}] * (i + 1))
-            store.land(batch, Landed(Flight(i, 0, {}, 7), {"fitness": 0.25, "long": [0.1] * 50}))
+            store.land(batch, FlightResult(Flight(i, 0, {}, 7), {"fitness": 0.25, "long": [0.1] * 50}))
 
 
 @cache
@@ -207,10 +207,10 @@ def stored():
 
 def _evaluations(target):
     """Tables of all flights of a study."""
-    from airflock.runs.store import Store
+    from airflock.runs.store import FlightStore
     from airflock.search.tables import export
 
-    with Store(stored(), write=False) as store:
+    with FlightStore(stored(), write=False) as store:
         export(store, target.parent)
 
 
@@ -235,7 +235,7 @@ WRITERS = {  # ending, decimal logarithm of the most bytes, and what writes
     "figure as svg": (".svg", 5.5, _figure),
     "video": (".mp4", 5.0, _video),
     "replay": (".html", 6.3, lambda target: results()[4].save(target)),
-    "table": (".csv", 5.5, lambda target: atomic.write(target, results()[2])),
+    "table": (".csv", 5.5, lambda target: atomic.write_file(target, results()[2])),
     "export as csv": (".csv", 5.0, _export),
     "export as parquet": (".parquet", 5.0, _export),
     "export as movement": (".nc", 5.0, _export),

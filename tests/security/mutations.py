@@ -173,16 +173,18 @@ def scenarios():
     """Documents of all presets, of the golden scenario, and of every section."""
     from airflock.scenarios.files import presets
 
-    shipped = [untrusted.read_toml(path) for path in (*presets().values(), GOLDEN / "scenario.toml")]
-    return shipped + [*documents.SCENARIOS] * (len(shipped) // len(documents.SCENARIOS))  # half of all cases
+    shipped_studies = [untrusted.read_toml(path) for path in (*presets().values(), GOLDEN / "scenario.toml")]
+    return shipped_studies + [*documents.SCENARIOS] * (
+        len(shipped_studies) // len(documents.SCENARIOS)
+    )  # half of all cases
 
 
 @cache
 def studies():
     """Documents of all studies and of the golden one, with a preset for its scenario."""
-    from airflock.search.study import shipped
+    from airflock.search.study import shipped_studies
 
-    found = [untrusted.read_toml(path) for path in (*shipped().values(), GOLDEN / "study.toml")]
+    found = [untrusted.read_toml(path) for path in (*shipped_studies().values(), GOLDEN / "study.toml")]
     named = [document for document in found if "scenario" in document]
     rest = [document for document in found if "scenario" not in document]
     preset = "vasarhelyi_2018/4ms"
@@ -236,14 +238,14 @@ def _judged(use, path, tell=False):
 @cache
 def undamaged():
     """Bytes and scores of the recording that is damaged: one of today's, made of the golden one."""
-    from airflock.recordings.attributes import CHECKSUM, checksum
+    from airflock.recordings.attributes import CHECKSUM_ATTRIBUTE, recording_checksum
     from airflock.recordings.files import load_recording
-    from airflock.recordings.scores import measure
+    from airflock.recordings.scores import measure_recording
 
     recording = load_recording(GOLDEN / "recording.nc")
     recording = recording.assign_attrs({"airflock_format": 2})
-    recording = recording.assign_attrs({CHECKSUM: checksum(recording)})
-    return bytes(recording.to_netcdf(None, engine="h5netcdf")), recording, measure(recording)[0]
+    recording = recording.assign_attrs({CHECKSUM_ATTRIBUTE: recording_checksum(recording)})
+    return bytes(recording.to_netcdf(None, engine="h5netcdf")), recording, measure_recording(recording)[0]
 
 
 def recording(seed, number, folder, tell=False):
@@ -251,7 +253,7 @@ def recording(seed, number, folder, tell=False):
     import warnings
 
     from airflock.recordings.files import load_recording
-    from airflock.recordings.scores import measure
+    from airflock.recordings.scores import measure_recording
 
     rng, path = random.Random(f"recording {seed} {number}"), folder / "damaged.nc"
     content, whole, wanted = undamaged()
@@ -286,7 +288,7 @@ def recording(seed, number, folder, tell=False):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             found = load_recording(path)
-        values, _ = measure(found)
+        values, _ = measure_recording(found)
         if not any("was changed" in str(warning.message) for warning in caught) and "airflock_checksum" in found.attrs:
             assert repr(values) == repr(wanted), "another score, and nothing was said"
 
@@ -396,7 +398,7 @@ def no_flights():
         raise Flown
 
     store.load_driver = drivers.load_driver = measuring.load_driver = flown
-    lockstep.Fleet.advance = flown
+    lockstep.LockstepFleet.advance = flown
     interpreted.flight_driver = flown
     simulate.compile_for = show.fly_show = flown
     simulate.in_threads = flown

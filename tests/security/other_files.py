@@ -44,13 +44,13 @@ def sound():
 
 def sound_card():
     """Bytes of a flight card."""
-    from airflock.drones.onboard.card import hash_of
-    from airflock.fleets.prepare import card_document
+    from airflock.drones.onboard.card import card_hash
+    from airflock.fleets.prepare import make_card_document
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_4ms", {"topology.kind": "nearest", "topology.k": 4})
-    made = card_document(scenario, site=(47.5, 19.0, 120.0), members=(1, 2, 3), mission=7, expires=2**33)
-    return json.dumps({**made, "hash": hash_of(made)}).encode()
+    made = make_card_document(scenario, site=(47.5, 19.0, 120.0), members=(1, 2, 3), mission=7, expires=2**33)
+    return json.dumps({**made, "hash": card_hash(made)}).encode()
 
 
 @cache
@@ -100,12 +100,12 @@ KEY = bytes(range(32))
 
 def _log():
     """Twenty ticks of a node that heard a datagram and its autopilot say nothing that makes sense."""
-    from airflock.drones.onboard.log import Logged
-    from airflock.drones.onboard.node import Memory, Node
+    from airflock.drones.onboard.log import LoggingNode
+    from airflock.drones.onboard.node import Node, NodeMemory
 
     lines = []
-    node = Node(_made_card(), 2, KEY, now=0.0, utc=10**15, memory=Memory(), radios=(0.2,))
-    logged = Logged(node, lines.append, now=0.0, memory=Memory(), radios=(0.2,))
+    node = Node(_made_card(), 2, KEY, now=0.0, utc=10**15, memory=NodeMemory(), radios=(0.2,))
+    logged = LoggingNode(node, lines.append, now=0.0, memory=NodeMemory(), radios=(0.2,))
     for tick in range(20):
         logged.radio(bytes([tick] * 40), 0.05 * tick)
         logged.autopilot(bytes([0xFD, tick] * 20), 0.05 * tick)
@@ -115,9 +115,9 @@ def _log():
 
 @cache
 def _made_card():
-    from airflock.drones.onboard.card import card_of
+    from airflock.drones.onboard.card import parse_card
 
-    return card_of(json.loads(sound_card()))
+    return parse_card(json.loads(sound_card()))
 
 
 def _steps():
@@ -204,19 +204,19 @@ def _refusal(kind, path):
 
 def _damaged(rng, kind, content):
     if kind == "card" and rng.random() < 0.8:  # sealed again, as somebody would who means harm
-        from airflock.drones.onboard.card import hash_of
+        from airflock.drones.onboard.card import card_hash
 
         document = mutate(rng, {k: v for k, v in json.loads(content).items() if k != "hash"})
         document = _without_dates(document)
-        return json.dumps({**document, "hash": hash_of(document)}).encode()
+        return json.dumps({**document, "hash": card_hash(document)}).encode()
     if kind == "certificate" and rng.random() < 0.8:
-        document = _without_dates(mutate(rng, untrusted.toml(content.decode())))
+        document = _without_dates(mutate(rng, untrusted.parse_toml(content.decode())))
         document["seal"] = hashlib.sha256(repr(document).encode()).hexdigest()
         return "".join(f"{json.dumps(key)} = {toml(value)}\n" for key, value in document.items()).encode()
     if kind in ("geojson", "steps", "memory") and rng.random() < 0.6:
         return json.dumps(_without_dates(mutate(rng, json.loads(content)))).encode()
     if kind in ("faults", "plan") and rng.random() < 0.6:
-        document = mutate(rng, untrusted.toml(content.decode()))
+        document = mutate(rng, untrusted.parse_toml(content.decode()))
         return "".join(f"{json.dumps(key)} = {toml(value)}\n" for key, value in document.items()).encode()
     if kind == "log" and rng.random() < 0.6:
         lines = content.decode().splitlines()
@@ -258,15 +258,15 @@ def _check_certificate(path):
 
 
 def _ground(path):
-    from airflock.world.scenes.outlines import ground_of
+    from airflock.world.scenes.outlines import load_field
 
-    ground_of(path, simplify=1.0, space=True)
+    load_field(path, simplify=1.0, space=True)
 
 
 def _faults(path):
-    from airflock.fleets.faults import read_faults
+    from airflock.fleets.faults import read_injected_faults
 
-    read_faults(path, (1, 2, 3))
+    read_injected_faults(path, (1, 2, 3))
 
 
 def _read_card(path):
@@ -276,16 +276,16 @@ def _read_card(path):
 
 
 def _replay_log(path):
-    from airflock.drones.onboard.log import read_log
+    from airflock.drones.onboard.log import replay_log_file
 
-    for _ in read_log(path, _made_card(), KEY):
+    for _ in replay_log_file(path, _made_card(), KEY):
         pass
 
 
 def _memory(path):
-    from airflock.drones.onboard.log import read_memory
+    from airflock.drones.onboard.log import read_node_memory
 
-    read_memory(path)
+    read_node_memory(path)
 
 
 def _plan(path):

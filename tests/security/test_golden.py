@@ -7,10 +7,10 @@ import pytest
 from mutations import GOLDEN
 
 import airflock
-from airflock.certificates.certificate import seal
-from airflock.certificates.check import check
+from airflock.certificates.certificate import certificate_checksum
+from airflock.certificates.check import check_certificate
 from airflock.drones.onboard.card import read_card
-from airflock.recordings.files import fly_again
+from airflock.recordings.files import replay_recording
 from airflock.search.study import load_study
 from airflock.support.errors import CardError, RecordingError, StudyError
 
@@ -28,7 +28,7 @@ def test_a_recording_of_0_1_has_the_scores_that_it_had(name):
 
 def test_a_recording_of_0_1_with_a_law_of_its_own_asks_for_it_before_it_flies_again():
     with pytest.raises(RecordingError, match="was flown with a law of its own, '/home/someone/laws/own_law.py'"):
-        fly_again(airflock.load_recording(GOLDEN / "own_law.nc"))
+        replay_recording(airflock.load_recording(GOLDEN / "own_law.nc"))
 
 
 def test_a_scenario_and_a_study_of_0_1_are_read():
@@ -60,17 +60,17 @@ def test_a_certificate_of_0_1_is_whole_and_its_bound_is_that_of_the_count(tmp_pa
     """None of 100 flights: the chance of an event is at most 1 - 0.05^(1/100) with 95 % (Clopper and Pearson)."""
     text = (GOLDEN / "certificate.toml").read_text()
     document = tomllib.loads(text)
-    assert document["seal"] == seal(document)
+    assert document["seal"] == certificate_checksum(document)
     assert document["limit"][0]["high"] == pytest.approx(1.0 - 0.05**0.01, rel=1e-12)
     try:
-        found = check(GOLDEN / "certificate.toml")
+        found = check_certificate(GOLDEN / "certificate.toml")
     except StudyError as fault:  # the law's text has changed since
         assert "its flights were computed by other rules" in str(fault)
     else:
         assert found.flown and not [line for line in found.faults if "bits" not in line]
     (tmp_path / "newer.toml").write_text(text.replace("format = 1", "format = 9", 1))
     with pytest.raises(StudyError, match="is of format 9; this Airflock reads format 1"):
-        check(tmp_path / "newer.toml")
+        check_certificate(tmp_path / "newer.toml")
 
 
 def test_what_is_saved_today_carries_its_format(tmp_path):

@@ -18,7 +18,7 @@ import pytest
 from damages import Planted
 
 import airflock
-from airflock.drones.onboard.card import hash_of, read_card
+from airflock.drones.onboard.card import card_hash, read_card
 from airflock.search.study import load_study
 from airflock.support.errors import AirflockError, ScenarioError
 
@@ -66,7 +66,7 @@ def packed(tmp_path):
     np.savez(tmp_path / "objects.npz", trajectories=np.array([Planted(tmp_path / "mark")], dtype=object))
     card = json.loads(other_files.sound_card())
     card = {**{key: value for key, value in card.items() if key != "hash"}, "law": {"kind": "evil"}}
-    (tmp_path / "card.json").write_text(json.dumps({**card, "hash": hash_of(card)}))
+    (tmp_path / "card.json").write_text(json.dumps({**card, "hash": card_hash(card)}))
     (tmp_path / "tuning" / "study").mkdir(parents=True)
     (tmp_path / "tuning" / "hardening.json").write_text('{"why": "", "steps": []}')
     (tmp_path / "tuning" / "tuned.toml").write_text(SCENARIO.replace("evil.py", str(tmp_path / "evil.py")))
@@ -133,7 +133,7 @@ def python(text):
 
 NAMES = {
     "airflock": airflock, "load_study": load_study, "Path": Path, "read_card": read_card,
-    "hardened": import_module("airflock.search.tune.stages").hardening,
+    "hardened": import_module("airflock.search.tune.stages").run_hardening_stage,
 }  # fmt: skip
 CONSENT = "would run the code in "
 WAYS = {

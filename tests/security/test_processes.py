@@ -26,7 +26,7 @@ def child(action):
 
 def writing(path, begun):
     """Begin to write a file and never end."""
-    with atomic.atomic(path) as temporary:
+    with atomic.atomic_path(path) as temporary:
         temporary.write_text("half")
         begun.touch()
         time.sleep(60.0)
@@ -102,8 +102,8 @@ def test_what_a_killed_process_left_is_swept_and_what_a_living_one_writes_is_not
     assert set(left) == {"dead", "alive"}
     for path in left.values():
         os.utime(path, (old, old))
-    atomic.swept.cache_clear()
-    atomic.write(tmp_path / "other.csv", "x")
+    atomic.remove_leftovers.cache_clear()
+    atomic.write_file(tmp_path / "other.csv", "x")
     assert not left["dead"].exists() and left["alive"].exists()
     os.kill(pids[1], signal.SIGKILL)
     os.waitpid(pids[1], 0)
@@ -113,11 +113,11 @@ def test_a_link_is_followed_and_a_named_pipe_refused(tmp_path):
     (tmp_path / "far").mkdir()
     (tmp_path / "far" / "real.csv").write_text("old")
     (tmp_path / "link.csv").symlink_to(tmp_path / "far" / "real.csv")
-    atomic.write(tmp_path / "link.csv", "new")
+    atomic.write_file(tmp_path / "link.csv", "new")
     assert (tmp_path / "link.csv").is_symlink() and (tmp_path / "far" / "real.csv").read_text() == "new"
     os.mkfifo(tmp_path / "pipe.csv")
     with pytest.raises(OSError, match="not a regular file"):
-        atomic.write(tmp_path / "pipe.csv", "new")
+        atomic.write_file(tmp_path / "pipe.csv", "new")
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o775])
@@ -126,7 +126,7 @@ def test_a_cache_that_others_may_write_is_not_used(tmp_path, monkeypatch, mode):
     (base / cache.DRIVERS).mkdir(parents=True)
     base.chmod(mode)
     monkeypatch.setenv("AIRFLOCK_CACHE", str(base))
-    assert "may be written by other users" in cache.cache_trouble(base)
+    assert "may be written by other users" in cache.cache_folder_error(base)
     spare = cache.cache_folder()
     assert spare != base and spare.stat().st_mode & 0o077 == 0 and spare.name != f"airflock-{os.getuid()}"
 
@@ -136,16 +136,16 @@ def test_a_cache_of_another_user_is_not_used(tmp_path):
         pytest.skip("only root can give a folder to another user")
     (tmp_path / cache.DRIVERS).mkdir()
     os.chown(tmp_path / cache.DRIVERS, 65534, 65534)
-    assert "is not a folder of this user's" in cache.cache_trouble(tmp_path)
+    assert "is not a folder of this user's" in cache.cache_folder_error(tmp_path)
     os.chown(tmp_path, 65534, 65534)
-    assert "belongs to another user" in cache.cache_trouble(tmp_path)
+    assert "belongs to another user" in cache.cache_folder_error(tmp_path)
 
 
 def test_drivers_that_others_could_have_written_are_thrown_away(tmp_path):
     inner = tmp_path / cache.DRIVERS
     (inner / ("0" * 20)).mkdir(parents=True)
     inner.chmod(0o777)
-    assert cache.cache_trouble(tmp_path) == ""
+    assert cache.cache_folder_error(tmp_path) == ""
     assert list(inner.iterdir()) == [] and inner.stat().st_mode & 0o777 == 0o700
 
 
@@ -159,9 +159,9 @@ def test_the_drivers_that_were_not_used_for_longest_go_first(tmp_path, monkeypat
         used = now - (10_000.0 * (5 - i) if i < 4 else 0.0)
         os.utime(folder, (used, used))
     (tmp_path / "studies").mkdir()
-    assert cache.shrink(tmp_path, most=2500) == 3
+    assert cache.shrink(tmp_path, max_bytes=2500) == 3
     assert sorted(path.name[-1] for path in (tmp_path / cache.DRIVERS).iterdir()) == ["3", "4"]
-    assert cache.shrink(tmp_path, most=0) == 1  # the one in use stays
+    assert cache.shrink(tmp_path, max_bytes=0) == 1  # the one in use stays
     assert cache.clear_cache() == (1, 1000) and (tmp_path / "studies").is_dir()
 
 

@@ -12,15 +12,15 @@ import xarray as xr
 from mutations import GOLDEN
 
 import airflock
-from airflock.recordings.flights import flown_document
-from airflock.recordings.isolated import Opening
+from airflock.recordings.flights import bare_document
+from airflock.recordings.isolated import ReaderProcess
 from airflock.support.errors import RecordingError
 
 
 def test_what_another_process_opens_is_what_xarray_opens():
     for name in ("recording.nc", "own_law.nc"):
         with xr.open_dataset(GOLDEN / name, engine="h5netcdf") as opened:
-            assert opened.load().identical(Opening(GOLDEN / name).answer())
+            assert opened.load().identical(ReaderProcess(GOLDEN / name).answer())
 
 
 def test_this_process_opens_no_hdf5():
@@ -44,13 +44,13 @@ def test_a_recording_names_no_file_of_code(tmp_path):
     scenario = airflock.load("vasarhelyi_2018/4ms")
     sections = ("model", "body", "sensors", "metrics")
     document = {name: {**scenario.document.get(name, {}), "kind": "/home/someone/own.py"} for name in sections}
-    told = flown_document(replace(scenario, document={**document, "faults": [{"kind": "/home/someone/own.py"}]}))
+    told = bare_document(replace(scenario, document={**document, "faults": [{"kind": "/home/someone/own.py"}]}))
     assert "someone" not in str(told) and str(told).count("'own'") == len(sections) + 1
 
 
 def test_a_recording_that_hangs_is_given_up():
     path = GOLDEN.parent / "hanging_recording.nc"  # 350 zeroed bytes in an attribute heap: HDF5 goes round and round
-    opening = Opening(path, limit=3.0)
+    opening = ReaderProcess(path, limit=3.0)
     with pytest.raises(RecordingError, match="could not be opened within 3 s; it may be damaged"):
         opening.answer()
     assert opening.process.returncode in (-signal.SIGXCPU, -signal.SIGKILL)

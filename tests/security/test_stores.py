@@ -4,21 +4,21 @@ import math
 
 import pytest
 
-from airflock.runs.executors import Flight, Landed
-from airflock.runs.store import FILE, Batch, Store
+from airflock.runs.executors import Flight, FlightResult
+from airflock.runs.store import FILE, CandidateBatch, FlightStore
 from airflock.search import tables
 from airflock.support.errors import StudyError
 
-BATCH = Batch("search", 0, 0)
+BATCH = CandidateBatch("search", 0, 0)
 
 
 @pytest.fixture
 def store(tmp_path):
-    with Store(tmp_path) as found:
+    with FlightStore(tmp_path) as found:
         found.begin({})
         found.ask(BATCH, [[0.5, 0.1], [0.25, 0.2]], [{"model.p_rep": 0.1}, {"model.p_rep": 0.2}])
         for i in range(2):
-            found.land(BATCH, Landed(Flight(i, 0, {}, 7), {"fitness": 0.5, "lost": math.nan}))
+            found.land(BATCH, FlightResult(Flight(i, 0, {}, 7), {"fitness": 0.5, "lost": math.nan}))
         found.tell(BATCH, [[0.5], [None]])
         yield found
 
@@ -28,8 +28,8 @@ def read(store):
     return (
         store.asked(BATCH),
         store.flown(BATCH),
-        tables.candidates(store, ["fitness"]).to_dict("list"),
-        tables.flights(store).to_dict("list"),
+        tables.candidate_table(store, ["fitness"]).to_dict("list"),
+        tables.flight_table(store).to_dict("list"),
     )
 
 
@@ -59,4 +59,4 @@ def test_a_tampered_row_is_one_line_or_another_row(store, column, value):
 def test_what_is_no_database_does_not_claim_that_flights_are_kept(tmp_path):
     (tmp_path / FILE).write_bytes(b"no database" * 1000)
     with pytest.raises(StudyError, match="file is not a database; its flights cannot be read"):
-        Store(tmp_path)
+        FlightStore(tmp_path)

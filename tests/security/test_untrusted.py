@@ -3,13 +3,12 @@
 import tomllib
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import airflock
 from airflock.search.study import load_study
 from airflock.support import untrusted
-from airflock.support.errors import AirflockError, ScenarioError, bounded
+from airflock.support.errors import AirflockError, ScenarioError, shortened
 
 
 @pytest.mark.parametrize(
@@ -32,14 +31,14 @@ from airflock.support.errors import AirflockError, ScenarioError, bounded
 )
 def test_text_beyond_bounds_is_refused(text, words):
     with pytest.raises(untrusted.TextError) as fault:
-        untrusted.toml(text)
+        untrusted.parse_toml(text)
     assert words in str(fault.value) and len(str(fault.value)) < 300
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 5000, "1" * 5000, "[1", "5e", None, b"{}", '{"a": 1e'])
 def test_json_beyond_bounds_or_damaged_is_refused(text):
     with pytest.raises(untrusted.TextError):
-        untrusted.json_object(text)
+        untrusted.parse_json_object(text)
 
 
 @given(st.text(alphabet="ab.=[]{}\"'#\\\n 01_,", max_size=80))
@@ -48,14 +47,14 @@ def test_within_bounds_the_door_reads_what_the_standard_parser_reads(text):
         wanted = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         with pytest.raises(untrusted.FormatError):
-            untrusted.toml(text)
+            untrusted.parse_toml(text)
     else:
-        assert untrusted.toml(text) == wanted
+        assert untrusted.parse_toml(text) == wanted
 
 
 def test_brackets_dots_and_digits_inside_strings_and_comments_do_not_count():
     text = f'a = "{"[" * 99}{"." * 99}"  # {"{" * 99} {"1" * 999}\nb = """{"[" * 99}\n{"9" * 999}"""\n' + "c = '[[.'\n"
-    assert untrusted.toml(text)["c"] == "[[."
+    assert untrusted.parse_toml(text)["c"] == "[[."
 
 
 @pytest.mark.parametrize(
@@ -96,7 +95,7 @@ def test_a_flood_of_faults_is_bounded(tmp_path):
     with pytest.raises(ScenarioError) as fault:
         airflock.load(tmp_path / "a.toml")
     assert len(fault.value.faults) == 51 and "more faults" in fault.value.faults[-1]
-    assert bounded("x" * 5000, 100) == "x" * 50 + " ... (4900 letters) ... " + "x" * 50
+    assert shortened("x" * 5000, 100) == "x" * 50 + " ... (4900 letters) ... " + "x" * 50
 
 
 @pytest.mark.parametrize("name", ["a" * 300 + ".toml", "a\0b.toml", "/dev/zero", ".", "/proc/self/mem", ""])

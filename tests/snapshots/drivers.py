@@ -17,7 +17,7 @@ MANY = 8000  # agents of one big flock: neighbours and order parameters by cells
 
 @cache
 def _cpu(plan):
-    return passes_driver.flight(plan)
+    return passes_driver.flight_driver_text(plan)
 
 
 @cache
@@ -27,7 +27,7 @@ def _cuda(plan, shape):
 
 @cache
 def _crowd(plan):
-    return cuda_cells.crowd(plan)
+    return cuda_cells.large_flock_text(plan)
 
 
 def texts(name):
@@ -50,7 +50,7 @@ def texts(name):
         plan = plan_of(big)
         if plan.grid:
             found[f"{MANY} agents"] = driver_text(big)
-            if cuda_crowd.refused(plan, 1000) is None:
+            if cuda_crowd.cell_plan_error(plan, 1000) is None:
                 found[f"GPU, {MANY} agents"] = _crowd(plan)
     return found
 

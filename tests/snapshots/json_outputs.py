@@ -11,11 +11,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from airflock.drones.mavlink.orders import Do
-from airflock.drones.onboard.card import hash_of
-from airflock.drones.onboard.log import Logged
-from airflock.drones.onboard.node import Memory
-from airflock.fleets.lockstep import KEY
+from airflock.drones.mavlink.orders import OrderKind
+from airflock.drones.onboard.card import card_hash
+from airflock.drones.onboard.log import LoggingNode
+from airflock.drones.onboard.node import NodeMemory
+from airflock.fleets.lockstep import SOFTWARE_KEY
 from fleets import card, document, fleet, scenario
 from haswell import airflock
 from snapshots import options
@@ -91,18 +91,18 @@ def _node_log(folder: Path) -> None:
     lines: list[str] = []
     fly = fleet(flown)
     made = document(flown)
-    (folder / "card.json").write_text(json.dumps({**made, "hash": hash_of(made)}), encoding="utf-8")
-    (folder / "card.key").write_text(KEY.hex() + "\n", encoding="ascii")
+    (folder / "card.json").write_text(json.dumps({**made, "hash": card_hash(made)}), encoding="utf-8")
+    (folder / "card.key").write_text(SOFTWARE_KEY.hex() + "\n", encoding="ascii")
     (folder / "card.key").chmod(0o600)
     assert card(flown).hash == fly.card.hash
-    fly.nodes[0] = Watched(fly.nodes[0], lines.append, now=0.0, memory=Memory(), radios=(0.2,))
+    fly.nodes[0] = Watched(fly.nodes[0], lines.append, now=0.0, memory=NodeMemory(), radios=(0.2,))
     fly.advance(6.0)
-    fly.order(Do.START, at=6.2)
+    fly.order(OrderKind.START, at=6.2)
     fly.advance(8.0)
     (folder / "node.log").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-class Watched(Logged):
+class Watched(LoggingNode):
     """A node whose log is written, and which the fleet can ask for its state."""
 
     def __getattr__(self, name: str) -> Any:

@@ -5,7 +5,7 @@ from typing import Any
 import typer.main
 
 from airflock.cli.main import app
-from airflock.drones.onboard.run import parser
+from airflock.drones.onboard.run import make_parser
 
 
 def _type_of(kind: Any) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def _verbs(command: Any, name: str) -> dict[str, Any]:
 
 def _node() -> dict[str, Any]:
     """Return the options of the node on board, which argparse reads: the flying computer has no other library."""
-    node = parser()
+    node = make_parser()
     shown = {
         each.dest: {
             "kind": "option" if each.option_strings else "argument",

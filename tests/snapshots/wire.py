@@ -5,28 +5,28 @@ from typing import Any
 
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-from airflock.drones.mavlink.orders import Do
+from airflock.drones.mavlink.orders import OrderKind
 from airflock.fleets import compare
-from airflock.fleets.faults import Fault
-from airflock.fleets.lockstep import Fleet
+from airflock.fleets.faults import InjectedFault
+from airflock.fleets.lockstep import LockstepFleet
 from fleets import card, scenario
 
 PRIVATE = bytes(range(32))
 PUBLIC = Ed25519PrivateKey.from_private_bytes(PRIVATE).public_key().public_bytes_raw()
 FIRST = 200  # datagrams that are recorded in full
 FAULTS = (
-    Fault("loss", (2,), 2.0, 12.0, 0.3),
-    Fault("jitter", (3,), 0.0, 15.0, 0.5),
-    Fault("duplicate", (4,), 0.0, 20.0, 0.5),
-    Fault("corrupt", (1,), 5.0, 15.0, 0.2),
-    Fault("outage", (4,), 10.0, 14.0),
-    Fault("partition", (1, 2), 16.0, 18.0),
-    Fault("rogue", (2,), 6.0, 9.0, 30.0),
-    Fault("impostor", (3,), 8.0, 10.0, 30.0),
-    Fault("clock", (2,), amount=0.02),
-    Fault("node", (1,), 19.0, 21.0),
-    Fault("gnss", (4,), 20.0, 22.0),
-    Fault("battery", (3,), 22.0, 23.0, 5.0),
+    InjectedFault("loss", (2,), 2.0, 12.0, 0.3),
+    InjectedFault("jitter", (3,), 0.0, 15.0, 0.5),
+    InjectedFault("duplicate", (4,), 0.0, 20.0, 0.5),
+    InjectedFault("corrupt", (1,), 5.0, 15.0, 0.2),
+    InjectedFault("outage", (4,), 10.0, 14.0),
+    InjectedFault("partition", (1, 2), 16.0, 18.0),
+    InjectedFault("rogue", (2,), 6.0, 9.0, 30.0),
+    InjectedFault("impostor", (3,), 8.0, 10.0, 30.0),
+    InjectedFault("clock", (2,), amount=0.02),
+    InjectedFault("node", (1,), 19.0, 21.0),
+    InjectedFault("gnss", (4,), 20.0, 22.0),
+    InjectedFault("battery", (3,), 22.0, 23.0, 5.0),
 )
 
 
@@ -61,7 +61,7 @@ class Tap:
 
 def _tapped(fleet: Any) -> Tap:
     """Listen to the ether of a fleet, and to the wires between its nodes and vehicles."""
-    tap, send, deliver = Tap(), fleet.ether.send, fleet.ether.deliver
+    tap, send, deliver = Tap(), fleet.channel.send, fleet.channel.deliver
 
     def sending(now: float, who: int, datagram: bytes, *rest: Any) -> None:
         tap("sent", datagram)
@@ -72,19 +72,19 @@ def _tapped(fleet: Any) -> Tap:
             tap(f"delivered to {to + 1}", datagram)
             yield to, datagram
 
-    fleet.ether.send, fleet.ether.deliver = sending, delivering
+    fleet.channel.send, fleet.channel.deliver = sending, delivering
     for vehicle in fleet.vehicles:
 
         def receiving(data: bytes, now: float, receive: Any = vehicle.receive) -> Any:
             tap("to the autopilot", data)
             return receive(data, now)
 
-        def telling(now: float, telemetry: Any = vehicle.telemetry) -> Any:
+        def telling(now: float, telemetry: Any = vehicle.due_telemetry) -> Any:
             data = telemetry(now)
             tap("from the autopilot", data)
             return data
 
-        vehicle.receive, vehicle.telemetry = receiving, telling
+        vehicle.receive, vehicle.due_telemetry = receiving, telling
     return tap
 
 
@@ -95,9 +95,9 @@ def _ending(fleet: Any, tap: Tap) -> dict[str, Any]:
 
 def _in_the_air() -> dict[str, Any]:
     """Four drones with sensor errors and faults of the ether, of nodes and of vehicles, for 25 s."""
-    flown = compare.sampled(scenario(4, 25.0, noisy=True), 0.2)
+    flown = compare.with_metric_period(scenario(4, 25.0, noisy=True), 0.2)
     made = compare.software_card(flown, operator=PUBLIC)
-    fleet = Fleet(flown, made, 3, start=compare.first_states(flown, 3), faults=FAULTS, operator=PRIVATE)
+    fleet = LockstepFleet(flown, made, 3, start=compare.simulated_start(flown, 3), faults=FAULTS, operator=PRIVATE)
     tap = _tapped(fleet)
     fleet.advance(25.0)
     return _ending(fleet, tap)
@@ -106,7 +106,7 @@ def _in_the_air() -> dict[str, Any]:
 def _from_the_ground() -> dict[str, Any]:
     """Three drones that start, hold, go on and return by the operator's orders, in 45 s."""
     flown = scenario(3)
-    fleet = Fleet(flown, card(flown, operator=PUBLIC), 5, operator=PRIVATE)
+    fleet = LockstepFleet(flown, card(flown, operator=PUBLIC), 5, operator=PRIVATE)
     tap, hear = _tapped(fleet), fleet.nodes[0].radio
 
     def order(do: Any, **more: Any) -> None:
@@ -119,11 +119,11 @@ def _from_the_ground() -> dict[str, Any]:
         fleet.nodes[0].radio = hear
 
     fleet.advance(5.0)
-    order(Do.START, at=6.0)
+    order(OrderKind.START, at=6.0)
     fleet.advance(22.0)
-    order(Do.HOLD)
+    order(OrderKind.HOLD)
     fleet.advance(5.0)
-    order(Do.RETURN, target=2, at=34.0)
+    order(OrderKind.RETURN, target=2, at=34.0)
     fleet.advance(13.0)
     return _ending(fleet, tap)
 

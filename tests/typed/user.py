@@ -33,7 +33,7 @@ def script() -> None:
     assert_type(airflock.doctor(), dict[str, Any])
     assert_type(airflock.harden(scenario, range(2))[0].fitness, float)
     assert_type(airflock.evolve(scenario, "study", generations=2).fitness, float)
-    assert_type(airflock.display(["AIR"], 20).formed[0].collisions, int)
+    assert_type(airflock.display(["AIR"], 20).shape_reports[0].collisions, int)
     airflock.simulate(scenario, sed=7)  # type: ignore[call-arg]
     airflock.sweep(scenario)  # type: ignore[call-arg]
     airflock.sweeep(scenario)  # type: ignore[attr-defined]

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airflock.cli.main import app
-from airflock.support.asked import WRONG, Asked, or_else
+from airflock.support.asked import INVALID, ErrorCollector, value_or_default
 from airflock.support.errors import AirflockError, CardError, ScenarioError
 
 SET = "vasarhelyi_2018/4ms"
@@ -84,22 +84,25 @@ def test_a_part_is_left_out_only_where_what_it_is_made_of_is_wrong():
             raise CardError([f"{x} is not above 0"])
         return x
 
-    asked = Asked(["--seeds 0 lies outside [1, 9]"])
+    asked = ErrorCollector(["--seeds 0 lies outside [1, 9]"])
     good, bad = asked.read(positive, 2.0), asked.read(positive, -1.0)
-    assert good == 2.0 and bad is WRONG and or_else(bad, 3.0) == 3.0 and or_else(good, 3.0) == 2.0
+    assert good == 2.0 and bad is INVALID and value_or_default(bad, 3.0) == 3.0 and value_or_default(good, 3.0) == 2.0
     assert asked.read(lambda a, b: a + b, good, 1.0) == 3.0
-    assert asked.read(lambda a, b: a + b, good, b=bad) is WRONG
-    assert asked.each(positive, [1.0, 2.0]) == [1.0, 2.0] and asked.each(positive, [1.0, -2.0, -3.0]) is WRONG
-    assert asked.each(positive, None) == []
+    assert asked.read(lambda a, b: a + b, good, b=bad) is INVALID
+    assert (
+        asked.collect_each(positive, [1.0, 2.0]) == [1.0, 2.0]
+        and asked.collect_each(positive, [1.0, -2.0, -3.0]) is INVALID
+    )
+    assert asked.collect_each(positive, None) == []
     with pytest.raises(ScenarioError) as fault:
-        asked.refuse()
+        asked.raise_errors()
     told = ["--seeds 0 lies outside [1, 9]", *(f"{x} is not above 0" for x in (-1.0, -2.0, -3.0))]
     assert str(fault.value).splitlines() == told
 
 
 def test_a_single_fault_stays_the_error_that_it_was():
-    asked = Asked()
-    asked.refuse()
+    asked = ErrorCollector()
+    asked.raise_errors()
     only = CardError(["no such card"])
 
     def fails():
@@ -107,7 +110,7 @@ def test_a_single_fault_stays_the_error_that_it_was():
 
     asked.read(fails)
     with pytest.raises(CardError) as fault:
-        asked.refuse()
+        asked.raise_errors()
     assert fault.value is only
 
 

@@ -1,8 +1,7 @@
 """Locals of helpers that stand in a stage overwrite nothing: a stage's text computes what the stage does in Python."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from airflock.engine import plan_of
 from airflock.scenarios.files import load

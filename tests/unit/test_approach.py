@@ -20,15 +20,17 @@ def test_no_pair_comes_nearer_than_is_counted(dimensions, seed):
     for far, drift, beside in ((100.0, 4.0, 1.0), (3e4, 30.0, 0.05), (1e5, 300.0, 0.0), (0.0, 0.0, 5.0)):
         x = (draw.normal(size=(dimensions, n)) * 20.0 + far).astype(np.float32)
         v = (draw.normal(size=(dimensions, n)) * beside + drift).astype(np.float32)
-        held = np.zeros(approach.HELD, np.float32)
-        approach.set_out(held, flock_of(x, v), n, plan=plan)
+        held = np.zeros(approach.HELD_SIZE, np.float32)
+        approach.start_drift(held, flock_of(x, v), n, plan=plan)
         first, counted = apart(x), np.float32(0.0)
         for _ in range(300):
             v = (v + draw.normal(size=v.shape) * 0.02 * beside).astype(np.float32)
             flock = flock_of(x, v)
-            squares = [sum(approach.beside(i, a, held, flock) ** 2 for a in range(dimensions)) for i in range(n)]
+            squares = [
+                sum(approach.velocity_beside_drift(i, a, held, flock) ** 2 for a in range(dimensions)) for i in range(n)
+            ]
             x = x + v * dt
-            counted = np.float32(counted + approach.approached(held, max(squares), dt))
+            counted = np.float32(counted + approach.approach_bound(held, max(squares), dt))
             assert (first - apart(x)).max() <= counted + approach.SLACK
 
 
@@ -54,10 +56,10 @@ def test_a_flight_that_counts_no_collisions_flies_as_one_that_does(preset, setti
 def test_a_flock_that_flies_past_without_a_change_of_shape_comes_no_nearer():
     plan = SimpleNamespace(dimensions=2)
     flock = flock_of(np.zeros((2, 5)), np.full((2, 5), 20.0))
-    held = np.zeros(approach.HELD)
-    approach.set_out(held, flock, 5, plan=plan)
-    assert all(approach.beside(i, a, held, flock) == 0.0 for i in range(5) for a in range(2))
-    assert approach.approached(held, 0.0, 0.01) < 1e-6
+    held = np.zeros(approach.HELD_SIZE)
+    approach.start_drift(held, flock, 5, plan=plan)
+    assert all(approach.velocity_beside_drift(i, a, held, flock) == 0.0 for i in range(5) for a in range(2))
+    assert approach.approach_bound(held, 0.0, 0.01) < 1e-6
 
 
 def test_the_least_distance_is_that_of_all_pairs(seed):

@@ -12,7 +12,7 @@ def views(path):
     """The stream behind a view that was written, and what became of it."""
     stream = io.BytesIO(b"0123456789" * 1000)
     try:
-        atomic.write(path, stream.getbuffer())
+        atomic.write_file(path, stream.getbuffer())
     except OSError as fault:
         return stream, fault
     return stream, None

@@ -44,8 +44,8 @@ def test_drones_with_boot_clocks_and_origins_of_their_own_meet(tmp_path):
     ned, speed = motion()
     near, far = (47.0, 19.0, 100.0), (47.009, 19.001, 130.0)
     write_ulog(tmp_path / "a.ulg", TIME, ned, speed, speed, origin=near, utc=1.7e9)
-    there = geodesy.moved(enu(ned), near, far)
-    turned = geodesy.turned(enu(speed), near, far)
+    there = geodesy.points_to_origin(enu(ned), near, far)
+    turned = geodesy.vectors_to_origin(enu(speed), near, far)
     write_ulog(tmp_path / "b.ulg", TIME + 300.0, enu(there), enu(turned), enu(turned), origin=far, utc=1.7e9 - 300.0)
     found = airflock.load_tracks([tmp_path / "a.ulg", tmp_path / "b.ulg"], accept=["down"])
     np.testing.assert_allclose(values(found, who=0), values(found, who=1), atol=1e-3)
@@ -137,7 +137,7 @@ def test_tables_of_px4_with_origins_of_their_own_meet_and_invalid_rows_are_left_
 
     ned, speed = motion()
     near, far = (47.0, 19.0, 100.0), (47.009, 19.001, 130.0)
-    there, turned = geodesy.moved(enu(ned), near, far), geodesy.turned(enu(speed), near, far)
+    there, turned = geodesy.points_to_origin(enu(ned), near, far), geodesy.vectors_to_origin(enu(speed), near, far)
     rows = {"a": (ned, speed, near), "b": (enu(there), enu(turned), far)}
     for name, (place, fast, origin) in rows.items():
         place, valid = place.copy(), (np.arange(300) >= 40).astype(int)

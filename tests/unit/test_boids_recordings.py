@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from airflock.recordings.layout import dataset
-from airflock.recordings.scores import measure
+from airflock.recordings.layout import make_dataset
+from airflock.recordings.scores import measure_recording
 from airflock.support.errors import RecordingError
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
@@ -16,11 +16,11 @@ BY = {"metrics.kind": "zapotecatl", "metrics.max_e": 2.25, "metrics.r_b": 0.05}
 
 def recording(times=3, agents=1, fill=0.3):
     frames = np.full((times, 9, agents), fill)
-    return dataset(frames, 3, 0.1, {}, "acceleration")
+    return make_dataset(frames, 3, 0.1, {}, "acceleration")
 
 
 def test_one_agent_is_in_nobody_s_way():
-    found, course = measure(recording(), BY)
+    found, course = measure_recording(recording(), BY)
     assert found["extension_cm"] == 0.0
     assert found["polarization_deg"] == pytest.approx(0.0, abs=1e-3)
     assert found["f_collision"] == 0.0
@@ -32,13 +32,13 @@ def test_one_agent_is_in_nobody_s_way():
 @pytest.mark.parametrize("settings", [{"agents": 0}, {"times": 0}])
 def test_an_empty_recording_is_refused(settings):
     with pytest.raises(RecordingError, match="position is empty"):
-        measure(recording(**settings), BY)
+        measure_recording(recording(**settings), BY)
 
 
 def test_a_recording_of_nobody_is_refused():
     with pytest.raises(RecordingError, match="no individual is present at any instant"):
-        measure(recording(agents=4, fill=np.nan), BY)
+        measure_recording(recording(agents=4, fill=np.nan), BY)
     holed = recording(agents=4)
     holed["position"][2, 1, 0, 3] = np.inf
     with pytest.raises(RecordingError, match=r"the position of agent_3 at t = 0\.2 s is infinite"):
-        measure(holed, BY)
+        measure_recording(holed, BY)

@@ -5,9 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from inside import Flock, Itself
-from inside import stages_cells as cells
-from inside import stages_words as words
+from inside import Flock, Itself, stages_cells as cells, stages_words as words
 
 HALF = {2: (6.0, 9.0, 0.0), 3: (6.0, 9.0, 4.0)}  # of the periodic box, m
 KINDS = [(dimensions, periodic) for dimensions in (2, 3) for periodic in (False, True)]
@@ -20,7 +18,7 @@ class Sorted:
         rng = np.random.default_rng(seed)
         self.plan = SimpleNamespace(dimensions=dimensions, periodic=periodic)
         half = np.array(HALF[dimensions])
-        self.numbers = SimpleNamespace(w=SimpleNamespace(**dict(zip(words.SIDES, half, strict=True))))
+        self.numbers = SimpleNamespace(w=SimpleNamespace(**dict(zip(words.HALF_SIZES, half, strict=True))))
         self.n, self.half, self.near = n, half[:dimensions], near
         self.states = np.concatenate(
             [rng.uniform(-1, 1, (dimensions, n)) * self.half[:, None], rng.normal(size=(dimensions, n))]
@@ -30,28 +28,30 @@ class Sorted:
         self.heard = np.empty((2 * dimensions, 20 * n))
         heard = dict(zip([*(f"h{a}" for a in axes), *(f"hv{a}" for a in axes)], self.heard, strict=True))
         self.flock = Flock((rows | heard).__getitem__, dimensions, Itself())
-        most = cells.CELLS * n + cells.SPARE
+        most = cells.MAX_CELLS_PER_AGENT * n + cells.SPARE
         self.starts, self.tally = np.zeros(most + 1, int), np.zeros(cells.CHUNKS * most, int)
         self.cell_of, self.whose = np.zeros(n, int), np.zeros(n, int)
         self.packed, self.flat = np.zeros((n, 2 * dimensions)), np.zeros((2 * dimensions, n + words.BLOCK))
-        boxed = cells.box(n, near, cells.CELLS * n, self.flock, self.numbers, self.states, plan=self.plan)
+        boxed = cells.cell_box(
+            n, near, cells.MAX_CELLS_PER_AGENT * n, self.flock, self.numbers, self.states, plan=self.plan
+        )
         self.low = boxed[0]
-        self.sides, self.count = cells.sort(
+        self.sides, self.count = cells.sort_by_cells(
             n, self.flock, self.starts, self.tally, self.cell_of, self.packed, self.flat, self.whose, lambda: boxed,
             plan=self.plan,
         )  # fmt: skip
 
     def around(self, line):
         """States of all who lie around a line of cells at the image they are met at, and where slabs begin."""
-        oy, oz = cells.place_of_line(line, self.count)
-        room = cells.room_around(oy, oz, self.starts, self.count, plan=self.plan)
+        oy, oz = cells.line_position(line, self.count)
+        room = cells.agents_around(oy, oz, self.starts, self.count, plan=self.plan)
         box, who = self.heard[:, : room + 2 * words.BLOCK], np.zeros(room + 2 * words.BLOCK, int)
-        slab, middle, found = cells.copied(
+        slab, middle, found = cells.copied_variables(
             oy, oz, self.starts, self.flat, self.whose, self.whose, box, self.count, self.flock, self.numbers,
             plan=self.plan, carried=((cells.WHO, who),),
         )  # fmt: skip
         assert found <= room
-        cells.filled_up(found, box, box[self.plan.dimensions :], plan=self.plan, carried=((cells.WHO, who),))
+        cells.pad_candidates(found, box, box[self.plan.dimensions :], plan=self.plan, carried=((cells.WHO, who),))
         return (oy, oz), box, who, slab, middle, found
 
 
@@ -60,7 +60,7 @@ def test_everybody_lies_once_in_the_own_cell_and_cells_are_wide_enough(dimension
     flock = Sorted(seed, dimensions, periodic)
     assert (flock.sides[:dimensions] >= flock.near).all() and np.prod(
         flock.count
-    ) <= cells.CELLS * flock.n + cells.SPARE
+    ) <= cells.MAX_CELLS_PER_AGENT * flock.n + cells.SPARE
     assert sorted(flock.whose) == list(range(flock.n))
     np.testing.assert_array_equal(flock.packed, flock.states[:, flock.whose].T)
     np.testing.assert_array_equal(flock.flat[:, : flock.n], flock.packed.T)

@@ -9,24 +9,24 @@ import pytest
 import tomlkit
 from typer.testing import CliRunner
 
-from airflock.certificates.bounds import look, per_hour
-from airflock.certificates.campaign import FOLDER, Campaign
-from airflock.certificates.certificate import NOT_SAID, digest, sealed
-from airflock.certificates.check import check
-from airflock.certificates.environment import sound_keys, usual_keys
-from airflock.certificates.flyer import Flyer
-from airflock.certificates.limit import read, read_all
-from airflock.certificates.run import certify, run
-from airflock.certificates.seeds import COUNT, identity, seed
-from airflock.certificates.tolerance import Screen, batch_of
+from airflock.certificates.bounds import rate_per_hour, take_look
+from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
+from airflock.certificates.certificate import NOT_SAID, scores_digest, with_checksum
+from airflock.certificates.check import check_certificate
+from airflock.certificates.environment import check_environment_keys, used_and_unused_keys
+from airflock.certificates.flyer import CampaignFlyer
+from airflock.certificates.limit import parse_limit, parse_limits
+from airflock.certificates.run import certify, run_campaign
+from airflock.certificates.seeds import COUNT_PURPOSE, certificate_seed, scenario_identity
+from airflock.certificates.tolerance import ValueScreen, value_batch
 from airflock.cli.main import app
 from airflock.engine import score_flights
-from airflock.runs.executors import Landed
-from airflock.runs.executors.in_process import InProcess
+from airflock.runs.executors import FlightResult
+from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.folder import Interrupted, open_folder
 from airflock.runs.space import with_parameters
 from airflock.scenarios.files import load
-from airflock.scenarios.making import make
+from airflock.scenarios.making import build_scenario
 from airflock.support.errors import AirflockError, ScenarioError, StudyError
 
 LIMIT = "r_min<1 at 2%"
@@ -34,7 +34,7 @@ LIMIT = "r_min<1 at 2%"
 
 def campaign(*limits, **how):
     scenario = load("vasarhelyi_2018/real_6ms")
-    return Campaign(scenario, read_all(list(limits or (LIMIT,)), scenario), **how)
+    return Campaign(scenario, parse_limits(list(limits or (LIMIT,)), scenario), **how)
 
 
 def dice(p):
@@ -50,10 +50,10 @@ def dice(p):
 
 
 def flown(asked, folder, p, *, budget=60.0, resume=False, score=None, **how):
-    open_folder(folder, asked, resume=resume, kind=FOLDER)
-    executor = InProcess(score or dice(p), 2)
+    open_folder(folder, asked, resume=resume, kind=CAMPAIGN_KIND)
+    executor = ThreadExecutor(score or dice(p), 2)
     try:
-        return run(asked, folder, executor, budget, **how)
+        return run_campaign(asked, folder, executor, budget, **how)
     finally:
         executor.close()
 
@@ -63,7 +63,7 @@ def test_a_rare_event_is_shown_a_frequent_one_refuted_and_one_at_the_limit_stays
     assert shown.shown and shown.verdicts[0].events == 0
     assert len(shown.rows) == math.ceil(math.log(0.025) / math.log(0.98)) and shown.verdicts[0].high <= 0.02
     refuted = flown(campaign(), tmp_path / "b", 0.3)
-    assert refuted.verdicts[0].refuted and not refuted.shown and len(refuted.rows) < len(shown.rows)
+    assert refuted.verdicts[0].is_refuted and not refuted.shown and len(refuted.rows) < len(shown.rows)
     assert "refuted: r_min<1 happens at least" in refuted.statements[0]
 
 
@@ -74,7 +74,7 @@ def test_several_limits_share_what_may_go_wrong(tmp_path):
 
 def test_a_limit_that_no_budget_can_show_is_told_with_its_price(tmp_path):
     found = flown(campaign("r_min<1 at 1e-9/h"), tmp_path / "a", 0.0, budget=0.5)
-    assert not found.shown and found.verdicts[0].needs > 2e10
+    assert not found.shown and found.verdicts[0].flights_to_show > 2e10
     assert "needs 22,133," in found.statements[0] and "on this machine; the given time can show" in found.statements[0]
 
 
@@ -82,7 +82,7 @@ def test_rates_are_per_flock_hour_and_drone_hour():
     one, other = campaign("r_min<1 at 0.3/h"), campaign("r_min<1 at 0.01/drone-h")
     p = one.probability(one.limits[0])
     assert p == pytest.approx(1.0 - math.exp(-0.3 / 6.0)) == other.probability(other.limits[0])
-    assert per_hour(p, one.hours) == pytest.approx(0.3) == 30 * other.in_own_unit(other.limits[0], p)
+    assert rate_per_hour(p, one.flight_hours) == pytest.approx(0.3) == 30 * other.to_limit_unit(other.limits[0], p)
 
 
 def test_what_was_interrupted_ends_as_if_it_had_not_been(tmp_path):
@@ -109,7 +109,7 @@ def test_flights_of_a_folder_that_does_not_stay_are_not_said_to_be_kept(tmp_path
         raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match=r"interrupted: 0 flights are not kept; with --out .* they are"):
-        flown(campaign(), tmp_path / "a", 0.0, score=stopped, kept=False)
+        flown(campaign(), tmp_path / "a", 0.0, score=stopped, is_stored=False)
 
 
 def test_a_folder_of_another_campaign_is_refused(tmp_path):
@@ -122,7 +122,7 @@ def test_a_folder_of_another_campaign_is_refused(tmp_path):
 
 def test_a_flight_that_fails_is_no_flight_that_went_well(tmp_path):
     asked = campaign()
-    bad = seed(asked.hash, COUNT, 30)
+    bad = certificate_seed(asked.hash, COUNT_PURPOSE, 30)
 
     def score(parameters, own):
         if own == bad:
@@ -137,9 +137,9 @@ def test_a_flight_that_fails_is_no_flight_that_went_well(tmp_path):
 def test_a_number_that_the_scenario_does_not_have_has_no_tolerance():
     exact = load("vasarhelyi_2018/4ms", {"sensors.kind": "perfect"})
     with pytest.raises(ScenarioError, match=r"sensors\.sd is not a number of this scenario; known: radio\.delay"):
-        sound_keys(exact, ["sensors.sd"])
+        check_environment_keys(exact, ["sensors.sd"])
     with pytest.raises(ScenarioError, match=r"topology\.k is not a number of the environment; known: radio\.delay"):
-        sound_keys(exact, ["topology.k"])
+        check_environment_keys(exact, ["topology.k"])
 
 
 def test_the_tolerance_of_a_number_is_found_between_two_values(tmp_path):
@@ -164,7 +164,7 @@ def test_what_is_zero_is_moved_up_and_how_often_faults_strike_is_a_number_of_the
     """Events begin at gusts of 3 m/s, and where the second fault strikes 5 times as often."""
     faults = [{"kind": "motor", "at": 5.0, "number": 2}, {"kind": "stuck", "per_hour": 2.0, "lasts": 9.0}]
     scenario = load("vasarhelyi_2018/real_6ms", {"faults": faults})
-    keys = usual_keys(scenario)
+    keys = used_and_unused_keys(scenario)
     assert {"wind.gust", "radio.loss", "faults[0].number", "faults[1].per_hour"} <= set(keys)
     assert "wind.at_6m" not in keys and keys[-2:] == ("radio.loss", "wind.gust")  # whose drivers must be compiled
 
@@ -172,7 +172,7 @@ def test_what_is_zero_is_moved_up_and_how_often_faults_strike_is_a_number_of_the
         near = values.get("wind.gust", 0.0) > 3.0 or values.get("faults[1].per_hour", 0.0) > 10.0
         return {"r_min": 0.5 if near else 5.0} | ({"closest": 0.4, "first": [9.0]} if near else {})
 
-    asked = Campaign(scenario, read_all([LIMIT], scenario))
+    asked = Campaign(scenario, parse_limits([LIMIT], scenario))
     keys = ("wind.gust", "faults[1].per_hour", "faults[0].number")
     gust, often, many = flown(asked, tmp_path / "a", 0.0, keys=keys, score=score).tolerance["axis"]
     assert gust["nominal"] == 0.0 and 2.8 <= gust["safe"] <= 3.0 < gust["not_shown"] <= 3.1 and "factor" not in gust
@@ -188,16 +188,16 @@ def test_each_number_has_its_share_of_the_time_that_is_left_and_compiling_takes_
     class Executor:
         def fly(self, flights):
             now[0] += 30.0  # a driver is compiled
-            yield Landed(flights[0], {"r_min": 5.0})
+            yield FlightResult(flights[0], {"r_min": 5.0})
 
     class Kept:
         flown = staticmethod(lambda _: {})
         land = staticmethod(lambda *_: None)
 
-    screen = Screen(Flyer(campaign(), Kept(), Executor(), until=80.0), 0.02)
+    screen = ValueScreen(CampaignFlyer(campaign(), Kept(), Executor(), until=80.0), 0.02)
     screen.share_time(4)
     assert screen.flyer.left == 20.0
-    screen.begin(batch_of("tolerance", {"wind.gust": 1.0}), {"wind.gust": 1.0})
+    screen.begin(value_batch("tolerance", {"wind.gust": 1.0}), {"wind.gust": 1.0})
     assert screen.flyer.left == 20.0 and now == [30.0]
     now[0] += 5.0
     screen.share_time(3)
@@ -230,16 +230,16 @@ def test_a_map_says_which_cells_are_safe_and_bounds_each(tmp_path):
 def test_numbers_that_are_not_sure_are_drawn_by_each_seed(tmp_path):
     document = dict(load("vasarhelyi_2018/real_6ms").document)
     document["radio"] = {**document["radio"], "delay": {"value": 1.0, "unit": "s", "interval": [0.8, 1.4]}}
-    scenario = make(document, "mine")
-    asked = Campaign(scenario, read_all([LIMIT], scenario), uncertain=True)
+    scenario = build_scenario(document, "mine")
+    asked = Campaign(scenario, parse_limits([LIMIT], scenario), flies_intervals=True)
     drawn = [asked.parameters(s)["radio.delay"] for s in range(500)]
     assert 0.8 <= min(drawn) < 0.82 and 1.38 < max(drawn) <= 1.4 and asked.parameters(7) == asked.parameters(7)
     assert type(drawn[0]) is float  # the line that replays a flight has it after --set, where np.float64(1.1) is a text
-    said = flown(asked, tmp_path / "a", 0.0).not_said
+    said = flown(asked, tmp_path / "a", 0.0).disclaimers
     assert any(
         "radio.delay anywhere in the given intervals, but not numbers that are wrong in it" in text for text in said
     )
-    assert flown(campaign(), tmp_path / "b", 0.0).not_said == list(NOT_SAID)
+    assert flown(campaign(), tmp_path / "b", 0.0).disclaimers == list(NOT_SAID)
     with pytest.raises(ScenarioError, match="no number has an interval"):
         certify("vasarhelyi_2018/real_6ms", LIMIT, uncertain=True)
 
@@ -268,11 +268,15 @@ def test_a_certificate_holds_all_that_it_takes_to_check_it(written, tmp_path):
     found, path = written
     copy = tmp_path / "alone.toml"
     copy.write_bytes(path.read_bytes())
-    again = check(copy)
+    again = check_certificate(copy)
     assert again.same and again.flown == 24 and found.check().same
     document = tomllib.loads(path.read_text())
-    assert document["shown"] == found.shown and document["flights"]["identity"] == identity(found.campaign.scenario)
-    assert identity(load(path.parent / "flights" / "scenario.toml")) == identity(found.campaign.scenario)
+    assert document["shown"] == found.shown and document["flights"]["identity"] == scenario_identity(
+        found.campaign.scenario
+    )
+    assert scenario_identity(load(path.parent / "flights" / "scenario.toml")) == scenario_identity(
+        found.campaign.scenario
+    )
     assert found.worst[0]["value"] == min(row.get("closest", row["r_min"]) for row in found.rows)
     assert "yes" in found._repr_html_() and "Certificate of" in repr(found)
 
@@ -280,7 +284,7 @@ def test_a_certificate_holds_all_that_it_takes_to_check_it(written, tmp_path):
 def lucky(limit, flights):
     """Counting that stopped where it looked best, its bound computed as if that had been fixed beforehand."""
     only = limit["looks"][0]
-    found = look(flights, 0, only["above"], only["below"])
+    found = take_look(flights, 0, only["above"], only["below"])
     only.update(flights=flights, events=0, low=found.low, high=found.high)
     limit.update(flights=flights, events=0, low=found.low, high=found.high, shown=True)
 
@@ -300,8 +304,8 @@ def test_what_is_changed_and_sealed_again_is_still_found(written, tmp_path, chan
     del document["seal"]
     change(document)
     path = tmp_path / "c.toml"
-    path.write_text(tomlkit.dumps(sealed(document)))
-    (fault,) = check(path).faults
+    path.write_text(tomlkit.dumps(with_checksum(document)))
+    (fault,) = check_certificate(path).faults
     assert re.search(told, fault)
 
 
@@ -322,11 +326,11 @@ def test_a_certificate_of_another_scenario_version_or_format_is_refused(written,
             changed = text.replace("agents = 3", "agents = 4")
         path.write_text(changed)
         with pytest.raises(StudyError, match=told):
-            check(path)
+            check_certificate(path)
 
 
 def test_a_digest_tells_nan_and_null_apart_from_numbers_but_not_from_each_other():
-    assert digest({"a": math.nan}) == digest({"a": None}) != digest({"a": 0.0})
+    assert scores_digest({"a": math.nan}) == scores_digest({"a": None}) != scores_digest({"a": 0.0})
 
 
 @pytest.mark.parametrize(
@@ -342,7 +346,7 @@ def test_a_digest_tells_nan_and_null_apart_from_numbers_but_not_from_each_other(
     ],
 )
 def test_limits_are_read(text, event, probability):
-    limit = read(text, load("vasarhelyi_2018/real_6ms"))
+    limit = parse_limit(text, load("vasarhelyi_2018/real_6ms"))
     found = limit.probability(1.0 / 6.0, 30)
     assert limit.event == event and (found is None if probability is None else found == pytest.approx(probability))
 
@@ -369,7 +373,7 @@ def test_all_faults_are_told_at_once_before_anything_flies(tmp_path):
 def test_limits_that_say_nothing_or_can_never_be_shown_are_refused(rate, said):
     """The first was called shown, by no flight at all; the second ended in an overflow."""
     with pytest.raises(ScenarioError, match=rf"limit 'r_min<1 at {rate}': allows the event in \S+ of flights: {said}"):
-        read(f"r_min<1 at {rate}", load("vasarhelyi_2018/real_6ms"))
+        parse_limit(f"r_min<1 at {rate}", load("vasarhelyi_2018/real_6ms"))
 
 
 def test_distances_are_not_certified_beside_collisions_that_are_looked_for_less_often():
@@ -379,8 +383,8 @@ def test_distances_are_not_certified_beside_collisions_that_are_looked_for_less_
     with pytest.raises(
         ScenarioError, match="n_coll is measured every metrics.collision_period = 1 s, and r_min at every"
     ):
-        read_all(both, seldom)
-    assert len(read_all(both, load("vasarhelyi_2018/real_6ms"))) == 2 and len(read_all(both[:1], seldom)) == 1
+        parse_limits(both, seldom)
+    assert len(parse_limits(both, load("vasarhelyi_2018/real_6ms"))) == 2 and len(parse_limits(both[:1], seldom)) == 1
 
 
 @pytest.mark.parametrize(("limit", "status"), [("r_min<0.001 at 50%", 0), ("r_min<100 at 10%", 1)])

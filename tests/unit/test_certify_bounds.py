@@ -5,15 +5,21 @@ from itertools import takewhile
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.stats import binomtest
 
 from airflock.certificates import seeds
-from airflock.certificates.bounds import look, lower_bound, needed, per_flight, per_hour, schedule
-from airflock.certificates.hazard import hazard
-from airflock.recordings.rare import upper_bound
-from airflock.scenarios.change import remade
+from airflock.certificates.bounds import (
+    flights_needed,
+    look_schedule,
+    lower_bound,
+    probability_per_flight,
+    rate_per_hour,
+    take_look,
+)
+from airflock.certificates.hazard import event_timing
+from airflock.recordings.rare import upper_probability_bound
+from airflock.scenarios.change import rebuilt
 from airflock.scenarios.files import load
 from airflock.search.study import load_study
 
@@ -22,28 +28,28 @@ from airflock.search.study import load_study
 def test_bounds_are_those_of_clopper_and_pearson(counts, confidence):
     k, n = counts
     above, below = (binomtest(k, n, alternative=side).proportion_ci(confidence) for side in ("less", "greater"))
-    assert upper_bound(k, n, confidence) == pytest.approx(above.high, rel=1e-9)
+    assert upper_probability_bound(k, n, confidence) == pytest.approx(above.high, rel=1e-9)
     assert lower_bound(k, n, confidence) == pytest.approx(below.low, rel=1e-9, abs=1e-12)
 
 
 @given(st.floats(1e-6, 0.5), st.floats(1e-4, 0.2))
 def test_the_first_upper_bound_shows_a_limit_with_no_flight_to_spare(limit, alpha):
-    n = needed(limit, alpha)
-    assert upper_bound(0, n, 1.0 - alpha) <= limit * (1.0 + 1e-9)
-    assert n == 1 or upper_bound(0, n - 1, 1.0 - alpha) > limit * (1.0 - 1e-9)
+    n = flights_needed(limit, alpha)
+    assert upper_probability_bound(0, n, 1.0 - alpha) <= limit * (1.0 + 1e-9)
+    assert n == 1 or upper_probability_bound(0, n - 1, 1.0 - alpha) > limit * (1.0 - 1e-9)
 
 
 @given(st.floats(1e-6, 0.4), st.floats(1e-3, 0.2))
 def test_looks_grow_and_never_pay_more_than_there_is(limit, alpha):
-    looks = [due for due, _ in zip(schedule(limit, alpha), range(60), strict=False)]
+    looks = [due for due, _ in zip(look_schedule(limit, alpha), range(60), strict=False)]
     assert all(a[0] < b[0] for a, b in zip(looks, looks[1:], strict=False))
     assert sum(above for _, above, _ in looks) <= alpha and sum(below for _, _, below in looks) <= alpha
 
 
 def outcomes(rng, truth, limit, alpha, flocks, most):
     """(shown, refuted) of many campaigns of up to `most` flights whose events have the probability `truth`."""
-    looks = list(takewhile(lambda due: due[0] <= most, schedule(limit, alpha)))
-    found = cache(look)
+    looks = list(takewhile(lambda due: due[0] <= most, look_schedule(limit, alpha)))
+    found = cache(take_look)
     sizes = np.diff([0, *(size for size, _, _ in looks)])
     events = rng.binomial(sizes, truth, (flocks, len(looks))).cumsum(axis=1)
     shown = refuted = 0
@@ -67,16 +73,16 @@ def test_what_is_false_is_shown_no_more_often_than_promised_over_all_looks(limit
 
 @given(st.floats(1e-9, 0.999), st.floats(1e-3, 10.0))
 def test_a_rate_and_a_probability_per_flight_are_one_another(p, hours):
-    assert per_flight(per_hour(p, hours), hours) == pytest.approx(p, rel=1e-9)
+    assert probability_per_flight(rate_per_hour(p, hours), hours) == pytest.approx(p, rel=1e-9)
 
 
 def test_events_of_an_even_rate_are_even_and_those_of_a_bad_start_are_not(seed):
     rng = np.random.default_rng(seed)
     times = rng.exponential(900.0, 4000)
-    even = hazard([t for t in times if t < 600.0], 4000, 600.0)
+    even = event_timing([t for t in times if t < 600.0], 4000, 600.0)
     assert even.chance > 1e-4 and even.expected == pytest.approx(1.0 / (1.0 + np.exp(-300.0 / 900.0)), rel=0.02)
-    assert hazard(list(rng.uniform(0.0, 200.0, 100)), 4000, 600.0).verdict == "uneven"
-    assert hazard([1.0] * 9, 4000, 600.0).verdict == "too few events to say"
+    assert event_timing(list(rng.uniform(0.0, 200.0, 100)), 4000, 600.0).verdict == "uneven"
+    assert event_timing([1.0] * 9, 4000, 600.0).verdict == "too few events to say"
 
 
 def test_seeds_of_search_choice_and_certification_never_meet():
@@ -84,14 +90,14 @@ def test_seeds_of_search_choice_and_certification_never_meet():
     study = load_study("vasarhelyi_2018/6ms", search={"seed": 2**20})
     largest = study.seed(15, 2**36 - 1)
     assert 2**40 <= load_study("vasarhelyi_2018/6ms").seed(0, 0) < largest < seeds.FIRST
-    parts = (seeds.COUNT, seeds.TOLERANCE, seeds.SPLIT, seeds.MAP)
-    ends = [seeds.seed("f" * 64, part, number) for part in parts for number in (0, 2**30 - 1)]
-    assert ends == sorted(set(ends)) and ends[-1] < 2**63 and seeds.seed("0" * 64, 0, 0) == seeds.FIRST
+    parts = (seeds.COUNT_PURPOSE, seeds.TOLERANCE_PURPOSE, seeds.SPLIT_PURPOSE, seeds.MAP_PURPOSE)
+    ends = [seeds.certificate_seed("f" * 64, part, number) for part in parts for number in (0, 2**30 - 1)]
+    assert ends == sorted(set(ends)) and ends[-1] < 2**63 and seeds.certificate_seed("0" * 64, 0, 0) == seeds.FIRST
 
 
 def test_a_scenario_fixes_its_seeds_by_what_decides_a_flight_and_by_nothing_else():
     scenario = load("vasarhelyi_2018/4ms")
-    one = seeds.identity(scenario)
-    assert one == seeds.identity(remade(scenario, {"title": "lucky", "metrics.r_coll": 1.0}))
+    one = seeds.scenario_identity(scenario)
+    assert one == seeds.scenario_identity(rebuilt(scenario, {"title": "lucky", "metrics.r_coll": 1.0}))
     others = [{"model.p_rep": 0.2}, {"agents": 99}, {"radio.delay": 0.5}, {"world.side": 200.0}]
-    assert len({one, *(seeds.identity(remade(scenario, other)) for other in others)}) == 5
+    assert len({one, *(seeds.scenario_identity(rebuilt(scenario, other)) for other in others)}) == 5

@@ -205,10 +205,10 @@ def test_interrupt_ends_with_one_line_and_status_2():
 
 
 def test_a_time_flown_may_carry_its_unit():
-    from airflock.cli.options import settings
+    from airflock.cli.options import parse_settings
 
-    assert settings(None, None, "600") == {"duration": 600.0}
-    assert airflock.load("vasarhelyi_2018/4ms", settings(None, 4, "2min")).flight.duration == 120.0
+    assert parse_settings(None, None, "600") == {"duration": 600.0}
+    assert airflock.load("vasarhelyi_2018/4ms", parse_settings(None, 4, "2min")).flight.duration == 120.0
     assert "--duration 2m: write a time" in called("run", "vasarhelyi_2018/4ms", "--duration", "2m").stderr
 
 

@@ -4,7 +4,7 @@ import threading
 import time
 
 from airflock.engine import compile_events
-from airflock.engine.compile_events import COMPILING, told_if_long
+from airflock.engine.compile_events import COMPILING, message_if_slow
 
 
 def sit_down(monkeypatch):
@@ -14,7 +14,7 @@ def sit_down(monkeypatch):
 
 
 def waited(seconds):
-    with told_if_long():
+    with message_if_slow():
         time.sleep(seconds)
 
 

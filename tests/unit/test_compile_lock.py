@@ -31,9 +31,9 @@ print(json.dumps([sum(driver.advance.stats.cache_hits.values()), sum(driver.adva
 HELD = """
 import sys, time
 from pathlib import Path
-from airflock.engine.compile_lock import alone
+from airflock.engine.compile_lock import folder_lock
 
-with alone(Path(sys.argv[1])) as held:
+with folder_lock(Path(sys.argv[1])) as held:
     print(held, flush=True)
     time.sleep(600.0)
 """
@@ -56,11 +56,11 @@ def test_of_two_processes_one_compiles_and_the_other_loads(tmp_path):
 def test_a_process_that_was_killed_holds_no_lock(tmp_path):
     process = subprocess.Popen([sys.executable, "-c", HELD, str(tmp_path)], text=True, stdout=-1)
     assert process.stdout.readline() == "True\n"
-    with alone(tmp_path, patience=0.0) as held:
+    with alone(tmp_path, timeout=0.0) as held:
         assert not held
     process.send_signal(signal.SIGKILL)
     process.wait()
-    with alone(tmp_path, patience=0.0) as held:
+    with alone(tmp_path, timeout=0.0) as held:
         assert held
 
 

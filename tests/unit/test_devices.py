@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock.engine import picked, plan_of, score_flights
+from airflock.engine import pick_device, plan_of, score_flights
 from airflock.scenarios import cost
 from airflock.scenarios.files import load
 from airflock.support import gpu as gpu
@@ -21,34 +21,34 @@ SMALL = scenario(agents=3, duration=0.2, world__side=60.0, world__walls="nearest
 
 @pytest.fixture
 def present(monkeypatch):
-    monkeypatch.setattr(gpu, "trouble", lambda: None)
-    monkeypatch.setattr(gpu, "runtime", lambda: runtime(free=140e9))
+    monkeypatch.setattr(gpu, "unavailable_reason", lambda: None)
+    monkeypatch.setattr(gpu, "cuda_runtime", lambda: runtime(free=140e9))
 
 
 @pytest.fixture
 def absent(monkeypatch):
-    monkeypatch.setattr(gpu, "trouble", lambda: "no driver")
+    monkeypatch.setattr(gpu, "unavailable_reason", lambda: "no driver")
 
 
 def test_unknown_devices_are_refused():
     with pytest.raises(ScenarioError, match="'gpu' is none of auto, cpu, cuda, python"):
-        picked([SMALL], "gpu")
+        pick_device([SMALL], "gpu")
 
 
 def test_a_missing_gpu_is_an_error_where_it_is_named_and_a_note_where_not(absent):
     with pytest.raises(DeviceError, match="device = cuda: no driver; choose device = cpu or auto"):
         score_flights([SMALL], [0], device="cuda")
     said = []
-    assert picked([SMALL], "auto", say=said.append) == "cpu"
+    assert pick_device([SMALL], "auto", notify=said.append) == "cpu"
     assert said == ["device auto: cpu, no driver"]
 
 
 def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypatch):
     monkeypatch.setattr("airflock.engine.devices.cores", lambda: 2)
     said = []
-    assert picked([SMALL], "auto", say=said.append) == "cpu"
+    assert pick_device([SMALL], "auto", notify=said.append) == "cpu"
     many = scenario(agents=100, duration=600.0)
-    assert picked([many] * 1000, "auto", say=said.append) == "cuda"
+    assert pick_device([many] * 1000, "auto", notify=said.append) == "cuda"
     assert "s of work" in said[0]
     assert said[1].startswith("device auto: cuda")
 
@@ -56,36 +56,36 @@ def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypat
 def test_auto_leaves_to_many_cores_what_one_thread_of_a_gpu_would_solve(present, monkeypatch):
     many, said = [load("dimock_2003/physical")] * 10_000, []
     monkeypatch.setattr("airflock.engine.devices.cores", lambda: 16)
-    assert picked(many, "auto", say=said.append) == "cpu"
+    assert pick_device(many, "auto", notify=said.append) == "cpu"
     assert said == ["device auto: cpu, about 19 s of work on 16 cores, where the GPU would take 1.1e+02 s"]
     monkeypatch.setattr("airflock.engine.devices.cores", lambda: 1)
-    assert picked(many, "auto") == "cuda"
+    assert pick_device(many, "auto") == "cuda"
 
 
 def test_one_long_flight_is_no_work_for_a_gpu(present, monkeypatch):
     monkeypatch.setattr("airflock.engine.devices.cores", lambda: 1)
     long = load("zapotecatl_2016/best", {"duration": 2e4})
-    assert cost.seconds_of(long) > 50.0
-    assert picked([long], "auto") == "cpu"
-    assert picked([long] * 1000, "auto") == "cuda"
+    assert cost.estimated_seconds(long) > 50.0
+    assert pick_device([long], "auto") == "cpu"
+    assert pick_device([long] * 1000, "auto") == "cuda"
 
 
 def test_a_big_flock_has_all_of_a_gpu_to_itself(present, monkeypatch):
     monkeypatch.setattr("airflock.engine.devices.cores", lambda: 16)
     keys = {"agents": 100_000, "world.edges": "periodic", "world.arena": "square", "world.side": 46.0,
             "world.height": 46.0, "start.separation": 0.0, "metrics.kind": "order", "dt": 0.02}  # fmt: skip
-    assert picked([load("zapotecatl_2016/literal", {**keys, "duration": 400.0})], "auto") == "cuda"
+    assert pick_device([load("zapotecatl_2016/literal", {**keys, "duration": 400.0})], "auto") == "cuda"
 
 
 def test_work_grows_with_flights_agents_and_time():
-    base = cost.seconds_of(scenario(agents=100, duration=100.0))
-    assert cost.seconds_of(scenario(agents=100, duration=200.0)) == pytest.approx(2.0 * base, rel=0.02)
-    assert cost.seconds_of(scenario(agents=200, duration=100.0)) > 2.5 * base
+    base = cost.estimated_seconds(scenario(agents=100, duration=100.0))
+    assert cost.estimated_seconds(scenario(agents=100, duration=200.0)) == pytest.approx(2.0 * base, rel=0.02)
+    assert cost.estimated_seconds(scenario(agents=200, duration=100.0)) > 2.5 * base
 
 
 def test_the_cpu_is_never_asked_about_a_gpu(monkeypatch):
-    monkeypatch.setattr(gpu, "trouble", lambda: pytest.fail("asked"))
-    assert picked([SMALL], "cpu") == "cpu"
+    monkeypatch.setattr(gpu, "unavailable_reason", lambda: pytest.fail("asked"))
+    assert pick_device([SMALL], "cpu") == "cpu"
 
 
 def test_plain_python_scores_like_the_compiled_flight(seed):
@@ -116,8 +116,7 @@ def test_every_flock_fits_on_the_threads_of_its_block(agents, flocks):
 @pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "kidger/city", "zapotecatl_2016/best", "dimock_2003/physical"])
 def test_all_rules_of_a_kernel_are_the_rules_of_the_cpu(name):
     """No rule is written twice: every rule and record of a CPU driver stands in the kernel with the same text."""
-    from inside import driver_stages as stages
-    from inside import kernel_text as kernel
+    from inside import driver_stages as stages, kernel_text as kernel
 
     plan = plan_of(load(name), grid=False)
     rules = [block for block in stages(plan).source.blocks if "def " in block]
@@ -140,7 +139,7 @@ def test_the_step_at_which_a_closed_flight_left_the_finite_numbers_is_found(wron
 
     monkeypatch.setattr(simulate.devices, "fly_one", fly_one)
     with pytest.raises(FlightError, match=f"agent 1 left the finite numbers at step {wrong} "):
-        simulate.checked(SMALL, 0, fly_one(SMALL), "cuda")
+        simulate.check_result(SMALL, 0, fly_one(SMALL), "cuda")
     assert steps == 20
     assert len(flown) <= 1 + 5  # by halves
 

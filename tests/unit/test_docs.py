@@ -82,7 +82,7 @@ def test_every_model_has_its_equations_beside_functions_that_exist():
 
 def test_every_order_parameter_has_formula_and_range():
     known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
-    assert set(known) == {name for found in registry.SETS.values() for name in registry.reports(found)}
+    assert set(known) == {name for found in registry.SETS.values() for name in registry.reported_values(found)}
     assert all(entry["formula"] and entry["range"] for entry in known.values())
 
 
@@ -92,7 +92,7 @@ def test_every_order_parameter_is_shown_by_two_flocks_that_differ_in_it(monkeypa
     from pictures import LOW_AND_HIGH, OF_MODEL, pairs
 
     found = pairs()
-    assert set(found) == {name for kind in registry.SETS.values() for name in registry.reports(kind)}
+    assert set(found) == {name for kind in registry.SETS.values() for name in registry.reported_values(kind)}
     assert set(OF_MODEL) == set(MODELS)
     assert all((DOCS / "gallery" / f"{example}.py").is_file() for example in OF_MODEL.values())
     source = (DOCS / "gallery" / f"{LOW_AND_HIGH[0]}.py").read_text(encoding="utf-8")

@@ -13,12 +13,12 @@ from airflock.recordings.exports import movement, tables
 def recording():
     """Five agents with the layout of a flight; one is absent for a while."""
     generator = np.random.default_rng(7)
-    from airflock.recordings.layout import dataset
+    from airflock.recordings.layout import make_dataset
 
     time = np.arange(200) * 0.1
     phase = generator.uniform(0, 6, 5)[None, :] + 0.4 * time[:, None]
     place, speed = 12 * np.stack([np.sin(phase), np.cos(phase)], 1), 4.8 * np.stack([np.cos(phase), -np.sin(phase)], 1)
-    found = dataset(np.concatenate([place, speed, 1.1 * speed], 1).astype(np.float32), 2, 0.1, {}, "velocity")
+    found = make_dataset(np.concatenate([place, speed, 1.1 * speed], 1).astype(np.float32), 2, 0.1, {}, "velocity")
     for name in ("position", "velocity", "command"):
         found[name][{"time": slice(50, 90), "individual": 2}] = np.nan
     return found
@@ -53,14 +53,14 @@ def test_what_is_commanded_is_no_velocity_because_it_was_a_table(recording, tmp_
 
 @pytest.mark.parametrize("space", [2, 3])
 def test_a_table_like_a_log_of_px4_comes_back_by_its_axes(recording, tmp_path, space):
-    from airflock.recordings.layout import dataset
+    from airflock.recordings.layout import make_dataset
 
     flat = np.concatenate([recording[name].values[:, :, 0] for name in ("position", "velocity", "command")], axis=1)
     climb = np.linspace(20.0, 30.0, 200)[:, None, None] + 0.0 * flat[:, :1]
     rise = np.full_like(climb, 10.0 / 19.9)
     tall = np.concatenate([flat[:, :2], climb, flat[:, 2:4], rise, flat[:, 4:], 0.0 * rise], axis=1)
     tall[50:90, :, 2] = np.nan
-    given = dataset(tall if space == 3 else flat, space, 0.1, {}, "velocity")
+    given = make_dataset(tall if space == 3 else flat, space, 0.1, {}, "velocity")
     path = airflock.export(given, tmp_path / "log.csv", layout="px4")
     table = pd.read_csv(path)
     first = given["position"].values[0, :, 0, 0]
@@ -76,7 +76,7 @@ def test_a_table_like_a_log_of_px4_comes_back_by_its_axes(recording, tmp_path, s
 
 @pytest.mark.parametrize("old", [False, True])
 def test_both_layouts_of_movement_come_back(recording, tmp_path, old):
-    path = movement.write_movement(recording, tmp_path / "tracks.nc", old=old)
+    path = movement.write_movement(recording, tmp_path / "tracks.nc", plural_dimensions=old)
     with xr.open_dataset(path, engine="h5netcdf") as opened:
         assert ("individuals" in opened.dims) == old and opened.attrs["ds_type"] == "poses"
     back = airflock.load_tracks(path)

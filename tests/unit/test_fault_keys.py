@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import fly
+from airflock.engine import fly_world
 from airflock.scenarios.files import load
 from airflock.support.errors import ScenarioError
 
@@ -20,7 +20,7 @@ def flock(settings=None, faults=(WEAK, DEAF)):
 
 
 def frames(scenario, seed):
-    return fly(scenario, seed, record=True, device="python").frames
+    return fly_world(scenario, seed, record=True, device="python").frames
 
 
 def lines_of(settings=None, faults=(WEAK, DEAF)):

@@ -11,14 +11,14 @@ import pytest
 from shapely.geometry import Polygon
 
 import airflock
-from airflock.recordings.flown_scenario import scenario_of
+from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.scenarios import geometry
 from airflock.scenarios.files import load
-from airflock.scenarios.making import make
-from airflock.support.coordinates import Site
+from airflock.scenarios.making import build_scenario
+from airflock.support.coordinates import FlightSite
 from airflock.support.errors import ScenarioError
-from airflock.support.untrusted import TextError, xml
-from airflock.world.scenes.outlines import ground_of
+from airflock.support.untrusted import TextError, parse_xml
+from airflock.world.scenes.outlines import load_field
 
 FIELDS = Path(__file__).parents[1] / "fields"
 FEW = {"agents": 4, "start.separation": 4.0, "duration": 1.0}
@@ -43,15 +43,15 @@ def faults_of(path, **settings):
 
 
 def test_a_field_in_an_l_with_a_pond_and_a_crane():
-    found = ground_of(FIELDS / "field.geojson", space=True)
-    keys, site = found.keys, Site(*found.origin, 0.0)
+    found = load_field(FIELDS / "field.geojson", space=True)
+    keys, site = found.keys, FlightSite(*found.origin, 0.0)
     assert found.origin == (47.4715, 19.062)
     assert len(keys["corners"]) == 6 and len(keys["obstacles"]) == 2
     assert (keys["floor"], keys["ceiling"]) == (5.0, 80.0) and keys["heights"] == [[-1e5, 1e5], [-1e5, 30.0]]
     for (x, y), (longitude, latitude) in zip(
         keys["corners"], [(19.06, 47.47), (19.064, 47.47), (19.064, 47.4715)], strict=False
     ):
-        back = site.geodetic(x, y, 0.0)
+        back = site.to_geodetic(x, y, 0.0)
         assert (back.latitude, back.longitude) == pytest.approx((latitude, longitude), abs=2e-8)
     north = 0.0015 * 111_181.0  # m; a degree of the meridian at 47.47° on WGS 84
     assert max(y for _, y in keys["corners"]) == pytest.approx(north, rel=1e-4)
@@ -59,7 +59,7 @@ def test_a_field_in_an_l_with_a_pond_and_a_crane():
 
 
 def test_kml_tells_the_same_field():
-    ours, theirs = (ground_of(FIELDS / f"field.{kind}") for kind in ("geojson", "kml"))
+    ours, theirs = (load_field(FIELDS / f"field.{kind}") for kind in ("geojson", "kml"))
     assert ours.origin == theirs.origin and ours.keys == theirs.keys
     assert "field, 6 corners" in theirs.note and "latitude 47.4715000" in theirs.note
 
@@ -74,7 +74,7 @@ def test_a_flight_in_a_field_keeps_it_without_the_file(tmp_path, seed):
     assert "left out in a plane" in load(tmp_path / "mine.toml").notes[1]
     (tmp_path / "here.geojson").unlink()
     recording = airflock.simulate(scenario, seed, device="python")
-    again = scenario_of(recording)
+    again = scenario_of_recording(recording)
     assert again.world == scenario.world and not again.world.file
     np.testing.assert_array_equal(airflock.simulate(again, seed, device="python").position, recording.position)
 
@@ -83,7 +83,7 @@ def test_fewer_corners_move_the_outline_by_no_more_than_asked(tmp_path):
     turn = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
     ring = np.column_stack([19.06 + 0.002 * np.cos(turn), 47.47 + 0.001 * np.sin(turn)]).tolist()
     path = written(tmp_path, polygon(ring))
-    whole, few = (ground_of(path, simplify=s).keys["corners"] for s in (0.0, 2.0))
+    whole, few = (load_field(path, simplify=s).keys["corners"] for s in (0.0, 2.0))
     assert len(few) < 40 < len(whole)
     assert Polygon(whole).exterior.hausdorff_distance(Polygon(few).exterior) <= 2.01
 
@@ -153,14 +153,14 @@ FETCH = '<!DOCTYPE k [<!ENTITY x SYSTEM "file:///etc/passwd">]><kml><name>&x;</n
 ])  # fmt: skip
 def test_hostile_xml_ends_at_the_door(tmp_path, text):
     with pytest.raises(TextError):
-        xml(text)
+        parse_xml(text)
     (tmp_path / "a.kml").write_text(text)
     (line,) = faults_of(tmp_path / "a.kml")
     assert line.startswith("vasarhelyi_2018/4ms: world.file = ") and len(line) < 500
 
 
 def test_xml_is_read_without_namespaces():
-    found = xml('<k:kml xmlns:k="http://a/b"><k:name> x <b/>y</k:name></k:kml>')
+    found = parse_xml('<k:kml xmlns:k="http://a/b"><k:name> x <b/>y</k:name></k:kml>')
     assert (found.tag, found.children[0].tag, found.children[0].children[0].tag) == ("kml", "name", "b")
     assert re.sub(r"\s+", " ", found.children[0].text) == "x y"
 
@@ -180,7 +180,7 @@ def test_what_is_not_loaded_reads_no_file():
     """Neither a recording's document nor a change of a flight."""
     table = {"model": {"kind": "vasarhelyi_2018"}, "world": {"file": "/etc/passwd"}}
     with pytest.raises(ScenarioError, match="a file is read where a scenario is loaded, and not here"):
-        make(table, "recording")
+        build_scenario(table, "recording")
     flight = airflock.open(load("vasarhelyi_2018/4ms", FEW), 1, device="python")
     with pytest.raises(ScenarioError, match="and not here"):
         flight.change({"world.file": str(FIELDS / "field.kml")})
@@ -221,8 +221,8 @@ def test_all_holes_of_one_inner_boundary_are_obstacles(tmp_path):
     one = f"<Placemark><Polygon>{outer}{boundary('innerBoundaryIs', POND, TREE)}</Polygon></Placemark>"
     each = boundary("innerBoundaryIs", POND) + boundary("innerBoundaryIs", TREE)
     two = f"<Placemark><MultiGeometry><Polygon>{outer}{each}</Polygon></MultiGeometry></Placemark>"
-    assert len(ground_of(kml(tmp_path, one)).keys["obstacles"]) == 2
-    assert ground_of(kml(tmp_path, one)).keys == ground_of(kml(tmp_path, two)).keys
+    assert len(load_field(kml(tmp_path, one)).keys["obstacles"]) == 2
+    assert load_field(kml(tmp_path, one)).keys == load_field(kml(tmp_path, two)).keys
 
 
 @pytest.mark.parametrize("wrapped", [
@@ -236,7 +236,7 @@ def test_kml_tells_heights_as_geojson_does(tmp_path, wrapped):
 
     path = kml(tmp_path, placemark(SHELL, 5), placemark(TREE, ""), placemark(POND, "-2.5"))
     theirs = written(tmp_path, polygon(SHELL, floor=5.0), polygon(TREE), polygon(POND, floor=-2.5))
-    assert ground_of(path, space=True).keys == ground_of(theirs, space=True).keys
+    assert load_field(path, space=True).keys == load_field(theirs, space=True).keys
     (line,) = faults_of(kml(tmp_path, placemark(SHELL, "low")))
     assert "the property floor = 'low' is not a height in m" in line
 
@@ -247,7 +247,7 @@ def test_corners_that_say_nothing_are_left_out(tmp_path):
     ends = zip(slanted, [*slanted[1:], slanted[0]], strict=True)
     fine = [[round(a[c] + (b[c] - a[c]) * k / 7.0, 7) for c in (0, 1)] for a, b in ends for k in range(7)]
     nearly = [[fine[2][0] + 1e-9, fine[2][1]]]
-    whole, few = (ground_of(written(tmp_path, polygon(ring))).keys for ring in (slanted, fine[3:] + fine[:3] + nearly))
+    whole, few = (load_field(written(tmp_path, polygon(ring))).keys for ring in (slanted, fine[3:] + fine[:3] + nearly))
     assert len(few["corners"]) == 4
     assert {tuple(c) for c in few["corners"]} == {tuple(c) for c in whole["corners"]}
     load(
@@ -264,7 +264,7 @@ def test_a_wood_that_ends_where_the_field_does_lies_inside(tmp_path, simplify):
         a, b = sorted((rng.uniform(0.1, 0.9), rng.uniform(0.1, 0.9)))
         edge = [[19.06 + 0.004 * k, 47.47 + 0.0007 * k] for k in (a, b)]
         path = written(tmp_path, polygon(slanted), polygon([*edge, [19.0622, 47.4715]], name="wood"))
-        keys = ground_of(path, simplify=simplify).keys
+        keys = load_field(path, simplify=simplify).keys
         assert Polygon(keys["corners"]).buffer(2e-3).covers(Polygon(keys["obstacles"][0]))
         load("vasarhelyi_2018/4ms", FEW | {"world.file": str(path), "world.simplify": simplify})
 
@@ -272,18 +272,18 @@ def test_a_wood_that_ends_where_the_field_does_lies_inside(tmp_path, simplify):
 def test_what_is_no_polygon_is_told(tmp_path):
     tree = {"type": "Feature", "properties": {"name": "oak"}, "geometry": {"type": "Point", "coordinates": SHELL[0]}}
     fence = {"type": "LineString", "coordinates": SHELL[:2]}
-    assert "; oak (Point), no polygon, is left out" in ground_of(written(tmp_path, polygon(SHELL), tree)).note
-    note = ground_of(written(tmp_path, polygon(SHELL), tree, fence)).note
+    assert "; oak (Point), no polygon, is left out" in load_field(written(tmp_path, polygon(SHELL), tree)).note
+    note = load_field(written(tmp_path, polygon(SHELL), tree, fence)).note
     assert "; oak (Point) and 1 more, no polygons, are left out" in note
 
 
 def test_many_short_sides_are_told(tmp_path):
     turn = np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)
     ring = np.column_stack([19.06 + 0.002 * np.cos(turn), 47.47 + 0.001 * np.sin(turn)]).tolist()
-    note = ground_of(written(tmp_path, polygon(ring))).note
-    few = len(ground_of(written(tmp_path, polygon(ring)), simplify=1.0).keys["corners"])
+    note = load_field(written(tmp_path, polygon(ring))).note
+    few = len(load_field(written(tmp_path, polygon(ring)), simplify=1.0).keys["corners"])
     assert f"agents feel each of its sides for itself: world.simplify = 1 leaves {few} of them" in note
-    assert "simplify" not in ground_of(FIELDS / "field.geojson").note
+    assert "simplify" not in load_field(FIELDS / "field.geojson").note
 
 
 @pytest.mark.parametrize("told", ["1 m", {"value": 1.0, "unit": "m", "source": "ours"}, "100 cm"])

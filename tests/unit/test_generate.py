@@ -4,8 +4,8 @@ import ast
 
 import pytest
 
-from airflock.engine.text.copies import Copies, Notes
-from airflock.engine.text.generate import Source
+from airflock.engine.text.copies import DependencyRecorder, TextCache
+from airflock.engine.text.generate import DriverSource
 from airflock.support.errors import RuleError
 
 
@@ -27,7 +27,7 @@ def rule(x, p):
 
 def flown(form, x):
     """The rule as a driver has it, run as plain Python, and the text of the driver."""
-    source = Source("", {"p": {"form": form}})
+    source = DriverSource("", {"p": {"form": form}})
     name = source.name(rule)
     text = "\n".join(source.blocks)
     space = {"real": float}
@@ -46,7 +46,7 @@ def test_a_choice_handed_on_is_made_before_compiling(form):
 
 
 def test_names_of_texts_stay_apart():
-    source = Source("", {})
+    source = DriverSource("", {})
     assert source.name(shape, {"form": "square"}) != source.name(shape, {"form": "cube"}) != source.name(shape)
     assert source.name(shape, {"form": "a b"}) != source.name(shape, {"form": "a c"})  # no names, numbered instead
     assert source.name(shape, {"form": "square"}) == source.name(shape, {"form": "square"})
@@ -93,14 +93,14 @@ def rebinds(x, p):
 
 
 def test_choices_within_choices_leave_nothing_unreachable_and_loops_are_seen():
-    source = Source("@njit(**JIT)", {"p": {"form": "a", "kind": "b"}})
+    source = DriverSource("@njit(**JIT)", {"p": {"form": "a", "kind": "b"}})
     source.name(nested)
     assert "unused" not in source.blocks[0]
     assert source.blocks[0].startswith('@njit(inline="always"')
 
 
 def test_defaults_and_truths_reach_a_driver():
-    source = Source("", {})
+    source = DriverSource("", {})
     name = source.name(usual)
     space = {"real": float}
     exec("\n".join(source.blocks), space)
@@ -117,7 +117,7 @@ def test_defaults_and_truths_reach_a_driver():
 )
 def test_what_no_driver_can_hold_is_one_line(rule, said):
     with pytest.raises(RuleError) as found:
-        Source("", {"p": {"form": "square"}}).name(rule)
+        DriverSource("", {"p": {"form": "square"}}).name(rule)
     assert said in str(found.value) and "\n" not in str(found.value)
 
 
@@ -134,7 +134,7 @@ def twice(x, p):
 
 def text_of(form):
     """All that a driver holds of the rule."""
-    source = Source("", {"p": {"form": form}})
+    source = DriverSource("", {"p": {"form": form}})
     source.name(twice)
     return "\n".join(source.blocks)
 
@@ -165,13 +165,13 @@ class Form:
 
 def asked_of(form):
     """What a copy asks that is written for a choice."""
-    notes = Notes(asked_of, Form(form))
+    notes = DependencyRecorder(asked_of, Form(form))
     notes.choice("p", "form")
     return notes
 
 
 def test_a_text_comes_back_for_the_same_answers_alone_and_only_the_last_are_kept():
-    kept = Copies(most=2, each=2)
+    kept = TextCache(max_rules=2, max_texts=2)
     for form in ("slow", "fast", "sure"):
         kept.keep("rule", asked_of(form), form)
     assert [kept.text("rule", asked_of(form)) for form in ("slow", "fast", "sure")] == [None, "fast", "sure"]

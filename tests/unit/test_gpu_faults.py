@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from airflock.cli import main
-from airflock.engine import picked, plan_of
+from airflock.engine import pick_device, plan_of
 from airflock.scenarios.files import load
 from airflock.support import gpu as gpu
 from airflock.support.errors import DeviceError
@@ -25,8 +25,8 @@ def machine(monkeypatch):
 
     def put(**properties):
         monkeypatch.delenv("NUMBA_ENABLE_CUDASIM", raising=False)
-        monkeypatch.setattr(gpu, "runtime", lambda: runtime(**properties))
-        monkeypatch.setattr(gpu, "trouble", gpu.trouble.__wrapped__)
+        monkeypatch.setattr(gpu, "cuda_runtime", lambda: runtime(**properties))
+        monkeypatch.setattr(gpu, "unavailable_reason", gpu.unavailable_reason.__wrapped__)
 
     return put
 
@@ -61,7 +61,7 @@ def test_a_missing_gpu_ends_the_command_and_auto_flies_on_the_cpu(name, machine,
     assert line.startswith("airflock: device = cuda: ") and line.count("\n") == 1
     assert words in line and "choose device = cpu or auto" in line
     said = []
-    assert picked([scenario(agents=3, duration=0.2)], "auto", say=said.append) == "cpu"
+    assert pick_device([scenario(agents=3, duration=0.2)], "auto", notify=said.append) == "cpu"
     assert len(said) == 1 and words in said[0] and "\n" not in said[0]
 
 
@@ -69,7 +69,7 @@ def test_without_numba_cuda_the_line_says_what_to_install(machine, monkeypatch):
     machine()
     monkeypatch.setitem(sys.modules, "numba_cuda", None)
     with pytest.raises(DeviceError, match=r"numba-cuda.*pip install 'airflock\[cuda\]'|import of numba_cuda halted"):
-        picked([scenario(agents=3)], "cuda")
+        pick_device([scenario(agents=3)], "cuda")
 
 
 LINKED = {"world.side": 1e5, "radio.kind": "links", "start.separation": 0.0, "duration": 600.0}
@@ -99,7 +99,7 @@ def test_what_is_too_much_for_a_gpu_is_said_before_anything_flies(name, machine,
     assert all(note.startswith("note: ") for note in notes)
     assert fault.startswith("airflock: device = cuda: ") and re.search(words, fault), fault
     said = []
-    assert picked([load(preset, {**keys, "agents": agents})] * 50, "auto", say=said.append) == "cpu"
+    assert pick_device([load(preset, {**keys, "agents": agents})] * 50, "auto", notify=said.append) == "cpu"
     assert re.search(words, said[0]) and "\n" not in said[0]
 
 

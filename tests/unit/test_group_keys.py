@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import fly
-from airflock.scenarios.cost import seconds_of
+from airflock.engine import fly_world
+from airflock.scenarios.cost import estimated_seconds
 from airflock.scenarios.files import load
-from airflock.studio.controls import controls_of, fields
-from airflock.studio.side import value_of
+from airflock.studio.controls import scenario_controls, set_options
+from airflock.studio.side import scenario_value
 from airflock.support.errors import ScenarioError
 
 PAPER = "vasarhelyi_2018/4ms"
@@ -25,7 +25,7 @@ def flock(settings=None, groups=GROUPS):
 
 
 def frames(scenario, seed):
-    return fly(scenario, seed, record=True, device="python").frames
+    return fly_world(scenario, seed, record=True, device="python").frames
 
 
 @pytest.mark.parametrize(
@@ -73,10 +73,10 @@ def test_a_spread_may_be_a_share_of_its_number_whatever_that_becomes(share, seed
     for keys, tau, p_rep in (({}, 2.0, 0.03), ({"groups.all.body.tau": 4.0, "model.p_rep": 0.6}, 4.0, 0.6)):
         plain = [{"name": "all", "body": {"tau": {"value": tau, "spread": 0.1 * tau}}, "model": {"p_rep": p_rep}}]
         found, known = flock(keys, groups), flock({}, plain)
-        assert found.own_numbers("b", "tau", seed) == pytest.approx(known.own_numbers("b", "tau", seed))
+        assert found.agent_values("b", "tau", seed) == pytest.approx(known.agent_values("b", "tau", seed))
         plain[0]["model"]["p_rep"] = {"value": found.parameters.p_rep, "spread": 0.1 * found.parameters.p_rep}
         known = flock({}, plain)
-        assert found.own_numbers("p", "p_rep", seed) == pytest.approx(known.own_numbers("p", "p_rep", seed))
+        assert found.agent_values("p", "p_rep", seed) == pytest.approx(known.agent_values("p", "p_rep", seed))
 
 
 def test_of_a_number_that_is_a_share_itself_a_percentage_is_a_hundredth():
@@ -142,7 +142,7 @@ def test_a_wrong_key_is_said_in_one_line(key, said):
 
 def test_each_group_has_sliders_of_its_own_numbers():
     scenario = flock()
-    found = controls_of(scenario)
+    found = scenario_controls(scenario)
     assert [control.key for control in found["group heavy: body"]] == [
         "groups.heavy.body.tau",
         "groups.heavy.body.a_max",
@@ -152,9 +152,11 @@ def test_each_group_has_sliders_of_its_own_numbers():
     assert not any(section.startswith("group light") for section in found)
     for section in found:
         for control in found[section] if section.startswith("group") else ():
-            assert control.value == value_of(scenario, control.key) and control.low <= control.value <= control.high
+            assert (
+                control.value == scenario_value(scenario, control.key) and control.low <= control.value <= control.high
+            )
     assert own["groups.old.ones.model.p_rep"].label.startswith("p_rep")
-    assert fields({"groups.old.ones.model.p_rep": 0.2}) == "--set groups.old.ones.model.p_rep=0.2"
+    assert set_options({"groups.old.ones.model.p_rep": 0.2}) == "--set groups.old.ones.model.p_rep=0.2"
 
 
 @pytest.mark.parametrize("model", [{"kind": "couzin_2005"}, {"dr_o": 3.0}, {}])
@@ -162,4 +164,4 @@ def test_the_groups_of_a_large_flock_cost_no_square_of_its_number(model):
     large = {"agents": 5000, "start.radius": 60.0, "groups": [{"name": "a", "agents": 9, "model": model}]}
     found, plain = load("couzin_2002/torus", large), load("couzin_2002/torus", {**large, "groups": []})
     assert not any(note.startswith("groups: ") for note in found.notes)
-    assert seconds_of(found) < 2.0 * seconds_of(plain)
+    assert estimated_seconds(found) < 2.0 * estimated_seconds(plain)

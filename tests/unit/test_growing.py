@@ -3,17 +3,16 @@
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import toys
-from airflock.runs.executors.in_process import InProcess
+from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.folder import Interrupted, open_folder
-from airflock.runs.space import declared
-from airflock.runs.store import Batch, Store
-from airflock.search.growing import LONGEST, SHARES, Length
-from airflock.search.run import run
-from airflock.search.search import averaged
+from airflock.runs.space import declared_numbers
+from airflock.runs.store import CandidateBatch, FlightStore
+from airflock.search.growing import LONGEST, SHARES, FlightLength
+from airflock.search.run import run_study
+from airflock.search.search import averaged_means
 from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -23,7 +22,7 @@ WHOLE = 600.0
 
 def finished(folder, study, score=toys.bowl, **options):
     open_folder(folder, study, resume=False)
-    return run(study, folder, InProcess(score, 2), **options)
+    return run_study(study, folder, ThreadExecutor(score, 2), **options)
 
 
 def hasty(parameters, seed):
@@ -33,26 +32,26 @@ def hasty(parameters, seed):
 
 
 def test_the_length_doubles_when_half_of_a_generation_is_as_good_as_the_best_of_the_first():
-    length = Length(400, True, growing=True)
+    length = FlightLength(400, True, growing=True)
     assert length.share == 1 / 8 and not length.whole
-    length.generation_over([0.1, 0.2, 0.3])
-    length.generation_over([0.2, 0.29, 0.9])  # its median is not yet as good as 0.3
+    length.end_generation([0.1, 0.2, 0.3])
+    length.end_generation([0.2, 0.29, 0.9])  # its median is not yet as good as 0.3
     assert length.share == 1 / 8
-    length.generation_over([None, 0.3, 0.4])
+    length.end_generation([None, 0.3, 0.4])
     assert length.share == 1 / 4
-    length.generation_over([0.0, 0.0, 0.0])  # flat: nothing to learn from flights so short
+    length.end_generation([0.0, 0.0, 0.0])  # flat: nothing to learn from flights so short
     assert length.share == 1 / 2
 
 
 @given(st.lists(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=6), min_size=80, max_size=80), st.booleans())
 def test_whatever_the_values_most_generations_fly_whole_flights_and_signs_do_not_matter(generations, maximise):
-    one, other = (Length(80, best, growing=True) for best in (maximise, not maximise))
+    one, other = (FlightLength(80, best, growing=True) for best in (maximise, not maximise))
     shares = []
     for values in generations:
         assert one.share == other.share
         shares.append(one.share)
-        one.generation_over(values)
-        other.generation_over([-value for value in values])
+        one.end_generation(values)
+        other.end_generation([-value for value in values])
     assert shares == sorted(shares) and one.whole
     assert all(shares.count(share) <= 80 // LONGEST for share in SHARES[:-1])
 
@@ -65,7 +64,7 @@ def test_whole_flights_alone_are_ranked_however_good_short_ones_look(tmp_path):
     table = pd.read_csv(tmp_path / "a" / "evaluations.csv")
     search = table[table["stage"] == "search"]
     assert set(search["duration_flown"].dropna()) == {75.0, 150.0, 300.0}
-    assert result.above <= search["duration_flown"].isna().sum() < result.candidates == len(search)
+    assert result.above <= search["duration_flown"].isna().sum() < result.candidate_count == len(search)
     assert table.loc[table["stage"] != "search", "duration_flown"].isna().all()
 
 
@@ -80,8 +79,8 @@ def test_a_search_that_is_cut_off_among_short_flights_ends_the_same(tmp_path):
     open_folder(tmp_path / "cut", toys.study(**keys), resume=False)
     for _ in range(2):
         with pytest.raises(Interrupted):
-            run(toys.study(**keys), tmp_path / "cut", InProcess(hasty, 2), stop)
-    assert run(toys.study(**keys), tmp_path / "cut", InProcess(hasty, 2)).document() == whole.document()
+            run_study(toys.study(**keys), tmp_path / "cut", ThreadExecutor(hasty, 2), stop)
+    assert run_study(toys.study(**keys), tmp_path / "cut", ThreadExecutor(hasty, 2)).document() == whole.document()
 
 
 def test_a_warm_start_flies_near_the_scenario_s_own_numbers_and_a_cold_one_in_the_middle(tmp_path):
@@ -89,9 +88,9 @@ def test_a_warm_start_flies_near_the_scenario_s_own_numbers_and_a_cold_one_in_th
     for start in ("scenario", "middle"):
         study = toys.study(start=start, spread=0.01, population=40, generations=1, pool=0, top=1)
         finished(tmp_path / start, study)
-        with Store(tmp_path / start, write=False) as store:
-            centres[start] = np.array(store.asked(Batch("search", 0, 0))).mean(axis=0)
-    known = declared(study.scenario)
+        with FlightStore(tmp_path / start, write=False) as store:
+            centres[start] = np.array(store.asked(CandidateBatch("search", 0, 0))).mean(axis=0)
+    known = declared_numbers(study.scenario)
     own = study.space.point({key: known[key][1] for key in study.space.keys})
     assert centres["scenario"] == pytest.approx(own, abs=0.01)
     assert centres["middle"] == pytest.approx([0.5] * 3, abs=0.01)
@@ -99,10 +98,10 @@ def test_a_warm_start_flies_near_the_scenario_s_own_numbers_and_a_cold_one_in_th
 
 def test_averages_are_those_of_the_last_half_and_quarter_and_scatter_less():
     means = [np.array([float(i)]) for i in range(8)]
-    assert [float(each[0]) for each in averaged(means, 3)] == [5.5, 6.5, 7.0]
-    assert averaged(means[:1], 2)[0] == 0.0 and averaged(means, 0) == []
+    assert [float(each[0]) for each in averaged_means(means, 3)] == [5.5, 6.5, 7.0]
+    assert averaged_means(means[:1], 2)[0] == 0.0 and averaged_means(means, 0) == []
     chance = np.random.default_rng(1).normal(size=(400, 64))
-    scatter = np.std([averaged(list(row[:, None]), 1)[0][0] for row in chance])
+    scatter = np.std([averaged_means(list(row[:, None]), 1)[0][0] for row in chance])
     assert scatter == pytest.approx(1.0 / np.sqrt(32.0), rel=0.15)  # of independent means
 
 

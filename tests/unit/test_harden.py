@@ -6,14 +6,14 @@ import pytest
 import toys
 from airflock.cli import harden as cli_harden
 from airflock.parts.radios.links import received
-from airflock.runs.executors.in_process import InProcess
-from airflock.runs.store import Store
+from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.store import FlightStore
 from airflock.scenarios.files import load
-from airflock.scenarios.making import make
+from airflock.scenarios.making import build_scenario
 from airflock.search import harden
 from airflock.search.measures import CARRIED, STOPS, measures
-from airflock.search.sensitivity import sensitivity
-from airflock.search.steps import Measured
+from airflock.search.sensitivity import run_sensitivity
+from airflock.search.steps import StepResult
 from airflock.support.errors import ScenarioError
 from inside import simulate
 
@@ -21,18 +21,18 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 def test_recipe_moves_the_way_of_table_s4_and_stays_inside_ranges():
-    plans = harden.recipe(load("vasarhelyi_2018/6ms"))
+    plans = harden.recipe_parameters(load("vasarhelyi_2018/6ms"))
     first, last = plans[0][1], plans[-1][1]
     assert first["model.p_rep"] == 0.07 and plans[0][0].name == "optimum"
     assert last["model.p_rep"] == pytest.approx(0.105) and last["model.c_frict"] == pytest.approx(0.45)
     assert last["model.v_shill"] == pytest.approx(0.7 * 19.7) and last["model.r0_shill"] == pytest.approx(3.5)
     tight = load("vasarhelyi_2018/6ms", {"model.p_rep": 9.0})
-    assert harden.recipe(tight)[-1][1]["model.p_rep"] == 10.0
+    assert harden.recipe_parameters(tight)[-1][1]["model.p_rep"] == 10.0
 
 
 def test_models_without_these_parameters_are_refused():
     with pytest.raises(ScenarioError, match="zapotecatl_2016/best: no recipe for model reynolds_1987: model.c_frict"):
-        harden.recipe(load("zapotecatl_2016/best"))
+        harden.recipe_parameters(load("zapotecatl_2016/best"))
 
 
 def flown_by(monkeypatch, score):
@@ -56,7 +56,7 @@ def test_steps_are_measured_against_the_optimum_on_the_same_seeds(monkeypatch):
     assert (
         steps[-1].verdict == "kept: p_rep up" and steps[2].verdict == "undone: gains no distance and no room at walls"
     )
-    found = make(harden.document(load("vasarhelyi_2018/6ms"), steps[-1]), "hardened")
+    found = build_scenario(harden.hardened_document(load("vasarhelyi_2018/6ms"), steps[-1]), "hardened")
     assert found.parameters.p_rep == pytest.approx(0.105) and found.published == {}
 
 
@@ -177,7 +177,7 @@ def test_measures_beside_the_law_are_tried_where_agents_collide_and_are_no_part_
     assert list(tried) == [CARRIED, STOPS] and steps[-1].name == "on fresh seeds"
     assert tried[CARRIED].gain == pytest.approx((8.0,) * 3) and not tried[CARRIED].kept
     assert "0 % of flights have collisions, 100 % without it; --set radio.kind=links" in tried[CARRIED].verdict
-    assert make(harden.document(lossy, steps[-1]), "hardened").transceiver.name == "constant"
+    assert build_scenario(harden.hardened_document(lossy, steps[-1]), "hardened").transceiver.name == "constant"
     sound = load("vasarhelyi_2018/6ms", {"radio.delay": 0.5})
     assert not any(step.name in (CARRIED, STOPS) for step in harden.harden(sound, range(5)))
     assert [step.name for step, _, _ in measures([sound])] == [CARRIED]  # nothing is lost
@@ -214,9 +214,9 @@ def test_sensitivity_finds_the_share_of_each_parameter(tmp_path):
         return {"fitness": a + 2.0 * b}
 
     for method in ("sobol", "morris"):
-        with Store(tmp_path) as store:
-            executor = InProcess(plane, 2)
-            table = sensitivity(study, store, executor, method=method, samples=64)
+        with FlightStore(tmp_path) as store:
+            executor = ThreadExecutor(plane, 2)
+            table = run_sensitivity(study, store, executor, method=method, samples=64)
             executor.close()
         if method == "sobol":
             assert table["ST"].to_numpy() == pytest.approx([0.2, 0.8, 0.0], abs=0.05)
@@ -227,7 +227,7 @@ def test_sensitivity_finds_the_share_of_each_parameter(tmp_path):
 def test_a_narrow_terminal_is_told_every_number(monkeypatch, capsys):
     named = "half of: v_shill down, r0_shill up again"
     steps = [
-        Measured(
+        StepResult(
             name, "", {}, 0.7123, 33.75, 0.125, (0.01234, -0.005, 0.0295), (1.625, 1.125, 2.125), {"f_wall": 0.987},
             1.0, -12.3, False, verdict,
         )

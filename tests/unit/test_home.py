@@ -5,8 +5,8 @@ import pytest
 from typer.testing import CliRunner
 
 import airflock
-from airflock.cli.usage import at_home
-from airflock.support.untrusted import own_path
+from airflock.cli.usage import expand_home
+from airflock.support.untrusted import expand_path
 from airflock.view.plots.save import save_figure
 
 mpl.use("agg")
@@ -27,11 +27,11 @@ def home(tmp_path, monkeypatch):
 
 
 def test_the_home_folder_is_put_in_for_its_sign_alone(home):
-    assert own_path("~/a/b.nc") == home / "a" / "b.nc"
+    assert expand_path("~/a/b.nc") == home / "a" / "b.nc"
     for name in ("a~/b.nc", "./~/b.nc", "~nobody-of-this-name/b.nc", "a/b.nc"):
-        assert str(own_path(name)) == name.removeprefix("./")
-    assert at_home("--save=~/b.nc") == f"--save={home}/b.nc" and at_home("~/b.nc") == f"{home}/b.nc"
-    assert at_home("--map=t:=time*1e-6") == "--map=t:=time*1e-6" and at_home("--plot") == "--plot"
+        assert str(expand_path(name)) == name.removeprefix("./")
+    assert expand_home("--save=~/b.nc") == f"--save={home}/b.nc" and expand_home("~/b.nc") == f"{home}/b.nc"
+    assert expand_home("--map=t:=time*1e-6") == "--map=t:=time*1e-6" and expand_home("--plot") == "--plot"
 
 
 def test_functions_read_and_write_in_the_home_folder(home):

@@ -11,13 +11,12 @@ import pytest
 import airflock
 from airflock.core import random
 from airflock.core.parameters import Quantity, declarations
-from airflock.estimate.identify import body, hills, packets, periods, synthetic
-from airflock.estimate.identify import sensors as standing
-from airflock.estimate.identify.hills import LINKS
-from airflock.estimate.identify.logs import Logs, logs_of_recording
-from airflock.estimate.identify.numbers import HARDER, UNITS, Number
-from airflock.estimate.identify.plan import flight_card
-from airflock.estimate.identify.run import identify, read_heard
+from airflock.estimate.identification import body, hills, packets, periods, sensors as standing, synthetic
+from airflock.estimate.identification.hills import CURVE_PARAMETERS
+from airflock.estimate.identification.logs import FlightLogs, logs_from_recording
+from airflock.estimate.identification.numbers import HARDER, KEY_UNITS, IdentifiedParameter
+from airflock.estimate.identification.plan import flight_card
+from airflock.estimate.identification.run import identify, read_heard
 from airflock.parts.radios import links
 from airflock.parts.sensors import langevin
 from airflock.support.errors import RecordingError, ScenarioError
@@ -44,7 +43,9 @@ def fly(tau, a_max, noise, white, *, drones=4, seconds=150.0, size=6.0, hold=2.0
     who = np.repeat(np.arange(drones), count)
     flat = [x.transpose(2, 0, 1).reshape(-1, 2) for x in (seen, wishes)]
     new = np.concatenate([[True], np.diff(who) != 0])
-    return Logs(time, 0.0 * flat[0], *flat, who, new, [f"d{i}" for i in range(drones)], np.zeros(len(time), bool)), dt
+    return FlightLogs(
+        time, 0.0 * flat[0], *flat, who, new, [f"d{i}" for i in range(drones)], np.zeros(len(time), bool)
+    ), dt
 
 
 @pytest.mark.parametrize("tau, a_max, noise, white", [(0.4, 3.0, 0.05, 0.1), (1.2, 2.5, 0.3, 0.02)])
@@ -52,7 +53,7 @@ def test_the_body_comes_back_through_the_noise_of_the_log(tau, a_max, noise, whi
     logs, dt = fly(tau, a_max, noise, white)
     found = body.fit_body(logs, dt)
     for name, truth in {"tau": tau, "a_max": a_max, "noise": noise, "white": white}.items():
-        low, high = found.interval[name]
+        low, high = found.intervals[name]
         assert low - (high - low) < truth < high + (high - low), name  # three standard errors and a bit
         assert high / low < 1.25 or name == "white", name
     assert not found.refused
@@ -73,7 +74,7 @@ def test_a_limit_that_hides_behind_a_longer_lag_is_no_lower_bound_above_itself(s
     found = body.fit_body(logs, dt)
     assert "at least" in found.refused["a_max"]
     assert 2.0 < found.seen < 3.5
-    low, high = found.interval["tau"]
+    low, high = found.intervals["tau"]
     assert low < 1.3 < high
 
 
@@ -92,7 +93,7 @@ def test_commands_computed_from_the_own_velocity_bend_the_lag_by_less(follows, o
     time, who = np.tile(STEP * np.arange(n - 1), drones), np.repeat(np.arange(drones), n - 1)
     flat = [x[:-1].transpose(1, 0, 2).reshape(-1, 2) for x in (measured, command)]
     names, new = [f"d{i}" for i in range(drones)], np.diff(who, prepend=-1) != 0
-    logs = Logs(time, np.zeros_like(flat[0]), *flat, who, new, names, np.zeros(len(time), bool))
+    logs = FlightLogs(time, np.zeros_like(flat[0]), *flat, who, new, names, np.zeros(len(time), bool))
     assert body.fit_body(logs).value["tau"] == pytest.approx(tau, abs=off)
 
 
@@ -103,7 +104,7 @@ def test_commands_that_the_vehicle_runs_ahead_of_are_no_lag():
     path = sum(g.normal(0, 1.0, 2) * np.sin(w * time[:, None] + g.uniform(0, 6, 2)) for w in (0.3, 0.7, 1.3, 2.1))
     seen = path + g.normal(0.0, 0.05, path.shape)
     new = np.arange(4000) == 0
-    logs = Logs(time, 0 * path, seen, path, np.zeros(4000, int), new, ["d"], np.zeros(4000, bool))
+    logs = FlightLogs(time, 0 * path, seen, path, np.zeros(4000, int), new, ["d"], np.zeros(4000, bool))
     found = body.fit_body(logs)
     assert set(found.refused) >= {"tau", "a_max", "noise"}
 
@@ -118,15 +119,15 @@ def test_late_commands_are_told():
     from dataclasses import replace
 
     found = body.fit_body(replace(logs, command=command), dt)
-    assert found.dead_time == pytest.approx(late * STEP, abs=STEP + 1e-9)
+    assert found.command_delay == pytest.approx(late * STEP, abs=STEP + 1e-9)
     assert any("late" in note for note in found.notes)
 
 
 def test_words_of_arrays_are_the_words_of_the_engine():
     agents = np.arange(7)
-    many = synthetic.words(2**40 + 5, random.SENSOR, 9, agents)
+    many = synthetic.agent_words(2**40 + 5, random.SENSOR, 9, agents)
     for agent in range(7):
-        one = random.words(2**40 + 5, random.SENSOR, 0, 9, agent)
+        one = random.random_words(2**40 + 5, random.SENSOR, 0, 9, agent)
         assert [int(w[agent]) for w in many] == list(one)
         first = synthetic.normal_pair(many[0], many[1])
         np.testing.assert_allclose([x[agent] for x in first], random.normal_pair(one[0], one[1]), rtol=1e-12)
@@ -135,14 +136,16 @@ def test_words_of_arrays_are_the_words_of_the_engine():
 def test_the_error_of_navigation_comes_back_from_drones_that_stand():
     truth = langevin.Parameters(noise=0.02, damping=0.15, scale=4.0)
     g = np.random.default_rng(5)
-    logs = synthetic.stand(11, 10, 300.0, truth, synthetic.Disturbed(white=0.05), g)
+    logs = synthetic.standing_logs(11, 10, 300.0, truth, synthetic.LogDisturbance(white=0.05), g)
     found = standing.fit_sensors(logs, truth.period)
     assert not found.refused
     for name in ("noise", "damping", "scale"):
-        low, high = found.interval[name]
+        low, high = found.intervals[name]
         assert low - (high - low) < getattr(truth, name) < high + (high - low)
     assert found.value["white"] == pytest.approx(0.05, rel=0.15)
-    short = standing.fit_sensors(synthetic.stand(11, 2, 10.0, truth, synthetic.Disturbed(), g), truth.period)
+    short = standing.fit_sensors(
+        synthetic.standing_logs(11, 2, 10.0, truth, synthetic.LogDisturbance(), g), truth.period
+    )
     assert "stand still" in short.refused["noise"]
 
 
@@ -181,14 +184,14 @@ def test_where_a_drone_stands_says_nothing_of_its_sensor():
 
 def hill(numbers, widths):
     """Loss of a normal likelihood of near, far and the two shares."""
-    return lambda z: 0.5 * float((((np.array(hills.unpacked(z)) - numbers) / widths) ** 2).sum())
+    return lambda z: 0.5 * float((((np.array(hills.unpack(z)) - numbers) / widths) ** 2).sum())
 
 
 def test_the_highest_of_two_hills_of_a_radio_is_found_though_the_other_is_wider():
     low = hill(np.array([28.0, 75.0, 0.91, 0.33]), np.array([3.0, 12.0, 0.03, 0.1]))
     high = hill(np.array([26.0, 58.0, 0.91, 0.45]), np.array([3.0, 3.0, 0.03, 0.1]))
-    best, *others = hills.lowest(lambda z: min(low(z) + 5.0, high(z)), 300.0)
-    assert hills.unpacked(best) == pytest.approx((26.0, 58.0, 0.91, 0.45), rel=0.01)
+    best, *others = hills.best_mode(lambda z: min(low(z) + 5.0, high(z)), 300.0)
+    assert hills.unpack(best) == pytest.approx((26.0, 58.0, 0.91, 0.45), rel=0.01)
     assert not others  # the lower one is not nearly as likely
 
 
@@ -196,39 +199,39 @@ def test_a_higher_hill_between_two_lengths_that_are_tried_is_found_and_both_are_
     widths = np.array([0.4, 1.0, 0.003, 0.02])
     low = hill(np.array([29.2, 41.8, 0.98, 0.69]), widths)
     high = hill(np.array([29.3, 51.3, 0.98, 0.46]), widths * (1.0, 1.4, 1.0, 1.0))
-    found = hills.lowest(lambda z: min(low(z) + 1.2, high(z)), 268.0)
-    fars = [hills.unpacked(z)[1] for z in found]
+    found = hills.best_mode(lambda z: min(low(z) + 1.2, high(z)), 268.0)
+    fars = [hills.unpack(z)[1] for z in found]
     assert fars == pytest.approx([51.3, 41.8], rel=0.01)
 
 
 def test_intervals_follow_a_bent_ridge_to_its_ends():
     # far by itself is known to 6 m, far squared times the share there to 1 %
     def loss(z):
-        near, far, high, low = hills.unpacked(z)
+        near, far, high, low = hills.unpack(z)
         rest = ((near - 25.0) / 1.0) ** 2 + ((high - 0.9) / 0.01) ** 2
         return 0.5 * (rest + ((far - 60.0) / 6.0) ** 2 + (np.log(far * far * low / 1080.0) / 0.01) ** 2)
 
-    found = hills.intervals(loss, hills.packed(25.0, 60.0, 0.9, 0.3))
+    found = hills.profile_intervals(loss, hills.pack(25.0, 60.0, 0.9, 0.3))
     assert found["far"] == pytest.approx((60.0 - 11.76, 60.0 + 11.76), abs=0.4)
     assert found["received_far"] == pytest.approx((1080.0 / 71.76**2, 1080.0 / 48.24**2), rel=0.03)
 
 
 def test_intervals_are_those_of_the_profile():
     numbers, widths = np.array([25.0, 60.0, 0.9, 0.3]), np.array([1.0, 2.0, 0.01, 0.03])
-    top = hills.placed(60.0, [np.log(25.0 / 35.0), np.log(0.9 / 0.1), np.log((0.3 / 0.9) / (1.0 - 0.3 / 0.9))])
-    assert hills.unpacked(top) == pytest.approx(numbers)
+    top = hills.pack_at_far(60.0, [np.log(25.0 / 35.0), np.log(0.9 / 0.1), np.log((0.3 / 0.9) / (1.0 - 0.3 / 0.9))])
+    assert hills.unpack(top) == pytest.approx(numbers)
     for (low, high), value, width in zip(
-        hills.intervals(hill(numbers, widths), top).values(), numbers, widths, strict=True
+        hills.profile_intervals(hill(numbers, widths), top).values(), numbers, widths, strict=True
     ):
         assert (low, high) == pytest.approx((value - 1.96 * width, value + 1.96 * width), abs=0.05 * width)
 
     # all of 100 packets came: a share p says log(p) each, so that 100 log(p) = -1.92 at the lower end
     def all_came(z):
-        near, far, share, other = hills.unpacked(z)
+        near, far, share, other = hills.unpack(z)
         return -100.0 * np.log(share) + hill(numbers, np.array([1.0, 2.0, np.inf, 0.03]))(z)
 
     certain = np.array([*top[:2], 9.0, np.log(0.3 / 0.7)])
-    low, high = hills.intervals(all_came, certain)["received_near"]
+    low, high = hills.profile_intervals(all_came, certain)["received_near"]
     assert low == pytest.approx(np.exp(-0.0192), abs=2e-3) and high > 0.9995
 
 
@@ -276,9 +279,9 @@ def test_what_is_wrong_with_a_table_of_packets_is_told_by_column_and_row(tmp_pat
         f"{tmp_path}/heard.csv: column got, row 14: 3 is not 0 or 1",
     ]
     with pytest.raises(RecordingError, match="give t and stamp in s: divide them by 1e6"):
-        packets.checked(heard.assign(t=1e6 * heard["t"], stamp=1e6 * heard["stamp"]))
+        packets.check_packets(heard.assign(t=1e6 * heard["t"], stamp=1e6 * heard["stamp"]))
     unheard = heard.assign(stamp=heard["stamp"].where(heard["got"] > 0))  # what never came has no stamp
-    assert len(packets.checked(unheard)) == len(heard)
+    assert len(packets.check_packets(unheard)) == len(heard)
     heard.to_csv(tmp_path / "comma.csv", index=False, sep=";", decimal=",")
     with pytest.raises(RecordingError, match="has ; between its columns"):
         read_heard(tmp_path / "comma.csv")
@@ -290,8 +293,8 @@ def test_the_curve_of_reception_comes_back():
     k = links.Parameters(kind="links", near=22.0, far=55.0, received_near=0.95, received_far=0.35)
     found = packets.fit_links(heard_by(k)[0], 0.2, k)
     assert not found.refused
-    for name in LINKS:
-        low, high = found.interval[name]
+    for name in CURVE_PARAMETERS:
+        low, high = found.intervals[name]
         assert low - (high - low) < getattr(k, name) < high + (high - low)
     near = heard_by(k)[0]
     near = near[near["distance"] < 40.0]
@@ -307,7 +310,7 @@ def test_the_end_of_the_range_is_not_taken_for_the_curve(error):
     heard["distance"] = np.abs(heard["distance"] + np.random.default_rng(1).normal(0.0, error, len(heard)))
     found = packets.fit_links(heard, 0.2, k)
     assert found.notes[0].startswith("no packet from beyond")
-    for name in set(LINKS) - set(found.refused):
+    for name in set(CURVE_PARAMETERS) - set(found.refused):
         assert found.value[name] == pytest.approx(getattr(k, name), rel=0.12), name
     assert not packets.fit_links(heard_by(k)[0], 0.2, k).notes  # no range, and none is made up
     assert not packets.fit_links(heard[heard["distance"] < 70.0], 0.2, k).notes
@@ -333,7 +336,7 @@ def test_identify_writes_a_table_where_the_radio_is_one(fleet):
     heard, _ = heard_by(truth.radio)
     found = identify(first.logs, like, heard=heard)
     told = {key: number for key, number in found.numbers.items() if key.startswith("radio.received_")}
-    known = packets.table_of(heard, 20.0)
+    known = packets.table_entries(heard, 20.0)
     assert list(told) == [f"radio.received_{n}" for n in range(16)] and "radio.near" not in found.numbers
     assert [n for n in range(16) if told[f"radio.received_{n}"].told] == list(range(9))  # up to 150 m
     assert all(told[f"radio.received_{n}"].value == known[f"received_{n}"] for n in range(9))
@@ -359,7 +362,7 @@ def fleet():
     numbers = {"body.tau": 0.6, "body.a_max": 4.0, "body.noise": 0.1, "radio.delay": 0.4, "radio.kind": "links"}
     extra = {"agents": 10, "duration": 150.0, "radio.range": 250.0, "metrics.period": STEP}
     truth = airflock.load("vasarhelyi_2018/real_6ms", {**extra, **numbers})
-    logger = synthetic.Disturbed(white=0.1, stamp_jitter=0.02)
+    logger = synthetic.LogDisturbance(white=0.1, stamp_jitter=0.02)
     with pytest.MonkeyPatch.context() as precisely:  # by the driver of the tests against hand-written C
         precisely.setattr(synthetic, "simulate", partial(synthetic.simulate, precision=64))
         logs, heard, recording = synthetic.fly_logs(truth, 3, logger, np.random.default_rng(3))
@@ -379,7 +382,7 @@ def test_a_fleet_is_identified_from_its_logs(fleet):
     assert far.low < truth.radio.far < far.high and (far.told or "fly more" in far.reason)
     assert "on the ground" in found.numbers["sensors.noise"].reason
     assert "preferred speed" in found.numbers["model.v_max"].reason or not found.numbers["model.v_max"].told
-    assert found.comparable and any("packets" in note for note in found.notes)
+    assert found.has_one_clock and any("packets" in note for note in found.notes)
 
 
 def test_the_file_that_identify_writes_flies_with_those_numbers(fleet, tmp_path):
@@ -403,7 +406,7 @@ def test_every_number_that_identify_tells_has_the_unit_of_the_scenario(fleet, tm
     import tomlkit
 
     truth, found, _ = fleet
-    for key, unit in UNITS.items():
+    for key, unit in KEY_UNITS.items():
         section, name = key.split(".")
         record = truth.parameters if section == "model" else getattr(truth, section)
         declared = {name: one.unit for name, one, _ in declarations(record) if isinstance(one, Quantity)}
@@ -422,23 +425,25 @@ def test_conservative_numbers_make_a_flight_harder(fleet):
     for key in plain:
         sign = 1.0 if HARDER[key] else -1.0
         assert sign * plain[key] <= sign * hard[key] + 1e-12 <= sign * harder[key] + 2e-12, key
-    assert set(HARDER) == set(UNITS)
-    assert Number("radio.received_near", 0.98, 0.97, 0.99, 0.9, "").pessimistic(0.95) == pytest.approx(0.97)
+    assert set(HARDER) == set(KEY_UNITS)
+    assert IdentifiedParameter("radio.received_near", 0.98, 0.97, 0.99, 0.9, "").pessimistic_end(0.95) == pytest.approx(
+        0.97
+    )
 
 
 def test_recordings_can_be_identified_and_need_commands(fleet):
     _, _, recording = fleet
-    logs = logs_of_recording(recording)
-    assert logs.drones == 10 and logs.new.sum() == 10 and logs.step == pytest.approx(STEP)
+    logs = logs_from_recording(recording)
+    assert logs.drones == 10 and logs.is_new.sum() == 10 and logs.step == pytest.approx(STEP)
     with pytest.raises(RecordingError, match="no command"):
-        logs_of_recording(recording.drop_vars("command"))
+        logs_from_recording(recording.drop_vars("command"))
 
 
 def test_the_flight_card_lists_every_number_and_takes_ten_minutes():
     card = flight_card(airflock.load("vasarhelyi_2018/real_6ms"))
     tabled = flight_card(airflock.load("vasarhelyi_2018/real_6ms", {"radio.kind": "table"}))
     told, told_of_table = ({key for part in each for key in part.keys} for each in (card, tabled))
-    assert told | told_of_table == set(UNITS) and told_of_table - told == set(packets.OF_TABLE)
+    assert told | told_of_table == set(KEY_UNITS) and told_of_table - told == set(packets.TABLE_KEYS)
     assert sum(part.seconds for part in card) < 660.0
 
 

@@ -11,12 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import airflock
 from airflock.recordings.imports import expressions, geodesy, motion
-from airflock.recordings.imports.track import Track
+from airflock.recordings.imports.track import ImportedTrack
 from airflock.support.errors import RecordingError
 
 RATE = 20.0
@@ -174,7 +173,7 @@ def test_movebank_rows_become_local_metres():
     ]  # fmt: skip
     found = airflock.load_tracks(pd.DataFrame(rows))
     assert list(found["individual"].values) == ["stork 0", "stork 1"] and found.attrs["fps"] == pytest.approx(1 / 900.0)
-    expected = geodesy.enu(lat0 + 2e-4 * np.arange(60), lon0 + 1e-4 * np.arange(60), 0.0, (lat0, lon0, 0.0))
+    expected = geodesy.to_enu(lat0 + 2e-4 * np.arange(60), lon0 + 1e-4 * np.arange(60), 0.0, (lat0, lon0, 0.0))
     np.testing.assert_allclose(values(found)[:, :, 0], expected[:, :2], rtol=1e-5, atol=1e-3)
 
 
@@ -194,14 +193,16 @@ def test_local_metres_keep_distances_and_directions(lat, lon, height, north, eas
     """A rigid motion: distances are those through the earth; up is the direction of height; north is due north."""
     origin = (lat, lon, height)
     a, b = (lat + 0.02 * north, lon + 0.02 * east, height), (lat, lon + 0.01, height + 30.0)
-    local = geodesy.enu(*np.array([a, b]).T, origin)
-    through = np.linalg.norm(geodesy.ecef(*a) - geodesy.ecef(*b))
+    local = geodesy.to_enu(*np.array([a, b]).T, origin)
+    through = np.linalg.norm(geodesy.to_ecef(*a) - geodesy.to_ecef(*b))
     assert np.linalg.norm(local[0] - local[1]) == pytest.approx(through, abs=1e-6)
-    np.testing.assert_allclose(geodesy.enu(lat, lon, height + 7.0, origin), [0.0, 0.0, 7.0], atol=1e-6)
-    step = geodesy.enu(lat + 1e-5, lon, height, origin)
+    np.testing.assert_allclose(geodesy.to_enu(lat, lon, height + 7.0, origin), [0.0, 0.0, 7.0], atol=1e-6)
+    step = geodesy.to_enu(lat + 1e-5, lon, height, origin)
     assert step[1] > 0.0 and abs(step[0]) < 1e-6
     other = (lat + 0.01, lon - 0.01, 12.0)
-    np.testing.assert_allclose(geodesy.moved(geodesy.enu(*a, other)[None], other, origin)[0], local[0], atol=1e-6)
+    np.testing.assert_allclose(
+        geodesy.points_to_origin(geodesy.to_enu(*a, other)[None], other, origin)[0], local[0], atol=1e-6
+    )
 
 
 def test_gaps_are_bridged_up_to_a_stated_length_and_else_absent():
@@ -243,15 +244,15 @@ x := 2"""
 @pytest.mark.parametrize("text", REFUSED.splitlines())
 def test_expressions_hold_arithmetic_only(text):
     with pytest.raises(RecordingError, match="may hold column names"):
-        expressions.parsed(text, "x")
+        expressions.parse_expression(text, "x")
 
 
 @given(st.floats(-1e3, 1e3), st.floats(0.1, 1e3))
 def test_expressions_are_the_arithmetic_they_show(a, b):
-    tree = expressions.parsed("-(a - 2.5) * 'b b' / 4 + a", "x")
-    found = expressions.value(tree, {"a": np.array([a]), "b b": np.array([b])})
+    tree = expressions.parse_expression("-(a - 2.5) * 'b b' / 4 + a", "x")
+    found = expressions.evaluate(tree, {"a": np.array([a]), "b b": np.array([b])})
     assert found[0] == -(a - 2.5) * b / 4 + a
-    assert expressions.names(tree).count("a") == 2
+    assert expressions.column_names(tree).count("a") == 2
 
 
 def written(tmp_path, table, name="log.csv", **options):
@@ -636,7 +637,7 @@ def test_the_comparison_of_axes_keeps_no_long_log_in_memory():
     """Of an hour of thirty drones it kept 0.28 GB: each twentieth row as a view of all."""
     table = circle(seconds=10_000.0)
     columns = {name: table[name].to_numpy() for name in ("x", "y", "vx", "vy")}
-    long = Track("drone", "log", table["t"].to_numpy(), columns, np.arange(len(table)))
+    long = ImportedTrack("drone", "log", table["t"].to_numpy(), columns, np.arange(len(table)))
     for found in motion._displacements(long, 2):
         assert found.base is None and 20_000 <= len(found) < 30_000
 
@@ -644,14 +645,14 @@ def test_the_comparison_of_axes_keeps_no_long_log_in_memory():
 GIVEN_BACK = """
 import numpy as np
 from airflock.recordings.imports import grid
-from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Track
+from airflock.recordings.imports.track import COMMAND_TARGETS, POSITION_TARGETS, VELOCITY_TARGETS, ImportedTrack
 
 def told(word):
     return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith(word))
 
 def one(number, rows):
-    columns = {name: np.linspace(0.0, 100.0, rows) for name in (*POSITION, *VELOCITY, *COMMAND)}
-    return Track(str(number), "log", np.linspace(0.0, 0.02 * (rows - 1), rows), columns, np.arange(rows))
+    columns = {name: np.linspace(0.0, 100.0, rows) for name in (*POSITION_TARGETS, *VELOCITY_TARGETS, *COMMAND_TARGETS)}
+    return ImportedTrack(str(number), "log", np.linspace(0.0, 0.02 * (rows - 1), rows), columns, np.arange(rows))
 
 grid.recording([one(0, 100)], np.arange(10) * 0.02, 0.02, 1.0, 32)
 tracks = [one(number, 60_000) for number in range(30)]

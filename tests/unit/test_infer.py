@@ -9,10 +9,18 @@ import pytest
 import xarray as xr
 
 import airflock
-from airflock.estimate.infer import bootstrap, candidates, flights, noise, predictive, ridges, search, select
-from airflock.estimate.infer.result import Inferred, Law, verdict_of
-from airflock.estimate.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
-from airflock.estimate.infer.walk import Gains, Walk
+from airflock.estimate.inference import bootstrap, candidates, flights, noise, predictive, ridges, search, select
+from airflock.estimate.inference.result import InferResult, LawResult, judge_laws
+from airflock.estimate.inference.tracks import (
+    ABSENT,
+    COUNTED,
+    ENTERS,
+    SEEN,
+    UNSEEN,
+    tracks_from_recording,
+    tracks_scale,
+)
+from airflock.estimate.inference.walk import FilterGains, InnovationFilter
 from airflock.support.errors import AirflockError, RecordingError
 from processes import called
 
@@ -96,30 +104,36 @@ def test_walks_at_random_are_explained_by_none():
 
 
 def test_a_quiet_flock_is_predicted_exactly_by_its_own_law():
-    tracks = tracks_of(vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
-    (own,), box = candidates.scenarios_of(["vicsek_1995"], BOX)
+    tracks = tracks_from_recording(
+        vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0)
+    )
+    (own,), box = candidates.law_scenarios(["vicsek_1995"], BOX)
     assert box[:2] == (0.5 * SIDE, 0.5 * SIDE)
-    law = candidates.candidate(own, scale_of([tracks]), 2)
+    law = candidates.make_candidate(own, tracks_scale([tracks]), 2)
     numbers = {n.column: v for n in law.numbers for k, v in NUMBERS.items() if n.key == k}
     # with gains of 1 a velocity is what was seen last: of a flock that no longer turns it is exact
-    e = Walk(law, tracks).errors(numbers, Gains((1.0, 1.0), (1.0, 1.0), 0.0), SPEED)
+    e = InnovationFilter(law, tracks).errors(numbers, FilterGains((1.0, 1.0), (1.0, 1.0), 0.0), SPEED)
     settled = tracks.state[90:] == COUNTED
     assert settled.any() and np.abs(e[90:].transpose(0, 2, 1)[settled]).max() < 1e-6
 
 
 def test_errors_of_perception_alone_move_nobody():
     """Who turns to the mean of all flies alike however blurred the places; a small radius takes others in."""
-    tracks = tracks_of(vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
-    (own,), _ = candidates.scenarios_of(["vicsek_1995"], BOX)
-    law = candidates.candidate(own, scale_of([tracks]), 2)
-    walk, gains = Walk(law, tracks), Gains((1.0, 1.0), (1.0, 1.0), 0.0)
-    kept = np.zeros((len(tracks.seen), 4, tracks.individuals))
+    tracks = tracks_from_recording(
+        vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0)
+    )
+    (own,), _ = candidates.law_scenarios(["vicsek_1995"], BOX)
+    law = candidates.make_candidate(own, tracks_scale([tracks]), 2)
+    walk, gains = InnovationFilter(law, tracks), FilterGains((1.0, 1.0), (1.0, 1.0), 0.0)
+    kept = np.zeros((len(tracks.seen), 4, tracks.individual_count))
 
     def apart(radius, blur):
         numbers = {n.column: (NUMBERS | {"model.r": radius})[n.key] for n in law.numbers if n.key in NUMBERS}
         walk.errors(numbers, gains, SPEED, None, kept)
         flown = [
-            flights.flown(walk, (numbers, gains, SPEED), kept, flights.Noise(flights.BLURRED, sd, 0.0, 0.0), [0], 1)
+            flights.fly_tracks(
+                walk, (numbers, gains, SPEED), kept, flights.FitNoise(flights.BLURRED, sd, 0.0, 0.0), [0], 1
+            )
             for sd in (blur, 0.0)
         ]
         end = tracks.spans[0][1]
@@ -131,14 +145,18 @@ def test_errors_of_perception_alone_move_nobody():
 
 def test_flights_of_the_posterior_check_perceive_with_errors_and_are_not_pushed_by_them():
     """Metres were flown as metres per second: a flock that turns to the mean of all came apart."""
-    tracks = tracks_of(vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
-    (own,), _ = candidates.scenarios_of(["vicsek_1995"], BOX)
-    law = candidates.candidate(own, scale_of([tracks]), 2)
+    tracks = tracks_from_recording(
+        vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0)
+    )
+    (own,), _ = candidates.law_scenarios(["vicsek_1995"], BOX)
+    law = candidates.make_candidate(own, tracks_scale([tracks]), 2)
     numbers = {n.column: (NUMBERS | {"model.r": 2.0 * SIDE})[n.key] for n in law.numbers if n.key in NUMBERS}
-    walk, place = Walk(law, tracks), (numbers, Gains((1.0, 1.0), (1.0, 1.0), 0.0), SPEED)
-    model = SimpleNamespace(walks=[walk], split=lambda _: place)
+    walk, place = InnovationFilter(law, tracks), (numbers, FilterGains((1.0, 1.0), (1.0, 1.0), 0.0), SPEED)
+    model = SimpleNamespace(filters=[walk], split=lambda _: place)
     quiet, blurred = (
-        predictive.posterior(model, None, flights.Noise(flights.BLURRED, sd, 0.0, 0.0), 3, lambda: None).found
+        predictive.run_predictive_check(
+            model, None, flights.FitNoise(flights.BLURRED, sd, 0.0, 0.0), 3, lambda: None
+        ).found
         for sd in (0.0, 0.3)
     )
     for name, values in quiet.items():
@@ -149,10 +167,10 @@ NUMBERS = {"model.r": RADIUS, "body.speed": SPEED, "body.turn": 60.0}
 
 
 def test_a_law_has_its_noise_at_zero_and_its_ranges_cut_to_what_was_seen():
-    scale = scale_of([tracks_of(vicsek())])
+    scale = tracks_scale([tracks_from_recording(vicsek())])
     for name, key in (("couzin_2002", "model.sigma"), ("vicsek_1995", "model.eta")):
-        law = candidates.candidate(candidates.scenarios_of([name], {})[0][0], scale, 2)
-        assert [n.key for n in law.noises] == [key] and key not in [n.key for n in law.numbers]
+        law = candidates.make_candidate(candidates.law_scenarios([name], {})[0][0], scale, 2)
+        assert [n.key for n in law.noise_parameters] == [key] and key not in [n.key for n in law.numbers]
         lengths = [n for n in law.numbers if n.unit == "m"]
         assert lengths and all(n.high <= 1.2 * scale.far for n in lengths)
 
@@ -167,7 +185,7 @@ def test_gains_after_gaps_are_those_of_a_kalman_filter():
         k = p @ h / (p[0, 0] + r * r)
         p = p - np.outer(k, h) @ p
     steady = k
-    grown = Gains((steady[0], steady[1] * period), (steady[0], steady[1] * period)).table(period)
+    grown = FilterGains((steady[0], steady[1] * period), (steady[0], steady[1] * period)).table(period)
     for unseen in range(4):  # from the steady state on without a look
         p = step @ p @ step.T + noise
         assert grown[0, :, unseen] == pytest.approx(p @ h / (p[0, 0] + r * r), rel=1e-6)
@@ -178,7 +196,7 @@ def test_who_is_unseen_for_long_has_left_and_enters_again():
     place[:, :, 0] = 0.1 * np.arange(120)[:, None]
     place[:, 1, 1] = 1.0
     place[30:33, 0] = place[60:80, 0] = np.nan
-    state = tracks_of(dataset(place), span=12.0).state[:, 0]
+    state = tracks_from_recording(dataset(place), span=12.0).state[:, 0]
     begin = 15  # of the span in which the gaps are: spans are cut evenly
     assert state[0] == ENTERS and state[begin + 13] == COUNTED
     assert set(state[30:33]) <= {UNSEEN, ABSENT} and state[33] in (SEEN, ENTERS)
@@ -218,33 +236,33 @@ def test_what_is_wrong_for_all_laws_is_said_once_and_files_name_their_import(tmp
 
 def test_held_out_steps_have_a_density_that_one_wild_step_does_not_decide():
     z = np.linspace(-400.0, 400.0, 400_001)
-    density = np.exp(-select.surprises(z))
+    density = np.exp(-select.outlier_log_density(z))
     assert density.sum() * (z[1] - z[0]) == pytest.approx(1.0, abs=1e-6)
     near = np.abs(z) < 2.0
     normal = np.exp(-0.5 * z[near] ** 2) / np.sqrt(2.0 * np.pi)
     assert density[near] == pytest.approx(normal, rel=2e-3)
-    assert select.surprises(np.array([30.0]))[0] < 15.0  # 451 by a normal density alone
+    assert select.outlier_log_density(np.array([30.0]))[0] < 15.0  # 451 by a normal density alone
 
 
 def test_the_best_is_named_with_its_doubts():
     def law(name, gain, missed, surprise, numbers=0):
         told = dict.fromkeys(map(str, range(numbers)))
-        return Law(name, gain, 5.0, 1.0, 20.0, -gain, 0.95, missed, told, None, None, None, np.array(surprise))
+        return LawResult(name, gain, 5.0, 1.0, 20.0, -gain, 0.95, missed, told, None, None, None, np.array(surprise))
 
     ahead = law("a", 400.0, 0.0, [1.0, 2.0, 3.0, 4.0])
-    assert verdict_of([ahead, law("b", 100.0, 0.0, [76.0, 77.1, 78.0, 78.9])])[1] == "a explains the tracks best"
-    doubtful = verdict_of([ahead, law("b", 399.0, 0.0, [0.0, 4.0, 1.0, 6.0])])[1]
+    assert judge_laws([ahead, law("b", 100.0, 0.0, [76.0, 77.1, 78.0, 78.9])])[1] == "a explains the tracks best"
+    doubtful = judge_laws([ahead, law("b", 399.0, 0.0, [0.0, 4.0, 1.0, 6.0])])[1]
     assert "b cannot be told from it" in doubtful
     # by 1 unit with a standard error of 4.1: the simpler of two is the better explanation, wherever it stands
     many, few = law("a", 400.0, 0.0, [1.0, 2.0, 3.0, 4.0], 8), law("b", 399.0, 0.0, [0.0, 4.0, 1.0, 6.0], 3)
-    assert verdict_of([many, few]) == (few, "b explains the tracks with 3 numbers as well as a with 8")
-    assert verdict_of([law("a", 400.0, 0.0, [1.0, 2.0, 3.0, 4.0], 3), few])[0].name == "a"
+    assert judge_laws([many, few]) == (few, "b explains the tracks with 3 numbers as well as a with 8")
+    assert judge_laws([law("a", 400.0, 0.0, [1.0, 2.0, 3.0, 4.0], 3), few])[0].name == "a"
     behind = law("b", 394.0, 0.0, [0.5, 6.0, 2.5, 7.0], 3)  # by 6 units with a standard error of 4.7
-    assert verdict_of([many, behind])[0] is many
-    assert "would explain 30%" in verdict_of([law("a", 400.0, 0.3, [1.0, 2.0])])[1]
-    assert verdict_of([law("a", 8.0, 0.0, [1.0, 2.0])])[0] is None  # within two standard errors
-    assert verdict_of([law("a", 18.0, 0.0, [1.0, 2.0])])[0] is None  # less than so many numbers bring by chance
-    unsure = verdict_of([replace(law("a", 11168.0, 0.0, [1.0, 2.0]), error=8965.0)])  # one span brings most of it
+    assert judge_laws([many, behind])[0] is many
+    assert "would explain 30%" in judge_laws([law("a", 400.0, 0.3, [1.0, 2.0])])[1]
+    assert judge_laws([law("a", 8.0, 0.0, [1.0, 2.0])])[0] is None  # within two standard errors
+    assert judge_laws([law("a", 18.0, 0.0, [1.0, 2.0])])[0] is None  # less than so many numbers bring by chance
+    unsure = judge_laws([replace(law("a", 11168.0, 0.0, [1.0, 2.0]), error=8965.0)])  # one span brings most of it
     assert unsure[0] is None and unsure[1] == (
         "none of these explains the tracks better than going straight on for sure: a is ahead in 100% of the spans, "
         "but its gain of 11168 is less than 2 standard errors (8965); longer tracks would tell"
@@ -261,17 +279,17 @@ def test_the_command_says_all_that_is_wrong_in_lines(tmp_path, monkeypatch):
 
 
 def test_json_holds_what_the_table_says():
-    from airflock.cli.infer import _plain
+    from airflock.cli.infer import _json_values
 
-    scale = scale_of([tracks_of(vicsek(frames=130))])
-    laws = [Law("a", 1.0, 2.0, 0.5, 20.0, 3.0, 0.9, float("nan"), {}, None, None, None, np.zeros(3))]
-    found = Inferred(laws, None, "none", 10, (5, 9), scale, 10)
-    plain = json.loads(json.dumps(_plain(found)))
+    scale = tracks_scale([tracks_from_recording(vicsek(frames=130))])
+    laws = [LawResult("a", 1.0, 2.0, 0.5, 20.0, 3.0, 0.9, float("nan"), {}, None, None, None, np.zeros(3))]
+    found = InferResult(laws, None, "none", 10, (5, 9), scale, 10)
+    plain = json.loads(json.dumps(_json_values(found)))
     assert plain["best"] is None and plain["laws"][0]["gain"] == 1.0 and plain["frames"] == {"fitted": 5, "all": 9}
 
 
 def test_positions_of_a_recording_stay_untouched():
     recording = vicsek(frames=130)
     kept = recording.copy(deep=True)
-    tracks_of(recording)
+    tracks_from_recording(recording)
     xr.testing.assert_identical(recording, kept)

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airflock.estimate.infer.fit import FINE, climb
-from airflock.estimate.infer.given_up import taken_back, ways_of
-from airflock.estimate.infer.ridges import Ridges
-from airflock.estimate.infer.run import _Comparison
+from airflock.estimate.inference.fit import FINE_SLOPES, climb_to_maximum
+from airflock.estimate.inference.given_up import restore_parameters, ridges_from_point
+from airflock.estimate.inference.ridges import Ridges
+from airflock.estimate.inference.run import _Comparison
 from line_laws import Line, quietly
 
 DROP = 4.0
@@ -18,8 +18,10 @@ def fitted(law, names, truth, number, default):
     """A model, and its fit by all numbers but one that stays at its default."""
     model = Line(law, names, truth, dict.fromkeys(names, 0.5) | {names[number]: default})
     rest = [k for k in range(len(names)) if k != number]
-    without = model.with_numbers([model.numbers[k] for k in rest])
-    return model, climb(without, np.array([truth[k] for k in rest]), [0, 1], steps=200, slopes=(FINE,))
+    without = model.with_parameters([model.numbers[k] for k in rest])
+    return model, climb_to_maximum(
+        without, np.array([truth[k] for k in rest]), [0, 1], steps=200, slopes=(FINE_SLOPES,)
+    )
 
 
 def test_the_others_lie_within_intervals_that_know_of_a_number_that_was_given_up():
@@ -29,7 +31,7 @@ def test_the_others_lie_within_intervals_that_know_of_a_number_that_was_given_up
     truth = (0.64, 0.7, 0.9)
     model, fit = fitted(law, ("gain", "slope", "bend"), truth, 2, 0.3)
     assert fit.place[0] == pytest.approx(0.04, abs=0.01)  # gain as it must be where bend is what it is not
-    ways = ways_of(model, fit, 2, 0.3, [0], DROP)
+    ways = ridges_from_point(model, fit, 2, 0.3, [0], DROP)
     low, high = Ridges(tuple(ways)).ends(np.append(fit.place, 0.3), DROP)
     bends = np.linspace(0.0, 1.0, 101)
     likely = [
@@ -47,12 +49,12 @@ def test_what_others_make_up_for_exactly_is_a_name_and_widens_nothing():
 
     model, fit = fitted(law, ("force", "free", "unit"), (0.5, 0.6, 0.4), 2, 0.3)
     assert fit.place[0] == pytest.approx(0.6, abs=0.05)
-    assert ways_of(model, fit, 2, 0.3, [0], DROP) == []
+    assert ridges_from_point(model, fit, 2, 0.3, [0], DROP) == []
 
 
 def test_what_changes_nothing_widens_nothing():
     model, fit = fitted(lambda x, a, b, idle: a * x + b + 0.0 * idle, ("a", "b", "idle"), (0.5, 0.6, 0.4), 2, 0.3)
-    assert ways_of(model, fit, 2, 0.3, [0], DROP) == []
+    assert ridges_from_point(model, fit, 2, 0.3, [0], DROP) == []
 
 
 def test_a_number_is_taken_back_where_a_walk_leads_higher_than_any_climb():
@@ -61,21 +63,21 @@ def test_a_number_is_taken_back_where_a_walk_leads_higher_than_any_climb():
 
     truth = (0.64, 0.9)
     model = Line(law, ("b", "a"), truth, {"b": 0.5, "a": 0.45})
-    without = model.with_numbers(model.numbers[:1])
-    fit = climb(without, np.array([0.1225]), [0], steps=200, slopes=(FINE,))
-    best, beside = (climb(model, np.array(u), [0, 1], steps=40) for u in (truth, (fit.place[0], 0.45)))
+    without = model.with_parameters(model.numbers[:1])
+    fit = climb_to_maximum(without, np.array([0.1225]), [0], steps=200, slopes=(FINE_SLOPES,))
+    best, beside = (climb_to_maximum(model, np.array(u), [0, 1], steps=40) for u in (truth, (fit.place[0], 0.45)))
     assert beside.loss > best.loss + 8.0
 
-    found, higher = taken_back(model.law, without, fit, [0], quietly)
+    found, higher = restore_parameters(model.law, without, fit, [0], quietly)
     assert found.law.numbers == model.law.numbers and higher.place == pytest.approx(truth, abs=0.05)
     without.seen = law(model.input, 0.1225, 0.45)  # nothing but the default flew
-    fit = climb(without, np.array([0.1225]), [0], steps=200, slopes=(FINE,))
-    assert taken_back(model.law, without, fit, [0], quietly)[0] is without
+    fit = climb_to_maximum(without, np.array([0.1225]), [0], steps=200, slopes=(FINE_SLOPES,))
+    assert restore_parameters(model.law, without, fit, [0], quietly)[0] is without
 
 
 def law_that(name, gain, surprise, every):
     """What a comparison asks of a law; surprises differ from span to span, by another rhythm for each law."""
-    return SimpleNamespace(name=name, gain=gain, surprise=surprise + np.sin(np.arange(100.0) / every))
+    return SimpleNamespace(name=name, gain=gain, negative_log_likelihoods=surprise + np.sin(np.arange(100.0) / every))
 
 
 def test_a_law_that_cannot_be_told_from_the_best_is_searched_as_deeply(monkeypatch):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from test_infer import PERIOD, SPEED, dataset
 
-from airflock.estimate.infer.lack_of_fit import SHELLS, lack_of_fit
-from airflock.estimate.infer.likelihood import Model
-from airflock.estimate.infer.tracks import scale_of, tracks_of
+from airflock.estimate.inference.lack_of_fit import SHELLS, lack_of_fit
+from airflock.estimate.inference.likelihood import FitModel
+from airflock.estimate.inference.tracks import tracks_from_recording, tracks_scale
 
 AGENTS, FRAMES, TURN = 10, 400, 0.15
 
@@ -28,8 +28,8 @@ def turning(answer, seed):
 
 def left_by_nobodys_law(place):
     """What is left over of going straight on."""
-    tracks = [tracks_of(dataset(place))]
-    model = Model(None, tracks, scale_of(tracks))
+    tracks = [tracks_from_recording(dataset(place))]
+    model = FitModel(None, tracks, tracks_scale(tracks))
     return lack_of_fit(model, model.first(), range(len(model.spans)))
 
 

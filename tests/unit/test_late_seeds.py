@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import toys
-from airflock.runs.executors.in_process import InProcess
+from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.folder import Interrupted, open_folder
-from airflock.runs.store import Batch, Store
-from airflock.search.request import study_of
-from airflock.search.run import run
-from airflock.search.search import search, total_flights, windowed
+from airflock.runs.store import CandidateBatch, FlightStore
+from airflock.search.request import study_from_request
+from airflock.search.run import run_study
+from airflock.search.search import run_search, total_flights, windowed_means
 from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -45,9 +45,9 @@ def ends(tmp_path, name, **keys):
     """Courage of the last mean of a search of 1,200 flights or so."""
     study = toys.study(population=20, top=0, **keys)
     open_folder(tmp_path / name, study, resume=False)
-    with Store(tmp_path / name) as store:
+    with FlightStore(tmp_path / name) as store:
         store.begin({})
-        (mean,) = search(study, store, InProcess(gamble, 1))
+        (mean,) = run_search(study, store, ThreadExecutor(gamble, 1))
         assert store.count() == total_flights(study)
     return courage(study.space.parameters(mean))
 
@@ -76,16 +76,16 @@ def test_flights_of_a_candidate_grow_in_equal_ratios_up_to_late_seeds():
 
 def test_windows_are_means_of_equal_parts_of_the_last_half():
     means = [np.array([float(i)]) for i in range(12)]
-    assert [float(each[0]) for each in windowed(means, 3)] == [6.5, 8.5, 10.5]
-    assert windowed(means, 0) == [] and len(windowed(means[:3], 5)) == 2
+    assert [float(each[0]) for each in windowed_means(means, 3)] == [6.5, 8.5, 10.5]
+    assert windowed_means(means, 0) == [] and len(windowed_means(means[:3], 5)) == 2
 
 
 def test_the_better_half_of_the_finalists_flies_on_and_the_winner_is_the_best_of_all_flights_of_the_best(tmp_path):
     study = toys.study(windows=2, averages=1, again=2, final_seeds=5)
     open_folder(tmp_path / "a", study, resume=False)
-    result = run(study, tmp_path / "a", InProcess(lambda p, seed: toys.bowl(p, seed, noise=0.3), 1))
-    with Store(tmp_path / "a", write=False) as store:
-        rounds = [store.flown(Batch(*batch)) for batch in (("final", 0, 0), ("final", 0, 1), ("again", 0, 0))]
+    result = run_study(study, tmp_path / "a", ThreadExecutor(lambda p, seed: toys.bowl(p, seed, noise=0.3), 1))
+    with FlightStore(tmp_path / "a", write=False) as store:
+        rounds = [store.flown(CandidateBatch(*batch)) for batch in (("final", 0, 0), ("final", 0, 1), ("again", 0, 0))]
         seeds = {seed for (seed,) in store.rows("SELECT seed FROM flight WHERE stage IN ('final', 'again', 'score')")}
     assert list(result.finalists["origin"]) == ["mean"] * 4 + ["top"] * 3
     flights, alive = {k: [] for k in range(7)}, list(range(7))
@@ -101,7 +101,7 @@ def test_the_better_half_of_the_finalists_flies_on_and_the_winner_is_the_best_of
 def test_a_search_that_is_cut_off_among_its_late_flights_ends_the_same(tmp_path):
     keys = {"generations": 10, "late_seeds": 3, "windows": 2, "again": 1, "restarts": 1}
     open_folder(tmp_path / "whole", toys.study(**keys), resume=False)
-    whole = run(toys.study(**keys), tmp_path / "whole", InProcess(toys.bowl, 2))
+    whole = run_study(toys.study(**keys), tmp_path / "whole", ThreadExecutor(toys.bowl, 2))
 
     def stop(progress):
         if progress.fresh in (70, 120):
@@ -110,9 +110,9 @@ def test_a_search_that_is_cut_off_among_its_late_flights_ends_the_same(tmp_path)
     open_folder(tmp_path / "cut", toys.study(**keys), resume=False)
     for _ in range(2):
         with pytest.raises(Interrupted):
-            run(toys.study(**keys), tmp_path / "cut", InProcess(toys.bowl, 2), stop)
-    assert run(toys.study(**keys), tmp_path / "cut", InProcess(toys.bowl, 2)).document() == whole.document()
-    with Store(tmp_path / "whole", write=False) as store:
+            run_study(toys.study(**keys), tmp_path / "cut", ThreadExecutor(toys.bowl, 2), stop)
+    assert run_study(toys.study(**keys), tmp_path / "cut", ThreadExecutor(toys.bowl, 2)).document() == whole.document()
+    with FlightStore(tmp_path / "whole", write=False) as store:
         seeds = [seed for (seed,) in store.rows("SELECT seed FROM flight WHERE stage = 'search'")]
     flown = 2 * 8 * sum(toys.study(**keys).seeds(generation) for generation in range(10))
     assert len(set(seeds)) == len(seeds) == flown  # every flight has a seed of its own
@@ -130,7 +130,10 @@ def test_faults_of_these_keys_are_told_together():
 
 
 def test_the_fast_search_takes_a_third_of_the_flights_and_goes_with_limits():
-    (fast, usual), limits = (study_of("vasarhelyi_2018/6ms", fast=fast) for fast in (True, False)), ["r_min<3 at 1%"]
+    (fast, usual), limits = (
+        (study_from_request("vasarhelyi_2018/6ms", fast=fast) for fast in (True, False)),
+        ["r_min<3 at 1%"],
+    )
 
     def cost(study):
         q, top = study.search, study.search.top
@@ -141,5 +144,5 @@ def test_the_fast_search_takes_a_third_of_the_flights_and_goes_with_limits():
         return total_flights(study) + race + final
 
     assert 0.3 < cost(fast) / cost(usual) < 1 / 3
-    with_limits = study_of("vasarhelyi_2018/6ms", fast=True, limit=limits, search_keys={"population": 20})
+    with_limits = study_from_request("vasarhelyi_2018/6ms", fast=True, limit=limits, search_keys={"population": 20})
     assert (with_limits.search.again, with_limits.search.seeds, with_limits.search.population) == (0, 2, 20)

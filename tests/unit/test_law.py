@@ -15,10 +15,10 @@ import pytest
 from airflock.core import maths
 from airflock.core.contract import model
 from airflock.core.rules import law
-from airflock.core.vocabulary import VOCABULARY, asks
+from airflock.core.vocabulary import VOCABULARY, argument_names
 from airflock.core.vocabulary.metrics import METRIC
-from airflock.engine.text.generate import Source
-from airflock.engine.text.probe import probe
+from airflock.engine.text.generate import DriverSource
+from airflock.engine.text.probe import probe_model
 from airflock.parts.bodies.registry import BODIES
 from airflock.parts.metrics.registry import METRICS
 from airflock.scenarios.laws import MODELS
@@ -137,17 +137,17 @@ def indices(x, work, first, last, size, p):
 
 
 def test_a_lawful_rule_passes():
-    assert law.faults(lawful) == []
+    assert law.rule_errors(lawful) == []
 
 
 def test_a_float_is_a_float_whatever_its_name():
     """A name that is used as no index makes of an integer beside it a double in a kernel of single precision."""
-    said = law.faults(named_like_indices)
+    said = law.rule_errors(named_like_indices)
     assert [line.partition("integer ")[2].split()[0] for line in sorted(said)] == ["1", "1", "1", "2", "2", "2", "3"]
 
 
 def test_what_counts_or_points_is_an_integer_whatever_its_name():
-    assert law.faults(indices) == law.faults(halved) == []
+    assert law.rule_errors(indices) == law.rule_errors(halved) == []
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_what_counts_or_points_is_an_integer_whatever_its_name():
     ],
 )
 def test_a_fault_names_file_line_and_reason(rule, said):
-    (line, *_) = law.faults(rule)
+    (line, *_) = law.rule_errors(rule)
     file, number, text = line.split(":", 2)
     assert file == __file__ and said in text
     with open(file, encoding="utf-8") as source:
@@ -187,16 +187,16 @@ def test_every_shipped_model_is_lawful(name):
     module = import_module(f"airflock.parts.laws.{name}")
     for kind in RULES:
         if hasattr(module, kind):
-            assert law.faults(getattr(module, kind)) == []
+            assert law.rule_errors(getattr(module, kind)) == []
 
 
 def test_every_shipped_body_and_order_parameter_is_lawful():
     for body in BODIES.values():
-        assert law.faults(body.move) == []
+        assert law.rule_errors(body.move) == []
     for metric in METRICS.values():
         for kind in METRIC:
             if getattr(metric, kind) is not None:
-                assert law.faults(getattr(metric, kind)) == [], (metric.name, kind)
+                assert law.rule_errors(getattr(metric, kind)) == [], (metric.name, kind)
 
 
 def test_an_unknown_name_is_refused_with_the_nearest_known_one():
@@ -204,7 +204,7 @@ def test_an_unknown_name_is_refused_with_the_nearest_known_one():
         return dx
 
     with pytest.raises(RuleError, match="asks for 'distnce'") as caught:
-        asks(neighbour, "neighbour", "mine")
+        argument_names(neighbour, "neighbour", "mine")
     assert all(name in str(caught.value) for name in VOCABULARY["neighbour"])
 
 
@@ -249,7 +249,7 @@ def test_a_model_with_a_part_missing_is_refused(parts, said):
 def test_rules_of_a_model_are_plain_python():
     module = import_module("airflock.parts.laws.vasarhelyi_2018")
     p = module.Parameters()
-    sums = module.neighbour(**{name: 1.0 for name in asks(module.neighbour, "neighbour") if name != "p"}, p=p)
+    sums = module.neighbour(**{name: 1.0 for name in argument_names(module.neighbour, "neighbour") if name != "p"}, p=p)
     assert all(isinstance(value, float) and math.isfinite(value) for value in sums)
 
 
@@ -289,7 +289,7 @@ def of_numpy(dx):
 def test_what_to_write_instead_is_told_of_the_rule_that_is_wrong(rule, said):
     parts = {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "neighbour": rule, "Sums": Sums}
     with pytest.raises(RuleError, match=said):
-        probe(model(SimpleNamespace(**parts), "mine"), Parameters())
+        probe_model(model(SimpleNamespace(**parts), "mine"), Parameters())
 
 
 def misspelt(dx, p):
@@ -307,7 +307,7 @@ def test_an_attribute_that_is_misspelt_names_the_near_one_and_its_line(rule, mea
     parts = {"Parameters": Gain, "COMMAND": "velocity", "decide": decide, "neighbour": rule, "Sums": Sums}
     line = rule.__code__.co_firstlineno + 1
     with pytest.raises(RuleError, match=rf"test_law.py:{line}: .* has no attribute {re.escape(meant)}$"):
-        probe(model(SimpleNamespace(**parts), "mine"), Gain())
+        probe_model(model(SimpleNamespace(**parts), "mine"), Gain())
 
 
 def rounded(dx):
@@ -348,7 +348,7 @@ def test_what_is_no_rule_or_no_record_is_told_with_its_line(rule, record, line, 
     parts = {"Parameters": Fixed, "COMMAND": "velocity", "decide": decide, "neighbour": rule, "Sums": record}
     first = getattr(rule, "__wrapped__", rule).__code__.co_firstlineno
     with pytest.raises(RuleError, match=rf"test_law.py:{first + line}: .*{re.escape(said)}"):
-        probe(model(SimpleNamespace(**parts), "mine"), Fixed())
+        probe_model(model(SimpleNamespace(**parts), "mine"), Fixed())
 
 
 @pytest.mark.parametrize(("name", "stands_for", "said"), [
@@ -360,15 +360,15 @@ def test_a_name_that_no_driver_has_is_told_with_its_line(name, stands_for, said,
     space = {name: stands_for}
     exec(compile(file.read_text(encoding="utf-8"), str(file), "exec"), space)
     with pytest.raises(RuleError, match=f"mine.py:3: rule rule uses {name}, .*{said}$"):
-        Source("", {}).name(space["rule"])
+        DriverSource("", {}).name(space["rule"])
 
 
 def test_a_text_that_a_rule_makes_is_for_plain_python_alone():
     """Numba knows no format of a number: it ended as a fault of the program."""
     with pytest.raises(RuleError, match=rf"test_law.py:{rounded.__code__.co_firstlineno + 1}: .* makes a text"):
-        Source("", {}).name(rounded)
-    lenient = Source("", {})
-    lenient.lenient = True
+        DriverSource("", {}).name(rounded)
+    lenient = DriverSource("", {})
+    lenient.allow_builtins = True
     lenient.name(rounded)
     space = {"real": float}
     exec("\n".join(lenient.blocks), space)

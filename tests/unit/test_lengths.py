@@ -6,9 +6,9 @@ import pytest
 
 import airflock
 from airflock.parts.metrics.registry import SETS
-from airflock.recordings.flown_scenario import scenario_of
-from airflock.recordings.lengths import IN_BODIES, in_bodies
-from airflock.recordings.scores import measure, not_told
+from airflock.recordings.flown_scenario import scenario_of_recording
+from airflock.recordings.lengths import IN_BODIES, body_length_settings
+from airflock.recordings.scores import measure_recording, undefined_metrics_of
 from airflock.support.errors import RecordingError
 from processes import called
 
@@ -39,18 +39,18 @@ def test_what_depends_on_a_length_says_so(kind, seed):
     recording = tracks(seed)
     settings = {"metrics.kind": kind, "world.arena": "square", "world.side": 200.0}
     settings |= {f"metrics.{key}": value for key, value in GIVEN.items()}
-    assert not_told(recording, scenario_of(recording, settings), settings) == {}
-    here = measure(recording, settings)[0]
+    assert undefined_metrics_of(recording, scenario_of_recording(recording, settings), settings) == {}
+    here = measure_recording(recording, settings)[0]
     for key, value in GIVEN.items():
         fewer = {name: given for name, given in settings.items() if name != f"metrics.{key}"}
         if key == "max_e" and "quality" in here:  # without it an error says what to give
             continue
-        refused = not_told(recording, scenario_of(recording, fewer), fewer)
+        refused = undefined_metrics_of(recording, scenario_of_recording(recording, fewer), fewer)
         for factor in (0.3, 3.0):
-            there = measure(recording, {**settings, f"metrics.{key}": factor * value})[0]
+            there = measure_recording(recording, {**settings, f"metrics.{key}": factor * value})[0]
             changed = {name for name in here if str(here[name]) != str(there[name])} - {"phi_lap", "phi_lap_abs"}
             assert changed <= set(refused) or key == "v_tol", (key, changed)
-        assert not set(measure(recording, fewer)[0]) & set(refused)
+        assert not set(measure_recording(recording, fewer)[0]) & set(refused)
 
 
 def test_a_body_is_a_length(seed):
@@ -61,14 +61,18 @@ def test_a_body_is_a_length(seed):
     by_hand = airflock.score(recording, settings={"metrics.r_coll": 1.0, "metrics.r_cluster": 10.0})
     assert scored["n_coll"][0] == by_hand["n_coll"][0] and scored["phi_corr"][0] == by_hand["phi_corr"][0]
     assert (scored[list(bare)].iloc[0].dropna() == bare.iloc[0].dropna()).all()  # the others are what they were
-    assert in_bodies(2.0)["metrics.r_coll"] == 1.0 and IN_BODIES["r_coll"] == 0.5
+    assert body_length_settings(2.0)["metrics.r_coll"] == 1.0 and IN_BODIES["r_coll"] == 0.5
     own = airflock.score(recording, settings={"metrics.r_cluster": 4.0}, body_length=2.0)  # who knows better is heard
     assert own["n_min"][0] == airflock.score(recording, settings={"metrics.r_cluster": 4.0})["n_min"][0]
 
 
 def test_a_simulated_flight_brings_its_lengths():
     flight = airflock.simulate(airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0}))
-    assert not_told(flight, scenario_of(flight)) == {} and {"n_coll", "phi_corr", "fitness"} <= set(measure(flight)[0])
+    assert undefined_metrics_of(flight, scenario_of_recording(flight)) == {} and {
+        "n_coll",
+        "phi_corr",
+        "fitness",
+    } <= set(measure_recording(flight)[0])
 
 
 def test_the_command_says_what_to_give(tmp_path, seed):

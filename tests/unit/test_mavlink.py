@@ -5,33 +5,34 @@ import random
 import struct
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from airflock.drones.mavlink import dialect, orders, status
-from airflock.drones.mavlink.autopilots import AUTOPILOTS, Speaker
-from airflock.drones.mavlink.frames import Packer, Stream, frames_in
+from airflock.drones.mavlink.autopilots import AUTOPILOTS, AutopilotCommands
+from airflock.drones.mavlink.frames import FramePacker, FrameStream, frames_in
 from airflock.drones.mavlink.keys import read_key, write_key
-from airflock.drones.mavlink.signing import EPOCH, LAST_STAMP, Receiver, Signer, stamp_at
-from airflock.drones.mavlink.status import Status
-from airflock.support.coordinates import FLATTENING, SEMI_MAJOR, Site, turned
+from airflock.drones.mavlink.signing import MAX_STAMP, SIGNING_EPOCH, PacketReceiver, PacketSigner, stamp_of_time
+from airflock.drones.mavlink.status import DroneStatus
+from airflock.support.coordinates import FLATTENING, SEMI_MAJOR, FlightSite, swap_enu_ned
 from airflock.support.errors import LinkError
 from attacks import attacks
 
-common = dialect.common()
+common = dialect.common_dialect()
 KEY = bytes(range(32))
 NOW = 1_800_000_000_000_000  # µs
-SITE = Site(47.5, 19.0, 120.0)
-STATUS = Status(NOW, (10.0, -20.0, 30.0), (1.0, -2.0, 0.5), 1.5, 6, True, 77, b"card", 88, 0.02, 9)
+SITE = FlightSite(47.5, 19.0, 120.0)
+STATUS = DroneStatus(NOW, (10.0, -20.0, 30.0), (1.0, -2.0, 0.5), 1.5, 6, True, 77, b"card", 88, 0.02, 9)
 finite = st.floats(-1e3, 1e3, width=32)
 
 
 def receiver(own=1, **more):
-    return Receiver(KEY, own, {status.MESSAGE: range(1, 60), orders.MESSAGE: (255,)}, started=NOW - 10**7, **more)
+    return PacketReceiver(
+        KEY, own, {status.STATUS_MESSAGE: range(1, 60), orders.TUNNEL_MESSAGE: (255,)}, started=NOW - 10**7, **more
+    )
 
 
 def packet(who=7, utc=NOW, key=KEY, told=STATUS):
-    return Signer(key, who)(status.message(told, SITE), utc)
+    return PacketSigner(key, who)(status.status_message(told, SITE), utc)
 
 
 # --------------------------------------------------------------------------------------------------------- frames
@@ -40,10 +41,10 @@ def packet(who=7, utc=NOW, key=KEY, told=STATUS):
 @given(st.sampled_from(sorted(common.mavlink_map)), st.binary(min_size=255, max_size=255))
 @settings(max_examples=300)
 def test_every_message_reads_as_pymavlink_reads_it(number, noise):
-    known = dialect.layout(number)
+    known = dialect.message_layout(number)
     payload = noise[: known.size]
     expected = common.mavlink_map[number](*_in_order(number, known.unpack(payload)))
-    found = dialect.values(number, payload)
+    found = dialect.message_fields(number, payload)
     for name in expected.fieldnames:
         a, b = found[name], getattr(expected, name)
         if isinstance(a, str):
@@ -54,8 +55,8 @@ def test_every_message_reads_as_pymavlink_reads_it(number, noise):
 
 def _in_order(number, flat):
     kind = common.mavlink_map[number]
-    known = dialect.layout(number)
-    fields = {name: (index, 0) for name, index in (*known.single, *known.texts)}
+    known = dialect.message_layout(number)
+    fields = {name: (index, 0) for name, index in (*known.numbers, *known.texts)}
     fields |= {name: (index, count) for name, index, count in known.arrays}
     for name in kind.fieldnames:
         index, count = fields[name]
@@ -67,13 +68,13 @@ def _in_order(number, flat):
 )
 @settings(max_examples=150)
 def test_a_line_with_rubbish_between_frames_loses_no_frame(velocities, rubbish, data):
-    pack = Packer(3, 1)
+    pack = FramePacker(3, 1)
     sent = [pack(common.MAVLink_local_position_ned_message(5, 1.0, 2.0, 3.0, *v)) for v in velocities]
     stream = b""
     for frame in sent:
         stream += data.draw(st.sampled_from([*rubbish, b"", b"\xfd\xff\x00\x00\x00\x07\xbf\x20\x00\x00"])) + frame
     stream += bytes(600)  # what could hide in a false start has now arrived
-    line, found = Stream(), []
+    line, found = FrameStream(), []
     while stream:
         cut = data.draw(st.integers(1, 700))
         found += line(stream[:cut])
@@ -90,7 +91,7 @@ def _single(x):
 @settings(max_examples=300)
 def test_any_bytes_are_read_without_an_exception(data):
     frames_in(data)
-    line = Stream()
+    line = FrameStream()
     for k in range(0, len(data), 7):
         line(data[k : k + 7])
     assert receiver()(data, NOW) is None  # nobody signed it
@@ -101,16 +102,16 @@ def test_any_bytes_are_read_without_an_exception(data):
 
 def test_pymavlink_accepts_what_we_sign_and_we_what_it_signs():
     theirs = common.MAVLink(None, 1, 191)
-    theirs.signing.secret_key, theirs.signing.timestamp = KEY, stamp_at(NOW) - 1
+    theirs.signing.secret_key, theirs.signing.timestamp = KEY, stamp_of_time(NOW) - 1
     assert theirs.decode(bytearray(packet())).get_type() == "UTM_GLOBAL_POSITION"
     got = receiver()(packet(), NOW)
-    assert (got.system, got.stamp, got.message) == (7, stamp_at(NOW), status.MESSAGE)
+    assert (got.system, got.stamp, got.message) == (7, stamp_of_time(NOW), status.STATUS_MESSAGE)
 
 
 def test_a_forged_stamp_locks_nobody_out():
     """pymavlink 2.4.50 keeps the stamp before it compares the signature: one such datagram, and a neighbour is mute."""
     ours, forged = receiver(), bytearray(packet())
-    forged[-12:-6] = LAST_STAMP.to_bytes(6, "little")
+    forged[-12:-6] = MAX_STAMP.to_bytes(6, "little")
     assert ours(bytes(forged), NOW) is None
     assert ours.refused["signature"] == 1 and not ours.heard
     assert ours(packet(), NOW) is not None
@@ -119,9 +120,11 @@ def test_a_forged_stamp_locks_nobody_out():
 def test_a_replay_is_refused_after_a_restart_too():
     before, old = receiver(), packet()
     assert before(old, NOW) and before(old, NOW) is None
-    fresh = Receiver(KEY, 1, {status.MESSAGE: range(1, 60)}, started=NOW + 500_000)  # half a second later
+    fresh = PacketReceiver(KEY, 1, {status.STATUS_MESSAGE: range(1, 60)}, started=NOW + 500_000)  # half a second later
     assert fresh(old, NOW + 500_000) is None and fresh.refused["replay"] == 1
-    behind = Receiver(KEY, 1, {status.MESSAGE: range(1, 60)}, started=NOW - 10**6, heard=before.heard)
+    behind = PacketReceiver(
+        KEY, 1, {status.STATUS_MESSAGE: range(1, 60)}, started=NOW - 10**6, last_stamps=before.heard
+    )
     assert behind(old, NOW) is None, "the own clock went back over the restart; what was heard is still known"
     assert fresh(packet(utc=NOW + 600_000), NOW + 600_000) is not None
 
@@ -129,13 +132,13 @@ def test_a_replay_is_refused_after_a_restart_too():
 def test_the_copy_by_another_radio_is_a_replay_and_any_other_bytes_need_a_signature():
     ours, told = receiver(), packet()
     assert ours(told, NOW) and ours(told, NOW) is None and ours(bytearray(told), NOW) is None
-    assert ours.refused["replay"] == 2 and ours.accepted == 1
+    assert ours.refused["replay"] == 2 and ours.accepted_count == 1
     assert ours(told, NOW + 10**8) is None and ours.refused["clock"] == 1
     for bit in range(8 * len(told)):
         bent = bytearray(told)
         bent[bit // 8] ^= 1 << bit % 8
         assert ours(bytes(bent), NOW) is None
-    assert ours.refused["signature"] > 400 and ours.refused["replay"] == 2 and ours.accepted == 1
+    assert ours.refused["signature"] > 400 and ours.refused["replay"] == 2 and ours.accepted_count == 1
     ahead = told[:-12] + (int.from_bytes(told[-12:-6], "little") + 1).to_bytes(6, "little") + told[-6:]
     assert ours(ahead, NOW) is None, "a newer stamp under the old signature"
     assert ours(packet(utc=NOW + 10), NOW + 10) is not None
@@ -144,17 +147,19 @@ def test_the_copy_by_another_radio_is_a_replay_and_any_other_bytes_need_a_signat
 @pytest.mark.parametrize("off", [-61.0, -1.01, 1.01, 60.0, 2.4e9])
 def test_a_clock_that_is_wrong_moves_nobody_elses(off):
     """A member with the key whose clock says 2104: refused, and our own stamps stay ours."""
-    ours, signer = receiver(), Signer(KEY, 1)
-    assert ours(packet(utc=max(EPOCH, min(NOW + round(off * 1e6), EPOCH + 10 * LAST_STAMP))), NOW) is None
-    signer(status.message(STATUS, SITE), NOW)
-    assert ours.refused["clock"] == 1 and signer.last == stamp_at(NOW)
+    ours, signer = receiver(), PacketSigner(KEY, 1)
+    assert (
+        ours(packet(utc=max(SIGNING_EPOCH, min(NOW + round(off * 1e6), SIGNING_EPOCH + 10 * MAX_STAMP))), NOW) is None
+    )
+    signer(status.status_message(STATUS, SITE), NOW)
+    assert ours.refused["clock"] == 1 and signer.last == stamp_of_time(NOW)
 
 
 def test_stamps_grow_over_a_restart_with_a_clock_that_went_back():
-    first = Signer(KEY, 7)
-    first(status.message(STATUS, SITE), NOW)
-    again = Signer(KEY, 7, last=first.last)
-    assert receiver(heard={7: first.last})(again(status.message(STATUS, SITE), NOW - 10**6), NOW) is not None
+    first = PacketSigner(KEY, 7)
+    first(status.status_message(STATUS, SITE), NOW)
+    again = PacketSigner(KEY, 7, last=first.last)
+    assert receiver(heard={7: first.last})(again(status.status_message(STATUS, SITE), NOW - 10**6), NOW) is not None
 
 
 def test_who_may_send_what():
@@ -162,8 +167,8 @@ def test_who_may_send_what():
     assert ours(packet(who=1), NOW) is None and ours.refused["own"] == 1
     assert ours(packet(who=200), NOW) is None and ours.refused["stranger"] == 1
     assert ours(packet(who=255), NOW) is None, "the operator has orders to give, not states"
-    order = orders.message(orders.Order(orders.Do.LAND, 0, 77, NOW), bytes(32))
-    assert ours(Signer(KEY, 7)(order, NOW), NOW) is None, "a peer has no orders to give"
+    order = orders.order_message(orders.OperatorOrder(orders.OrderKind.LAND, 0, 77, NOW), bytes(32))
+    assert ours(PacketSigner(KEY, 7)(order, NOW), NOW) is None, "a peer has no orders to give"
 
 
 def test_ten_thousand_attacks_change_nothing_and_hide_nothing():
@@ -176,14 +181,14 @@ def test_ten_thousand_attacks_change_nothing_and_hide_nothing():
 
 
 def test_turning_twice_is_the_identity():
-    assert turned(*turned(1.0, 2.0, 3.0)) == (1.0, 2.0, 3.0)
-    assert turned(1.0, 0.0, 0.0) == (0.0, 1.0, 0.0) and turned(0.0, 0.0, 1.0)[2] == -1.0
+    assert swap_enu_ned(*swap_enu_ned(1.0, 2.0, 3.0)) == (1.0, 2.0, 3.0)
+    assert swap_enu_ned(1.0, 0.0, 0.0) == (0.0, 1.0, 0.0) and swap_enu_ned(0.0, 0.0, 1.0)[2] == -1.0
 
 
 @given(st.floats(-80, 80), st.floats(-180, 179.999), st.floats(0, 3000), st.tuples(*[st.floats(-2e3, 2e3)] * 3))
 def test_there_and_back_again(latitude, longitude, altitude, at):
-    site = Site(latitude, longitude, altitude)
-    assert site.local(*site.geodetic(*at)) == pytest.approx(at, abs=1e-5)
+    site = FlightSite(latitude, longitude, altitude)
+    assert site.local(*site.to_geodetic(*at)) == pytest.approx(at, abs=1e-5)
 
 
 def _earth_centred(latitude, longitude, height):
@@ -195,7 +200,7 @@ def _earth_centred(latitude, longitude, height):
 
 @given(st.floats(-70, 70), st.floats(-180, 180), st.floats(0, 3000), st.floats(-700, 700), st.floats(-700, 700))
 def test_the_plane_is_the_tangent_plane_within_half_a_metre(latitude, longitude, altitude, x, y):
-    at = Site(latitude, longitude, altitude).geodetic(x, y, 0.0)
+    at = FlightSite(latitude, longitude, altitude).to_geodetic(x, y, 0.0)
     a, b = _earth_centred(latitude, longitude, altitude), _earth_centred(*at)
     d = [q - p for p, q in zip(a, b, strict=True)]
     phi, lam = math.radians(latitude), math.radians(longitude)
@@ -205,7 +210,7 @@ def test_the_plane_is_the_tangent_plane_within_half_a_metre(latitude, longitude,
 
 
 def test_the_date_line_is_no_wall():
-    x, _, _ = Site(10.0, 179.9999, 0.0).local(10.0, -179.9999, 0.0)
+    x, _, _ = FlightSite(10.0, 179.9999, 0.0).local(10.0, -179.9999, 0.0)
     assert 0.0 < x < 30.0
 
 
@@ -216,8 +221,8 @@ def test_the_date_line_is_no_wall():
     st.tuples(*[st.floats(-3e3, 3e3)] * 3), st.tuples(*[st.floats(-300, 300)] * 3), st.integers(0, 13), st.booleans()
 )
 def test_a_status_arrives_as_it_was_told(at, velocity, phase, airborne):
-    told = STATUS._replace(position=at, velocity=velocity, phase=phase, airborne=airborne)
-    heard = status.status_of(receiver()(packet(told=told), NOW).values, SITE)
+    told = STATUS._replace(position=at, velocity=velocity, phase=phase, is_airborne=airborne)
+    heard = status.parse_status(receiver()(packet(told=told), NOW).values, SITE)
     assert heard.position == pytest.approx(at, abs=6e-4) and heard.velocity == pytest.approx(velocity, abs=3e-5)
     assert heard._replace(position=at, velocity=velocity) == told
 
@@ -226,22 +231,27 @@ def test_a_status_takes_95_bytes_and_none_of_another_kind_passes():
     assert len(packet(told=STATUS)) == 95
     values = receiver()(packet(), NOW).values
     for key, value in (("flags", 1), ("flight_state", 16), ("uas_id", (1, *values["uas_id"][1:]))):
-        assert status.status_of(values | {key: value}, SITE) is None
+        assert status.parse_status(values | {key: value}, SITE) is None
 
 
 def test_only_the_operators_key_gives_orders():
     pytest.importorskip("cryptography")
-    private, public = orders.new_keys()
-    other, _ = orders.new_keys()
-    order = orders.Order(orders.Do.GOTO, 3, 77, NOW, NOW + 5, (475000000, 190000000, 140000))
-    heard = receiver()(Signer(KEY, 255)(orders.message(order, private), NOW), NOW).values
-    assert orders.order_of(heard, public) == order
-    assert orders.order_of(receiver()(Signer(KEY, 255)(orders.message(order, other), NOW), NOW).values, public) is None
+    private, public = orders.new_operator_keys()
+    other, _ = orders.new_operator_keys()
+    order = orders.OperatorOrder(orders.OrderKind.GOTO, 3, 77, NOW, NOW + 5, (475000000, 190000000, 140000))
+    heard = receiver()(PacketSigner(KEY, 255)(orders.order_message(order, private), NOW), NOW).values
+    assert orders.parse_order(heard, public) == order
+    assert (
+        orders.parse_order(
+            receiver()(PacketSigner(KEY, 255)(orders.order_message(order, other), NOW), NOW).values, public
+        )
+        is None
+    )
     changed = list(heard["payload"])
-    for k in range(orders.CONTENT.size + orders.SEAL):
+    for k in range(orders.ORDER_FORMAT.size + orders.SEAL_LENGTH):
         bent = changed.copy()
         bent[k] ^= 1 << random.Random(k).randrange(8)
-        assert orders.order_of(heard | {"payload": bent}, public) is None
+        assert orders.parse_order(heard | {"payload": bent}, public) is None
 
 
 # ------------------------------------------------------------------------------------------- autopilots and files
@@ -249,7 +259,7 @@ def test_only_the_operators_key_gives_orders():
 
 def test_what_a_node_says_to_its_autopilot():
     for kind in AUTOPILOTS.values():
-        say = Speaker(kind, 4)
+        say = AutopilotCommands(kind, 4)
         (frame,) = frames_in(say.velocity((1.0, 2.0, 3.0), 7))
         told = frame.values()
         assert (told["vx"], told["vy"], told["vz"], told["target_system"]) == (2.0, 1.0, -3.0, 4)
@@ -259,7 +269,7 @@ def test_what_a_node_says_to_its_autopilot():
         p = frame.values()
         mode = int(p["param2"]) << 16 | int(p["param3"]) << 24 if kind.name == "px4" else int(p["param2"])
         assert mode == kind.ours
-    assert AUTOPILOTS["px4"].parameter(struct.unpack("<f", struct.pack("<i", 5))[0], 6) == 5.0
+    assert AUTOPILOTS["px4"].parameter_value(struct.unpack("<f", struct.pack("<i", 5))[0], 6) == 5.0
 
 
 def test_key_files(tmp_path):

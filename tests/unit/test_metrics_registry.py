@@ -1,19 +1,19 @@
 """What an order parameter means is told by the set that a flight is scored with."""
 
-from airflock.parts.metrics.registry import METRICS, SETS, reports
+from airflock.parts.metrics.registry import METRICS, SETS, reported_values
 
 
 def test_each_kind_tells_of_its_own_fitness():
     """A fitness is a power with a unit for birds, a product of factors for drones; quality has none."""
-    assert reports(SETS["dimock"])["fitness"][0] == "W"
-    assert "product" in reports(SETS["vasarhelyi"])["fitness"][1]
-    assert "f_goals" in reports(SETS["kidger"])["fitness"][1]
-    assert "fitness" not in reports(SETS["zapotecatl"])
+    assert reported_values(SETS["dimock"])["fitness"][0] == "W"
+    assert "product" in reported_values(SETS["vasarhelyi"])["fitness"][1]
+    assert "f_goals" in reported_values(SETS["kidger"])["fitness"][1]
+    assert "fitness" not in reported_values(SETS["zapotecatl"])
 
 
 def test_every_name_has_a_meaning():
     for kind in SETS:
-        assert all(meaning for _, meaning in reports(SETS[kind]).values()), kind
+        assert all(meaning for _, meaning in reported_values(SETS[kind]).values()), kind
 
 
 def test_every_order_parameter_says_what_it_is_while_some_are_absent():

@@ -4,18 +4,17 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from airflock.core.agent import State
 from airflock.core.maths import braking_curve
-from airflock.drones.mavlink.orders import Do
-from airflock.drones.onboard.limiter import limit
-from airflock.drones.onboard.mission import FLY, TABLE, Facts, Phase, look
-from airflock.drones.onboard.safety import Safety
+from airflock.drones.mavlink.orders import OrderKind
+from airflock.drones.onboard.limiter import limit_velocity
+from airflock.drones.onboard.mission import FLYING_PHASES, MISSION_TABLE, MissionFacts, MissionPhase, next_step
+from airflock.drones.onboard.safety import SafetyLimits
 
-WELL, SAFE = Facts(), Safety()
-P = Phase
+WELL, SAFE = MissionFacts(), SafetyLimits()
+P = MissionPhase
 PILOT = {"mode_ours": False}
 # number, phase, facts that fire it, next phase; facts of a higher row and where that leads
 ROWS = [
@@ -49,22 +48,22 @@ ROWS = [
     ("17b", P.CLEARED, {"armed": False, "misses": ("no position",)}, P.READY, {"fault": "x"}, P.FAULT),
     ("18", P.CLEARED, {"armed": False, "due": True}, P.ARMING, {"misses": ("battery",)}, P.READY),
     ("19", P.ARMING, {"streamed_for": 2.0}, P.TAKEOFF, {"killed": True}, P.DONE),
-    ("19c", P.ARMING, {"order": Do.LAND}, P.READY, {"killed": True}, P.DONE),
-    ("19c", P.ARMING, {"armed": False, "order": Do.HOLD}, P.READY, None, None),
+    ("19c", P.ARMING, {"order": OrderKind.LAND}, P.READY, {"killed": True}, P.DONE),
+    ("19c", P.ARMING, {"armed": False, "order": OrderKind.HOLD}, P.READY, None, None),
     ("19b", P.ARMING, {"armed": False, "phase_for": 11.0}, P.READY, {"killed": True}, P.DONE),
     ("20", P.TAKEOFF, {"at_layer": True}, P.GATHER, {"gnss_bad_for": 1.0}, P.HOLD),
     ("21", P.TAKEOFF, {"neighbour_near": True}, P.HOLD, {"at_layer": True}, P.GATHER),
     ("21b", P.TAKEOFF, {"climbing": False, "phase_for": 6.0}, P.LAND, PILOT, P.MANUAL),
     ("22", P.GATHER, {"gathered": True}, P.FLOCK, {"few_for": 11.0}, P.HOLD),
-    ("22", P.GATHER, {"order": Do.GO}, P.FLOCK, {"clock_bad_for": 1.0}, P.HOLD),
-    ("23", P.FLOCK, {"order": Do.LAND}, P.LAND, {"battery_home": True}, P.RETURN),
-    ("23", P.GOTO, {"order": Do.RETURN}, P.RETURN, {"position_bad_for": 1.0}, P.HOLD),
+    ("22", P.GATHER, {"order": OrderKind.GO}, P.FLOCK, {"clock_bad_for": 1.0}, P.HOLD),
+    ("23", P.FLOCK, {"order": OrderKind.LAND}, P.LAND, {"battery_home": True}, P.RETURN),
+    ("23", P.GOTO, {"order": OrderKind.RETURN}, P.RETURN, {"position_bad_for": 1.0}, P.HOLD),
     ("23", P.FLOCK, {"time_over": True}, P.RETURN, PILOT, P.MANUAL),
-    ("23", P.FLOCK, {"order": Do.HOLD}, P.HOLD, {"outside_for": 1.0}, P.RETURN),
-    ("23", P.FLOCK, {"order": Do.GOTO}, P.GOTO, {"battery_home": True}, P.RETURN),
-    ("23", P.GOTO, {"order": Do.RESUME}, P.FLOCK, {"overload": True}, P.HOLD),
-    ("24", P.FLOCK, {"joined": True}, None, {"order": Do.HOLD}, P.HOLD),
-    ("25", P.HOLD, {"calm_for": 3.0, "before": P.GOTO}, P.GOTO, {"order": Do.LAND}, P.LAND),
+    ("23", P.FLOCK, {"order": OrderKind.HOLD}, P.HOLD, {"outside_for": 1.0}, P.RETURN),
+    ("23", P.FLOCK, {"order": OrderKind.GOTO}, P.GOTO, {"battery_home": True}, P.RETURN),
+    ("23", P.GOTO, {"order": OrderKind.RESUME}, P.FLOCK, {"overload": True}, P.HOLD),
+    ("24", P.FLOCK, {"joined": True}, None, {"order": OrderKind.HOLD}, P.HOLD),
+    ("25", P.HOLD, {"calm_for": 3.0, "before": P.GOTO}, P.GOTO, {"order": OrderKind.LAND}, P.LAND),
     ("26", P.RETURN, {"at_home": True}, P.LAND, {"position_bad_for": 1.0}, P.HOLD),
     ("27", P.LAND, {"landed": True, "mode_land": True}, P.DONE, {"landed": False, "killed": True}, P.DONE),
     ("28", P.BOOT, {"landed": False}, P.MANUAL, None, None),
@@ -73,49 +72,51 @@ ROWS = [
 
 def at(phase, given):
     safety = replace(SAFE, operator_lost=given.get("says", "ignore"))
-    return look(phase, WELL._replace(**{k: v for k, v in given.items() if k != "says"}), safety)
+    return next_step(phase, WELL._replace(**{k: v for k, v in given.items() if k != "says"}), safety)
 
 
 @pytest.mark.parametrize(("number", "phase", "given", "to", "higher", "then"), ROWS)
 def test_every_row_fires_and_gives_way_to_a_higher_one(number, phase, given, to, higher, then):
     step = at(phase, given)
     if to is None:
-        assert step.row is None and step.to == phase and number in step.effects
+        assert step.row is None and step.next_phase == phase and number in step.effects
     else:
-        assert (step.row.number, step.to) == (number, to)
+        assert (step.row.number, step.next_phase) == (number, to)
     if higher is not None:
         above = at(phase, given | higher)
-        assert above.to == then and above.row.number != number
-        order = [row.number for row in TABLE]
+        assert above.next_phase == then and above.row.number != number
+        order = [row.number for row in MISSION_TABLE]
         assert order.index(above.row.number) < len(order) - order[::-1].index(number)
 
 
 def test_all_28_rows_of_the_table_are_here():
     whole = {number.rstrip("bc") for number, *_ in ROWS}
-    assert whole == {row.number.rstrip("bc") for row in TABLE} == {str(k) for k in range(1, 29)}
-    assert {number for number, *_ in ROWS} == {row.number for row in TABLE}
+    assert whole == {row.number.rstrip("bc") for row in MISSION_TABLE} == {str(k) for k in range(1, 29)}
+    assert {number for number, *_ in ROWS} == {row.number for row in MISSION_TABLE}
 
 
-@pytest.mark.parametrize("phase", sorted(FLY - {P.TAKEOFF, P.GATHER}))
+@pytest.mark.parametrize("phase", sorted(FLYING_PHASES - {P.TAKEOFF, P.GATHER}))
 def test_a_drone_that_flies_well_flies_on(phase):
-    assert at(phase, {}).row is None and at(phase, {}).to == phase
+    assert at(phase, {}).row is None and at(phase, {}).next_phase == phase
 
 
-@given(st.sampled_from(sorted(Phase)), st.data())
+@given(st.sampled_from(sorted(MissionPhase)), st.data())
 def test_whatever_goes_wrong_the_pilot_comes_first_and_nothing_on_the_ground_flies_by_itself(phase, data):
-    names = [name for name, kind in Facts.__annotations__.items() if kind is bool]
+    names = [name for name, kind in MissionFacts.__annotations__.items() if kind is bool]
     odd = {name: data.draw(st.booleans(), label=name) for name in names}
-    odd |= {n: data.draw(st.sampled_from([0.0, 1.0, 99.0])) for n, k in Facts.__annotations__.items() if k is float}
-    odd["order"] = data.draw(st.sampled_from([None, *Do]))
+    odd |= {
+        n: data.draw(st.sampled_from([0.0, 1.0, 99.0])) for n, k in MissionFacts.__annotations__.items() if k is float
+    }
+    odd["order"] = data.draw(st.sampled_from([None, *OrderKind]))
     step = at(phase, odd)
-    if phase in FLY and not odd["mode_ours"]:
-        assert step.to == P.MANUAL
+    if phase in FLYING_PHASES and not odd["mode_ours"]:
+        assert step.next_phase == P.MANUAL
     if phase in (P.BOOT, P.READY, P.CLEARED, P.DONE, P.FAULT):
-        assert step.to not in FLY
-        assert step.to != P.ARMING or (phase == P.CLEARED and odd["due"])
+        assert step.next_phase not in FLYING_PHASES
+        assert step.next_phase != P.ARMING or (phase == P.CLEARED and odd["due"])
     if phase in (P.DONE, P.FAULT):
-        assert step.to == phase
-    if phase == P.MANUAL and step.to == P.HOLD:
+        assert step.next_phase == phase
+    if phase == P.MANUAL and step.next_phase == P.HOLD:
         assert odd["mode_ours"] and odd["resume"] and odd["healthy"]
 
 
@@ -131,7 +132,7 @@ def square(own, half=100.0):
 
 @given(st.tuples(numbers, numbers, numbers), states)
 def test_whatever_is_wished_stays_within_all_limits(wish, own):
-    (vx, vy, vz), _ = limit(wish, own, square(own), (2.0, 60.0), SAFE)
+    (vx, vy, vz), _ = limit_velocity(wish, own, square(own), (2.0, 60.0), SAFE)
     assert all(map(math.isfinite, (vx, vy, vz)))
     assert math.hypot(vx, vy) <= SAFE.speed_max * (1 + 1e-9) and abs(vz) <= SAFE.climb_max
     for distance, nx, ny, _ in square(own):
@@ -144,8 +145,8 @@ def test_whatever_is_wished_stays_within_all_limits(wish, own):
 @given(st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-1, 1)))
 def test_what_is_harmless_passes_unchanged(wish):
     own = State(0.0, 0.0, 30.0, 0.0, 0.0, 0.0)
-    made = limit(wish, own, square(own), (2.0, 60.0), SAFE)
-    assert made.velocity == pytest.approx(wish, abs=1e-12) and not made.fenced
+    made = limit_velocity(wish, own, square(own), (2.0, 60.0), SAFE)
+    assert made.velocity == pytest.approx(wish, abs=1e-12) and not made.is_fenced
 
 
 @given(st.floats(0, 2 * math.pi), st.floats(-90, 90), st.floats(-90, 90))
@@ -154,7 +155,7 @@ def test_a_drone_at_full_speed_stops_before_the_fence(direction, x, y):
     own, dt = State(x, y, 20.0, 0.0, 0.0, 0.0), 0.05
     wish = (6.0 * math.cos(direction), 6.0 * math.sin(direction), 0.0)
     for _ in range(1200):
-        v = limit(wish, own, square(own), (2.0, 60.0), SAFE).velocity
+        v = limit_velocity(wish, own, square(own), (2.0, 60.0), SAFE).velocity
         ax, ay = (v[0] - own.vx) / SAFE.response, (v[1] - own.vy) / SAFE.response
         k = min(1.0, SAFE.accel / max(math.hypot(ax, ay), 1e-9))
         vx, vy = own.vx + k * ax * dt, own.vy + k * ay * dt

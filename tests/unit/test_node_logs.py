@@ -7,9 +7,9 @@ import pytest
 
 import airflock
 from airflock.core.agent import State
-from airflock.drones.onboard.log import Logged
-from airflock.drones.onboard.mission import Phase
-from airflock.drones.onboard.node import Memory, Node
+from airflock.drones.onboard.log import LoggingNode
+from airflock.drones.onboard.mission import MissionPhase
+from airflock.drones.onboard.node import Node, NodeMemory
 from airflock.support.errors import RecordingError
 from fleets import card
 
@@ -18,22 +18,22 @@ KEY, UTC = bytes(range(32)), 1_767_225_600 * 10**6  # µs
 CARD = card(airflock.load("vasarhelyi_2018/real_4ms", {"agents": 4}))
 
 
-def written(path, member, boot, place, phase=Phase.FLOCK, hold=1):
+def written(path, member, boot, place, phase=MissionPhase.FLOCK, hold=1):
     """The log of a node whose autopilot tells places (tick, axis) at each tick, 0.05 s apart, or at each `hold`-th.
 
     boot : since when its computer is on, s
     """
     lines = []
-    node = Node(CARD, member, KEY, now=boot, utc=UTC, memory=Memory(), radios=(0.2,))
-    logged = Logged(node, lines.append, now=boot, memory=Memory(), radios=(0.2,))
+    node = Node(CARD, member, KEY, now=boot, utc=UTC, memory=NodeMemory(), radios=(0.2,))
+    logged = LoggingNode(node, lines.append, now=boot, memory=NodeMemory(), radios=(0.2,))
     speed = np.gradient(place, 0.05, axis=0)
     place, speed = (np.repeat(each[::hold], hold, axis=0) for each in (place, speed))
     for k in range(len(place)):
         logged.tick(boot + 0.05 * k)
-        node.wire.state, node.phase = State(*place[k], *speed[k]), phase
+        node.autopilot_link.state, node.phase = State(*place[k], *speed[k]), phase
         node.command = (1.0, 0.0, -0.5)
         row = json.loads(lines[-1])
-        row |= {"phase": node.phase.name, "own": list(node.wire.state), "set": list(node.command)}
+        row |= {"phase": node.phase.name, "own": list(node.autopilot_link.state), "set": list(node.command)}
         lines[-1] = json.dumps(row)
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -59,7 +59,7 @@ def test_two_drones_meet_on_one_clock(tmp_path):
 
 
 def test_what_a_node_on_the_ground_says_is_no_command(tmp_path):
-    log = written(tmp_path / "a.log", 3, 5.0, circle(0.0), phase=Phase.READY)
+    log = written(tmp_path / "a.log", 3, 5.0, circle(0.0), phase=MissionPhase.READY)
     notes = []
     found = airflock.load_tracks(log, say=notes.append)
     assert "command" not in found and any("never flew" in note for note in notes)

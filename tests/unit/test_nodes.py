@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 import airflock
-from airflock.core.rules.nodes import walk
+from airflock.core.rules.nodes import walk_tree
 
 LEFT_OUT = ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.alias
 
@@ -12,4 +12,4 @@ LEFT_OUT = ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop, a
 def test_all_nodes_of_the_package_are_met_in_the_order_of_ast():
     for file in sorted(Path(airflock.__file__).parent.rglob("*.py")):
         tree = ast.parse(file.read_text(encoding="utf-8"))
-        assert walk(tree) == [node for node in ast.walk(tree) if not isinstance(node, LEFT_OUT)], file
+        assert walk_tree(tree) == [node for node in ast.walk(tree) if not isinstance(node, LEFT_OUT)], file

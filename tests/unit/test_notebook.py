@@ -12,11 +12,11 @@ import airflock
 import toys
 from airflock.parts.metrics import registry
 from airflock.recordings.measures import milling
-from airflock.runs.executors.in_process import InProcess
-from airflock.runs.store import Store
-from airflock.search.search import search
+from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.store import FlightStore
+from airflock.search.search import run_search
 from airflock.search.study import load_study
-from airflock.search.winner import conclude
+from airflock.search.winner import conclude_study
 from airflock.support.errors import ParameterError, RecordingError, ScenarioError
 from processes import called
 
@@ -184,10 +184,10 @@ def test_flights_moments_studies_and_results_show_themselves_with_units_and_mean
     assert repr(study).startswith("<Study of vasarhelyi_2018/6ms: 11 parameters for fitness, 150 generations of 100 ")
     assert "<td>model.p_rep</td><td>0.01 … 0.5</td><td>1/s</td><td>linear</td>" in study._repr_html_()
 
-    toy, executor = toys.study(), InProcess(toys.bowl, 1)
+    toy, executor = toys.study(), ThreadExecutor(toys.bowl, 1)
     (tmp_path / "a").mkdir()
-    with Store(tmp_path / "a") as store:
-        found = conclude(toy, store, executor, search(toy, store, executor), tmp_path / "a")
+    with FlightStore(tmp_path / "a") as store:
+        found = conclude_study(toy, store, executor, run_search(toy, store, executor), tmp_path / "a")
     executor.close()
     assert repr(found).startswith(f"<Result {tmp_path / 'a'}: ") and f"on {found.seeds} fresh seeds>" in repr(found)
     for key, value in found.parameters.items():

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 import toys
-from airflock.runs.executors.in_process import InProcess
-from airflock.runs.store import Store
+from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.store import FlightStore
 from airflock.search.evaluator import Evaluator
-from airflock.search.fitness import Objective, losses
-from airflock.search.genetic import BinaryGenetic, decode, genetic
-from airflock.search.nondominated import front
-from airflock.search.optimisers import optimiser
-from airflock.search.race import race
+from airflock.search.fitness import Objective, candidate_losses
+from airflock.search.genetic import BinaryGenetic, decode, minimise_over_bits
+from airflock.search.nondominated import pareto_front
+from airflock.search.optimisers import make_optimiser
+from airflock.search.race import race_candidates
 from airflock.support.errors import StudyError
 
 
 def run(algorithm, f, dimension, objectives, population, generations, seed):
-    state = optimiser(algorithm, dimension, objectives, population, seed)
+    state = make_optimiser(algorithm, dimension, objectives, population, seed)
     for _ in range(generations):
         points = state.ask()
         assert points.shape == (population, dimension) and points.min() >= 0.0 and points.max() <= 1.0
@@ -51,21 +51,21 @@ def test_cma_es_takes_one_dimension_and_optima_on_the_bounds(seed):
 
 
 def test_cma_es_begins_in_the_middle_with_a_sixth_of_the_range(seed):
-    points = np.concatenate([optimiser("cmaes", 4, 1, 100, seed + i).ask() for i in range(20)])
+    points = np.concatenate([make_optimiser("cmaes", 4, 1, 100, seed + i).ask() for i in range(20)])
     assert np.allclose(points.mean(axis=0), 0.5, atol=0.02)
     assert np.allclose(points.std(axis=0), 1.0 / 6.0, rtol=0.05)
 
 
 def test_genetic_algorithm_finds_all_ones_and_the_cell_of_a_sphere(seed):
-    ones = genetic(lambda bits: 30.0 - bits.sum(axis=1), 30, generations=120, seed=seed)
+    ones = minimise_over_bits(lambda bits: 30.0 - bits.sum(axis=1), 30, generations=120, seed=seed)
     assert ones.loss <= 1.0 and len(ones.best) == 120
-    near = genetic(lambda bits: sphere(decode(bits)), 50, generations=150, seed=seed)
+    near = minimise_over_bits(lambda bits: sphere(decode(bits)), 50, generations=150, seed=seed)
     assert near.loss < 0.01
 
 
 def test_nondominated_sorting_reaches_the_front_of_zdt1(seed):
     _, _, found = run("nsga2", zdt1, 10, 2, 60, 120, seed)
-    best = found[front(found)]
+    best = found[pareto_front(found)]
     assert len(best) >= 25
     away = np.abs(best[:, 1] - (1.0 - np.sqrt(best[:, 0])))
     assert np.median(away) < 0.01 and np.quantile(away, 0.9) < 0.05
@@ -107,14 +107,14 @@ def test_generations_of_the_genetic_algorithm_replace_their_parents(seed):
 def test_front_holds_exactly_those_whom_nobody_betters(seed):
     table = np.random.default_rng(seed).random((80, 3)).round(1)
     brute = [i for i, a in enumerate(table) if not any((b <= a).all() and (b < a).any() for b in table)]
-    assert front(table).tolist() == brute
+    assert pareto_front(table).tolist() == brute
 
 
 def test_failed_candidates_lose_against_all_of_their_generation():
     up, down = Objective("a"), Objective("b", maximise=False)
-    table = losses([[1.0, 1.0], [None, None], [3.0, 5.0]], (up, down))
+    table = candidate_losses([[1.0, 1.0], [None, None], [3.0, 5.0]], (up, down))
     assert table.tolist() == [[-1.0, 1.0], [0.0, 6.0], [-3.0, 5.0]]
-    assert losses([[None]], (up,)).tolist() == [[1.0]]
+    assert candidate_losses([[None]], (up,)).tolist() == [[1.0]]
 
 
 def test_objectives_over_seeds():
@@ -134,11 +134,11 @@ def test_race_finds_the_best_where_one_flight_says_little(tmp_path, seed):
     study = toys.study(pool=200, top=5)
     rng = np.random.default_rng(seed)
     points = rng.random((2000, 3))
-    noisy = InProcess(lambda p, s: {"fitness": toys.bowl(p | {"model.p_rep": 0.2}, s, noise=0.1)["fitness"]}, 2)
+    noisy = ThreadExecutor(lambda p, s: {"fitness": toys.bowl(p | {"model.p_rep": 0.2}, s, noise=0.1)["fitness"]}, 2)
     given = [study.space.parameters(point) | {"model.p_rep": 0.2} for point in points]
     true = np.array([toys.bowl(parameters, 0, noise=0.0)["fitness"] for parameters in given])
-    with Store(tmp_path) as store:
-        winners = race(Evaluator(study, store, noisy), points, -(true + rng.normal(0.0, 0.1, len(true))))
+    with FlightStore(tmp_path) as store:
+        winners = race_candidates(Evaluator(study, store, noisy), points, -(true + rng.normal(0.0, 0.1, len(true))))
     noisy.close()
     ranks = np.argsort(np.argsort(-true))[winners]
     assert len(winners) == 5 and np.median(ranks) < 200

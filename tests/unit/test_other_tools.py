@@ -9,14 +9,14 @@ import xarray as xr
 
 import airflock
 from airflock.recordings.exports.movement import write_movement
-from airflock.recordings.layout import dataset
+from airflock.recordings.layout import make_dataset
 
 
 def straight(frames=50, n=3):
     """Straight flights at constant velocity, in the layout of recordings."""
     t = np.arange(frames)[:, None, None] * 0.1
     speed = np.random.default_rng(2).normal(0.0, 2.0, (1, 2, n)) + 0.0 * t
-    return dataset(np.concatenate([t * speed, speed, speed], axis=1), 2, 0.1, {}, "velocity")
+    return make_dataset(np.concatenate([t * speed, speed, speed], axis=1), 2, 0.1, {}, "velocity")
 
 
 def test_movement_computes_the_velocities_of_what_we_write(tmp_path):
@@ -24,7 +24,7 @@ def test_movement_computes_the_velocities_of_what_we_write(tmp_path):
     kinematics = pytest.importorskip("movement.kinematics")
     found = straight()
     old = tuple(int(part) for part in movement.__version__.split(".")[:2]) < (0, 17)
-    path = write_movement(found, tmp_path / "tracks.nc", old=old)
+    path = write_movement(found, tmp_path / "tracks.nc", plural_dimensions=old)
     with xr.open_dataset(path, engine="h5netcdf") as opened:
         theirs = kinematics.compute_velocity(opened.load()["position"])
     names = {"keypoints": "keypoint", "individuals": "individual"}

@@ -8,7 +8,7 @@ import pytest
 
 import airflock
 from airflock.engine import Flight
-from airflock.scenarios.own_code import own_module
+from airflock.scenarios.own_code import import_user_file
 from airflock.studio.flights import FlightRequest
 from airflock.studio.player import Player
 from airflock.support.errors import RuleError, ScenarioError
@@ -22,7 +22,7 @@ def test_a_file_that_was_changed_within_a_second_runs_as_it_is(tmp_path, monkeyp
     for number in "123":
         path.write_text(f"GAIN = 0.{number}\n")
         os.utime(path, (1e9, 1e9))
-        module = own_module(path, "model.kind = 'mine.py'", trust=True)
+        module = import_user_file(path, "model.kind = 'mine.py'", trust=True)
         assert float(f"0.{number}") == module.GAIN
         assert (module.__name__, module.__file__) == ("mine", str(path))
     assert list(tmp_path.iterdir()) == [path], "nothing is left beside a user's file"
@@ -32,14 +32,14 @@ def test_a_file_that_was_changed_within_a_second_runs_as_it_is(tmp_path, monkeyp
 def test_what_is_no_text_of_python_is_refused(tmp_path, name):
     (tmp_path / name).write_text("GAIN = 0.1\n")
     with pytest.raises(ScenarioError, match="is not a Python file"):
-        own_module(tmp_path / name, "model.kind", trust=True)
+        import_user_file(tmp_path / name, "model.kind", trust=True)
 
 
 def test_a_fault_of_its_own_names_the_line_and_the_word_that_was_meant(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text('import airflock\n\n\ndef made():\n    return airflock.quantiti(1.0, "m")\n\n\nGAIN = made()\n')
     with pytest.raises(RuleError) as fault:
-        own_module(path, "model.kind", trust=True)
+        import_user_file(path, "model.kind", trust=True)
     said = "AttributeError: module 'airflock' has no attribute 'quantiti'; did you mean quantity?"
     assert str(fault.value) == f"{path}:5: {said}"
 
@@ -115,7 +115,7 @@ def test_a_second_file_that_lies_beside_a_law_is_to_be_written_into_it(tmp_path)
         path = tmp_path / f"{name}_law.py"
         path.write_text(f"from {name} import lean\n{LAW}")
         with pytest.raises(RuleError) as fault:
-            own_module(path, "model.kind", trust=True)
+            import_user_file(path, "model.kind", trust=True)
         told = str(fault.value).removeprefix(f"{path}:1: ModuleNotFoundError: No module named '{name}'")
         assert told.startswith(more) and bool(told) == bool(more)
 
@@ -159,4 +159,4 @@ def test_a_page_stops_the_flight_of_a_rule_that_raises_and_goes_on(raising, monk
     monkeypatch.setattr("airflock.studio.origin.Flight", plainly)
     path, told = raising
     player = Player(FlightRequest("vasarhelyi_2018/4ms", {"agents": 3}, law=path))
-    assert not player.fly(50) and player.failure == f"stopped: {told}"
+    assert not player.fly(50) and player.failure_message == f"stopped: {told}"

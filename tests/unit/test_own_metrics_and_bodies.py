@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import fly
-from airflock.parts.metrics.registry import SETS, metric_set, reports
-from airflock.recordings.files import fly_again
-from airflock.recordings.flights import flown_document
-from airflock.recordings.flown_scenario import scenario_of
+from airflock.engine import fly_world
+from airflock.parts.metrics.registry import SETS, metric_set, reported_values
+from airflock.recordings.files import replay_recording
+from airflock.recordings.flights import bare_document
+from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.scenarios.files import load
 from airflock.support.errors import AirflockError, RuleError, ScenarioError
 
@@ -91,7 +91,7 @@ def files(tmp_path):
 
 def test_a_metric_of_ones_own_measures_what_its_rule_says(files):
     found = load("vasarhelyi_2018/4ms", SMALL, metrics=files / "spread.py")
-    flown = fly(found, 1, record=True, device="python")
+    flown = fly_world(found, 1, record=True, device="python")
     x = flown.frames[:, 0]
     truth = np.abs(x - x.mean(axis=1, keepdims=True)).mean()
     values = found.judged(flown.values)
@@ -100,15 +100,15 @@ def test_a_metric_of_ones_own_measures_what_its_rule_says(files):
     assert found.measures.best == "fitness" and "phi_vel" in values  # METRICS: one of ours beside it
     narrow = load("vasarhelyi_2018/4ms", {**SMALL, "metrics.width": 1.0}, metrics=files / "spread.py")
     assert narrow.judged(flown.values)["fitness"] == pytest.approx(1.0 / (1.0 + truth), rel=1e-12)
-    assert reports(found.measures)["spread"] == ("m", "mean distance to the centre, east")
+    assert reported_values(found.measures)["spread"] == ("m", "mean distance to the centre, east")
 
 
 def test_a_body_of_ones_own_flies_half_of_the_command(files):
     found = load("vasarhelyi_2018/4ms", SMALL, body=files / "half.py")
-    frames = fly(found, 1, record=True, device="python").frames
+    frames = fly_world(found, 1, record=True, device="python").frames
     np.testing.assert_array_equal(frames[1:, 2:4], 0.5 * frames[:-1, 4:6])  # a decision at every sample
     still = load("vasarhelyi_2018/4ms", {**SMALL, "body.share": 0.0}, body=files / "half.py")
-    assert np.ptp(fly(still, 1, record=True, device="python").frames[:, :2], axis=0).max() == 0.0
+    assert np.ptp(fly_world(still, 1, record=True, device="python").frames[:, :2], axis=0).max() == 0.0
 
 
 @pytest.mark.parametrize(("returned", "said"), [
@@ -131,7 +131,7 @@ def test_a_body_without_numbers_needs_no_parameters(tmp_path, seed):
     path.write_text('ACCEPTS, INTEGRATION = "velocity", "new"\n\n\ndef move(cx, cy, cz):\n    return cx, cy, cz\n')
     ours = load("vasarhelyi_2018/4ms", SMALL | {"body.kind": "direct"})
     theirs = load("vasarhelyi_2018/4ms", SMALL, body=path)
-    one, other = (fly(found, seed, record=True, device="python").frames for found in (ours, theirs))
+    one, other = (fly_world(found, seed, record=True, device="python").frames for found in (ours, theirs))
     assert np.array_equal(one, other)
     assert airflock.check_body(path)
     theirs = load("vasarhelyi_2018/4ms", SMALL | {"groups": [{"name": "a", "agents": 1}]}, body=path)
@@ -144,7 +144,7 @@ def test_a_file_and_the_same_names_given_directly_are_one(files):
     direct = load(
         "vasarhelyi_2018/4ms", {**SMALL, **keys}, metrics=namespace(METRIC), body=airflock.body(namespace(BODY))
     )
-    a, b = (found.judged(fly(found, 2, record=True, device="python").values) for found in (from_file, direct))
+    a, b = (found.judged(fly_world(found, 2, record=True, device="python").values) for found in (from_file, direct))
     assert a == b
     listed = load("vasarhelyi_2018/4ms", SMALL, metrics=["speed", airflock.metric(namespace(METRIC), "spread")])
     assert listed.numbers["q"] == load("vasarhelyi_2018/4ms").numbers["q"]
@@ -153,10 +153,10 @@ def test_a_file_and_the_same_names_given_directly_are_one(files):
 def test_a_recording_is_scored_without_the_code_that_it_was_flown_with(files):
     named = load("vasarhelyi_2018/4ms", {**SMALL, "metrics.kind": str(files / "spread.py")}, trust=True)
     recording = airflock.simulate(named, 1, precision=64, device="python")
-    assert scenario_of(recording).measures.name == "vasarhelyi"  # a recording runs no code that it names
+    assert scenario_of_recording(recording).measures.name == "vasarhelyi"  # a recording runs no code that it names
     direct = load("vasarhelyi_2018/4ms", SMALL, metrics=namespace(METRIC), body=namespace(BODY))
     recording = airflock.simulate(direct, 1, precision=64, device="python")
-    again = scenario_of(recording)
+    again = scenario_of_recording(recording)
     assert again.measures.name == "vasarhelyi" and again.vehicle.name == "multirotor"
 
 
@@ -165,7 +165,7 @@ def test_code_in_the_current_folder_is_found_and_only_its_name_is_kept(files, mo
     keys = {**SMALL, "metrics.kind": "spread.py", "body.kind": "half.py"}
     document = load("kidger/final_2d", {"agents": 3, "metrics.kind": "spread.py"}, trust=True).document
     assert document["metrics"]["kind"] == "spread.py"
-    kept = flown_document(load("vasarhelyi_2018/4ms", {"metrics.kind": "spread.py"}, trust=True))
+    kept = bare_document(load("vasarhelyi_2018/4ms", {"metrics.kind": "spread.py"}, trust=True))
     assert kept["metrics"]["kind"] == "spread"  # no place of a file
     other = load("vasarhelyi_2018/4ms", keys, trust=True)  # the preset's numbers are another body's
     assert other.vehicle.name == "half" and any("multirotor are left out" in note for note in other.notes)
@@ -243,6 +243,6 @@ def test_code_that_a_recording_names_does_not_run_with_trust_in_another_file(fil
     document = json.loads(recording.attrs["airflock_scenario"])
     document["body"]["kind"] = "evil.py"
     crafted = recording.assign_attrs(airflock_scenario=json.dumps(document))
-    assert scenario_of(crafted, {"metrics.kind": "spread.py"}, trust=True).vehicle.name == "multirotor"
+    assert scenario_of_recording(crafted, {"metrics.kind": "spread.py"}, trust=True).vehicle.name == "multirotor"
     with pytest.raises(AirflockError, match=r"body.kind = 'evil.py', which is not in the file"):
-        fly_again(crafted, settings={"metrics.kind": "spread.py"}, trust=True)
+        replay_recording(crafted, settings={"metrics.kind": "spread.py"}, trust=True)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from airflock.studio.view import BREADTH, drawn_back
+from airflock.studio.view import FULL_ASPECT, camera_for_aspect
 
 AIM = {"position": (10.0, -3.0, 200.0), "look_at": (10.0, 5.0, 0.0), "fov": 0.8, "near": 2.0, "far": 4000.0}
 
@@ -16,15 +16,15 @@ def seen(aim, aspect):
 
 @pytest.mark.parametrize("aspect", [0.2, 390 / 800, 1.0])
 def test_a_narrow_page_sees_as_far_sideways_as_others(aspect):
-    narrow = drawn_back(AIM, aspect)
-    assert seen(narrow, aspect) == pytest.approx(seen(AIM, BREADTH))
+    narrow = camera_for_aspect(AIM, aspect)
+    assert seen(narrow, aspect) == pytest.approx(seen(AIM, FULL_ASPECT))
     way = [a - b for a, b in zip(AIM["position"], AIM["look_at"], strict=True)]
     back = [a - b for a, b in zip(narrow["position"], narrow["look_at"], strict=True)]
-    assert back == pytest.approx([c * BREADTH / aspect for c in way])  # along the same line of sight
+    assert back == pytest.approx([c * FULL_ASPECT / aspect for c in way])  # along the same line of sight
     assert list(narrow) == list(AIM)  # the position first
 
 
-@pytest.mark.parametrize("aspect", [BREADTH, 1.6, 0.0])
+@pytest.mark.parametrize("aspect", [FULL_ASPECT, 1.6, 0.0])
 def test_other_pages_see_what_they_saw(aspect):
-    assert drawn_back(AIM, aspect) == AIM
-    assert drawn_back({}, 0.5) == {}
+    assert camera_for_aspect(AIM, aspect) == AIM
+    assert camera_for_aspect({}, 0.5) == {}

@@ -7,10 +7,10 @@ import pytest
 
 from airflock.engine import Flight
 from airflock.studio.flights import FlightRequest
-from airflock.studio.opening import Opening
-from airflock.studio.panel import Panel
+from airflock.studio.opening import OpeningPanel
+from airflock.studio.panel import Widgets
 from airflock.studio.player import Player
-from airflock.studio.playing import Playing
+from airflock.studio.playing import PlaybackPanel
 from airflock.support import atomic
 
 PRESET = "vasarhelyi_2018/4ms"
@@ -46,7 +46,7 @@ def asked(player, action):
     player.tick(0.0)
     then = player.time
     player.fly(20)
-    assert player.flight is flown and player.time > then and not player.failure
+    assert player.flight is flown and player.time > then and not player.failure_message
     return player.faults
 
 
@@ -64,7 +64,7 @@ def test_a_folder_that_is_gone_is_told_and_the_flight_goes_on(player, tmp_path):
 @pytest.mark.parametrize(("name", "said"), [("\0.toml", "NUL"), (f"{300 * 'a'}.toml", "File name too long")])
 def test_a_name_that_no_file_may_have_is_told_and_the_flight_goes_on(player, tmp_path, monkeypatch, name, said):
     monkeypatch.chdir(tmp_path)
-    room = object.__new__(Opening)
+    room = object.__new__(OpeningPanel)
     room.player, room.page = player, None
     (line,) = asked(player, lambda: room.take(name, b"agents = 3"))
     assert said in line and line.isprintable() and not list(tmp_path.iterdir())
@@ -74,7 +74,7 @@ def test_what_nobody_foresaw_is_told_and_the_flight_goes_on(player, monkeypatch)
     def breaks(*_):
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr(Player, "_open", breaks)
+    monkeypatch.setattr(Player, "_open_panes", breaks)
     (line,) = asked(player, lambda: player.reset(seed=8))
     assert line == "unexpected ZeroDivisionError: division by zero; please report it" and player.seed == 3
 
@@ -95,14 +95,14 @@ def typed(field, value):
 
 def test_a_number_beyond_the_ends_of_its_field_is_not_heard():
     heard = []
-    field = Panel(SimpleNamespace(gui=Fields())).number("agents", 10, 1, 1000, heard.append)
+    field = Widgets(SimpleNamespace(gui=Fields())).number("agents", 10, 1, 1000, heard.append)
     for value in (25, 999_999, 0, -3, 1000, 1):
         typed(field, value)
     assert heard == [25, 1000, 1]
 
 
 def test_a_field_shows_what_flies_where_another_number_is_refused(player):
-    room = object.__new__(Playing)
+    room = object.__new__(PlaybackPanel)
     room.player, room.seed, room.agents = player, SimpleNamespace(value=3), SimpleNamespace(value=1000)
     (line,) = asked(player, lambda: room.reset(agents=1000))
     assert "do not fit" in line and room.agents.value == 5
@@ -110,29 +110,29 @@ def test_a_field_shows_what_flies_where_another_number_is_refused(player):
 
 def test_the_end_of_the_longest_flight_is_told(player, monkeypatch):
     assert not player.over and player.status == ""
-    monkeypatch.setattr("airflock.studio.origin.LONGEST", 1.0)
+    monkeypatch.setattr("airflock.studio.origin.MAX_DURATION", 1.0)
     player.reset()
     player.fly(100)
     then = player.flight.step
     assert player.tick(1.0) is False and player.flight.step == then
     assert player.over and player.status == "a page flies at most 1 s; Reset starts again"
-    player.back(0.5)
+    player.go_back(0.5)
     assert not player.over and player.time == pytest.approx(0.5)
 
 
 def test_whoever_goes_back_further_than_is_kept_is_told_so(player):
     for _ in range(10):
         player.fly(100)
-    player.back(3.0)
+    player.go_back(3.0)
     assert player.note == "back at t = 3 s"
     player.fork()
     player.fly(20)
     player.join()
-    player.back(1.0)
+    player.go_back(1.0)
     assert player.note == "no earlier moment is kept" and player.time == pytest.approx(3.2)
     player.fly(100)
     player.fly(100)
-    player.back(1.0)
+    player.go_back(1.0)
     assert player.note == "back at t = 3.2 s; no earlier moment is kept"
 
 

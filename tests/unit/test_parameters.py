@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from importlib import import_module
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from airflock.core.parameters import (
     Choice,
@@ -16,10 +15,9 @@ from airflock.core.parameters import (
     declarations,
     number_names,
     quantity,
-    quantity_fault,
+    quantity_error,
 )
-from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import complete
+from airflock.core.silence import Parameters as Silence, with_defaults
 from airflock.parts.bodies.registry import BODIES
 from airflock.scenarios.files import load
 from airflock.scenarios.laws import MODELS
@@ -77,10 +75,10 @@ def test_only_numbers_in_range_get_in(value):
 
 def test_a_plain_number_is_told_without_its_unit():
     share = Quantity("1", 0.0, 1.0, "a share", "", False)
-    assert quantity_fault(2.0, share) == "= 2 lies outside [0, 1]"
-    assert quantity_fault("2", share) == "= '2' is not a number; give [0, 1]"
+    assert quantity_error(2.0, share) == "= 2 lies outside [0, 1]"
+    assert quantity_error("2", share) == "= '2' is not a number; give [0, 1]"
     length = share._replace(unit="m")
-    assert quantity_fault(2.0, length) == "= 2 m lies outside [0, 1] m"
+    assert quantity_error(2.0, length) == "= 2 m lies outside [0, 1] m"
     with pytest.raises(ScenarioError, match=r"agents = 0 lies outside \[1, 1e\+07\]$"):
         load("vasarhelyi_2018/4ms", {"agents": 0})
 
@@ -95,4 +93,4 @@ def test_declared_parameters_of_a_class_that_is_no_dataclass_are_not_lost():
 
 @pytest.mark.parametrize("speed", [0.0, 1000.0, 1e4])
 def test_the_reach_of_a_lost_neighbour_grows_at_twice_the_speed_of_the_fastest_laws_too(speed):
-    assert complete(Silence(), speed).closing == 2.0 * (speed or 4.0)
+    assert with_defaults(Silence(), speed).closing == 2.0 * (speed or 4.0)

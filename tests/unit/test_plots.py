@@ -21,30 +21,29 @@ from matplotlib.text import Text
 from typer.testing import CliRunner
 
 import airflock
-from airflock.certificates.bounds import look
+from airflock.certificates.bounds import take_look
 from airflock.cli.main import app
 from airflock.core.maths import bell, braking_curve, excess, peak, rising
 from airflock.parts.laws import vasarhelyi_2018
 from airflock.recordings.files import save
-from airflock.recordings.flown_scenario import scenario_of
-from airflock.recordings.layout import dataset
-from airflock.recordings.scores import courses
-from airflock.scenarios.families import Given
-from airflock.scenarios.making import make
+from airflock.recordings.flown_scenario import scenario_of_recording
+from airflock.recordings.layout import make_dataset
+from airflock.recordings.scores import time_series_names
+from airflock.scenarios.families import CallerParts
+from airflock.scenarios.making import build_scenario
 from airflock.support.errors import AirflockError, RecordingError
-from airflock.view.plots import flight as flight_view
-from airflock.view.plots import style
-from airflock.view.plots.certificate import certificate, tail
-from airflock.view.plots.film_stage import Stage
+from airflock.view.plots import flight as flight_view, style
+from airflock.view.plots.certificate import extrapolated_tail, plot_certificate
+from airflock.view.plots.film_stage import VideoFrame
 from airflock.view.plots.heatmap import heatmap
-from airflock.view.plots.responses import alignment, allowed_difference, repulsion, wall_response
+from airflock.view.plots.responses import alignment_curve, allowed_difference_curve, repulsion_curve, wall_curve
 from airflock.view.plots.rules import rules
 from airflock.view.plots.save import PictureError, save_figure
-from airflock.view.plots.series import Pen, rotations, series
+from airflock.view.plots.series import SmoothedLines, rotations, series
 from airflock.view.plots.trajectories import trajectories
 from airflock.view.plots.transfer import transfer
 from airflock.view.plots.video import frame_count, video
-from airflock.view.stage.arrows import vectors
+from airflock.view.stage.arrows import vector_fields
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 
@@ -60,7 +59,7 @@ def flight(axes=2, agents=3, seconds=100.0, period=0.5, document=None):
     position = [RADIUS * np.cos(angle), RADIUS * np.sin(angle), level][:axes]
     velocity = [-PACE * np.sin(angle), PACE * np.cos(angle), flat][:axes]
     attributes = {} if document is None else {"airflock_scenario": json.dumps(document), "airflock_seed": 7}
-    return dataset(np.stack(position + velocity + velocity, axis=1), axes, period, attributes, "velocity")
+    return make_dataset(np.stack(position + velocity + velocity, axis=1), axes, period, attributes, "velocity")
 
 
 SQUARE = {
@@ -185,13 +184,13 @@ def test_rotations_draw_one_line_for_each_flight():
 def test_drawn_rules_are_the_closed_forms_of_the_paper(name):
     scenario = airflock.load(name)
     p, r = scenario.parameters, np.linspace(0.5, 120.0, 60)
-    (push,) = repulsion(scenario.model, p, r)
+    (push,) = repulsion_curve(scenario.model, p, r)
     assert np.allclose(push.values, p.p_rep * np.maximum(p.r0_rep - r, 0.0), rtol=1e-9, atol=1e-12)
     allowed = np.array([max(p.v_frict, braking_curve(d - p.r0_frict, p.a_frict, p.p_frict)) for d in r])
-    assert np.allclose(allowed_difference(scenario.model, p, r), allowed, rtol=1e-9)
-    (term,) = alignment(scenario.model, p, r, 4.0)
+    assert np.allclose(allowed_difference_curve(scenario.model, p, r), allowed, rtol=1e-9)
+    (term,) = alignment_curve(scenario.model, p, r, 4.0)
     assert np.allclose(term.values, [p.c_frict * excess(4.0, a) * 4.0 for a in allowed], atol=1e-12)
-    (wall,) = wall_response(scenario.model, p, r, p.v_flock)
+    (wall,) = wall_curve(scenario.model, p, r, p.v_flock)
     gap = p.v_shill + p.v_flock
     stop = np.array([braking_curve(d - p.r0_shill, p.a_shill, p.p_shill) for d in r])
     assert np.allclose(wall.values, np.maximum(gap - stop, 0.0), atol=1e-9)
@@ -211,7 +210,9 @@ def test_the_figure_of_rules_holds_these_lines_with_units():
 
 def test_friction_of_virágh_2014_allows_no_difference_at_all():
     scenario = airflock.load("viragh_2014/4ms")
-    assert np.array_equal(allowed_difference(scenario.model, scenario.parameters, np.array([1.0, 20.0])), [0.0, 0.0])
+    assert np.array_equal(
+        allowed_difference_curve(scenario.model, scenario.parameters, np.array([1.0, 20.0])), [0.0, 0.0]
+    )
     assert len(rules(scenario).axes) == 3
 
 
@@ -227,7 +228,7 @@ def test_rules_of_any_model_are_drawn_vector_by_vector():
         vz: float
         n: float
 
-    assert vectors(Sums) == {"apart": ("apart_x", "apart_y"), "v": ("vx", "vy")}
+    assert vector_fields(Sums) == {"apart": ("apart_x", "apart_y"), "v": ("vx", "vy")}
 
     def neighbour(dx, dy, dz, r2, dvx, dvy, dvz):
         return Sums(-dx / r2, -dy / r2, -dz / r2, dvx, dvy, dvz, 1.0)
@@ -241,15 +242,15 @@ def test_rules_of_any_model_are_drawn_vector_by_vector():
     )  # fmt: skip
     parameters = vasarhelyi_2018.Parameters()
     r = np.array([1.0, 2.0, 4.0])
-    apart, velocity = repulsion(found, parameters, r)
+    apart, velocity = repulsion_curve(found, parameters, r)
     assert np.allclose(apart.values, 1.0 / r) and not velocity.values.any()
-    figure = rules(make({"agents": 3}, "own", given=Given(law=found)), difference=2.0)
+    figure = rules(build_scenario({"agents": 3}, "own", caller_parts=CallerParts(law=found)), difference=2.0)
     assert [axes.get_ylabel() for axes in figure.axes] == ["apart", "v"]  # a panel for each vector
 
 
 def test_transfer_functions_are_those_of_the_fitness():
     scenario = airflock.load("vasarhelyi_2018/4ms")
-    q = scenario.measured_by()
+    q = scenario.resolved_metrics()
     figure = transfer(scenario)
     forms = (lambda v: rising(v, q.v_flock, q.v_tol), lambda v: bell(v, q.r_tol), lambda v: peak(v, q.a_tol))
     for axes, form in zip(figure.axes, forms, strict=True):
@@ -311,8 +312,8 @@ def test_a_video_has_the_promised_frames_and_size(tmp_path, ending):
 
 
 def test_darts_are_where_the_agents_are_and_point_where_they_fly():
-    stage = Stage(flight(document=SQUARE), None, None, tail=2.0, height=240, speed=1.0)
-    stage.picture(12.25)  # between two frames
+    stage = VideoFrame(flight(document=SQUARE), None, None, tail=2.0, height=240, speed=1.0)
+    stage.render(12.25)  # between two frames
     corners = np.array([path.vertices[:4] for path in stage.darts.get_paths()])
     angle = 12.25 * PACE / RADIUS + np.arange(3) * 2.0 * math.pi / 3.0
     nose, back = corners[:, 0], corners[:, 2]
@@ -323,12 +324,12 @@ def test_darts_are_where_the_agents_are_and_point_where_they_fly():
 
 
 def test_pictures_in_space_project_parallel():
-    view = flight_view.view_of(3)
+    view = flight_view.projection(3)
     assert np.allclose([view.right @ view.up, view.right @ view.right, view.up @ view.up], [0.0, 1.0, 1.0])
-    stage = Stage(flight(axes=3, document=BOX), None, None, tail=0.0, height=120, speed=1.0)
-    assert stage.picture(1.0).shape == (stage.size[1], stage.size[0], 4)
-    flat = Stage(flight(document=SQUARE), None, None, tail=2.0, height=120, speed=1.0, space=True)
-    flat.picture(12.0)
+    stage = VideoFrame(flight(axes=3, document=BOX), None, None, tail=0.0, height=120, speed=1.0)
+    assert stage.render(1.0).shape == (stage.size[1], stage.size[0], 4)
+    flat = VideoFrame(flight(document=SQUARE), None, None, tail=2.0, height=120, speed=1.0, space=True)
+    flat.render(12.0)
     corners = np.array([path.vertices[:4] for path in flat.darts.get_paths()])
     angle = 12.0 * PACE / RADIUS + np.arange(3) * 2.0 * math.pi / 3.0
     ring = RADIUS * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
@@ -419,9 +420,9 @@ def test_lines_differ_for_colour_blind_readers_too():
     def luminance(color):
         return sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), color[:3], strict=True))
 
-    ramp = [luminance(style.SPEED(v)) for v in np.linspace(0.0, 1.0, 20)]
+    ramp = [luminance(style.SPEED_COLOURS(v)) for v in np.linspace(0.0, 1.0, 20)]
     assert np.all(np.diff(ramp) > 0.0)  # speed can be read in grey
-    assert len({to_hex(c) for c in style.LINES}) == len(style.LINES)
+    assert len({to_hex(c) for c in style.LINE_COLOURS}) == len(style.LINE_COLOURS)
 
 
 def test_no_line_is_drawn_across_a_periodic_world():
@@ -448,16 +449,16 @@ def wrapping(seconds=60.0, period=0.5):
         "world": {"side": 40.0, "edges": "periodic", "height": 40.0},
     }
     attributes = {"airflock_scenario": json.dumps(world), "airflock_seed": 7}
-    return dataset(np.stack([x, y, pace, still, pace, still], axis=1), 2, period, attributes, "velocity")
+    return make_dataset(np.stack([x, y, pace, still, pace, still], axis=1), 2, period, attributes, "velocity")
 
 
 def test_nothing_is_drawn_through_a_periodic_face():
     recording = wrapping()
     for path in coloured_paths(trajectories(recording)):
         assert np.abs(np.diff(np.array(path.get_segments())[..., 0], axis=1)).max() < 3.0
-    stage = Stage(recording, None, None, tail=4.0, height=120, speed=1.0)
+    stage = VideoFrame(recording, None, None, tail=4.0, height=120, speed=1.0)
     for instant in np.arange(4.0, 20.0, 0.125):
-        stage.picture(float(instant))
+        stage.render(float(instant))
         tails = np.array(stage.tails.get_segments())
         assert np.abs(np.diff(tails[..., 0], axis=1)).max() < 3.0
         expected = (instant * PACE + np.array([0.0, 5.0, 11.0]) + 20.0) % 40.0 - 20.0
@@ -495,24 +496,24 @@ def test_smoothed_series_keep_constants_and_say_their_window(smooth):
     assert ("means over 5 s" in title) == (smooth == 5.0)
     line = next(line for line in upper.lines if line.get_label().startswith("$\\phi^{\\mathrm{vel}}"))
     course = airflock.over_time(recording)["phi_vel"]
-    pen = Pen(airflock.over_time(recording), smooth)
+    pen = SmoothedLines(airflock.over_time(recording), smooth)
     assert line.get_ydata().mean() == pytest.approx(course.mean() / 4.0, rel=0.02)
     assert len(line.get_ydata()) == len(course)
-    assert pen.window == {0.0: 0.0, 5.0: 5.0, None: 0.5}[smooth]
+    assert pen.window_seconds == {0.0: 0.0, 5.0: 5.0, None: 0.5}[smooth]
 
 
 def test_the_least_of_a_window_is_never_above_the_instant():
     times = np.arange(0.0, 50.0, 0.5)
     values = pd.Series(np.random.default_rng(8).normal(size=len(times)), index=times)
-    axes = style.Picture(3.0, 2.0).add_subplot()
-    (line,) = Pen(pd.DataFrame({"a": values}), 4.0).draw(axes, values, style.BLUE, "a", least=True)
+    axes = style.NotebookFigure(3.0, 2.0).add_subplot()
+    (line,) = SmoothedLines(pd.DataFrame({"a": values}), 4.0).draw(axes, values, style.BLUE, "a", least=True)
     assert (line.get_ydata() <= values.to_numpy()).all() and line.get_ydata().min() == values.min()
-    (line,) = Pen(pd.DataFrame({"a": values}), 4.0).draw(axes, values * 0.0 + 3.0, style.BLUE, "a")
+    (line,) = SmoothedLines(pd.DataFrame({"a": values}), 4.0).draw(axes, values * 0.0 + 3.0, style.BLUE, "a")
     assert line.get_ydata() == pytest.approx(3.0)
 
 
 def test_pictures_of_one_panel_are_drawn_into_axes_that_are_given():
-    figure = style.Picture(6.0, 3.0)
+    figure = style.NotebookFigure(6.0, 3.0)
     left, right = figure.subplots(1, 2)
     assert airflock.plot(flight(document=SQUARE), "trajectories", ax=right) is figure
     assert not left.has_data() and right.has_data()
@@ -520,7 +521,7 @@ def test_pictures_of_one_panel_are_drawn_into_axes_that_are_given():
 
 def test_where_ffmpeg_is_not_installed_the_command_says_so_before_it_flies(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.setattr("airflock.view.plots.picture.flight_of", lambda *_, **__: pytest.fail("flew"))
+    monkeypatch.setattr("airflock.view.plots.picture.recording_or_flight", lambda *_, **__: pytest.fail("flew"))
     said = CliRunner().invoke(app, ["video", "vasarhelyi_2018/4ms", "--out", str(tmp_path / "a.mp4")])
     assert "videos need imageio-ffmpeg: pip install 'airflock[video]'" in str(said.exception)
     with pytest.raises(PictureError, match="videos need imageio-ffmpeg"):
@@ -530,20 +531,20 @@ def test_where_ffmpeg_is_not_installed_the_command_says_so_before_it_flies(monke
 
 def test_a_chart_beside_a_video_moves_with_it():
     recording = flight(agents=12, seconds=20.0, document={**SQUARE, "agents": 12})
-    stage = Stage(recording, None, None, tail=0.0, height=160, speed=1.0, chart="phi_vel")
-    plain = Stage(recording, None, None, tail=0.0, height=160, speed=1.0)
+    stage = VideoFrame(recording, None, None, tail=0.0, height=160, speed=1.0, chart="phi_vel")
+    plain = VideoFrame(recording, None, None, tail=0.0, height=160, speed=1.0)
     assert stage.size[0] > plain.size[0] + 50 and stage.size[1] == plain.size[1]
-    one, other = (stage.picture(t)[:, plain.size[0] :].copy() for t in (2.0, 18.0))
+    one, other = (stage.render(t)[:, plain.size[0] :].copy() for t in (2.0, 18.0))
     assert (one != other).any()
-    assert stage.cursor.get_xdata() == [18.0, 18.0]
+    assert stage.chart_cursor.get_xdata() == [18.0, 18.0]
     with pytest.raises(RecordingError, match="this recording has"):
-        Stage(recording, None, None, tail=0.0, height=160, speed=1.0, chart="mood")
-    assert courses(scenario_of(recording)) == list(airflock.over_time(recording).columns)
+        VideoFrame(recording, None, None, tail=0.0, height=160, speed=1.0, chart="mood")
+    assert time_series_names(scenario_of_recording(recording)) == list(airflock.over_time(recording).columns)
 
 
 @pytest.mark.parametrize(("chart", "said"), [("phi_velo", "did you mean phi_vel?"), ("mood", "phi_vel, ")])
 def test_a_chart_of_what_a_flight_does_not_have_is_refused_before_it_is_flown(tmp_path, monkeypatch, chart, said):
-    monkeypatch.setattr("airflock.view.plots.picture.flight_of", lambda *_, **__: pytest.fail("flew"))
+    monkeypatch.setattr("airflock.view.plots.picture.recording_or_flight", lambda *_, **__: pytest.fail("flew"))
     path = tmp_path / "a.mp4"
     told = CliRunner().invoke(app, ["video", "vasarhelyi_2018/4ms", "--chart", chart, "--out", str(path)])
     assert isinstance(told.exception, RecordingError) and said in str(told.exception) and not path.exists()
@@ -569,7 +570,7 @@ def test_words_for_vectors_that_are_not_there_are_refused():
 
 @pytest.mark.parametrize("kind", ["series", "rules", "transfer", "trajectories"])
 def test_every_kind_of_picture_is_drawn_where_the_given_axes_are(kind):
-    figure = style.Picture(8.0, 6.0)
+    figure = style.NotebookFigure(8.0, 6.0)
     places = figure.subplots(2, 1)
     what = "vasarhelyi_2018/4ms" if kind in ("rules", "transfer") else flight()
     assert airflock.plot(what, kind, ax=places[1]) is figure
@@ -583,7 +584,7 @@ def test_every_kind_of_picture_is_drawn_where_the_given_axes_are(kind):
 
 
 def test_a_picture_of_panels_needs_axes_of_a_grid():
-    figure = style.Picture(4.0, 4.0)
+    figure = style.NotebookFigure(4.0, 4.0)
     with pytest.raises(airflock.AirflockError, match="axes of a grid"):
         airflock.plot("vasarhelyi_2018/4ms", "rules", ax=figure.add_axes((0.1, 0.1, 0.8, 0.8)))
 
@@ -625,9 +626,9 @@ def test_tracks_of_one_frame_are_drawn_without_a_warning():
 )
 def test_the_tail_of_a_certificate_is_that_of_distributions_that_are_generalised_pareto(distances, below):
     values = distances((np.arange(5000) + 0.5) / 5000)
-    at, share = tail(values)
+    at, share = extrapolated_tail(values)
     assert share[at > 0.0] == pytest.approx(below(at[at > 0.0]), rel=0.1, abs=1e-3)
-    assert share[-1] == pytest.approx(0.2, rel=1e-3) and tail(values[:99]) is None
+    assert share[-1] == pytest.approx(0.2, rel=1e-3) and extrapolated_tail(values[:99]) is None
 
 
 def test_a_certificate_draws_numbers_with_a_factor_and_numbers_from_zero():
@@ -640,9 +641,11 @@ def test_a_certificate_draws_numbers_with_a_factor_and_numbers_from_zero():
     limits = SimpleNamespace(verdicts=(), rows=(), tolerance={"axis": axis}, over={}, shown=True)
     limits.campaign = SimpleNamespace(confidence=0.95, scenario=SimpleNamespace(name="mine"))
     limits.verdicts = (
-        SimpleNamespace(looks=[look(100, 0, 0.05, 0.05)], probability=0.1, high=0.03, limit=SimpleNamespace(event="x")),
+        SimpleNamespace(
+            looks=[take_look(100, 0, 0.05, 0.05)], probability=0.1, high=0.03, limit=SimpleNamespace(event="x")
+        ),
     )
-    panel = certificate(limits).axes[1]
+    panel = plot_certificate(limits).axes[1]
     texts = {text.get_text(): text.get_ha() for text in panel.texts}
     assert texts["1 s"] == "left" and texts["40 m"] == "right" and texts["0 to 3 m/s"] == "left"
     widths = [bar.get_width() for bar in panel.patches]

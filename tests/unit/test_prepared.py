@@ -41,7 +41,7 @@ def test_what_was_prepared_is_no_part_of_a_scenario():
     scenario = airflock.load("vasarhelyi_2018/4ms")
     before = replace(scenario)
     plan_of(scenario)
-    assert scenario.prepared
+    assert scenario.engine_cache
     assert scenario == before
-    assert not copy(scenario).prepared
-    assert not replace(scenario).prepared
+    assert not copy(scenario).engine_cache
+    assert not replace(scenario).engine_cache

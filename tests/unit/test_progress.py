@@ -3,10 +3,17 @@
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from airflock.cli.progress import EVERY, FIRST, Log, Pace, counted, line, spoken
+from airflock.cli.progress import (
+    FIRST_LINE_AFTER,
+    LINE_INTERVAL,
+    LogProgress,
+    TimeLeft,
+    counting_parts,
+    format_duration,
+    progress_line,
+)
 
 
 class Clock:
@@ -21,7 +28,7 @@ class Clock:
 def told(capsys, moments, total=None):
     """Moments (s) at which a log told of work that went on at each of `moments`, and its lines."""
     clock, found = Clock(), []
-    log = Log(clock)
+    log = LogProgress(clock)
     for k, clock.now in enumerate(moments):
         log.update("flying", k, total)
         found += [(clock.now, text) for text in capsys.readouterr().err.splitlines()]
@@ -29,15 +36,18 @@ def told(capsys, moments, total=None):
 
 
 def test_what_is_soon_over_says_nothing(capsys):
-    assert told(capsys, range(math.ceil(FIRST)))[0] == []
+    assert told(capsys, range(math.ceil(FIRST_LINE_AFTER)))[0] == []
 
 
 def test_lines_are_rarer_the_longer_work_takes(capsys):
     moments, _ = told(capsys, range(24 * 3600))
-    assert moments[:3] == [FIRST, FIRST + EVERY, FIRST + 2 * EVERY]
+    assert moments[:3] == [FIRST_LINE_AFTER, FIRST_LINE_AFTER + LINE_INTERVAL, FIRST_LINE_AFTER + 2 * LINE_INTERVAL]
     gaps = [b - a for a, b in zip(moments, moments[1:], strict=False)]
-    assert all(max(EVERY, 0.1 * a) <= gap <= max(EVERY, 0.1 * a) + 1.0 for a, gap in zip(moments, gaps, strict=False))
-    assert len(moments) == pytest.approx(300.0 / EVERY + math.log(86400.0 / 300.0) / math.log(1.1), abs=2)
+    assert all(
+        max(LINE_INTERVAL, 0.1 * a) <= gap <= max(LINE_INTERVAL, 0.1 * a) + 1.0
+        for a, gap in zip(moments, gaps, strict=False)
+    )
+    assert len(moments) == pytest.approx(300.0 / LINE_INTERVAL + math.log(86400.0 / 300.0) / math.log(1.1), abs=2)
 
 
 def test_a_line_says_how_much_is_done_and_what_is_left(capsys):
@@ -50,7 +60,7 @@ def test_a_line_says_how_much_is_done_and_what_is_left(capsys):
 def test_steady_work_ends_when_it_was_said_to(rate, before, more):
     """Also where a run that was cut off did some of it before, in no time; and other work has a pace of its own."""
     clock = Clock()
-    pace = Pace(clock)
+    pace = TimeLeft(clock)
     total = before + more
     for k in range(more + 1):
         clock.now = k / rate
@@ -67,16 +77,22 @@ def test_steady_work_ends_when_it_was_said_to(rate, before, more):
 
 
 def test_times_are_spoken():
-    assert [spoken(s) for s in (9.6, 99.0, 600.0, 5940.0, 12600.0)] == ["10 s", "99 s", "10 min", "99 min", "3.5 h"]
+    assert [format_duration(s) for s in (9.6, 99.0, 600.0, 5940.0, 12600.0)] == [
+        "10 s",
+        "99 s",
+        "10 min",
+        "99 min",
+        "3.5 h",
+    ]
 
 
 def test_a_command_that_is_quiet_tells_nothing(capsys, monkeypatch):
-    monkeypatch.setattr("airflock.cli.progress.FIRST", 0.0)
-    with counted("flights", 2, quiet=True) as done:
+    monkeypatch.setattr("airflock.cli.progress.FIRST_LINE_AFTER", 0.0)
+    with counting_parts("flights", 2, quiet=True) as done:
         done()
-    with line(quiet=True) as silent:
+    with progress_line(quiet=True) as silent:
         silent.say("a limit cannot be shown")
     assert capsys.readouterr().err == ""
-    with counted("flights", 2) as done:
+    with counting_parts("flights", 2) as done:
         done()
     assert capsys.readouterr().err == "flights: 0 of 2 (0%)\n"  # the next one is not due

@@ -29,12 +29,13 @@ KERNELS = {
 
 
 def driver_of(name, bits=32, **layout):
-    from inside import kernel_driver as flight_driver
-    from inside import layout_of
+    from inside import kernel_driver as flight_driver, layout_of
 
     found = load(name)
     plan = plan_of(found, precision=bits)
-    plan = replace(plan.built(grid=False), meshed=plan.scene)  # as if the buildings came from a mesh: more of the rules
+    plan = replace(
+        plan.built(grid=False), has_mesh=plan.scene
+    )  # as if the buildings came from a mesh: more of the rules
     return flight_driver(plan, replace(layout_of(plan, found.agents, 1000), **layout)), plan
 
 

@@ -10,15 +10,15 @@ import pytest
 import typer.main
 
 import airflock
-from airflock.cli.counterparts import COUNTERPARTS, LIBRARY
+from airflock.cli.counterparts import COUNTERPARTS, LIBRARY_FUNCTIONS
 from airflock.cli.main import app
 
 PACKAGES = {"plots", "measures"}
 CLASSES = {"AirflockError", "Scenario", "Flight", "Parameters"}
 HOMES = {
     "evolve": "airflock.search.run", "certify": "airflock.certificates.run", "display": "airflock.displays.displays",
-    "tune": "airflock.search.tune.run", "identify": "airflock.estimate.identify.run",
-    "infer": "airflock.estimate.infer.run",
+    "tune": "airflock.search.tune.run", "identify": "airflock.estimate.identification.run",
+    "infer": "airflock.estimate.inference.run",
     "body": "airflock.core.contract", "fleet": "airflock.fleets.flying",
 }  # fmt: skip
 UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "s", "body_length": "m"}
@@ -65,9 +65,9 @@ COMMANDS = typer.main.get_command(app).commands
 
 def test_every_command_has_a_function_and_every_function_a_command():
     assert set(COUNTERPARTS) == set(COMMANDS)
-    assert {found.function for found in COUNTERPARTS.values() if "." not in found.function} | set(LIBRARY) == set(
-        FUNCTIONS
-    )
+    assert {found.function for found in COUNTERPARTS.values() if "." not in found.function} | set(
+        LIBRARY_FUNCTIONS
+    ) == set(FUNCTIONS)
 
 
 def test_no_cell_of_the_tables_of_commands_and_functions_is_empty():

@@ -3,14 +3,13 @@
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import toys
-from airflock.runs.executors.in_process import InProcess
+from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.folder import Interrupted, open_folder
-from airflock.search.racing import still_needed
-from airflock.search.run import run
+from airflock.search.racing import remaining_candidates
+from airflock.search.run import run_study
 from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -20,7 +19,7 @@ RACE = {"racing": "optimistic", "random_numbers": "generation", "seeds": 4, "pop
 
 def finished(folder, study, score=toys.bowl, watch=None, resume=False):
     open_folder(folder, study, resume=resume)
-    return run(study, folder, InProcess(score, 2), watch)
+    return run_study(study, folder, ThreadExecutor(score, 2), watch)
 
 
 @given(st.lists(st.floats(-100, 100), min_size=4, max_size=12), st.lists(st.floats(-5, 5), min_size=3, max_size=3))
@@ -29,9 +28,9 @@ def test_where_chance_is_common_the_better_half_is_never_dropped(skill, chance):
     alive = list(range(len(skill)))
     for seen in range(1, 3):
         values = [[a + b for b in chance[:seen]] for a in skill]
-        alive = still_needed(values, alive, 3 - seen, True)
+        alive = remaining_candidates(values, alive, 3 - seen, True)
         mirrored = [[-value for value in row] for row in values]
-        assert still_needed(mirrored, list(range(len(skill))), 3 - seen, False) == still_needed(
+        assert remaining_candidates(mirrored, list(range(len(skill))), 3 - seen, False) == remaining_candidates(
             values, list(range(len(skill))), 3 - seen, True
         )
     middle = sorted(skill, reverse=True)[(len(skill) + 1) // 2 - 1]
@@ -40,8 +39,8 @@ def test_where_chance_is_common_the_better_half_is_never_dropped(skill, chance):
 
 def test_a_candidate_that_the_best_flights_could_still_save_flies_on_and_a_failed_one_does_not():
     values = [[0.9], [0.6], [0.1], [None]]
-    assert still_needed(values, range(4), 3, True) == [0, 1, 2]  # (0.1 + 3 * 0.9) / 4 = 0.7, the middle has 0.6
-    assert still_needed(values, range(4), 1, True) == [0, 1]  # (0.1 + 0.9) / 2 = 0.5
+    assert remaining_candidates(values, range(4), 3, True) == [0, 1, 2]  # (0.1 + 3 * 0.9) / 4 = 0.7, the middle has 0.6
+    assert remaining_candidates(values, range(4), 1, True) == [0, 1]  # (0.1 + 0.9) / 2 = 0.5
 
 
 def test_flights_are_saved_and_every_seed_is_common(tmp_path):

@@ -9,11 +9,10 @@ import pytest
 
 from airflock.core import maths
 from airflock.engine import plan_of
-from airflock.engine.text.generate import Source
+from airflock.engine.text.generate import DriverSource
 from airflock.parts.laws import vasarhelyi_2018
 from airflock.scenarios.files import load
-from inside import Forms, shape_of, spelled, with_reciprocals
-from inside import cuda_kernel as kernel
+from inside import Forms, cuda_kernel as kernel, shape_of, spelled, with_reciprocals
 
 NAMES = {
     "math": math, "real": float, "least": min, "most": max, "ONE": 1.0, "inverse_root": lambda a: 1.0 / math.sqrt(a),
@@ -23,7 +22,7 @@ NAMES = {
 
 def forms_of(rule):
     """Second forms of a rule and of all that it calls, and everything compiled as plain Python, by name."""
-    source = Source("", {})
+    source = DriverSource("", {})
     name = source.name(rule)
     forms = Forms(source.blocks, "")
     keys = forms.keys(name)
@@ -67,7 +66,7 @@ def test_a_model_takes_the_reciprocals_of_distance_speed_and_gain(seed):
 
 
 def test_a_stage_takes_a_root_and_its_reciprocal_at_once():
-    source = Source("", {})
+    source = DriverSource("", {})
     name = source.name(maths.excess)
     lines = f"r2 = x * x + TINY\nr = math.sqrt(r2)\ns = {name}(r, q.v)\nt = s / q.v\nu = s / t"
     body, numbers = with_reciprocals(Forms(source.blocks, ""), ast.parse(lines).body, {"q"})
@@ -85,7 +84,7 @@ def test_second_forms_are_called_where_they_stand_and_handed_to_nobody(name):
     one = load(name)
     plan = plan_of(one, precision=32).built(grid=False)
     shape = shape_of(one.agents, 1, whole=bool(plan.model.flock))
-    tree = ast.parse(kernel.flight(plan, shape))
+    tree = ast.parse(kernel.flight_text(plan, shape))
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     forms = {node.name for node in functions if node.name.endswith("_per")}
     assert forms

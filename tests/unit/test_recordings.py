@@ -10,9 +10,9 @@ import xarray as xr
 
 import airflock
 from airflock.engine import driver_text, plan_of
-from airflock.recordings.attributes import name_of
-from airflock.recordings.layout import dataset, frames_of
-from airflock.recordings.scores import measure, over_time
+from airflock.recordings.attributes import recording_name
+from airflock.recordings.layout import make_dataset, recording_frames
+from airflock.recordings.scores import measure_recording, over_time
 from airflock.support.errors import AirflockError, RecordingError
 from inside import drivers, measuring, passes_driver, tables
 
@@ -40,7 +40,7 @@ def circling():
 
 
 def test_layout_is_that_of_movement():
-    found = dataset(np.zeros((5, 6, 3)), 2, 0.2, {}, "velocity")
+    found = make_dataset(np.zeros((5, 6, 3)), 2, 0.2, {}, "velocity")
     assert found.position.dims == ("time", "space", "keypoint", "individual")
     assert found.attrs["ds_type"] == "poses" and found.attrs["fps"] == 5.0 and found.attrs["time_unit"] == "seconds"
     assert found.confidence.dims == ("time", "keypoint", "individual")
@@ -48,7 +48,7 @@ def test_layout_is_that_of_movement():
 
 
 def test_a_log_is_scored_without_velocity_model_or_arena(circling):
-    values, course = measure(circling, {"metrics.r_cluster": 80.0})
+    values, course = measure_recording(circling, {"metrics.r_cluster": 80.0})
     assert values["phi_vel"] == pytest.approx(5.0, rel=1e-3)
     assert values["r_min_mean"] == pytest.approx(20.0 * np.sqrt(2.0), rel=1e-6)
     assert values["phi_corr"] == pytest.approx(-1.0 / 3.0, abs=1e-3)  # unit vectors of a cross sum to zero
@@ -94,7 +94,7 @@ def test_a_missing_position_takes_its_drone_out_of_that_instant_alone(circling):
 )
 def test_what_is_no_recording_is_refused_with_the_reason(circling, damage, words):
     with pytest.raises(RecordingError, match=words):
-        frames_of(damage(circling))
+        recording_frames(damage(circling))
 
 
 def test_flight_with_a_law_given_directly_can_still_be_scored(tmp_path):
@@ -114,7 +114,7 @@ def test_flight_with_a_law_given_directly_can_still_be_scored(tmp_path):
 
 def test_a_recording_of_a_law_of_ones_own_is_scored_anywhere_without_it_and_flown_again_with_it(tmp_path, monkeypatch):
     from airflock.parts.laws import viragh_2014
-    from airflock.recordings.files import fly_again
+    from airflock.recordings.files import replay_recording
 
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "mine.py").write_text(Path(viragh_2014.__file__).read_text())
@@ -129,8 +129,8 @@ def test_a_recording_of_a_law_of_ones_own_is_scored_anywhere_without_it_and_flow
     assert airflock.score(again)["phi_vel"][0] > 0.0
     assert str(tmp_path) not in again.attrs["airflock_scenario"]
     with pytest.raises(RecordingError, match="--law FILE.py"):
-        fly_again(again)
-    assert fly_again(again, law=tmp_path / "sub" / "mine.py") == (True, [])
+        replay_recording(again)
+    assert replay_recording(again, law=tmp_path / "sub" / "mine.py") == (True, [])
     assert scenario.document["model"]["kind"] == "mine.py"
 
 
@@ -179,7 +179,7 @@ def test_same_sampling_gives_the_same_numbers_from_the_kernel_and_from_the_recor
     ],
 )
 def test_pictures_of_tracks_are_called_like_their_file(circling, attributes, name):
-    assert name_of(circling.assign_attrs(attributes)) == name
+    assert recording_name(circling.assign_attrs(attributes)) == name
 
 
 def test_where_nothing_stands_no_instant_has_a_clearance(circling):
@@ -206,5 +206,5 @@ def test_one_driver_measures_flights_of_several_laws():
     for law in ("vasarhelyi_2018/4ms", "viragh_2014/4ms", "couzin_2002/torus"):
         found = airflock.load(law, keys | {"world.side": 100.0})
         plan = plan_of(found, precision=64)
-        texts.add(passes_driver.replay(measuring.shared(plan, tables(found, plan, 0))[0]))
+        texts.add(passes_driver.replay(measuring.shared_plan(plan, tables(found, plan, 0))[0]))
     assert len(texts) == 1

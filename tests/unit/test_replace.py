@@ -7,8 +7,7 @@ import pytest
 
 from airflock.engine import plan_of
 from airflock.scenarios.files import load
-from inside import Across, CudaBuilder, ReplacementError, must_replace
-from inside import cuda_cells as cells
+from inside import Across, CudaBuilder, ReplacementError, cuda_cells as cells, must_replace
 
 LARGE = "couzin_2002/swarm"  # flown by cells where it is large
 
@@ -34,7 +33,7 @@ def respelled(lines):
 def test_a_stage_in_another_spelling_is_refused_where_a_kernel_takes_it(monkeypatch):
     """The kernel of a large flock looks for spellings of `neighbours`; none may be missed in silence."""
     plan = plan_of(load(LARGE), precision=32).built(grid=True)
-    cells.crowd(plan)
+    cells.large_flock_text(plan)
     add = CudaBuilder.function
     monkeypatch.setattr(
         CudaBuilder,
@@ -44,7 +43,7 @@ def test_a_stage_in_another_spelling_is_refused_where_a_kernel_takes_it(monkeypa
         ),
     )
     with pytest.raises(ReplacementError, match=r"integer\(j\)"):
-        cells.crowd(plan)
+        cells.large_flock_text(plan)
 
 
 def test_a_variable_that_is_called_as_a_row_over_the_others_is_refused():

@@ -9,16 +9,15 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
 import airflock
 from airflock.cli import main as run_main
 from airflock.support.errors import RecordingError
 from airflock.view.replays import check_colour
-from airflock.view.replays.pack import Packed, pack, unpack
-from airflock.view.stage.clusters import clusters
+from airflock.view.replays.pack import PackedPositions, pack_positions, unpack_positions
+from airflock.view.stage.clusters import cluster_labels
 
 MOTOR = {"kind": "motor", "agents": [7]}
 FRAMES = st.tuples(st.integers(1, 9), st.integers(2, 3), st.integers(1, 4))
@@ -26,17 +25,17 @@ FRAMES = st.tuples(st.integers(1, 9), st.integers(2, 3), st.integers(1, 4))
 
 @given(FRAMES.flatmap(lambda shape: arrays(float, shape, elements=st.floats(-1e4, 1e4, width=32))))
 def test_unpacked_positions_lie_within_half_a_quantum(position):
-    packed = pack(position)
-    away = np.abs(unpack(packed)[0] - position).max(axis=(0, 2))
-    assert (away <= 0.5 * np.array(packed.quantum) + 1e-9 * np.abs(position).max()).all()
-    assert (np.array(packed.quantum) <= np.maximum(np.ptp(position, axis=(0, 2)) / 65535, 1e-12)).all()
+    packed = pack_positions(position)
+    away = np.abs(unpack_positions(packed)[0] - position).max(axis=(0, 2))
+    assert (away <= 0.5 * np.array(packed.step) + 1e-9 * np.abs(position).max()).all()
+    assert (np.array(packed.step) <= np.maximum(np.ptp(position, axis=(0, 2)) / 65535, 1e-12)).all()
 
 
 @given(st.integers(1, 9), st.integers(1, 4), st.integers(0, 3), st.integers(0, 2**32 - 1))
 def test_rows_of_bytes_are_kept_exactly(frames, agents, count, seed):
     rng = np.random.default_rng(seed)
     rows = list(rng.integers(0, 256, (count, frames, agents)).astype(np.uint8))
-    found = unpack(pack(rng.normal(size=(frames, 2, agents)), rows))[1]
+    found = unpack_positions(pack_positions(rng.normal(size=(frames, 2, agents)), rows))[1]
     assert len(found) == count and all((a == b).all() for a, b in zip(found, rows, strict=True))
 
 
@@ -63,7 +62,7 @@ def test_a_minute_of_a_thousand_drones_takes_less_than_five_megabytes():
     rng = np.random.default_rng(3)
     speed = 4.0 * np.exp(1j * np.cumsum(rng.normal(0.0, 0.1, (600, 1000)), axis=0))
     path = np.cumsum(0.1 * speed + rng.normal(0.0, 0.01, (600, 1000)), axis=0)
-    size = len(pack(np.stack([path.real, path.imag], axis=1)).data) * 4 / 3 + len(three())
+    size = len(pack_positions(np.stack([path.real, path.imag], axis=1)).data) * 4 / 3 + len(three())
     assert size < 5e6
 
 
@@ -104,7 +103,7 @@ def shown(page):
     """Rows of bytes of a page, by the names of its layers; at last, of a recording with gaps, who is there."""
     told = about(page)
     data = base64.b64decode(re.search(r'id="data">(.*?)</script>', page.text, re.S)[1])
-    rows = unpack(Packed(told["low"], told["quantum"], tuple(told["shape"]), data))[1]
+    rows = unpack_positions(PackedPositions(told["low"], told["quantum"], tuple(told["shape"]), data))[1]
     return dict(zip([*(layer["name"] for layer in told["layers"]), "there"], rows, strict=False))
 
 
@@ -136,8 +135,8 @@ def test_layers_hold_clusters_faults_groups_and_what_the_recording_knows_of_each
     times = recording["time"].values
     assert ((rows["fault"] == 0) == ((times >= 2.0)[:, None] & (np.arange(12) == 7))).all()
     assert np.abs(rows["pace"] / 254 * np.ptp(speed.values) + speed.values.min() - speed.values).max() < 0.02
-    reach = scenario.measured_by().r_cluster
-    last = clusters(recording["position"].values[-1, :, 0].T, reach)
+    reach = scenario.resolved_metrics().r_cluster
+    last = cluster_labels(recording["position"].values[-1, :, 0].T, reach)
     assert ((rows["cluster"][-1] == 255) == (last < 0)).all()
     assert len(set(rows["cluster"][-1].tolist()) - {255}) == len(set(last.tolist()) - {-1})
 

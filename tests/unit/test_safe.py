@@ -5,21 +5,20 @@ import random
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.stats import norm
 from test_harden import flown_by
 
 import toys
-from airflock.certificates.chance import chance, indices
-from airflock.certificates.limit import read
-from airflock.runs.executors.in_process import InProcess
+from airflock.certificates.chance import estimated_probability, reliability_indices
+from airflock.certificates.limit import parse_limit
+from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.scenarios.files import load
 from airflock.search import harden
-from airflock.search.run import run
-from airflock.search.safe import allowed, excess, flights_that_count, safe_first
+from airflock.search.run import run_study
+from airflock.search.safe import allowed_probability, flights_per_event, limit_excess, rank_by_excess
 from airflock.search.study import make_study
 from airflock.support.errors import ScenarioError
 
@@ -51,7 +50,7 @@ def searched(folder, limits=()):
     few = {"population": 12, "generations": 40, "seeds": 4, "averages": 2, "pool": 24, "top": 4, "final_seeds": 100}
     study = toys.study(limits=limits, **few)
     folder.mkdir(exist_ok=True)
-    return run(study, folder, InProcess(flight, 1))
+    return run_study(study, folder, ThreadExecutor(flight, 1))
 
 
 @pytest.fixture(autouse=True)
@@ -88,7 +87,7 @@ def test_where_no_candidate_keeps_a_limit_the_nearest_is_told_to_break_it(tmp_pa
 )
 def test_who_keeps_limits_comes_first_in_order_of_fitness_then_who_breaks_them_least(rows):
     losses, much = np.array(rows).T
-    found = safe_first(losses[:, None], much)[:, 0]
+    found = rank_by_excess(losses[:, None], much)[:, 0]
     order = sorted(range(len(rows)), key=lambda i: found[i])
     kept = [i for i in order if much[i] == 0.0]
     assert order[: len(kept)] == kept and (np.diff(losses[kept]) >= 0.0).all()
@@ -100,11 +99,11 @@ def test_who_keeps_limits_comes_first_in_order_of_fitness_then_who_breaks_them_l
 def test_chances_come_near_the_probability_of_normal_distances(beta):
     """One candidate of 20,000 flights knows it, and 2,000 equal ones of two flights know it together."""
     rng = np.random.default_rng(5)
-    limit = read("r_min<3 at 1%", PAPER)
+    limit = parse_limit("r_min<3 at 1%", PAPER)
     many = [{"r_min": x} for x in 3.0 + beta + rng.standard_normal(20_000)]
-    assert chance(limit, many) == pytest.approx(float(norm.sf(beta)), rel=0.1)
+    assert estimated_probability(limit, many) == pytest.approx(float(norm.sf(beta)), rel=0.1)
     pairs = 3.0 + beta + rng.standard_normal((2000, 2))
-    found = indices(limit, [[{"r_min": x} for x in pair] for pair in pairs])
+    found = reliability_indices(limit, [[{"r_min": x} for x in pair] for pair in pairs])
     assert found.mean() == pytest.approx(beta, abs=0.1) and np.ptp(found) < 0.7  # nobody is told to be safe by luck
     order = np.argsort(pairs.mean(axis=1))
     assert found[order[:500]].mean() < beta < found[order[-500:]].mean()  # and yet who was nearer is worse
@@ -124,50 +123,58 @@ def test_what_is_rarer_than_flights_could_count_does_not_look_rarer_than_it_is(t
     """Right where tails are exponential, careful where they fall faster: as the mean beyond a tenth of them says."""
     draw, share = TAILS[tail]
     begin, far = (brentq(lambda x, at=at: share(x) - at, -10.0, 10.0) for at in (0.1, rarity))
-    excess = quad(share, begin, 1.0 if tail == "that ends" else 60.0)[0] / 0.1
-    known = max(1.0, 0.1 * math.exp(-(far - begin) / excess) / rarity)  # no less than what was counted
-    limit, rng = read("r_min<3 at 1%", PAPER), np.random.default_rng(11)
-    many = chance(limit, [{"r_min": 3.0 + far - x} for x in draw(rng, 200_000)]) / rarity
+    limit_excess = quad(share, begin, 1.0 if tail == "that ends" else 60.0)[0] / 0.1
+    known = max(1.0, 0.1 * math.exp(-(far - begin) / limit_excess) / rarity)  # no less than what was counted
+    limit, rng = parse_limit("r_min<3 at 1%", PAPER), np.random.default_rng(11)
+    many = estimated_probability(limit, [{"r_min": 3.0 + far - x} for x in draw(rng, 200_000)]) / rarity
     assert many == pytest.approx(known, rel=0.05)
-    few = [chance(limit, [{"r_min": 3.0 + far - x} for x in draw(rng, 601)]) / rarity for _ in range(200)]
+    few = [
+        estimated_probability(limit, [{"r_min": 3.0 + far - x} for x in draw(rng, 601)]) / rarity for _ in range(200)
+    ]
     assert np.quantile(few, 0.1) > 0.5  # where 601 flights show two events, or none
 
 
 def test_distances_that_meet_by_chance_in_single_precision_keep_their_tail():
-    limit, rng = read("r_min<3 at 1%", PAPER), np.random.default_rng(13)
+    limit, rng = parse_limit("r_min<3 at 1%", PAPER), np.random.default_rng(13)
     nearest = np.float32(9.0 - rng.exponential(1.0, 20_000)).astype(float)
     assert len(np.unique(nearest)) < len(nearest)
     kept = nearest[nearest > 3.5]  # of 20,000 flights none is an event, and a fifth of them says what is beyond
     few = [{"r_min": x} for x in kept[:4000]]
-    assert 0.0 < chance(limit, few) < 0.01
+    assert 0.0 < estimated_probability(limit, few) < 0.01
 
 
 def test_wide_distances_are_no_danger_and_near_ones_are():
     """Of flights that vary alike, those whose long tail lies on the safe side are safer."""
-    limit, rng = read("r_min<3 at 1%", PAPER), np.random.default_rng(7)
+    limit, rng = parse_limit("r_min<3 at 1%", PAPER), np.random.default_rng(7)
     tail = rng.exponential(1.0, 5000)
     wide, near = ([{"r_min": 9.0 + sign * x} for x in tail - tail.mean()] for sign in (1.0, -1.0))
-    assert indices(limit, [wide])[0] > 1.5 * indices(limit, [near])[0]
+    assert reliability_indices(limit, [wide])[0] > 1.5 * reliability_indices(limit, [near])[0]
 
 
 def test_what_repeats_itself_is_counted_and_a_flight_that_failed_is_an_event():
-    limit = read("phi_wall>0 at 1%", PAPER)
+    limit = parse_limit("phi_wall>0 at 1%", PAPER)
     clean, touching = [{"phi_wall": 0.0}] * 4, [{"phi_wall": 0.0}, {"phi_wall": 0.3}, {"phi_wall": 0.0}, None]
     always = touching[1::2]
-    assert (chance(limit, clean), chance(limit, touching), chance(limit, always)) == (0.0, 0.5, 1.0)
-    assert indices(limit, [clean, touching, always]).tolist() == [np.inf, 0.0, float(norm.isf(0.75))]
-    near = read("r_min<3 at 1%", PAPER)
-    assert indices(near, [[None, {"r_min": 20.0}], [{"r_min": 21.0}, {"r_min": 22.0}]])[0] == 0.0
+    assert (
+        estimated_probability(limit, clean),
+        estimated_probability(limit, touching),
+        estimated_probability(limit, always),
+    ) == (0.0, 0.5, 1.0)
+    assert reliability_indices(limit, [clean, touching, always]).tolist() == [np.inf, 0.0, float(norm.isf(0.75))]
+    near = parse_limit("r_min<3 at 1%", PAPER)
+    assert reliability_indices(near, [[None, {"r_min": 20.0}], [{"r_min": 21.0}, {"r_min": 22.0}]])[0] == 0.0
 
 
 def test_a_rate_allows_less_in_a_shorter_flight_and_says_how_many_flights_tell():
-    limit = read("r_min<3 at 0.01/h", PAPER)
-    whole = allowed(limit, PAPER)
+    limit = parse_limit("r_min<3 at 0.01/h", PAPER)
+    whole = allowed_probability(limit, PAPER)
     assert whole == pytest.approx(1.0 - np.exp(-0.01 / 6.0))
-    assert allowed(limit, PAPER, 0.5) == pytest.approx(whole / 2.0, rel=1e-3)
-    assert flights_that_count([limit], PAPER) == 601 and flights_that_count([], PAPER) == 1
+    assert allowed_probability(limit, PAPER, 0.5) == pytest.approx(whole / 2.0, rel=1e-3)
+    assert flights_per_event([limit], PAPER) == 601 and flights_per_event([], PAPER) == 1
     rows = [[{"r_min": 30.0}, {"r_min": 31.0}], [{"r_min": 3.0}, {"r_min": 4.0}]]
-    much = excess([limit], PAPER, rows, reserve=10.0)  # both vary by 0.71 m; the second is 0.71 of that off the limit
+    much = limit_excess(
+        [limit], PAPER, rows, reserve=10.0
+    )  # both vary by 0.71 m; the second is 0.71 of that off the limit
     assert much.tolist() == pytest.approx([0.0, float(norm.isf(whole / 10.0)) - 0.5**0.5], rel=0.02)
 
 

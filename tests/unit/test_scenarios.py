@@ -5,12 +5,11 @@ import tomllib
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
-from airflock.scenarios.change import variant
+from airflock.scenarios.change import scenario_variant
 from airflock.scenarios.files import load, presets
-from airflock.scenarios.making import make
+from airflock.scenarios.making import build_scenario
 from airflock.support.errors import AirflockError, ScenarioError
 
 DOCUMENTS = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in presets().items()}
@@ -66,7 +65,7 @@ def mutated(draw):
 @settings(max_examples=3000, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_a_mutated_scenario_loads_or_is_refused_in_lines_that_name_it(document):
     try:
-        found = make(document, "mutant.toml")
+        found = build_scenario(document, "mutant.toml")
     except AirflockError as fault:
         lines = str(fault).splitlines()
         assert lines and all(line.startswith("mutant.toml: ") for line in lines)
@@ -233,7 +232,7 @@ def test_another_law_begins_from_its_own_numbers():
     same = load("vasarhelyi_2018/4ms", {"model.kind": "vasarhelyi_2018"})
     assert same.parameters == load("vasarhelyi_2018/4ms").parameters and same.published
     assert load("vasarhelyi_2018/4ms", {"model.kind": "viragh_2014", "model.v_flock": 3.0}).parameters.v_flock == 3.0
-    assert variant(named, {"model.kind": "vicsek_1995", "body.kind": "heading"}).model.name == "vicsek_1995"
+    assert scenario_variant(named, {"model.kind": "vicsek_1995", "body.kind": "heading"}).model.name == "vicsek_1995"
 
 
 def test_numbers_of_numpy_are_numbers_and_texts_and_truth_values_are_not():

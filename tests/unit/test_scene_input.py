@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.displays import assignment, fly_show, points_of
+from airflock.displays import assignment, fly_show, shape_points
 from airflock.support.errors import AirflockError, FlightError, ScenarioError
 from airflock.world.scenery import Parameters
 from airflock.world.scenes import meshes
@@ -205,7 +205,7 @@ def test_more_drones_than_points_is_one_clear_line():
     with pytest.raises(AirflockError, match="shape 1 has 10 points, fewer than 20 drones"):
         fly_show([np.zeros((10, 3))], 20)
     with pytest.raises(AirflockError, match="3 drones are more than 2 points"):
-        assignment.assign(np.zeros((3, 3)), np.zeros((2, 3)), np.zeros(2, bool))
+        assignment.assign_points(np.zeros((3, 3)), np.zeros((2, 3)), np.zeros(2, bool))
     with pytest.raises(AirflockError, match=r"failing = 1.5"):
         fly_show([np.zeros((10, 3))], 5, 1.5)
 
@@ -219,7 +219,7 @@ def test_pictures_that_show_nothing_are_refused(tmp_path):
     cases = (("white.png", "nothing in it"), ("torn.png", "damaged"), ("none.png", "no such file"))
     for shape, words in (*cases, ("torn.stl", f"{tmp_path / 'torn.stl'}: the file is cut short")):
         with pytest.raises(AirflockError, match=re.escape(words)) as caught:
-            points_of(str(tmp_path / shape), 10)
+            shape_points(str(tmp_path / shape), 10)
         assert str(caught.value).startswith(str(tmp_path / shape))  # and names no key that a display lacks
 
 
@@ -229,7 +229,7 @@ def test_a_file_of_another_kind_is_not_flown_as_text(tmp_path, monkeypatch, shap
     if shape in ("drawing.svg", "there.1"):
         (tmp_path / shape).write_text("<svg/>")
     with pytest.raises(AirflockError, match=r"no such file|neither a picture nor a mesh") as caught:
-        points_of(shape, 10)
+        shape_points(shape, 10)
     assert str(caught.value).startswith(f"{shape}: ") and ".png" in str(caught.value) and ".stl" in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
 
@@ -239,4 +239,4 @@ def test_a_text_with_a_point_in_it_is_still_a_text(monkeypatch, text):
     from airflock.displays import shapes
 
     monkeypatch.setattr(shapes, "_pixels_of_text", lambda _: np.ones((50, 50), bool))
-    assert points_of(text, 10).shape == (10, 3)
+    assert shape_points(text, 10).shape == (10, 3)

@@ -11,17 +11,23 @@ from matplotlib.collections import LineCollection
 import airflock
 from airflock.cli import tables
 from airflock.parts.aero.wing import pitch
-from airflock.recordings.flights import plain
-from airflock.recordings.layout import dataset
+from airflock.recordings.flights import to_plain_values
+from airflock.recordings.layout import make_dataset
 from airflock.support.errors import RecordingError
-from airflock.view.plots.film_stage import Stage
-from airflock.view.plots.flight import paths_of, view_of
+from airflock.view.plots.film_stage import VideoFrame
+from airflock.view.plots.flight import paths_in_window, projection
 from airflock.view.plots.flocked import flocked
-from airflock.view.plots.rays import cast_at, rays
-from airflock.view.plots.scene_paths import ELEVATION, nearby, outlines_in_space, scenery, through
+from airflock.view.plots.rays import rays, rays_at_frame
+from airflock.view.plots.scene_paths import (
+    VIEW_ELEVATION_DEG,
+    outlines_in_space,
+    scenery_lines,
+    shapes_near_paths,
+    through,
+)
 from airflock.view.plots.trajectories import trajectories
 from airflock.view.plots.video import video
-from airflock.view.plots.wash import downwash, formation_at, wash
+from airflock.view.plots.wash import downwash, solve_formation, wash
 from airflock.world.shapes import BOX, CYLINDER
 
 
@@ -35,8 +41,12 @@ def recording(name="kidger/city", **keys):
     if dims == 3:
         frames[:, 2] = 8.0
     frames[:, dims] = 60.0
-    about = {"airflock_scenario": json.dumps(plain(found.document)), "airflock_name": name, "airflock_seed": 0}
-    return dataset(frames, dims, 1.0 / 60.0, about, "velocity")
+    about = {
+        "airflock_scenario": json.dumps(to_plain_values(found.document)),
+        "airflock_name": name,
+        "airflock_seed": 0,
+    }
+    return make_dataset(frames, dims, 1.0 / 60.0, about, "velocity")
 
 
 @pytest.mark.parametrize("name", ["kidger/city", "kidger/forest", "kidger/final_2d"])
@@ -45,8 +55,8 @@ def test_paths_through_a_scene_show_what_stands_there(name):
     figure = through(made)
     axes = figure.axes[0]
     assert axes.get_xlabel() == "east (m)"
-    shown = nearby(airflock.load(name), paths_of(made))
-    assert len(shown) and len(scenery(made, paths_of(made))) >= len(shown)
+    shown = shapes_near_paths(airflock.load(name), paths_in_window(made))
+    assert len(shown) and len(scenery_lines(made, paths_in_window(made))) >= len(shown)
     if name == "kidger/city":
         assert len(axes.collections[0].get_paths()) == len(shown)  # a ground plan of each building
         named = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
@@ -60,7 +70,7 @@ def test_paths_through_a_scene_show_what_stands_there(name):
 
 def test_rays_of_an_agent_are_those_that_its_model_casts():
     made = recording(model__separation="normalised")  # so that they go on side by side
-    found, command = cast_at(made, 3, 20)
+    found, command = rays_at_frame(made, 3, 20)
     free = [ray for ray in found if ray.free >= ray.length]
     assert len(found) > 1 and found[0].free < found[0].length  # the building ahead
     assert free == found[-1:]  # it stops at the first free ray and flies there
@@ -98,20 +108,20 @@ def test_a_video_shows_the_scene(tmp_path):
 
 def test_statistics_of_lists_and_of_what_never_happened():
     rows = [{"time_to_goal": [1.0, 4.0], "t": float("nan")}, {"time_to_goal": [3.0, float("nan")], "t": float("nan")}]
-    found = tables.statistics(rows)
+    found = tables.column_statistics(rows)
     assert found["mean"]["time_to_goal"] == [2.0, 4.0] and found["median"]["time_to_goal"] == [2.0, 4.0]
-    assert tables.clean(found)["mean"]["t"] is None and tables.clean(rows[1]) == {
+    assert tables.to_json_value(found)["mean"]["t"] is None and tables.to_json_value(rows[1]) == {
         "time_to_goal": [3.0, None],
         "t": None,
     }
-    assert tables.number([1.25, float("nan")]) == "1.25, never"
+    assert tables.format_number([1.25, float("nan")]) == "1.25, never"
 
 
 def test_only_the_time_of_an_event_is_never(capsys):
     nan = float("nan")
     rows = [{"time_to_flock": nan, "time_to_goal": [1.0, nan], "clearance": nan, "power": float("inf")}] * 2
     for count in (1, 2):
-        tables.score_table("flight", rows[:count], {}, {})
+        tables.print_score_table("flight", rows[:count], {}, {})
         out = capsys.readouterr().out
         shown = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line.strip()}
         assert shown["time_to_flock"] == ["never"] * count and shown["time_to_goal"][:2] == ["1,", "never"]
@@ -131,12 +141,12 @@ def test_a_city_in_space_draws_all_that_was_flown_once():
 @pytest.mark.parametrize("name", ["kidger/city", "kidger/forest"])
 def test_outlines_in_space_are_the_corners_and_rims_of_all_shapes(name):
     made = recording(name)
-    shown = nearby(airflock.load(name), paths_of(made))
+    shown = shapes_near_paths(airflock.load(name), paths_in_window(made))
     axes = through(made, space=True).axes[0]
     outlines = axes.collections[0].get_segments()
     boxes, cylinders = ((shown[:, 6] == kind).sum() for kind in (BOX, CYLINDER))
     assert len(outlines) == 6 * (boxes + cylinders) == 6 * len(shown)  # two rims and four uprights each
-    view, points = view_of(3, elevation_deg=ELEVATION), np.concatenate(outlines)
+    view, points = projection(3, elevation_deg=VIEW_ELEVATION_DEG), np.concatenate(outlines)
     if name == "kidger/city":
         corners = [[row[a], row[b], row[c]] for row in shown for a in (0, 3) for b in (1, 4) for c in (2, 5)]
         expected = np.column_stack(view(np.array(corners)))
@@ -148,10 +158,10 @@ def test_outlines_in_space_are_the_corners_and_rims_of_all_shapes(name):
 def test_videos_in_space_and_from_above_stand_on_the_same_ground(tmp_path):
     made = recording()
     for space in (True, False):
-        stage = Stage(made, None, None, tail=0.1, height=160, speed=1.0, space=space)
-        assert stage.picture(0.3).shape == (stage.size[1], stage.size[0], 4)
+        stage = VideoFrame(made, None, None, tail=0.1, height=160, speed=1.0, space=space)
+        assert stage.render(0.3).shape == (stage.size[1], stage.size[0], 4)
         drawn = sum(len(lines.get_segments()) for lines in stage.axes.collections[:1])
-        assert drawn == len(outlines_in_space(nearby(airflock.load("kidger/city"), paths_of(made))))
+        assert drawn == len(outlines_in_space(shapes_near_paths(airflock.load("kidger/city"), paths_in_window(made))))
     corners = np.array([path.vertices[:4] for path in stage.darts.get_paths()])
     where = made["position"].sel(time=0.3, method="nearest").values[:2, 0].T
     np.testing.assert_allclose(corners[:, 0] + (corners[:, 2] - corners[:, 0]) * (0.6 / 0.82), where, atol=0.05)
@@ -161,13 +171,13 @@ def test_the_air_of_a_formation_is_that_of_its_lifting_line():
     scenario = airflock.load("dimock_2003/physical", {"wing.segments": "10"})
     rng = np.random.default_rng(3)
     position = rng.uniform(-4.0, 4.0, (3, 5)) * [[1.0], [1.0], [0.05]]
-    found = formation_at(scenario, position, np.ones((3, 5)))
+    found = solve_formation(scenario, position, np.ones((3, 5)))
     m, h = 10, pitch(scenario.wing)
     for bird, place in enumerate(found.place):
         across = place[1] + (np.arange(m) - 0.5 * (m - 1)) * h
         points = np.column_stack([np.full(m, place[0]), across, np.full(m, place[2])])
         np.testing.assert_allclose(downwash(scenario, found, points, without=bird), found.wash[bird], atol=1e-5)
-    alone = formation_at(scenario, np.array([[0.0, 0.0], [-1e5, 1e5], [0.0, 0.0]]), np.ones((3, 2)))
+    alone = solve_formation(scenario, np.array([[0.0, 0.0], [-1e5, 1e5], [0.0, 0.0]]), np.ones((3, 2)))
     np.testing.assert_allclose(alone.drag, alone.solo, rtol=1e-6)
 
 
@@ -176,13 +186,17 @@ def test_a_formation_is_drawn_with_what_each_bird_saves():
     span = scenario.wing.span
     frames = np.zeros((1, 9, 3))
     frames[0, 0], frames[0, 1], frames[0, 3] = [0.0, -1.5 * span, -1.5 * span], [0.0, 0.95 * span, -0.95 * span], 13.0
-    about = {"airflock_scenario": json.dumps(plain(scenario.document)), "airflock_name": "v", "airflock_seed": 0}
-    axes = wash(dataset(frames, 3, 1.0, about, "velocity")).axes[0]
+    about = {
+        "airflock_scenario": json.dumps(to_plain_values(scenario.document)),
+        "airflock_name": "v",
+        "airflock_seed": 0,
+    }
+    axes = wash(make_dataset(frames, 3, 1.0, about, "velocity")).axes[0]
     said = [float(text.get_text().replace(" %", "")) for text in axes.texts if text.get_text().endswith("%")]
     assert len(said) == 3 and said[1] == said[2] < -20.0 and said[1] < said[0]  # who flies behind saves most
     assert len(axes.lines) == 3 and np.ptp(axes.lines[0].get_xdata()) == pytest.approx(span)
     frames[0, 1] = 0.0  # one behind the other, each in the downwash of those ahead
-    words = [text.get_text() for text in wash(dataset(frames, 3, 1.0, about, "velocity")).axes[0].texts]
+    words = [text.get_text() for text in wash(make_dataset(frames, 3, 1.0, about, "velocity")).axes[0].texts]
     assert any("% above that of lone birds" in said for said in words)
     with pytest.raises(RecordingError, match="fly in space"):
         wash(recording("kidger/final_2d"))

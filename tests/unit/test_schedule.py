@@ -9,11 +9,19 @@ import pytest
 
 from airflock.engine import plan_of
 from airflock.scenarios.files import load
-from inside import ORDER, Itself, columns, in_turn, measured, order, shape_of
-from inside import cuda_cells as cells
-from inside import cuda_kernel as kernel
-from inside import passes_driver as driver
-from inside import stages_flight as flight
+from inside import (
+    ORDER,
+    Itself,
+    columns,
+    cuda_cells as cells,
+    cuda_kernel as kernel,
+    in_turn,
+    measured,
+    order,
+    passes_driver as driver,
+    shape_of,
+    stages_flight as flight,
+)
 
 IN_TURNS = "zapotecatl_2016/best"
 PRESETS = (
@@ -46,7 +54,7 @@ STUCK = {"faults": [{"kind": "stuck", "agents": [0], "at": 1.0}]}
 def test_a_driver_calls_its_stages_in_the_order_of_a_step(name, keys):
     plan = plan_of(load(name, keys), precision=32).built(grid=False)
     assert bool(keys) == ("overrule" in order(plan)["decide"])
-    text = driver.flight(plan)
+    text = driver.flight_driver_text(plan)
     expected = due(plan)
     if plan.sequential:
         assert calls(text, "turns", in_turn(plan)) == list(in_turn(plan))
@@ -58,14 +66,14 @@ def test_a_driver_calls_its_stages_in_the_order_of_a_step(name, keys):
 def test_a_kernel_calls_them_in_the_same_order(name):
     one = load(name)
     plan = plan_of(one, precision=32).built(grid=False)
-    text = kernel.flight(plan, shape_of(one.agents, 1, whole=bool(plan.model.flock)))
+    text = kernel.flight_text(plan, shape_of(one.agents, 1, whole=bool(plan.model.flock)))
     assert calls(text, "fly", due(plan)) == due(plan)
 
 
 def test_so_do_kernels_of_one_big_flock():
     plan = plan_of(load("couzin_2002/swarm"), precision=32).built(grid=True)
     expected = [stage for event in ("decide", "move") for stage in order(plan)[event]]
-    text = cells.crowd(plan)
+    text = cells.large_flock_text(plan)
     node = next(n for n in ast.parse(text).body if isinstance(n, ast.FunctionDef) and n.name == "advance")
     found = [n.func.id for n in ast.walk(node) if isinstance(n, ast.Call) and getattr(n.func, "id", "") in expected]
     assert sorted(found, key=expected.index) == [stage for stage in expected if stage in found]

@@ -11,8 +11,7 @@ from airflock.scenarios import scenario as scenarios
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER, SECTIONS
-from inside import Builder
-from inside import tables_module as engine_tables
+from inside import Builder, tables_module as engine_tables
 
 
 def read_by_text(plan, row):
@@ -26,16 +25,16 @@ def read_by_text(plan, row):
 
 @pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "kidger/city", "vasarhelyi_2018/fixed_wing"])
 def test_any_order_of_sections_flies_the_same_numbers(name, seed, monkeypatch):
-    found = load(name).in_flight(0)
+    found = load(name).with_drawn_scene(0)
     rng = np.random.default_rng(seed)
-    truth = engine_tables.read_by_drivers(found, 0.2)
+    truth = engine_tables.driver_records(found, 0.2)
     rows = set()
     for _ in range(5):  # the columns are laid out by one order and filled by another: by name they meet
         for module in (scenarios, engine_tables):
             monkeypatch.setattr(module, "ORDER", tuple(ORDER[i] for i in rng.permutation(len(ORDER))))
         fresh = replace(found)  # which holds no plan of another order
         plan = plan_of(fresh, precision=64)
-        row = engine_tables.tables(fresh, plan, 0).row
+        row = engine_tables.world_tables(fresh, plan, 0).row
         rows.add(tuple(row.tolist()))
         for letter, record in read_by_text(plan, row).items():
             own = truth | {"c": truth["c"]._replace(period=record.period)} if letter == "c" else truth
@@ -56,7 +55,7 @@ def test_sections_are_the_records_of_a_scenario():
 
 def test_how_a_driver_is_built_is_no_field_to_patch():
     plan = plan_of(load("vasarhelyi_2018/4ms"))
-    assert plan.built(grid=True, record=True).grid and not plan.grid
-    assert plan.built(record=True).built(record=False) == plan
+    assert plan.built(grid=True, keep_frames=True).grid and not plan.grid
+    assert plan.built(keep_frames=True).built(keep_frames=False) == plan
     with pytest.raises(TypeError):
-        replace(plan, record=True)
+        replace(plan, keep_frames=True)

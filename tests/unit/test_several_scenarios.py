@@ -7,27 +7,26 @@ import tomllib
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import airflock
 import toys
 from airflock.cli.harden import _optima
 from airflock.engine import score_flight, score_flights
-from airflock.runs.executors.cluster import rebuild
-from airflock.runs.executors.in_process import InProcess
+from airflock.runs.executors.cluster import rebuild_scenario
+from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.folder import Interrupted, open_folder
 from airflock.runs.space import with_parameters
-from airflock.runs.store import Batch, Store
+from airflock.runs.store import CandidateBatch, FlightStore
 from airflock.scenarios.files import load
-from airflock.scenarios.making import make
+from airflock.scenarios.making import build_scenario
 from airflock.search import harden
-from airflock.search.batched import Batched
+from airflock.search.batched import BatchExecutor
 from airflock.search.evaluator import Evaluator
-from airflock.search.run import executor_for, run
-from airflock.search.several import of_scenarios
+from airflock.search.run import run_study, study_executor
+from airflock.search.several import combine_scenarios
 from airflock.search.study import load_study, make_study
-from airflock.search.task import tasks_of
+from airflock.search.task import study_tasks
 from airflock.support.errors import ScenarioError
 from inside import simulate
 
@@ -40,7 +39,7 @@ def two(over="mean", **search):
     """A study of two scenarios whose flights cost nothing."""
     first = load("vasarhelyi_2018/6ms")
     keys = {"population": 16, "generations": 25, **search}
-    return toys.study({"over_scenarios": over}, [first, make(first.document, "late", FAR)], **keys)
+    return toys.study({"over_scenarios": over}, [first, build_scenario(first.document, "late", FAR)], **keys)
 
 
 def valley(best, height):
@@ -54,15 +53,15 @@ def valley(best, height):
 
 def flown(folder, study, watch=None, resume=False):
     open_folder(folder, study, resume=resume)
-    return run(study, folder, InProcess(valley(0.1, 1.0), 2, [valley(0.3, 0.5)]), watch)
+    return run_study(study, folder, ThreadExecutor(valley(0.1, 1.0), 2, [valley(0.3, 0.5)]), watch)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=5))
 def test_over_scenarios_is_the_mean_or_the_worst_and_fails_with_any(values):
-    assert of_scenarios(values, "mean", True) == pytest.approx(statistics.fmean(values), abs=1e-9)
-    assert of_scenarios(values, "worst", True) == min(values)
-    assert of_scenarios(values, "worst", False) == max(values)
-    assert of_scenarios([*values, None], "mean", True) is None
+    assert combine_scenarios(values, "mean", True) == pytest.approx(statistics.fmean(values), abs=1e-9)
+    assert combine_scenarios(values, "worst", True) == min(values)
+    assert combine_scenarios(values, "worst", False) == max(values)
+    assert combine_scenarios([*values, None], "mean", True) is None
 
 
 @pytest.mark.parametrize(("over", "best"), [("mean", 0.2), ("worst", 0.3)])
@@ -83,7 +82,7 @@ def test_every_seed_flies_in_every_scenario_and_rows_and_result_tell_which(tmp_p
     for _, one in search.groupby(["generation", "candidate"]):
         each = one.groupby("scenario")["seed"].apply(list)
         assert each["late"] == each["vasarhelyi_2018/6ms"] and len(set(each["late"])) == 2
-    with Store(tmp_path / "a", write=False) as store:
+    with FlightStore(tmp_path / "a", write=False) as store:
         told = store.rows("SELECT generation, candidate, fitness FROM candidate WHERE stage='search'")
     worst = search.groupby(["generation", "candidate", "scenario"])["fitness"].mean().groupby(level=[0, 1]).min()
     assert all(json.loads(f)[0] == pytest.approx(worst[g, c], abs=1e-12) for g, c, f in told)
@@ -112,23 +111,23 @@ def test_a_study_of_several_that_is_cut_off_ends_the_same(tmp_path):
 
 def test_real_flights_are_those_of_each_scenario_here_together_and_on_workers(tmp_path):
     small = load("vasarhelyi_2018/4ms", {"duration": 2.0, "agents": 5})
-    longer = make(small.document, "longer", {"duration": 3.0, **FAR})
+    longer = build_scenario(small.document, "longer", {"duration": 3.0, **FAR})
     study = make_study({"space": toys.SPACE}, "two", scenario=[small, longer])
     points = np.array([[0.2, 0.4, 0.6]])
     given = study.space.parameters(points[0])
     wanted = [score_flight(with_parameters(each, given), 7)["fitness"] for each in (small, longer)]
     rows = []
-    for name, executor in (("here", executor_for(study, threads=2)), ("together", Batched(study, "cpu"))):
+    for name, executor in (("here", study_executor(study, threads=2)), ("together", BatchExecutor(study, "cpu"))):
         (tmp_path / name).mkdir()
-        with Store(tmp_path / name) as store:
+        with FlightStore(tmp_path / name) as store:
             evaluator = Evaluator(study, store, executor)
-            rows += evaluator.evaluate(Batch("search", 0, 0), points, seeds=[[7]])
-            half = evaluator.evaluate(Batch("search", 0, 1), points, seeds=[[7]], share=0.5)
+            rows += evaluator.evaluate(CandidateBatch("search", 0, 0), points, seeds=[[7]])
+            half = evaluator.evaluate(CandidateBatch("search", 0, 1), points, seeds=[[7]], duration_share=0.5)
         executor.close()
     assert rows == [[sum(wanted) / 2.0]] * 2
     shorter = [with_parameters(each, {**given, "duration": d}) for each, d in ((small, 1.0), (longer, 1.5))]
     assert half == [[sum(row["fitness"] for row in score_flights(shorter, [7, 7])) / 2.0]]
-    there = [rebuild(task.text, task.where) for task in tasks_of(study)]
+    there = [rebuild_scenario(task.text, task.where) for task in study_tasks(study)]
     assert [score_flight(with_parameters(each, given), 7)["fitness"] for each in there] == wanted
 
 
@@ -199,7 +198,7 @@ def test_each_fault_of_several_scenarios_is_one_line(document, words):
 def test_a_step_of_hardening_that_breaks_what_held_in_one_of_two_scenarios_is_undone(monkeypatch):
     """More repulsion widens distances in both, and drives agents into the walls of the second."""
     first = load("vasarhelyi_2018/6ms")
-    late = make(first.document, "late", FAR)
+    late = build_scenario(first.document, "late", FAR)
 
     def score_flights(scenarios, seeds, **_):
         return [

@@ -12,7 +12,7 @@ from airflock.parts.faults.registry import KINDS
 from airflock.parts.sensors.registry import SENSORS
 from airflock.scenarios import groups, keys, making
 from airflock.scenarios.files import load, presets
-from airflock.scenarios.laws import MODELS, find_model
+from airflock.scenarios.laws import MODELS, find_law
 from airflock.scenarios.sections import SECTIONS
 from airflock.support.errors import ScenarioError
 
@@ -159,10 +159,10 @@ def test_the_list_of_keys_is_that_of_the_declarations_and_of_a_loaded_scenario()
 def test_every_name_that_a_file_may_hold_is_among_the_keys():
     every = airflock.keys()
     names = {key.name for key in every}
-    assert {name.partition(".")[0] for name in names} == {*making.TOP, "extends"}
-    for of, known in (("faults", fault.KEYS), ("groups", groups.KEYS)):
+    assert {name.partition(".")[0] for name in names} == {*making.TOP_LEVEL_KEYS, "extends"}
+    for of, known in (("faults", fault.ENTRY_KEYS), ("groups", groups.KEYS)):
         assert {key.name for key in keys.sections()[of].keys} == {f"{of}.{name}" for name in known}
-    records = {**BODIES, **SENSORS, **KINDS} | {name: find_model(name) for name in MODELS}
+    records = {**BODIES, **SENSORS, **KINDS} | {name: find_law(name) for name in MODELS}
     for name, found in records.items():
         declared = {key for key, _, _ in declarations(found.Parameters)}
         assert {key.name.partition(".")[2] for key in keys.sections()[name].keys} == declared, name
@@ -173,7 +173,7 @@ def test_every_name_that_a_file_may_hold_is_among_the_keys():
 def test_the_keys_of_a_kind_of_fault_are_its_numbers_and_those_of_every_entry():
     names = [key.name for key in keys.keys("motor")]
     assert names[0] == "faults.share" and {"faults.at", "faults.per_hour", "faults.agents", "body.motor"} <= set(names)
-    assert {key.name for key in keys.keys("gnss_frozen")} == {f"faults.{name}" for name in fault.KEYS}
+    assert {key.name for key in keys.keys("gnss_frozen")} == {f"faults.{name}" for name in fault.ENTRY_KEYS}
 
 
 def test_an_unknown_section_of_keys_is_told_with_the_nearest():

@@ -4,8 +4,7 @@ import pytest
 
 from airflock.engine import plan_of
 from airflock.scenarios.files import load
-from inside import ZERO, Builder, StageError, argument, ask, most, repeat, specialise, vector
-from inside import stages_start as start
+from inside import ZERO, Builder, StageError, argument, ask, most, repeat, specialise, stages_start as start, vector
 
 
 def made(stage, name="vasarhelyi_2018/4ms", **known):

@@ -8,10 +8,10 @@ from scipy.stats import binom
 
 from airflock.certificates.branches import LineageFlyer
 from airflock.certificates.campaign import Campaign
-from airflock.certificates.flyer import Flyer
-from airflock.certificates.limit import read_all
-from airflock.certificates.splitting import Lineage, Particle, Repetition, estimate, repetition
-from airflock.runs.store import Store
+from airflock.certificates.flyer import CampaignFlyer
+from airflock.certificates.limit import parse_limits
+from airflock.certificates.splitting import Lineage, LineageFlight, Repetition, estimate_probability, run_repetition
+from airflock.runs.store import FlightStore
 from airflock.scenarios.files import load
 
 STEPS, HEIGHT = 100, 100.0
@@ -42,12 +42,14 @@ def test_the_exact_probability_is_that_of_counting(seed):
 def repetitions(seed, count, depth, counted=400, start=100):
     made, values = [], []
     for number in range(count):
-        first = [Particle(x, walk(x)) for x in (Lineage(seed * 10**6 + number * counted + i) for i in range(counted))]
+        first = [
+            LineageFlight(x, walk(x)) for x in (Lineage(seed * 10**6 + number * counted + i) for i in range(counted))
+        ]
         values += [particle.least for particle in first]
         near = sorted(first, key=lambda particle: particle.least)[:start]
         rng = np.random.default_rng([seed, number])
         fly = lambda batch, lineages: [walk(x) for x in lineages]  # noqa: E731
-        made.append(repetition(near, counted, HEIGHT - depth, fly, 10.0, rng, size=100))
+        made.append(run_repetition(near, counted, HEIGHT - depth, fly, 10.0, rng, size=100))
     return made, values
 
 
@@ -57,7 +59,7 @@ def test_splitting_finds_the_probability_of_a_rare_fall(seed):
     found = np.array([r.probability(HEIGHT - 34) for r in made])
     error = found.std(ddof=1) / math.sqrt(len(found))
     assert found.mean() == pytest.approx(truth(34), abs=4.0 * error) and error < 0.4 * truth(34)
-    told = estimate(made, HEIGHT - 34, values)
+    told = estimate_probability(made, HEIGHT - 34, values)
     assert not told.refused and told.low < truth(34) * 1.5 and told.high > truth(34) / 1.5
 
 
@@ -68,19 +70,19 @@ def test_every_flight_that_is_found_is_flown_again_by_its_lineage(seed):
 
 def test_a_branch_changes_nothing_before_it():
     one = Lineage(3, ((10, 5), (40, 6)))
-    assert one.branched(40, 7).branches == ((10, 5), (40, 7)) and one.branched(7, 9).branches == ((7, 9),)
-    before, after = (dict(walk(x)) for x in (one, one.branched(60, 8)))
+    assert one.branch(40, 7).branches == ((10, 5), (40, 7)) and one.branch(7, 9).branches == ((7, 9),)
+    before, after = (dict(walk(x)) for x in (one, one.branch(60, 8)))
     assert {k: v for k, v in before.items() if k <= 60} == {k: v for k, v in after.items() if k <= 60}
 
 
 def test_splitting_that_goes_on_after_more_flights_takes_no_flight_of_the_one_before_for_its_own(tmp_path, monkeypatch):
     """It starts from other flights then, so that flights of the same number are other ones."""
     monkeypatch.setattr(
-        "airflock.certificates.branches.falls", lambda _, lineage, *rest: [list(f) for f in walk(lineage)]
+        "airflock.certificates.branches.record_falls", lambda _, lineage, *rest: [list(f) for f in walk(lineage)]
     )
     scenario = load("vasarhelyi_2018/real_6ms")
-    with Store(tmp_path) as store:
-        flyer = Flyer(Campaign(scenario, read_all(["r_min<1 at 1e-3/h"], scenario)), store, None)
+    with FlightStore(tmp_path) as store:
+        flyer = CampaignFlyer(Campaign(scenario, parse_limits(["r_min<1 at 1e-3/h"], scenario)), store, None)
         for counted, seed in ((400, 1), (800, 2), (400, 1)):
             (found,) = LineageFlyer(flyer, 0, 1, counted)(0, [Lineage(seed)])
             assert found == [list(f) for f in walk(Lineage(seed))]
@@ -88,18 +90,18 @@ def test_splitting_that_goes_on_after_more_flights_takes_no_flight_of_the_one_be
 
 def synthetic(p, ancestors=20):
     """A repetition that says: half of the flights of the level 5 are below 1, and these are p of all."""
-    last = [Particle(Lineage(i), [(0, 0.5)]) for i in range(ancestors)]
+    last = [LineageFlight(Lineage(i), [(0, 0.5)]) for i in range(ancestors)]
     return Repetition([(5.0, 2.0 * p), (1.0, p)], last, [(5.0, 2.0 * p, [0.5, 3.0] * 50)])
 
 
 def test_no_number_is_given_where_counting_says_otherwise_or_too_few_flights_are_behind_it():
     values = [0.5] * 50 + [9.0] * 9950
     ps = (0.0048, 0.005, 0.0052, 0.0049, 0.0051)
-    sound = estimate([synthetic(p) for p in ps], 1.0, values)
+    sound = estimate_probability([synthetic(p) for p in ps], 1.0, values)
     assert not sound.refused and sound.low < 0.005 < sound.high
-    low = estimate([synthetic(0.1 * p) for p in ps], 1.0, values)
+    low = estimate_probability([synthetic(0.1 * p) for p in ps], 1.0, values)
     assert "disagrees with counting" in low.refused and math.isnan(low.probability)
-    few = estimate([synthetic(p, ancestors=3) for p in ps], 1.0, values)
+    few = estimate_probability([synthetic(p, ancestors=3) for p in ps], 1.0, values)
     assert "stem from 3 first flights or fewer" in few.refused
-    never = estimate([*(synthetic(p) for p in ps), Repetition([(5.0, 0.01)], [])], 1.0, values)
+    never = estimate_probability([*(synthetic(p) for p in ps), Repetition([(5.0, 0.01)], [])], 1.0, values)
     assert "5 of 6 repetitions came so far" in never.refused

@@ -14,24 +14,32 @@ from airflock.core import random
 from airflock.core.contract.declared import CLOCKS
 from airflock.engine import plan_of
 from flocks import ISLANDS, NOTCHED, scenario
-from inside import WHOLE, Flock, Itself, Surroundings, clusters_of, stages, tables
-from inside import passes_decide as decide
-from inside import passes_driver as driver
-from inside import passes_measure as measure
-from inside import passes_perceive as perceive
-from inside import stages_approach as approach
-from inside import stages_decide as deciding
-from inside import stages_gusts as gusts
-from inside import stages_measure as judging
-from inside import stages_meet as meet
-from inside import stages_move as motion
-from inside import stages_neighbours as neighbours
-from inside import stages_noise as noise
-from inside import stages_perceive as measuring
-from inside import stages_receive as receive
-from inside import stages_start as start
-from inside import stages_surfaces as surfaces
-from inside import stages_words as words
+from inside import (
+    WHOLE,
+    Flock,
+    Itself,
+    Surroundings,
+    clusters_of,
+    passes_decide as decide,
+    passes_driver as driver,
+    passes_measure as measure,
+    passes_perceive as perceive,
+    stages,
+    stages_approach as approach,
+    stages_decide as deciding,
+    stages_gusts as gusts,
+    stages_measure as judging,
+    stages_meet as meet,
+    stages_move as motion,
+    stages_neighbours as neighbours,
+    stages_noise as noise,
+    stages_perceive as measuring,
+    stages_receive as receive,
+    stages_start as start,
+    stages_surfaces as surfaces,
+    stages_words as words,
+    tables,
+)
 
 FILES = sorted(Path(stages.__file__).parent.glob("*.py"))
 
@@ -92,7 +100,7 @@ class World:
         found = scenario(kind, agents=6, world__side=60.0, world__height=50.0, start__separation=4.0, **keys)
         self.plan = plan_of(found, precision=64)
         self.tables = tables(found, self.plan, seed)
-        self.build = driver.stages(self.plan)
+        self.build = driver.flight_stages(self.plan)
         rng, n = np.random.default_rng(seed), 6
         dims = self.plan.dimensions
         self.state = {
@@ -101,7 +109,7 @@ class World:
             "words": np.zeros((4, n), np.uint32).astype(object),
             "store": np.concatenate([rng.uniform(-9.0, 9.0, (2 * dims, n, n)), np.full((1, n, n), -1e9)]),
             "gust": np.array([0.3, -0.2, 0.1, 0.5, -0.4])[: 5 if self.plan.dryden else 3],
-            "held": rng.uniform(-2.0, 2.0, approach.HELD),
+            "held": rng.uniform(-2.0, 2.0, approach.HELD_SIZE),
         }  # fmt: skip
         whole = dict(zip(WHOLE, self.tables.whole.tolist(), strict=True))
         self.whole, self.row = types.SimpleNamespace(**whole), self.tables.row.tolist()
@@ -126,7 +134,7 @@ class World:
         common = self.row, self.tables.whole.tolist(), state["work"]
         made["snapshot"](1, n, state["work"], state["ring"])
         made["perceive"](step, 0, n, *common, state["ring"], state["words"])
-        around = (self.rest[name] for name in perceive.around(self.plan))
+        around = (self.rest[name] for name in perceive.world_arguments(self.plan))
         made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"], state["words"], *around)
         made["boundaries"](n, *common, *self.rest.values())
         made["decide"](step, n, 0.7, *common, None, *list(self.rest.values())[1:])
@@ -150,7 +158,7 @@ class World:
         def draw(i):
             receive.draw(range(n), flock, whole, i, step, n, plan=plan)
 
-        fields = decide._asked(self.build, words.live(model.Sums, plan.dimensions))
+        fields = decide._asked(self.build, words.nonzero_fields(model.Sums, plan.dimensions))
         sums = tuple((c, model.reduce.get(model.Sums._fields[c], "sum")) for c in fields)
         around = self.around()
 
@@ -164,7 +172,7 @@ class World:
         surfaces.boundaries(range(n), flock, numbers, whole, self.rest["faces"], around, plan=plan, model=model)
         deciding.decide(
             range(n), flock, numbers, whole, around, step, 0.7, None, None,
-            plan=plan, model=model, summed=fields, walled=words.live(model.Walls, plan.dimensions),
+            plan=plan, model=model, summed=fields, walled=words.nonzero_fields(model.Walls, plan.dimensions),
         )  # fmt: skip
         state["fastest"] = motion.move(
             range(n), range(n), flock, numbers, step, n,
@@ -221,12 +229,12 @@ class World:
             if text:
                 least = self.text()[f"measure_{clock}"](0.7, n, n, self.row, whole, work, edges, spans, scene, *parts)
             else:
-                metrics = judging.measured(self.plan, clock)
+                metrics = judging.measured_metrics(self.plan, clock)
                 least = judging.measure(
                     self.flock(work), self.numbers(), self.whole, self.around(), 0.7, n, n, *parts,
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
                     plan=self.plan, metrics=metrics, nearest=clock == "collision", over=None, abreast=True,
-                    headed=measure.headed(metrics), summed="xvh",
+                    headed=measure.needs_headings(metrics), summed="xvh",
                 )  # fmt: skip
             found.append((least, values, memory, work))
         return found

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airflock.engine import driver_text, fly, plan_of
+from airflock.engine import driver_text, fly_world, plan_of
 from airflock.scenarios.files import load
 from airflock.support.errors import FlightError, ScenarioError
 from flocks import scenario
@@ -30,7 +30,7 @@ def test_jitter_must_not_carry_an_agent_over_a_face_that_bounces():
 def test_a_given_start_outside_is_one_line():
     start = np.array([[0.0, 3.0], [0.0, -12.5], [0.0, 0.0], [0.0, 0.0]])
     with pytest.raises(FlightError, match="agent 1 lies 2.5 m outside the arena, from whose faces agents bounce"):
-        fly(scenario(**BOUNCE, agents=2), 0, start=start, device="python")
+        fly_world(scenario(**BOUNCE, agents=2), 0, start=start, device="python")
 
 
 PERIODIC = {"world__edges": "periodic", "world__side": 4.0, "start__separation": 0.0}
@@ -42,7 +42,7 @@ def test_a_given_start_beyond_a_periodic_box_is_the_place_inside(seed):
     rng = np.random.default_rng(seed)
     inside = np.concatenate([rng.integers(-31, 32, (2, 8)) / 16, 0.03 * rng.normal(size=(2, 8))])  # no rounding
     away = inside + np.concatenate([4.0 * rng.integers(-3, 4, (2, 8)), np.zeros((2, 8))])
-    known, moved = (fly(found, seed, record=True, start=start, device="python") for start in (inside, away))
+    known, moved = (fly_world(found, seed, record=True, start=start, device="python") for start in (inside, away))
     np.testing.assert_array_equal(moved.frames, known.frames)
     assert moved.values == known.values
 
@@ -51,7 +51,7 @@ def test_a_collision_over_the_face_of_a_periodic_box_is_seen_from_the_first_step
     """Found by a draw: two agents two sides apart, so at one place, were not looked at until they could have flown."""
     found = scenario("vicsek_1995", **PERIODIC, agents=2, duration=1.0, metrics__kind="vasarhelyi", metrics__r_coll=0.5)
     start = np.array([[0.0, 8.05], [0.0, 0.0], [0.01, 0.01], [0.0, 0.0]])
-    assert fly(found, seed, start=start, device="python").values["n_coll"] == 1.0
+    assert fly_world(found, seed, start=start, device="python").values["n_coll"] == 1.0
 
 
 @pytest.mark.parametrize(

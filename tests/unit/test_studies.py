@@ -15,14 +15,14 @@ import pytest
 import airflock
 import toys
 from airflock.runs.executors import Flight
-from airflock.runs.executors.in_process import InProcess
+from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.folder import Interrupted, differences, open_folder
 from airflock.runs.space import with_parameters
-from airflock.runs.store import FILE, Batch, Store
-from airflock.search.batched import Batched
-from airflock.search.request import asked_for, sound_device, study_of
-from airflock.search.run import run, score_of
-from airflock.search.study import load_study, shipped
+from airflock.runs.store import FILE, CandidateBatch, FlightStore
+from airflock.search.batched import BatchExecutor
+from airflock.search.request import check_study_device, evolve_request, study_from_request
+from airflock.search.run import run_study, study_score
+from airflock.search.study import load_study, shipped_studies
 from airflock.support.errors import ScenarioError, StudyError
 from airflock_papers.dimock_2003.units import gains
 from airflock_papers.vasarhelyi_2018.published import SPEEDS, optimum
@@ -32,7 +32,7 @@ from processes import called
 def finished(folder, study=None, score=toys.bowl, **options):
     study = study or toys.study()
     open_folder(folder, study, resume=False)
-    return run(study, folder, InProcess(score, 2), **options)
+    return run_study(study, folder, ThreadExecutor(score, 2), **options)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def done(tmp_path_factory):
 def test_best_is_near_the_optimum_and_its_score_is_of_fresh_seeds(done):
     assert done.fitness == pytest.approx(1.0, abs=0.02) and done.low <= done.fitness <= done.high
     assert done.parameters["model.p_rep"] == pytest.approx(0.2, abs=0.05)
-    with Store(done.folder, write=False) as store:
+    with FlightStore(done.folder, write=False) as store:
         seeds = {stage: {s for (s,) in store.rows("SELECT seed FROM flight WHERE stage=?", (stage,))} for stage in
                  ("search", "final", "score")}  # fmt: skip
     assert len(seeds["search"]) == 16 * 25 * 2 and len(seeds["final"]) == len(seeds["score"]) == 4
@@ -63,7 +63,7 @@ def test_folder_holds_a_scenario_that_flies_tables_and_pictures(done):
 
 
 def test_working_ranges_span_the_candidates_that_reach_the_mean(done):
-    with Store(done.folder, write=False) as store:
+    with FlightStore(done.folder, write=False) as store:
         rows = store.rows("SELECT parameters, fitness FROM candidate WHERE stage='search'")
     good = [json.loads(p)["model.p_rep"] for p, f in rows if (json.loads(f)[0] or 0.0) >= done.fitness]
     assert done.above == len(good) and done.ranges["model.p_rep"] == (min(good), max(good))
@@ -96,7 +96,7 @@ def test_pareto_studies_keep_a_front(tmp_path):
 def test_genetic_algorithm_and_common_random_numbers(tmp_path):
     study = toys.study(algorithm="ga", seeds=2, random_numbers="study")
     finished(tmp_path / "a", study)
-    with Store(tmp_path / "a", write=False) as store:
+    with FlightStore(tmp_path / "a", write=False) as store:
         assert store.rows("SELECT count(DISTINCT seed) FROM flight WHERE stage='search'") == [(2,)]
 
 
@@ -112,30 +112,30 @@ def test_ctrl_c_keeps_what_has_landed_and_resume_ends_the_same(tmp_path, done):
         finished(tmp_path / "a", study, watch=stop)
     open_folder(tmp_path / "a", study, resume=True)
     fresh = []
-    again = run(study, tmp_path / "a", InProcess(toys.bowl, 2), lambda p: fresh.append(p.fresh))
+    again = run_study(study, tmp_path / "a", ThreadExecutor(toys.bowl, 2), lambda p: fresh.append(p.fresh))
     assert max(fresh) <= 16 * 25 * 2 - 100
     assert again.document() == done.document()
 
 
 def test_overlapping_writers_are_refused_and_readers_are_not(tmp_path):
-    with Store(tmp_path) as first:
+    with FlightStore(tmp_path) as first:
         first.begin({})
         with pytest.raises(StudyError, match=r"another process \(process \d+ on .*\) is writing this study"):
-            Store(tmp_path)
-        Store(tmp_path, write=False).close()
-    Store(tmp_path).close()
+            FlightStore(tmp_path)
+        FlightStore(tmp_path, write=False).close()
+    FlightStore(tmp_path).close()
 
 
 def test_flights_are_on_disk_as_soon_as_they_land_and_count_once(tmp_path):
-    from airflock.runs.executors import Flight, Landed
+    from airflock.runs.executors import Flight, FlightResult
 
-    batch = Batch("search", 0, 0)
-    with Store(tmp_path) as store:
+    batch = CandidateBatch("search", 0, 0)
+    with FlightStore(tmp_path) as store:
         store.ask(batch, [[0.5]], [{"model.p_rep": 0.1}])
-        store.land(batch, Landed(Flight(0, 0, {}, 7), {"fitness": 0.1 + 0.2, "lost": float("nan")}))
+        store.land(batch, FlightResult(Flight(0, 0, {}, 7), {"fitness": 0.1 + 0.2, "lost": float("nan")}))
         with sqlite3.connect(tmp_path / FILE) as other:
             assert other.execute("SELECT seed FROM flight").fetchall() == [(7,)]
-        store.land(batch, Landed(Flight(0, 0, {}, 7), {"fitness": 9.0}))
+        store.land(batch, FlightResult(Flight(0, 0, {}, 7), {"fitness": 9.0}))
         found = store.flown(batch)[0, 0]
         assert found["fitness"] == 0.1 + 0.2 and found["lost"] != found["lost"]
 
@@ -182,28 +182,28 @@ def test_a_study_goes_on_with_what_its_folder_holds(tmp_path):
     """Settings, keys of the search and limits need not be asked for again; what is, counts."""
     first = {"agents": 5, "radio.kind": "links", "model.p_rep": 0.1}, {"generations": 2, "seeds": 2}, "r_min<3 at 1%"
     name, folder = "vasarhelyi_2018/6ms", tmp_path / "a"
-    begun = study_of(name, first[0], search_keys=first[1], limit=first[2])
+    begun = study_from_request(name, first[0], search_keys=first[1], limit=first[2])
     open_folder(folder, begun, resume=False)
-    again, told = asked_for(name, folder=folder)
+    again, told = evolve_request(name, folder=folder)
     assert again.document() == begun.document() and "agents = 5" in told and "limit = ['r_min<3 at 1%']" in told
     open_folder(folder, again, resume=True)
-    other, _ = asked_for(name, {"agents": 6}, search_keys={"generations": 3}, folder=folder)
+    other, _ = evolve_request(name, {"agents": 6}, search_keys={"generations": 3}, folder=folder)
     assert other.scenario.agents == 6 and other.search.generations == 3 and other.search.seeds == 2
-    assert asked_for(name, first[0], search_keys=first[1], limit=first[2], folder=folder)[1] == ""
+    assert evolve_request(name, first[0], search_keys=first[1], limit=first[2], folder=folder)[1] == ""
 
 
 def test_files_that_are_no_store_and_full_disks_are_one_line(tmp_path):
     (tmp_path / FILE).write_text("years of work, and no database at all" * 100)
     with pytest.raises(StudyError, match="file is not a database"):
-        Store(tmp_path)
+        FlightStore(tmp_path)
     assert "years of work" in (tmp_path / FILE).read_text()
     other = tmp_path / "full"
     other.mkdir()
-    with Store(other) as store:
+    with FlightStore(other) as store:
         store.connection.execute("PRAGMA max_page_count = 20")  # the smallest full disk
         with pytest.raises(StudyError, match="database or disk is full; what was stored before is kept"):
-            store.ask(Batch("search", 0, 0), [[0.5] * 4000] * 50, [{}] * 50)
-        assert store.asked(Batch("search", 0, 0)) == []
+            store.ask(CandidateBatch("search", 0, 0), [[0.5] * 4000] * 50, [{}] * 50)
+        assert store.asked(CandidateBatch("search", 0, 0)) == []
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_own_fitness_is_read_from_beside_the_study(tmp_path):
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_law_in_a_file_of_its_own_comes_along_with_the_winner(tmp_path):
-    law = Path(airflock.__file__).parent / "models" / "viragh_2014.py"
+    law = Path(airflock.__file__).parent / "parts" / "laws" / "viragh_2014.py"
     (tmp_path / "mine.py").write_text(law.read_text())
     (tmp_path / "mine.toml").write_text('duration = 1.0\nagents = 3\n[model]\nkind = "mine.py"\n')
     search = {"population": 4, "generations": 1, "top": 1, "final_seeds": 2}
@@ -262,7 +262,7 @@ def test_a_law_in_a_file_of_its_own_comes_along_with_the_winner(tmp_path):
 
 def test_shipped_studies_hold_the_published_optima_and_table_s6():
     names = [f"vasarhelyi_2018/{speed}ms" for speed in SPEEDS]
-    assert set(names) <= set(shipped())
+    assert set(names) <= set(shipped_studies())
     for name, speed in zip(names, SPEEDS, strict=True):
         study = load_study(name)
         published = optimum(speed).parameters
@@ -308,7 +308,7 @@ def test_public_door_evolves_a_short_flight_with_a_fitness_of_ones_own(tmp_path)
     assert airflock.load(tmp_path / "a" / "best.toml").parameters.v_flock == result.parameters["model.v_flock"]
 
 
-@pytest.mark.parametrize("name", sorted(shipped()))
+@pytest.mark.parametrize("name", sorted(shipped_studies()))
 def test_every_shipped_study_can_be_begun(name):
     study = load_study(name)
     parameters = study.space.parameters([0.5] * len(study.space.axes))
@@ -340,10 +340,10 @@ def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monke
     space, flights = study.space, []
     for i in range(7):
         flights.append(Flight(i, 0, space.parameters([0.1 + 0.1 * i] * 11), 40 + i))
-    executor = InProcess(score_of(study), 2)
-    alone = {landed.flight.candidate: landed.values for landed in executor.fly(flights)}
+    executor = ThreadExecutor(study_score(study), 2)
+    alone = {landed.flight.candidate_index: landed.values for landed in executor.fly(flights)}
     executor.close()
-    together = {x.flight.candidate: x.values for x in Batched(study, "cpu").fly(flights)}
+    together = {x.flight.candidate_index: x.values for x in BatchExecutor(study, "cpu").fly(flights)}
     assert together == alone
     whole = simulate.score_flights
 
@@ -353,7 +353,7 @@ def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monke
         return whole(scenarios, seeds, **keywords)
 
     monkeypatch.setattr(simulate, "score_flights", faulty)
-    landed = {x.flight.candidate: x for x in Batched(study, "cpu").fly(flights)}
+    landed = {x.flight.candidate_index: x for x in BatchExecutor(study, "cpu").fly(flights)}
     assert landed[3].values is None and landed[3].reason.startswith("seed 43")
     assert {i: x.values for i, x in landed.items() if i != 3} == {i: v for i, v in alone.items() if i != 3}
 
@@ -364,7 +364,7 @@ def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monke
 )
 def test_devices_that_cannot_be_are_one_line(device, scheduler, words):
     with pytest.raises(StudyError, match=words):
-        sound_device(device, scheduler)
+        check_study_device(device, scheduler)
 
 
 def test_a_study_of_another_device_is_another_study():

@@ -6,11 +6,11 @@ import time
 
 import pytest
 
-from airflock.support.threads import in_background, in_threads
+from airflock.support.threads import run_in_background, run_in_threads
 
 INTERRUPTED = """
 import faulthandler, random, signal, time
-from airflock.support.threads import in_threads
+from airflock.support.threads import run_in_threads
 
 faulthandler.dump_traceback_later(60, exit=True)
 signal.signal(signal.SIGALRM, signal.default_int_handler)
@@ -19,7 +19,7 @@ heard = 0
 for _ in range(30):
     try:
         signal.setitimer(signal.ITIMER_REAL, random.uniform(1e-3, 0.1))
-        list(in_threads([lambda: time.sleep(1e-5)] * 2000, 2))
+        list(run_in_threads([lambda: time.sleep(1e-5)] * 2000, 2))
         signal.setitimer(signal.ITIMER_REAL, 0)
     except KeyboardInterrupt:
         heard += 1
@@ -41,7 +41,7 @@ def test_results_come_in_the_order_of_the_jobs(threads):
         return k
 
     jobs = [lambda k=k: job(k) for k in range(40)]
-    assert list(in_threads(jobs, threads, lambda: told.append(1))) == list(range(40))
+    assert list(run_in_threads(jobs, threads, lambda: told.append(1))) == list(range(40))
     assert len(told) == 40
 
 
@@ -58,7 +58,7 @@ def test_a_fault_reaches_who_asks_and_no_further_job_begins(threads):
 
     found = []
     with pytest.raises(ValueError, match="the sixth"):
-        for result in in_threads([lambda k=k: job(k) for k in range(400)], threads):
+        for result in run_in_threads([lambda k=k: job(k) for k in range(400)], threads):
             found.append(result)
     assert found == [0, 1, 2, 3, 4]
     assert len(begun) < 400
@@ -68,7 +68,7 @@ def test_work_in_the_background_begins_when_its_caller_goes_on():
     done, usual = [], sys.getswitchinterval()
     sys.setswitchinterval(10.0)  # s; a thread that has the interpreter keeps it
     try:
-        work = in_background(lambda: done.append("work"))
+        work = run_in_background(lambda: done.append("work"))
         done.append("caller")
         work.result(60.0)
     finally:

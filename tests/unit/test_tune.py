@@ -9,28 +9,27 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import airflock
-from airflock.certificates.request import campaign_of
-from airflock.certificates.seeds import identity
-from airflock.cli.options import time_of
+from airflock.certificates.request import campaign_from_request
+from airflock.certificates.seeds import scenario_identity
+from airflock.cli.options import parse_seconds
 from airflock.engine import score_flights
 from airflock.runs.folder import Interrupted
-from airflock.runs.store import Store
+from airflock.runs.store import FlightStore
 from airflock.scenarios.files import load
-from airflock.scenarios.making import make
-from airflock.search.race import ROUNDS
+from airflock.scenarios.making import build_scenario
+from airflock.search.race import RACE_ROUNDS
 from airflock.search.tune import run as tuning
-from airflock.search.tune.assumed import defaults
-from airflock.search.tune.feasible import infeasible
+from airflock.search.tune.assumed import default_rows
+from airflock.search.tune.feasible import infeasible_limit_lines
 from airflock.search.tune.folder import MOST_SEEDS, read_plan
-from airflock.search.tune.next_flight import replays
-from airflock.search.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
-from airflock.search.tune.request import usual_limits
+from airflock.search.tune.next_flight import replay_files
+from airflock.search.tune.plan import CERTIFY_SHARE, HARDEN, POPULATION, SEARCH, TRIED, make_plan
+from airflock.search.tune.request import default_limits
 from airflock.search.tune.run import tune
-from airflock.search.tune.start import start_of
+from airflock.search.tune.start import prepare_start
 from airflock.support.errors import RecordingError, ScenarioError, StudyError
 
 SEEDS = "SELECT seed FROM flight WHERE stage=?"
@@ -41,52 +40,56 @@ MINE = {
 
 
 def test_it_starts_from_the_law_s_numbers_at_this_speed_and_leaves_alone_what_the_file_says():
-    mine = make(MINE, "mine")
-    start, notes = start_of(mine)
+    mine = build_scenario(MINE, "mine")
+    start, notes = prepare_start(mine)
     shipped = load("vasarhelyi_2018/6ms")
     assert start.parameters.p_rep == 0.2 and start.radio.delay == 0.4 and start.agents == 4
     for name in ("r0_rep", "c_frict", "v_shill", "a_shill"):
         assert getattr(start.parameters, name) == pytest.approx(getattr(shipped.parameters, name), rel=1e-3)
     assert "scaled to 6 m/s" in notes[0]
-    assert start_of(start_of(mine)[0])[0].parameters == start.parameters
-    assert start_of(load("vicsek_1995/ordered"))[0].parameters == load("vicsek_1995/ordered").parameters
+    assert prepare_start(prepare_start(mine)[0])[0].parameters == start.parameters
+    assert prepare_start(load("vicsek_1995/ordered"))[0].parameters == load("vicsek_1995/ordered").parameters
 
 
 @pytest.mark.parametrize(("side", "room"), [(120.0, 6.0), (59.0, 3.0), (53.0, 0.0)])
 def test_room_at_walls_is_given_where_there_is_place_for_it_and_the_file_says_nothing(side, room):
     crowded = {**MINE, "agents": 12, "world": {"side": side}}  # fits with 12 m between agents
-    found, notes = start_of(make(crowded, "mine"))
+    found, notes = prepare_start(build_scenario(crowded, "mine"))
     assert found.start.wall_clearance == room
     assert any(f"nearer than {room:g} m" in note for note in notes) == bool(room)
-    said = make({**crowded, "start": {"wall_clearance": 0.1}}, "mine")
-    assert start_of(said)[0].start.wall_clearance == 0.1
+    said = build_scenario({**crowded, "start": {"wall_clearance": 0.1}}, "mine")
+    assert prepare_start(said)[0].start.wall_clearance == 0.1
 
 
 @given(st.floats(1.0, 1e5), st.floats(0.05, 500.0))
 def test_a_plan_fits_into_its_budget_or_says_what_would(budget, rate):
     try:
-        plan = plan_of(budget, rate)
+        plan = make_plan(budget, rate)
     except StudyError as fault:
         assert "too small" in str(fault) and "give at least" in str(fault)
         return
     q = plan.search
-    raced = sum(max(q["top"], round(share * q["pool"])) * seeds for share, seeds in ROUNDS)
+    raced = sum(max(q["top"], round(share * q["pool"])) * seeds for share, seeds in RACE_ROUNDS)
     finalists = q["top"] + 1 + q["averages"]
     flown = POPULATION * q["seeds"] * q["generations"] + raced + (finalists + 1) * q["final_seeds"]
     assert flown <= SEARCH * budget * rate * 1.05 + 16 and TRIED * plan.seeds <= HARDEN * budget * rate + 1e-6
-    assert plan.seconds == CERTIFY * budget and pytest.approx(1.0) == SEARCH + HARDEN + CERTIFY
+    assert plan.seconds == CERTIFY_SHARE * budget and pytest.approx(1.0) == SEARCH + HARDEN + CERTIFY_SHARE
 
 
 @given(st.floats(1e3, 1e5), st.floats(1.0, 500.0), st.integers(1, 30_000))
 def test_a_limit_that_the_budget_cannot_show_is_told_beforehand_with_a_budget_that_can(budget, rate, of_100_000):
     """Nothing happened in n flights: its bound at the first look, which half of alpha pays, is that of (1 - p)^n."""
-    asked = campaign_of(start_of(make(MINE, "mine"))[0], [f"r_min<3 at {of_100_000}e-5/flight"], 0.95)
-    plan = plan_of(budget, rate)
-    lines = infeasible(asked, plan)
+    asked = campaign_from_request(
+        prepare_start(build_scenario(MINE, "mine"))[0], [f"r_min<3 at {of_100_000}e-5/flight"], 0.95
+    )
+    plan = make_plan(budget, rate)
+    lines = infeasible_limit_lines(asked, plan)
     counted = int(2.0 / 3.0 * plan.seconds * rate)  # the rest of the time is for how far numbers may change
     assert bool(lines) == ((1.0 - of_100_000 * 1e-5) ** counted > 0.025)
     for line in lines:
-        assert infeasible(asked, plan_of(time_of(re.search(r"--budget (\S+),", line)[1]), rate)) == []
+        assert (
+            infeasible_limit_lines(asked, make_plan(parse_seconds(re.search(r"--budget (\S+),", line)[1]), rate)) == []
+        )
 
 
 @pytest.fixture(scope="module")
@@ -102,8 +105,12 @@ def done(tmp_path_factory, seen):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tuning, "rate_of", lambda *_: 300.0)
         patch.setattr("airflock.search.run.draw", lambda *_: None)  # the study's own pictures
-        patch.setattr("airflock.certificates.environment.usual_keys", lambda _: ("radio.delay", "agents"))  # one driver
-        return tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"], watch=seen.append), folder
+        patch.setattr(
+            "airflock.certificates.environment.used_and_unused_keys", lambda _: ("radio.delay", "agents")
+        )  # one driver
+        return tune(
+            build_scenario(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"], watch=seen.append
+        ), folder
 
 
 def test_it_tells_its_stages_in_their_order_and_their_flights(done, seen):
@@ -118,9 +125,9 @@ def test_it_tells_its_stages_in_their_order_and_their_flights(done, seen):
 
 def test_the_folder_holds_what_to_fly_what_was_shown_and_a_report(done):
     found, folder = done
-    assert identity(load(folder / "tuned.toml")) == identity(found.scenario)
+    assert scenario_identity(load(folder / "tuned.toml")) == scenario_identity(found.scenario)
     told = tomllib.loads((folder / "certificate.toml").read_text())
-    assert told["shown"] == found.shown and told["flights"]["identity"] == identity(found.scenario)
+    assert told["shown"] == found.shown and told["flights"]["identity"] == scenario_identity(found.scenario)
     shown = found._repr_html_()
     assert "tuned.toml</b>, in " in shown and "<td>model.p_rep</td>" in shown
     assert all(verdict.limit.text.replace("<", "&lt;") in shown for verdict in found.certificate.verdicts)
@@ -148,30 +155,30 @@ def test_the_folder_holds_what_to_fly_what_was_shown_and_a_report(done):
 )
 def test_only_numbers_that_a_flight_reads_are_assumed(settings, are, are_not):
     """Brute force: what is left out changes no bit of a flight when it is changed."""
-    scenario = make(MINE, "mine", {"duration": 2.0, **settings})
-    told = {key for key, _, _ in defaults(scenario)}
+    scenario = build_scenario(MINE, "mine", {"duration": 2.0, **settings})
+    told = {key for key, _, _ in default_rows(scenario)}
     assert are <= told and not are_not & told
-    others = [make(MINE, "mine", {"duration": 2.0, **settings, key: 12.5}) for key in are_not]
+    others = [build_scenario(MINE, "mine", {"duration": 2.0, **settings, key: 12.5}) for key in are_not]
     flown, *same = score_flights([scenario, *others], [1] * 3, device="python")
     assert same == [flown] * 2
 
 
 def test_numbers_of_groups_are_assumed():
-    grouped = make({**MINE, "groups": [{"agents": 2, "body": {"tau": 2.0}}]}, "mine")
-    assert {"body.tau", "body.a_max", "sensors.noise"} <= {key for key, _, _ in defaults(grouped)}
+    grouped = build_scenario({**MINE, "groups": [{"agents": 2, "body": {"tau": 2.0}}]}, "mine")
+    assert {"body.tau", "body.a_max", "sensors.noise"} <= {key for key, _, _ in default_rows(grouped)}
 
 
 def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch):
     found, folder = done
     monkeypatch.setattr(tuning, "rate_of", lambda *_: pytest.fail("the plan is kept"))
     monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.certificates.environment.usual_keys", lambda _: ("radio.delay", "agents"))
+    monkeypatch.setattr("airflock.certificates.environment.used_and_unused_keys", lambda _: ("radio.delay", "agents"))
     with pytest.raises(StudyError, match="holds a tuning already; continue it with --resume"):
-        tune(make(MINE, "mine"), folder)
+        tune(build_scenario(MINE, "mine"), folder)
     with pytest.raises(StudyError, match="holds the tuning of another scenario"):
-        tune(make({**MINE, "agents": 5}, "mine"), folder, resume=True)
+        tune(build_scenario({**MINE, "agents": 5}, "mine"), folder, resume=True)
     steps = json.loads((folder / "hardening.json").read_text())
-    again = tune(make(MINE, "mine"), folder, resume=True)  # limits are those that it began with
+    again = tune(build_scenario(MINE, "mine"), folder, resume=True)  # limits are those that it began with
     assert [each.text for each in again.certificate.campaign.limits] == ["r_min<0.1 at 10%"]
     assert again.result.parameters == found.result.parameters
     assert json.loads((folder / "hardening.json").read_text()) == steps
@@ -179,16 +186,16 @@ def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch
     kept = (folder / "hardening.json").read_text()
     (folder / "hardening.json").write_text("[1]")
     with pytest.raises(StudyError, match=r"hardening.json: holds list"):
-        tune(make(MINE, "mine"), folder, limit=["r_min<0.1 at 10%"], resume=True)
+        tune(build_scenario(MINE, "mine"), folder, limit=["r_min<0.1 at 10%"], resume=True)
     (folder / "hardening.json").write_text(kept)
     with pytest.raises(StudyError, match="holds no tuning to resume"):
-        tune(make(MINE, "mine"), tmp_path / "new", resume=True)
+        tune(build_scenario(MINE, "mine"), tmp_path / "new", resume=True)
 
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory):
     """A log of four drones as a table, of a lag of 0.5 s that the scenario does not know."""
-    flown = airflock.simulate(make({**MINE, "duration": 60.0, "body": {"tau": 0.5}}, "true"), seed=3)
+    flown = airflock.simulate(build_scenario({**MINE, "duration": 60.0, "body": {"tau": 0.5}}, "true"), seed=3)
     columns = {"t": np.repeat(flown["time"].values, 4), "id": np.tile(np.arange(4), flown.sizes["time"])}
     for axis, name in enumerate("xy"):
         for what, prefix in (("position", ""), ("velocity", "v"), ("command", "c")):
@@ -212,11 +219,13 @@ def test_a_plan_with_margins_of_an_earlier_version_is_refused_in_one_line(done, 
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
     monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.certificates.environment.usual_keys", lambda _: ("radio.delay",))
-    how = {"like": make(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
+    monkeypatch.setattr("airflock.certificates.environment.used_and_unused_keys", lambda _: ("radio.delay",))
+    how = {"like": build_scenario(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
     found = tune([logs], tmp_path / "a", **how)
     tau = load(tmp_path / "a" / "identified.toml").body.tau
-    assert tau == pytest.approx(0.5, rel=0.1) and found.scenario.body.tau == tau != make(MINE, "mine").body.tau
+    assert (
+        tau == pytest.approx(0.5, rel=0.1) and found.scenario.body.tau == tau != build_scenario(MINE, "mine").body.tau
+    )
     assert tomllib.loads((tmp_path / "a" / "study" / "study.toml").read_text())["search"]["start"] == "scenario"
     told = {number["key"]: number for number in found.document()["identified"]["numbers"]}
     assert told["body.tau"]["low"] < 0.5 < told["body.tau"]["high"] and "reason" in told["radio.delay"]
@@ -225,7 +234,9 @@ def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs,
         assert text in page
     monkeypatch.setattr("airflock.search.tune.logs.identify", lambda *_, **__: pytest.fail("identified already"))
     again = tune([logs], tmp_path / "a", resume=True, **how)
-    assert again.identified == found.identified and identity(again.scenario) == identity(found.scenario)
+    assert again.identify_report == found.identify_report and scenario_identity(again.scenario) == scenario_identity(
+        found.scenario
+    )
     other = tmp_path / "log.csv"
     other.write_text(logs.read_text() + "\n")
     with pytest.raises(StudyError, match="holds the tuning of other logs .logs differs.; give another --out"):
@@ -253,10 +264,10 @@ def test_the_worst_flight_of_each_limit_is_played(tmp_path, monkeypatch):
     )
     worst = [{"limit": limit, "seed": seed} for limit, seeds in (("a", (1, 2, 3)), ("b", (4, 1))) for seed in seeds]
     made = SimpleNamespace(worst=worst, campaign=SimpleNamespace(parameters=lambda _: {}))
-    found = SimpleNamespace(certificate=made, scenario=make(MINE, "mine"), folder=tmp_path)
-    assert list(replays(found)) == shows == [1, 4, 2]
+    found = SimpleNamespace(certificate=made, scenario=build_scenario(MINE, "mine"), folder=tmp_path)
+    assert list(replay_files(found)) == shows == [1, 4, 2]
     worst += [{"limit": limit, "seed": seed} for limit, seed in (("c", 5), ("d", 6), ("e", 7))]
-    assert list(replays(found)) == [1, 4, 5, 6, 7]
+    assert list(replay_files(found)) == [1, 4, 5, 6, 7]
 
 
 def test_the_report_says_what_was_flown_and_which_files_it_is_about(done):
@@ -264,7 +275,7 @@ def test_the_report_says_what_was_flown_and_which_files_it_is_about(done):
     found, folder = done
     page = (folder / "report.html").read_text()
     for name, rows in (("study", ("search", "final", "score")), ("certificate_flights", ("count",))):
-        with Store(folder / name, write=False) as store:
+        with FlightStore(folder / name, write=False) as store:
             for stage in rows:
                 seeds = [s for (s,) in store.rows(SEEDS, (stage,))]
                 assert f"<td>{len(seeds):,}</td><td>{min(seeds)} to {max(seeds)}</td>" in page
@@ -280,19 +291,19 @@ def test_ctrl_c_between_stages_says_how_to_go_on(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
-    monkeypatch.setattr(tuning, "search", lambda *_: SimpleNamespace(dead=""))
+    monkeypatch.setattr(tuning, "search", lambda *_: SimpleNamespace(dead_reason=""))
     monkeypatch.setattr(tuning, "hardening", interrupted)
     with pytest.raises(Interrupted, match="stages that are over are kept in .*; continue with --resume"):
-        tune(make(MINE, "mine"), tmp_path / "a", budget=4.0, limit=["r_min<0.1 at 10%"])
+        tune(build_scenario(MINE, "mine"), tmp_path / "a", budget=4.0, limit=["r_min<0.1 at 10%"])
 
 
 def test_limits_are_by_default_on_collisions_and_where_there_are_walls_on_contacts():
-    assert usual_limits(make(MINE, "mine")) == ["r_min<3 at 0.01/h", "clearance<0 at 0.01/h"]
-    assert usual_limits(make({**MINE, "world": {"arena": "none"}, "start": {"kind": "ball"}}, "mine")) == [
+    assert default_limits(build_scenario(MINE, "mine")) == ["r_min<3 at 0.01/h", "clearance<0 at 0.01/h"]
+    assert default_limits(build_scenario({**MINE, "world": {"arena": "none"}, "start": {"kind": "ball"}}, "mine")) == [
         "r_min<3 at 0.01/h"
     ]
     with pytest.raises(ScenarioError, match="metrics.kind = 'order' has no r_min to limit; say what is to be shown"):
-        usual_limits(load("vicsek_1995/ordered"))
+        default_limits(load("vicsek_1995/ordered"))
 
 
 def test_search_hardening_and_certificate_hold_to_the_same_limits_on_seeds_that_never_meet(done):
@@ -300,11 +311,11 @@ def test_search_hardening_and_certificate_hold_to_the_same_limits_on_seeds_that_
     study = tomllib.loads((folder / "study" / "study.toml").read_text())
     assert study["limits"] == ["r_min<0.1 at 10%"] == [limit.text for limit in found.certificate.campaign.limits]
     assert found.result.limits[0]["keeps"] and found.result.limits[0]["limit"] == "r_min<0.1 at 10%"
-    with Store(folder / "study", write=False) as store:
+    with FlightStore(folder / "study", write=False) as store:
         searched = {
             stage: {s for (s,) in store.rows(SEEDS, (stage,))} for stage in ("search", "race", "final", "score")
         }
-    with Store(folder / "certificate_flights", write=False) as store:
+    with FlightStore(folder / "certificate_flights", write=False) as store:
         certified = {seed for (seed,) in store.rows("SELECT seed FROM flight")}
     parts = [*searched.values(), certified]
     assert all(parts) and sum(map(len, parts)) == len(set().union(*parts))
@@ -315,12 +326,12 @@ def test_logs_without_a_law_and_laws_without_logs_are_one_line(logs, tmp_path):
     for what, more, words in (
         ([logs, logs], {}, "tune takes one scenario; for logs, give --like"),
         ([logs], {"heard": logs}, "logs, give --like"),
-        (make(MINE, "mine"), {"like": make(MINE, "mine")}, "give log files, not a scenario"),
+        (build_scenario(MINE, "mine"), {"like": build_scenario(MINE, "mine")}, "give log files, not a scenario"),
     ):
         with pytest.raises(ScenarioError, match=words):
             tune(what, tmp_path / "a", **more)
     with pytest.raises(RecordingError, match=r"missing.csv: No such file"):
-        tune([tmp_path / "missing.csv"], tmp_path / "a", like=make(MINE, "mine"))
+        tune([tmp_path / "missing.csv"], tmp_path / "a", like=build_scenario(MINE, "mine"))
     assert not (tmp_path / "a").exists()
 
 

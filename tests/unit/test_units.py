@@ -4,12 +4,11 @@ import math
 import re
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from airflock.scenarios.files import load
-from airflock.scenarios.making import make
-from airflock.scenarios.units import SPELLINGS, UNITS, factor
+from airflock.scenarios.making import build_scenario
+from airflock.scenarios.units import SPELLINGS, UNITS, conversion_factor
 from airflock.support.errors import ScenarioError
 
 NAME = "vasarhelyi_2018/4ms"
@@ -39,12 +38,16 @@ COMPOUND = [(u, d) for d, known in UNITS.items() for u in known if d not in ("N"
 
 @pytest.mark.parametrize(("unit", "declared"), COMPOUND)
 def test_a_compound_unit_is_made_of_its_parts(unit, declared):
-    assert factor(unit, declared) == pytest.approx(measure(unit) / measure(declared), rel=1e-12)
+    assert conversion_factor(unit, declared) == pytest.approx(measure(unit) / measure(declared), rel=1e-12)
 
 
 def test_units_without_such_parts_are_those_of_their_definitions():
-    assert factor("lb", "kg") * factor("g", "m/s^2") == pytest.approx(factor("lbf", "N"), rel=1e-12)
-    assert factor("g/cm^3", "kg/m^3") == pytest.approx(factor("g", "kg") / factor("cm", "m") ** 3)
+    assert conversion_factor("lb", "kg") * conversion_factor("g", "m/s^2") == pytest.approx(
+        conversion_factor("lbf", "N"), rel=1e-12
+    )
+    assert conversion_factor("g/cm^3", "kg/m^3") == pytest.approx(
+        conversion_factor("g", "kg") / conversion_factor("cm", "m") ** 3
+    )
     assert sum(len(known) for known in UNITS.values()) >= 30
 
 
@@ -55,7 +58,7 @@ def test_every_spelling_stands_for_a_known_unit():
 
 @given(st.floats(1e-3, 20.0), st.sampled_from(["us", "ms", "min", "h", "s"]))
 def test_a_value_with_a_unit_is_the_value_in_seconds(seconds, unit):
-    text = f"{seconds / factor(unit, 's'):.15g} {unit}"
+    text = f"{seconds / conversion_factor(unit, 's'):.15g} {unit}"
     scenario = load(NAME, {"radio.delay": text, "sensors.period": 0.0})
     assert scenario.radio.delay == pytest.approx(seconds, rel=1e-11)
     told = [note for note in scenario.notes if note.startswith("radio.delay = ") and " is " in note and unit in note]
@@ -133,7 +136,9 @@ def test_a_conversion_is_told_with_its_key_in_the_order_of_the_file():
     keys = {"loss": "5 %", "range": "0.1 km", "delay": "400 ms"}
     groups = [{"agents": 3, "body": {"tau": {"value": 1.2, "spread": "100 ms"}}}]
     faults = [{"kind": "motor", "share": "30 %", "at": "0.5 min"}]
-    notes = make({"model": {"kind": "vasarhelyi_2018"}, "radio": keys, "groups": groups, "faults": faults}).notes
+    notes = build_scenario(
+        {"model": {"kind": "vasarhelyi_2018"}, "radio": keys, "groups": groups, "faults": faults}
+    ).notes
     told = [note.partition(" = ")[0] for note in notes if " is " in note]
     assert told[:3] == ["radio.loss", "radio.range", "radio.delay"]
     assert told[3:6] == ["groups[0].body.tau.spread", "faults[0].at", "faults[0].share"]

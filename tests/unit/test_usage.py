@@ -10,8 +10,8 @@ from typer.main import get_command
 
 import airflock
 from airflock.cli.main import app, main
-from airflock.cli.sweep import alike
-from airflock.recordings.sweeps import shown
+from airflock.cli.sweep import merge_similar_notes
+from airflock.recordings.sweeps import metric_to_show
 from airflock.scenarios.files import load
 from airflock.support.errors import AirflockError
 from airflock.view.plots.picture import KINDS
@@ -113,8 +113,8 @@ def test_a_debugger_that_is_left_ends_the_command(after, tmp_path, monkeypatch, 
 
 def test_a_sweep_shows_what_flights_are_judged_by_and_else_their_order():
     named = {"vasarhelyi_2018/4ms": "fitness", "zapotecatl_2016/best": "quality", "vicsek_1995/ordered": "polarisation"}
-    assert {name: shown(None, [load(name)]) for name in named} == named
-    assert shown(None, [load("vasarhelyi_2018/4ms", {"metrics.kind": "order"})]) == "polarisation"
+    assert {name: metric_to_show(None, [load(name)]) for name in named} == named
+    assert metric_to_show(None, [load("vasarhelyi_2018/4ms", {"metrics.kind": "order"})]) == "polarisation"
 
 
 def test_the_nearest_choice_is_told():
@@ -132,7 +132,7 @@ def test_what_is_right_ends_well(words, monkeypatch, capsys):
 
 def test_notes_of_a_sweep_that_differ_in_numbers_alone_are_one_line():
     notes = ["delay = 0.1 s is odd", "no walls", "delay = 0.25 s is odd", "delay = 1e-05 s is odd", "delay = x is odd"]
-    assert list(alike(notes)) == ["delay = 0.1 s is odd (2 more like it)", "no walls", "delay = x is odd"]
+    assert list(merge_similar_notes(notes)) == ["delay = 0.1 s is odd (2 more like it)", "no walls", "delay = x is odd"]
 
 
 def texts(command, path=()):

@@ -10,12 +10,12 @@ import pytest
 import airflock
 import several_terms
 from airflock.core.parameters import declarations, number_names
-from airflock.engine import driver_text, fly
-from airflock.engine.text.generate import Source
+from airflock.engine import driver_text, fly_world
+from airflock.engine.text.generate import DriverSource
 from airflock.runs.space import full_space
-from airflock.scenarios.families import Given
-from airflock.scenarios.making import make
-from airflock.studio.controls import controls_of
+from airflock.scenarios.families import CallerParts
+from airflock.scenarios.making import build_scenario
+from airflock.studio.controls import scenario_controls
 from airflock.support.errors import ParameterError, RuleError, ScenarioError
 from flocks import interpreted
 from reference.flight import fly_plainly
@@ -26,7 +26,7 @@ LAW = airflock.model(vars(several_terms))
 
 def terms(**settings):
     """A scenario of the law with several terms."""
-    return make({}, "terms", CLOSE | {"world.arena": "none"} | settings, given=Given(law=LAW))
+    return build_scenario({}, "terms", CLOSE | {"world.arena": "none"} | settings, caller_parts=CallerParts(law=LAW))
 
 
 def weights(found):
@@ -67,11 +67,18 @@ def test_faults_of_a_declaration_and_of_values_are_one_line_each():
 def test_a_scenario_gives_a_vector_whole_or_by_component_and_tells_all_that_is_wrong():
     assert weights(terms()) == (0.5, 0.3, 0.1)
     assert weights(terms(**{"model.w": [0.4, "0.2 m/s", 0.0]})) == (0.4, 0.2, 0.0) == weights(terms(w=[0.4, 0.2, 0.0]))
-    base = make(
-        {"model": {"w": {"value": [0.4, 0.2, 0.0], "unit": "m/s"}}}, "t", {"model.w_2": 1.0}, given=Given(law=LAW)
+    base = build_scenario(
+        {"model": {"w": {"value": [0.4, 0.2, 0.0], "unit": "m/s"}}},
+        "t",
+        {"model.w_2": 1.0},
+        caller_parts=CallerParts(law=LAW),
     )
     assert weights(base) == (0.4, 0.2, 1.0)
-    assert weights(make(base.document, "t", {"model.w": [1, 2, 3]}, given=Given(law=LAW))) == (1.0, 2.0, 3.0)
+    assert weights(build_scenario(base.document, "t", {"model.w": [1, 2, 3]}, caller_parts=CallerParts(law=LAW))) == (
+        1.0,
+        2.0,
+        3.0,
+    )
     with pytest.raises(ScenarioError) as told:
         terms(**{"model.w": [9.0, "x", 0.1], "model.reach": -1.0})
     assert str(told.value).splitlines() == [
@@ -96,7 +103,9 @@ def test_a_file_may_extend_another_and_give_the_vector_anew(tmp_path):
 def test_a_search_and_a_page_see_components():
     scenario = terms()
     assert {"model.w_0", "model.w_1", "model.w_2"} <= {axis.key for axis in full_space(scenario).axes}
-    assert {"model.w_0", "model.w_2"} <= {control.key for group in controls_of(scenario).values() for control in group}
+    assert {"model.w_0", "model.w_2"} <= {
+        control.key for group in scenario_controls(scenario).values() for control in group
+    }
 
 
 def test_a_law_with_a_vector_keeps_the_standing_list():
@@ -121,7 +130,7 @@ def test_a_flight_is_that_of_the_reference_and_every_component_counts():
 
 def test_compiled_is_interpreted_and_a_flight_may_change_a_component():
     scenario = terms(**{"metrics.kind": "order"})
-    compiled = fly(scenario, 3, precision=64, record=True)
+    compiled = fly_world(scenario, 3, precision=64, record=True)
     assert np.abs(compiled.frames - interpreted(scenario, 3).frames).max() < 1e-9
     flight = airflock.open(scenario, 3, device="python").advance(1.0).change({"model.w_2": 1.5})
     assert weights(flight.scenario) == (0.5, 0.3, 1.5)
@@ -148,7 +157,7 @@ def as_a_whole(p):
 
 
 def text_of(rule):
-    source = Source("", {}, {"p": {"w": 3}})
+    source = DriverSource("", {}, {"p": {"w": 3}})
     name = source.name(rule)
     space = {"real": float, "p": several_terms.Parameters()}
     exec("\n".join(source.blocks), space)

@@ -8,7 +8,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 from verdicts import rows, table  # noqa: E402
 
-SIZES = SimpleNamespace(saturated=15_000, generation=100, generations=150, boids=1_000_000, flights=1000, apart=10.0)
+SIZES = SimpleNamespace(
+    saturated_rows=15_000, generation=100, generations=150, boids=1_000_000, flights=1000, apart=10.0
+)
 
 
 def measured(**changes):

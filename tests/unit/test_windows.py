@@ -68,7 +68,7 @@ def test_one_writer_at_a_time_opens_a_store(tmp_path):
     code = """
 import os
 from airflock.support.errors import StudyError
-from airflock.evolve import store
+from airflock.runs import store
 from pathlib import Path
 handle = store._lock(Path("."))
 try:
@@ -77,8 +77,8 @@ except StudyError as fault:
     print("process" in str(fault))
 os.close(handle)
 os.close(store._lock(Path(".")))
-from airflock.engine.compile_lock import alone
-with alone(Path(".")) as held, alone(Path("."), patience=0.0) as twice:
+from airflock.engine.compile_lock import folder_lock
+with folder_lock(Path(".")) as held, folder_lock(Path("."), timeout=0.0) as twice:
     print(held, twice)
 """
     assert run_as_on_windows(code, tmp_path) == ["True", "True", "False"]
@@ -87,12 +87,12 @@ with alone(Path(".")) as held, alone(Path("."), patience=0.0) as twice:
 def test_a_study_opens_and_the_cache_is_made(tmp_path):
     code = """
 import airflock
-from airflock import cache
+from airflock.support import cache
 from pathlib import Path
-print(cache.cache_trouble(Path("kept")) == "" and Path("kept/drivers").is_dir())
-from airflock.runs.store import Store
+print(cache.cache_folder_error(Path("kept")) == "" and Path("kept/drivers").is_dir())
+from airflock.runs.store import FlightStore
 Path("study").mkdir()
-with Store(Path("study"), write=True) as kept:
+with FlightStore(Path("study"), write=True) as kept:
     print(Path("study/evaluations.sqlite").exists())
 """
     assert run_as_on_windows(code, tmp_path) == ["True", "True"]
@@ -101,13 +101,13 @@ with Store(Path("study"), write=True) as kept:
 def test_what_was_left_of_a_file_is_removed_and_a_serial_line_is_refused_in_one_line(tmp_path):
     code = """
 import os
-from airflock import atomic
+from airflock.support import atomic
 from airflock.support.errors import LinkError
 from airflock.drones.onboard.ports import open_port
 left = ".a.airflock-12345678.txt"
 open(left, "w").close()
 os.utime(left, (0, 0))
-atomic.write("a.txt", "whole")
+atomic.write_file("a.txt", "whole")
 print(os.path.exists(left), open("a.txt").read())
 try:
     open_port("serial:/dev/ttyUSB0:57600")
@@ -119,7 +119,7 @@ except LinkError as fault:
 
 HOLDS = """
 import os, sys, time
-from airflock import locks
+from airflock.support import locks
 locks.lock(os.open(sys.argv[1], os.O_RDWR | os.O_CREAT))
 print("held", flush=True)
 time.sleep(60.0)
@@ -140,11 +140,11 @@ def test_a_lock_ends_with_the_process_that_is_killed(tmp_path):
 
 
 def test_only_the_module_of_locks_asks_for_what_posix_alone_has():
-    source = Path(locks.__file__).parent
+    source = Path(locks.__file__).parents[1]
     asking = {
         path.name
         for path in source.rglob("*.py")
         for line in path.read_text(encoding="utf-8").splitlines()
         if line.strip() in ("import fcntl", "import termios", "import resource", "import pwd")
     }
-    assert asking == {"locks.py", "ports.py", "reader.py"}
+    assert asking == {"locks.py", "ports.py", "isolated.py"}

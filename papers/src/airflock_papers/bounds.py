@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError
 
 NAMES = ("ours", "sd", "low", "high", "p", "runs", "published", "published_sd", "reference", "reference_sd")
 COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {

@@ -20,10 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock.support import atomic
-from airflock.support.errors import AirflockError
-from airflock.support.machine import kind
-from airflock.support.untrusted import TextError, json_object, read_text
+from airflock.support import AirflockError, TextError, atomic, parse_json_object, processor_kind, read_text
 from airflock_papers import committed as tables
 from airflock_papers.catalogue import find
 from airflock_papers.claims import VERDICTS, Measured, judge
@@ -34,7 +31,7 @@ from airflock_papers.statements import Statement, load
 from airflock_papers.texts import texts
 
 COMMITTED = "breaks.csv"
-GOOD = {kind: verdicts[0] for kind, verdicts in VERDICTS.items()}
+GOOD = {processor_kind: verdicts[0] for processor_kind, verdicts in VERDICTS.items()}
 RED = "turned red"
 GREEN = "still holds"  # a claim that its own change does not break
 UNSHOWN = "does not hold with so few flights"  # so that its turning red would say nothing
@@ -211,7 +208,7 @@ def fly_all(folder: Path, say: Callable[[str], None], threads: int | None = None
     Returns the rows of the table with the new results. The folder keeps finished parts and a log of the progress.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    now = f"{texts()} on {kind()}"
+    now = f"{texts()} on {processor_kind()}"
     rows = committed()
     todo: dict[tuple[str, str], set[str]] = {}
     for row in rows:
@@ -225,9 +222,10 @@ def fly_all(folder: Path, say: Callable[[str], None], threads: int | None = None
             tell = teller(folder / "log.txt", say, f"{number}/{len(todo)} {name} {part}")
             results = fly(find(name), only=part, seeds=SEEDS.get((name, part)), threads=threads, progress=tell, ids=ids)
             flown = [
-                Row(name, part, b.id, b.change, b.result, f"{b.ours:.4g}", f"{b.changed:.4g}", kind()) for b in results
+                Row(name, part, b.id, b.change, b.result, f"{b.ours:.4g}", f"{b.changed:.4g}", processor_kind())
+                for b in results
             ]
-            atomic.write(path, json.dumps({"texts": now, "rows": flown}))
+            atomic.write_file(path, json.dumps({"texts": now, "rows": flown}))
         new |= {(row.paper, row.id): row for row in flown}
     return [new.get((row.paper, row.id), row) for row in rows]
 
@@ -235,7 +233,7 @@ def fly_all(folder: Path, say: Callable[[str], None], threads: int | None = None
 def _kept(path: Path, now: str, ids: Collection[str]) -> list[Row] | None:
     """Return the rows of a part that was flown with these texts, or None if the file lacks some or cannot be read."""
     try:
-        document = json_object(read_text(path))
+        document = parse_json_object(read_text(path))
         rows = [Row(*map(str, row)) for row in document["rows"]] if document.get("texts") == now else []
     except (OSError, TextError, LookupError, TypeError, ValueError):
         return None

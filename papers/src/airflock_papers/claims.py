@@ -8,8 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from airflock.support import atomic
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError, atomic
 from airflock_papers import bounds
 from airflock_papers.counts import headline
 from airflock_papers.statements import Statement
@@ -164,7 +163,7 @@ def write_claims(path: Path, claims: Iterable[Claim], above: Mapping[str, Any]) 
         table.append(entry)
     document.add("claim", table)
     try:
-        atomic.write(path, tomlkit.dumps(document))
+        atomic.write_file(path, tomlkit.dumps(document))
     except OSError as fault:
         raise AirflockError(f"{path}: cannot be written: {fault.strerror or fault}; nothing was saved") from fault
 

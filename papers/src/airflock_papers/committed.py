@@ -7,8 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
-from airflock.support import atomic
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError, atomic
 
 
 def read(name: str, command: str) -> list[dict[str, str]]:
@@ -29,7 +28,7 @@ def write(columns: Iterable[str], rows: Iterable[NamedTuple], path: Path) -> Non
     table = csv.writer(text, lineterminator="\n")
     table.writerow(columns)
     table.writerows(rows)
-    atomic.write(path, text.getvalue())
+    atomic.write_file(path, text.getvalue())
 
 
 def renew(

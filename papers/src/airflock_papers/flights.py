@@ -7,11 +7,9 @@ from typing import Any
 import pandas as pd
 
 from airflock.engine import score_flights
-from airflock.recordings.flights import simulate
-from airflock.recordings.scores import over_time
-from airflock.scenarios.change import remade
-from airflock.scenarios.scenario import Scenario
-from airflock.support.threads import in_threads
+from airflock.recordings import over_time, simulate
+from airflock.scenarios import Scenario, rebuilt
+from airflock.support import run_in_threads
 from airflock_papers.progress import Progress
 
 
@@ -48,7 +46,7 @@ class Flights:
             [scenarios[k] for k, _ in pairs],
             [s for _, s in pairs],
             threads=self.threads,
-            done=self.counter(title, len(pairs)),
+            on_done=self.counter(title, len(pairs)),
         )
         keys = [(*k, s) if isinstance(k, tuple) else (k, s) for k, s in pairs]
         return pd.DataFrame(rows, index=pd.MultiIndex.from_tuples(keys))
@@ -62,7 +60,7 @@ class Flights:
             return lambda: over_time(simulate(scenario, seed))
 
         jobs = [job(seed) for seed in range(seeds)]
-        return list(in_threads(jobs, self.threads, self.counter(title, seeds)))
+        return list(run_in_threads(jobs, self.threads, self.counter(title, seeds)))
 
     def counter(self, title: str, total: int) -> Callable[[], None]:
         """What is called after each flight of a title, to tell how far it is."""
@@ -96,4 +94,4 @@ def with_changes(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
             owner = scenario.records[section] if section else scenario.flight
             value = getattr(owner, name) * float(value.removeprefix("times "))
         settings[key] = value
-    return remade(scenario, settings)
+    return rebuilt(scenario, settings)

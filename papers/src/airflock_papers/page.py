@@ -41,7 +41,7 @@ def write(
     folder.mkdir(parents=True, exist_ok=True)
     records.write_claims(folder / names[0], claims, records.header(title, command, told=told) | dict(more or {}))
     header, read = records.read_claims(folder / names[0])  # so that both show the same rounded numbers
-    atomic.write(folder / names[1], page(title, command, read, sections, about, flown_by(header)))
+    atomic.write_file(folder / names[1], page(title, command, read, sections, about, flown_by(header)))
 
 
 def flown_by(header: Mapping[str, Any]) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError
 from airflock_papers.claims import Claim, Measured, judge, unmeasured
 from airflock_papers.flights import Flights
 from airflock_papers.progress import Progress, progress_bar

@@ -69,7 +69,7 @@ def page(papers: Path) -> str:
 
 def main(papers: Path) -> None:
     """Write papers/programs.md."""
-    atomic.write(papers / "programs.md", page(papers))
+    atomic.write_file(papers / "programs.md", page(papers))
 
 
 if __name__ == "__main__":

@@ -18,8 +18,7 @@ def progress_bar() -> Iterator[Progress]:
         yield _lines(lambda line: print(line, file=sys.stderr, flush=True))
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bars
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bars, TextColumn, TimeRemainingColumn
 
     with Bars(
         TextColumn("{task.description}"),

@@ -12,11 +12,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from airflock.support import atomic
-from airflock.support.machine import kind
-from airflock.support.untrusted import TextError, json_object, read_text
-from airflock_papers import PAPERS
-from airflock_papers import committed as tables
+from airflock.support import TextError, atomic, parse_json_object, processor_kind, read_text
+from airflock_papers import PAPERS, committed as tables
 from airflock_papers.catalogue import find
 from airflock_papers.progress import teller
 from airflock_papers.texts import texts
@@ -62,7 +59,7 @@ def parts() -> list[tuple[str, str]]:
 def fly(folder: Path, say: Callable[[str], None], threads: int | None = None) -> list[Verdict]:
     """Verdicts of every part; what is done is kept in the folder, with a log of the progress."""
     folder.mkdir(parents=True, exist_ok=True)
-    now = f"{texts()} on {kind()}"
+    now = f"{texts()} on {processor_kind()}"
     found: list[Verdict] = []
     todo = parts()
     for number, (name, part) in enumerate(todo, 1):
@@ -70,15 +67,15 @@ def fly(folder: Path, say: Callable[[str], None], threads: int | None = None) ->
         kept = _kept(path, now)
         if kept is None:
             kept = _flown(name, part, threads, teller(folder / "log.txt", say, f"{number}/{len(todo)} {name} {part}"))
-            atomic.write(path, json.dumps({"texts": now, "verdicts": kept}))
-        found += [Verdict(name, part, *row, kind()) for row in kept]
+            atomic.write_file(path, json.dumps({"texts": now, "verdicts": kept}))
+        found += [Verdict(name, part, *row, processor_kind()) for row in kept]
     return found
 
 
 def _kept(path: Path, now: str) -> list[tuple[str, str, float]] | None:
     """Rows of a part that was flown with these texts; of a file that is not there, or is damaged, none."""
     try:
-        document = json_object(read_text(path))
+        document = parse_json_object(read_text(path))
         return (
             [(str(name), str(verdict), float(ours)) for name, verdict, ours in document["verdicts"]]
             if (document.get("texts") == now)

@@ -14,7 +14,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
 
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError
 from airflock_papers.statements import load
 
 WHY = (

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields
 from importlib import resources
 from typing import Any
 
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError
 from airflock_papers import bounds
 from airflock_papers.quantities import QUANTITIES
 

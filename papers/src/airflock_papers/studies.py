@@ -4,12 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from airflock.runs.folder import STUDY, open_folder
-from airflock.search.result import Result
-from airflock.search.run import executor_for, run
-from airflock.search.search import Progress
-from airflock.search.study import load_study
-from airflock.support.cache import cache_folder
+from airflock.runs import STUDY_FILE, open_folder
+from airflock.search import EvolveResult, SearchProgress, load_study, run_study, study_executor
+from airflock.support import cache_folder
 from airflock_papers.flights import Flights
 
 QUICK = {"population": 12, "generations": 4, "pool": 24, "top": 4, "final_seeds": 10}
@@ -30,7 +27,7 @@ def evolve(
     space: Mapping[str, Any] | None = None,
     folder: str = "",
     search: Mapping[str, Any] | None = None,
-) -> Result:
+) -> EvolveResult:
     """Result of a run of a shipped study, begun or continued.
 
     settings : keys of the scenario to change; space : table that replaces the study's; folder : its name, if another
@@ -41,10 +38,10 @@ def evolve(
         name, settings=settings, search={"seed": number, **keys}, tables={"space": space} if space else None
     )
     place = folder_of(folder or name, number, flights.quick)
-    open_folder(place, study, resume=(place / STUDY).exists())
+    open_folder(place, study, resume=(place / STUDY_FILE).exists())
 
-    def watch(p: Progress) -> None:
+    def watch(p: SearchProgress) -> None:
         if flights.progress:
             flights.progress(title, p.done, p.total)
 
-    return run(study, place, executor_for(study, threads=flights.threads), watch)
+    return run_study(study, place, study_executor(study, threads=flights.threads), watch)

@@ -9,13 +9,13 @@ import numpy as np
 
 from airflock import __version__
 from airflock.certificates import seeds
-from airflock.certificates.flights import measured
-from airflock.certificates.limit import Limit
-from airflock.runs.folder import fingerprint
-from airflock.scenarios.scenario import Scenario
+from airflock.certificates.flights import with_distance_metrics
+from airflock.certificates.limit import EventLimit
+from airflock.runs import fingerprint
+from airflock.scenarios import Scenario
 
 LAYOUT = 1  # of the folder; raised whenever an older folder could not be continued
-FOLDER = "campaign"  # campaign.toml in the folder of flights
+CAMPAIGN_KIND = "campaign"  # campaign.toml in the folder of flights
 
 
 @dataclass(frozen=True)
@@ -29,22 +29,22 @@ class Campaign:
     """
 
     scenario: Scenario
-    limits: tuple[Limit, ...]
+    limits: tuple[EventLimit, ...]
     confidence: float = 0.95
-    precision: int = 32
+    bits: int = 32
     flights: int | None = None
-    uncertain: bool = False
+    flies_intervals: bool = False
     device: str = "cpu"
 
     @cached_property
     def hash(self) -> str:
         """Identity of the scenario, which fixes the seeds."""
-        return seeds.identity(self.scenario)
+        return seeds.scenario_identity(self.scenario)
 
     @cached_property
     def flown(self) -> Scenario:
         """The scenario as it is measured."""
-        return measured(self.scenario, self.limits)
+        return with_distance_metrics(self.scenario, self.limits)
 
     @property
     def alpha(self) -> float:
@@ -52,30 +52,33 @@ class Campaign:
         return (1.0 - self.confidence) / len(self.limits)
 
     @property
-    def hours(self) -> float:
+    def flight_hours(self) -> float:
         """Duration of a flight, h."""
         return self.scenario.flight.duration / 3600.0
 
-    def probability(self, limit: Limit) -> float | None:
+    def probability(self, limit: EventLimit) -> float | None:
         """A limit as a probability per flight."""
-        return limit.probability(self.hours, self.scenario.agents)
+        return limit.probability(self.flight_hours, self.scenario.agents)
 
-    def in_own_unit(self, limit: Limit, probability: float) -> float:
+    def to_limit_unit(self, limit: EventLimit, probability: float) -> float:
         """A probability per flight in the unit of a limit."""
-        return limit.in_own_unit(probability, self.hours, self.scenario.agents)
+        return limit.to_limit_unit(probability, self.flight_hours, self.scenario.agents)
 
     @cached_property
-    def intervals(self) -> dict[str, tuple[float, float]]:
+    def number_intervals(self) -> dict[str, tuple[float, float]]:
         """Key → interval of every number that the scenario's file is not sure of."""
-        return intervals(self.scenario.document) if self.uncertain else {}
+        return read_intervals(self.scenario.document) if self.flies_intervals else {}
 
     def parameters(self, seed: int) -> dict[str, float]:
         """Numbers of the world of one flight, uniform in their intervals; the seed alone decides them."""
-        if not self.intervals:
+        if not self.number_intervals:
             return {}
-        drawn = np.random.default_rng(seed).random(len(self.intervals)).tolist()  # plain numbers, for what is printed
+        drawn = (
+            np.random.default_rng(seed).random(len(self.number_intervals)).tolist()
+        )  # plain numbers, for what is printed
         return {
-            key: low + (high - low) * x for (key, (low, high)), x in zip(self.intervals.items(), drawn, strict=True)
+            key: low + (high - low) * x
+            for (key, (low, high)), x in zip(self.number_intervals.items(), drawn, strict=True)
         }
 
     def document(self) -> dict[str, Any]:
@@ -83,20 +86,20 @@ class Campaign:
         return {
             "layout": LAYOUT,
             "airflock": __version__,
-            "rules": fingerprint(self.flown, self.precision),
+            "rules": fingerprint(self.flown, self.bits),
             "device": self.device,
-            "precision": self.precision,
+            "precision": self.bits,
             "name": self.scenario.name,
             "identity": self.hash,
             "confidence": self.confidence,
             "limits": [limit.text for limit in self.limits],
             "flights": self.flights,
-            "uncertain": self.uncertain,
+            "uncertain": self.flies_intervals,
             "scenario": {key: value for key, value in self.scenario.document.items() if key != "published"},
         }
 
 
-def intervals(document: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+def read_intervals(document: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """Key → interval of the numbers of a scenario's document that have one, as `airflock identify` writes them."""
     found = {}
     for section, table in document.items():

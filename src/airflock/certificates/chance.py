@@ -24,22 +24,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from airflock.certificates.limit import Limit
+from airflock.certificates.limit import EventLimit
 
 ENOUGH = 30  # flights of one candidate
 NEAREST, FEWEST = 0.1, 10  # share of its flights that show how its tail falls, and at least so many
 REPEATED = 0.1  # share of flights; distances in single precision meet by chance, some of ten thousand
 LIKE = 8  # candidates that share a deviation as far as they differ: wide flocks' distances vary more than narrow ones'
 LEAST = 0.1  # share of a difference that is left where chance explains all: so the order of candidates stays
-Row = Mapping[str, Any] | None  # scores of a flight; None: it failed
+ScoreRow = Mapping[str, Any] | None  # scores of a flight; None: it failed
 
 
-def indices(limit: Limit, flights: Sequence[Sequence[Row]]) -> NDArray[np.float64]:
+def reliability_indices(limit: EventLimit, flights: Sequence[Sequence[ScoreRow]]) -> NDArray[np.float64]:
     """Reliability index of each candidate (candidate,): standard deviations between its mean and the limit's event.
 
     flights : of each candidate; a flight that failed counts as the event
     """
-    counted = [sum(row is None or limit.happened(row) for row in rows) for rows in flights]
+    counted = [sum(row is None or limit.has_happened(row) for row in rows) for rows in flights]
     rooms = [np.array([_room(limit, row) for row in rows]) for rows in flights]
     every = np.concatenate(rooms)
     known = every[np.isfinite(every)]
@@ -56,20 +56,20 @@ def indices(limit: Limit, flights: Sequence[Sequence[Row]]) -> NDArray[np.float6
     return found
 
 
-def chance(limit: Limit, flights: Sequence[Row]) -> float:
+def estimated_probability(limit: EventLimit, flights: Sequence[ScoreRow]) -> float:
     """Estimated probability of the limit's event per flight of one candidate: no less than what was counted."""
-    counted = sum(row is None or limit.happened(row) for row in flights) / len(flights)
-    return max(counted, float(norm.sf(indices(limit, [flights])[0])) if counted < 1.0 else 1.0)
+    counted = sum(row is None or limit.has_happened(row) for row in flights) / len(flights)
+    return max(counted, float(norm.sf(reliability_indices(limit, [flights])[0])) if counted < 1.0 else 1.0)
 
 
-def index_of(probability: float) -> float:
+def reliability_index(probability: float) -> float:
     """The reliability index beyond which an event has this probability."""
     return float(norm.isf(probability))
 
 
 def _of_share(events: int, flights: int) -> float:
     """Index of a share of flights; infinite where nothing happened, finite where it always did."""
-    return index_of(min(events, flights - 0.5) / flights) if events else math.inf
+    return reliability_index(min(events, flights - 0.5) / flights) if events else math.inf
 
 
 def _of_tail(room: NDArray[np.float64]) -> float:
@@ -78,7 +78,7 @@ def _of_tail(room: NDArray[np.float64]) -> float:
     begin, excess = nearest[-1], float((nearest[-1] - nearest[:-1]).mean())
     if begin <= 0.0 or excess == 0.0:
         return math.inf
-    return index_of((len(nearest) - 1) / len(room) * math.exp(-begin / excess))
+    return reliability_index((len(nearest) - 1) / len(room) * math.exp(-begin / excess))
 
 
 def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -106,7 +106,7 @@ def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
         return np.asarray(np.where(spread > 0.0, means / spread, np.copysign(math.inf, means)), float)
 
 
-def _room(limit: Limit, row: Row) -> float:
+def _room(limit: EventLimit, row: ScoreRow) -> float:
     """How far a flight's score lies on the safe side of the event, in its unit; nan where there is none."""
     found = math.nan if row is None or row.get(limit.score) is None else float(row[limit.score])
     return found - limit.value if limit.sign in ("<", "<=") else limit.value - found

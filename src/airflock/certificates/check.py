@@ -9,22 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from airflock import __version__
-from airflock.certificates.bounds import look
+from airflock.certificates.bounds import take_look
 from airflock.certificates.campaign import Campaign
-from airflock.certificates.certificate import FORMAT, digest, seal
-from airflock.certificates.counting import due
-from airflock.certificates.flights import score_of
-from airflock.certificates.limit import Limit, read_all
-from airflock.certificates.seeds import COUNT, seed
-from airflock.runs.folder import versions
-from airflock.scenarios.making import make
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import StudyError
-from airflock.support.untrusted import from_outside, own_path, read_toml
+from airflock.certificates.certificate import CERTIFICATE_FORMAT, certificate_checksum, scores_digest
+from airflock.certificates.counting import looks_due
+from airflock.certificates.flights import limit_score_function
+from airflock.certificates.limit import EventLimit, parse_limits
+from airflock.certificates.seeds import COUNT_PURPOSE, certificate_seed
+from airflock.runs import program_versions
+from airflock.scenarios import Scenario, build_scenario
+from airflock.support import StudyError, as_error, expand_path, read_toml
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckReport:
     """What a check found.
 
     flown : flights that were flown again; faults: what does not hold, one line each; notes: what may explain it
@@ -45,13 +43,13 @@ class Checked:
         return f"<check: {self.flown} of {self.total:,} flights flown again: {said}>"
 
 
-def check(
+def check_certificate(
     path: str | os.PathLike[str],
     *,
     threads: int | None = None,
     trust: bool = False,
-    done: Callable[[], None] | None = None,
-) -> Checked:
+    on_done: Callable[[], None] | None = None,
+) -> CheckReport:
     """Check a certificate file.
 
     path    : of certificate.toml; threads : of the flights, all processors by default
@@ -70,50 +68,52 @@ def check(
     >>> check(path).same
     True
     """
-    with from_outside(path, StudyError):
-        document = read_toml(own_path(path))
-    return checked(document, str(path), threads=threads, trust=trust, done=done)
+    with as_error(path, StudyError):
+        document = read_toml(expand_path(path))
+    return check_document(document, str(path), threads=threads, trust=trust, on_done=on_done)
 
 
-def checked(
+def check_document(
     document: Mapping[str, Any],
     where: str,
     *,
     scenario: Scenario | None = None,
     threads: int | None = None,
     trust: bool = False,
-    done: Callable[[], None] | None = None,
-) -> Checked:
-    """Check the content of a certificate; `scenario` stands in for the one that it holds. Raises like `check`."""
+    on_done: Callable[[], None] | None = None,
+) -> CheckReport:
+    """Check the content of a certificate, whose scenario `scenario` replaces. Raises like `check_certificate`."""
     if not {"seal", "format", "limit", "flights", "scenario"} <= set(document):
         raise StudyError(f"{where}: is not a certificate; airflock certify writes one")
-    if document["format"] != FORMAT:
-        raise StudyError(f"{where}: is of format {document['format']}; this Airflock reads format {FORMAT}")
+    if document["format"] != CERTIFICATE_FORMAT:
+        raise StudyError(f"{where}: is of format {document['format']}; this Airflock reads format {CERTIFICATE_FORMAT}")
     faults = _shape_faults(document)
     if faults:
         raise StudyError(f"{where}: is damaged: {'; '.join(faults)}")
-    with from_outside(f"{where}: is damaged", StudyError):
+    with as_error(f"{where}: is damaged", StudyError):
         flown = document["flown"]
         if flown["airflock"] != __version__:
             raise StudyError(
                 f"{where}: made by airflock {flown['airflock']}, this is {__version__}; check it with that"
             )
         faults = (
-            ["was changed after it was written (its checksum differs)"] if seal(document) != document["seal"] else []
+            ["was changed after it was written (its checksum differs)"]
+            if certificate_checksum(document) != document["seal"]
+            else []
         )
         campaign = _campaign(document, where, scenario, trust)
         faults += _sums(document, campaign)
         rules = campaign.document()["rules"]
         if rules != flown["rules"]:
             raise StudyError(f"{where}: its flights were computed by other rules (text {flown['rules']}, here {rules})")
-        found, notes = _flown_again(document, campaign, threads, done), _differences(flown)
-    return Checked(len(document["check"]["digests"]), int(document["flights"]["count"]), (*faults, *found), notes)
+        found, notes = _flown_again(document, campaign, threads, on_done), _differences(flown)
+    return CheckReport(len(document["check"]["digests"]), int(document["flights"]["count"]), (*faults, *found), notes)
 
 
 MOST_DIGESTS = 1_000_000  # flights that a certificate may ask to be flown again
-Kinds = Mapping[str, tuple[type, ...]]
+KeyTypes = Mapping[str, tuple[type, ...]]
 _NUMBER = (int, float)
-_TABLES: dict[str, Kinds] = {
+_TABLES: dict[str, KeyTypes] = {
     "flown": {"airflock": (str,), "rules": (str,), "precision": (int,), "device": (str,)},
     "flights": {
         "count": (int,), "looks": (str,), "uncertain": (bool,), "identity": (str,), "first_seed": (int,),
@@ -121,8 +121,8 @@ _TABLES: dict[str, Kinds] = {
     "check": {"every": (int,), "digests": (list,)},
     "scenario": {"name": (str,)},
 }  # fmt: skip
-_LIMIT: Kinds = {"text": (str,), "looks": (list,), "high": _NUMBER, "low": _NUMBER, "shown": (bool,)}
-_LOOK: Kinds = {"flights": (int,), "events": (int,), "above": _NUMBER, "below": _NUMBER}
+_LIMIT: KeyTypes = {"text": (str,), "looks": (list,), "high": _NUMBER, "low": _NUMBER, "shown": (bool,)}
+_LOOK: KeyTypes = {"flights": (int,), "events": (int,), "above": _NUMBER, "below": _NUMBER}
 
 
 def _shape_faults(document: Mapping[str, Any]) -> list[str]:
@@ -143,7 +143,7 @@ def _shape_faults(document: Mapping[str, Any]) -> list[str]:
     return [f"{fault} is missing or of another type than a certificate has there" for fault in faults[:5]]
 
 
-def _wrong(name: str, table: Any, kinds: Kinds) -> list[str]:
+def _wrong(name: str, table: Any, kinds: KeyTypes) -> list[str]:
     if not isinstance(table, Mapping):
         return [name]
     return [f"{name}.{key}" for key, kind in kinds.items() if not _is(table.get(key), kind)]
@@ -157,11 +157,11 @@ def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None
     told = dict(document["scenario"])
     name = str(told.pop("name"))
     if scenario is None:
-        scenario = make(told, name, folder=Path(where).parent, trust=trust)
+        scenario = build_scenario(told, name, folder=Path(where).parent, trust=trust)
     flights, flown = document["flights"], document["flown"]
     campaign = Campaign(
         scenario,
-        read_all([entry["text"] for entry in document["limit"]], scenario),
+        parse_limits([entry["text"] for entry in document["limit"]], scenario),
         float(document["confidence"]),
         int(flown["precision"]),
         int(flights["count"]) if str(flights["looks"]).startswith("fixed") else None,
@@ -176,11 +176,11 @@ def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None
 def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
     """Bounds and verdicts that do not follow from the counts."""
     faults = []
-    if document["flights"]["first_seed"] != seed(campaign.hash, COUNT, 0):
+    if document["flights"]["first_seed"] != certificate_seed(campaign.hash, COUNT_PURPOSE, 0):
         faults.append("its seeds are not those that the scenario fixes")
     for entry, limit in zip(document["limit"], campaign.limits, strict=True):
         told = [(int(x["flights"]), int(x["events"]), float(x["above"]), float(x["below"])) for x in entry["looks"]]
-        again = [look(*each) for each in told]
+        again = [take_look(*each) for each in told]
         high, low = min((x.high for x in again), default=1.0), max((x.low for x in again), default=0.0)
         paid = max(sum(x.above for x in again), sum(x.below for x in again))
         probability = campaign.probability(limit)
@@ -193,9 +193,9 @@ def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
     return faults
 
 
-def _fixed(told: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: Limit, count: int) -> bool:
+def _fixed(told: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: EventLimit, count: int) -> bool:
     """Whether looks are the first of those that a limit fixes, at flights that there are, and no event is undone."""
-    known = list(islice(due(campaign, limit), len(told)))
+    known = list(islice(looks_due(campaign, limit), len(told)))
     sizes = [(flights, above, below) for flights, _, above, below in told]
     same = len(known) == len(told) and all(
         each[0] == right[0] and all(math.isclose(a, b, rel_tol=1e-9) for a, b in zip(each[1:], right[1:], strict=True))
@@ -210,28 +210,29 @@ def _flown_again(
     document: Mapping[str, Any], campaign: Campaign, threads: int | None, done: Callable[[], None] | None
 ) -> list[str]:
     from airflock.engine import compile_for
-    from airflock.support.threads import in_threads
+    from airflock.support import run_in_threads
 
     wanted, every = document["check"]["digests"], int(document["check"]["every"])
     numbers = [every * i for i in range(len(wanted))]
-    score = score_of(campaign.flown, campaign.limits, campaign.precision, campaign.device)
+    score = limit_score_function(campaign.flown, campaign.limits, campaign.bits, campaign.device)
     if campaign.device == "cpu" and numbers:
-        compile_for(campaign.flown, precision=campaign.precision)
+        compile_for(campaign.flown, precision=campaign.bits)
 
     def job(number: int) -> Callable[[], str]:
-        own = seed(campaign.hash, COUNT, number)
-        return lambda: digest(score(campaign.parameters(own), own))
+        own = certificate_seed(campaign.hash, COUNT_PURPOSE, number)
+        return lambda: scores_digest(score(campaign.parameters(own), own))
 
-    flown = in_threads([job(number) for number in numbers], 1 if campaign.device != "cpu" else threads, done)
+    flown = run_in_threads([job(number) for number in numbers], 1 if campaign.device != "cpu" else threads, done)
     other = [number for number, now, then in zip(numbers, flown, wanted, strict=True) if now != then]
-    return [f"flight {number}, seed {seed(campaign.hash, COUNT, number)}: other bits" for number in other[:5]] + (
-        [f"and {len(other) - 5} more flights with other bits"] if len(other) > 5 else []
-    )
+    return [
+        f"flight {number}, seed {certificate_seed(campaign.hash, COUNT_PURPOSE, number)}: other bits"
+        for number in other[:5]
+    ] + ([f"and {len(other) - 5} more flights with other bits"] if len(other) > 5 else [])
 
 
 def _differences(flown: Mapping[str, Any]) -> tuple[str, ...]:
     """Versions that differ from those of the certificate: what may explain other bits."""
-    now = versions()
+    now = program_versions()
     return tuple(
         f"{name}: {flown[name]} then, {value} now" for name, value in now.items() if flown.get(name, value) != value
     )

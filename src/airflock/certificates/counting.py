@@ -7,23 +7,22 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
-from airflock.certificates.bounds import Look, look, needed, schedule, share
+from airflock.certificates.bounds import InterimLook, alpha_share, flights_needed, look_schedule, take_look
 from airflock.certificates.campaign import Campaign
-from airflock.certificates.flyer import Flyer
-from airflock.certificates.limit import Limit
-from airflock.certificates.seeds import COUNT, seed
-from airflock.runs.executors import Flight
-from airflock.runs.store import Batch, Store
-from airflock.support.errors import StudyError
+from airflock.certificates.flyer import CampaignFlyer
+from airflock.certificates.limit import EventLimit
+from airflock.certificates.seeds import COUNT_PURPOSE, certificate_seed
+from airflock.runs import CandidateBatch, Flight, FlightStore
+from airflock.support import StudyError
 
-BATCH = Batch("count", 0, 0)
+COUNT_BATCH = CandidateBatch("count", 0, 0)
 CHUNK = 2.0  # s of flights that are handed out together
 FIRST = 16  # flights before the first guess of how many there will be time for
 MARGIN = 1.5  # a limit is given up beforehand only if it needs so many times the flights that there is time for
 
 
 @dataclass
-class Verdict:
+class LimitVerdict:
     """What counting says of one limit.
 
     probability : the limit per flight; None: it is only to be bounded
@@ -32,11 +31,11 @@ class Verdict:
     could    : the limit that there was time to show instead
     """
 
-    limit: Limit
+    limit: EventLimit
     probability: float | None
-    looks: list[Look] = field(default_factory=list)
-    needs: int = 0
-    could: float = 1.0
+    looks: list[InterimLook] = field(default_factory=list)
+    flights_to_show: int = 0
+    provable_probability: float = 1.0
 
     @property
     def low(self) -> float:
@@ -54,7 +53,7 @@ class Verdict:
         return self.high < 1.0 if self.probability is None else self.high <= self.probability
 
     @property
-    def refuted(self) -> bool:
+    def is_refuted(self) -> bool:
         """Whether the opposite is shown: the event happens more often."""
         return self.probability is not None and not self.shown and self.low > self.probability
 
@@ -70,20 +69,20 @@ class Verdict:
 
 
 @dataclass
-class Count:
+class CountResult:
     """Flights that were counted.
 
     rows  : scores of flight 0, 1, 2, ...; seconds : of this process; rate : flights per second, 0 where unknown
     """
 
-    verdicts: list[Verdict]
+    verdicts: list[LimitVerdict]
     rows: list[Mapping[str, Any]]
     seconds: float = 0.0
     rate: float = 0.0
 
 
 @dataclass(frozen=True)
-class Progress:
+class CountProgress:
     """How far counting is: flights (those of the store included), flights that decide, events of each limit so far."""
 
     done: int
@@ -92,15 +91,15 @@ class Progress:
     rate: float
 
 
-Watch = Callable[[Progress], None]
+OnCountProgress = Callable[[CountProgress], None]
 
 
-def count(flyer: Flyer, watch: Watch | None = None) -> Count:
+def count_events(flyer: CampaignFlyer, on_progress: OnCountProgress | None = None) -> CountResult:
     """Count events over the seeds of a campaign, in their order, until its time is over.
 
     Raises StudyError for a flight that fails: a certificate leaves none out.
     """
-    counting = _Counting(flyer, watch)
+    counting = _Counting(flyer, on_progress)
     while counting.goes_on():
         counting.fly()
     counting.told.seconds = time.monotonic() - counting.began
@@ -113,17 +112,17 @@ class _Counting:
     scores : of flights by number, in whatever order they landed; only a prefix without holes counts
     """
 
-    def __init__(self, flyer: Flyer, watch: Watch | None):
+    def __init__(self, flyer: CampaignFlyer, watch: OnCountProgress | None):
         self.flyer, self.watch = flyer, watch
         self.campaign = campaign = flyer.campaign
         self.began, self.fresh, self.chunk = time.monotonic(), 0, FIRST
         self.scores: dict[int, Mapping[str, Any]] = {}
-        for (_, number), values in flyer.store.flown(BATCH).items():
+        for (_, number), values in flyer.store.flown(COUNT_BATCH).items():
             if values is None:
                 raise StudyError(f"{flyer.store.path}: {_failure(campaign, number, _reason(flyer.store, number))}")
             self.scores[number] = values
         self.events = [0] * len(campaign.limits)
-        self.told = Count([Verdict(limit, campaign.probability(limit)) for limit in campaign.limits], [])
+        self.told = CountResult([LimitVerdict(limit, campaign.probability(limit)) for limit in campaign.limits], [])
         self.aims: list[int] = []
 
     def goes_on(self) -> bool:
@@ -132,10 +131,10 @@ class _Counting:
         while len(rows) in self.scores:
             rows.append(self.scores[len(rows)])
             for i, verdict in enumerate(verdicts):
-                self.events[i] += verdict.limit.happened(rows[-1])
+                self.events[i] += verdict.limit.has_happened(rows[-1])
                 coming = _next(self.campaign, verdict)
                 if coming is not None and coming[0] == len(rows):
-                    verdict.looks.append(look(len(rows), self.events[i], *coming[1:]))
+                    verdict.looks.append(take_look(len(rows), self.events[i], *coming[1:]))
         still = [verdict for verdict in verdicts if _open(self.campaign, verdict)]
         self.aims = [coming[0] for verdict in still if (coming := _next(self.campaign, verdict))]
         self._note()
@@ -149,13 +148,15 @@ class _Counting:
         for verdict in still:
             first = self._first(verdict)  # a limit with an event may yet be refuted
             hopeless = first > MARGIN * able and not self.events[verdicts.index(verdict)]
-            verdict.needs, verdict.could = (first, smallest(able, self.campaign.alpha)) if hopeless else (0, 1.0)
+            verdict.flights_to_show, verdict.provable_probability = (
+                (first, provable_probability(able, self.campaign.alpha)) if hopeless else (0, 1.0)
+            )
         self.chunk = max(FIRST, math.ceil(min(CHUNK, left) * self.told.rate))
-        return not all(verdict.needs for verdict in still)
+        return not all(verdict.flights_to_show for verdict in still)
 
-    def _first(self, verdict: Verdict) -> int:
+    def _first(self, verdict: LimitVerdict) -> int:
         """Flights without an event that would show a limit; 0 where there is an upper bound already."""
-        return 0 if verdict.high < 1.0 else least(self.campaign, verdict.limit)
+        return 0 if verdict.high < 1.0 else flights_to_show(self.campaign, verdict.limit)
 
     def fly(self) -> None:
         """Fly the next few flights that the store does not hold."""
@@ -163,9 +164,9 @@ class _Counting:
         flights = []
         for number in range(done, min(max(self.aims), done + self.chunk)):
             if number not in self.scores:
-                own = seed(self.campaign.hash, COUNT, number)
+                own = certificate_seed(self.campaign.hash, COUNT_PURPOSE, number)
                 flights.append(Flight(0, number, self.campaign.parameters(own), own))
-        for landed in self.flyer.fly(BATCH, flights):
+        for landed in self.flyer.fly(COUNT_BATCH, flights):
             if landed.values is None:
                 raise StudyError(_failure(self.campaign, landed.flight.repeat, landed.reason))
             self.scores[landed.flight.repeat], self.fresh = landed.values, self.fresh + 1
@@ -175,45 +176,46 @@ class _Counting:
     def _note(self) -> None:
         if self.watch:
             total = max([*self.aims, len(self.scores)])
-            self.watch(Progress(len(self.scores), total, tuple(self.events), self.told.rate))
+            self.watch(CountProgress(len(self.scores), total, tuple(self.events), self.told.rate))
 
 
-def _open(campaign: Campaign, verdict: Verdict) -> bool:
+def _open(campaign: Campaign, verdict: LimitVerdict) -> bool:
     """Whether further flights could decide."""
     if campaign.flights:
         return not verdict.looks
-    return not verdict.shown and not verdict.refuted
+    return not verdict.shown and not verdict.is_refuted
 
 
-def due(campaign: Campaign, limit: Limit) -> Iterator[tuple[int, float, float]]:
+def looks_due(campaign: Campaign, limit: EventLimit) -> Iterator[tuple[int, float, float]]:
     """All looks at a limit: flights, and the error probabilities spent on the upper and on the lower bound."""
     probability = campaign.probability(limit)
     if campaign.flights:
         yield campaign.flights, campaign.alpha, campaign.alpha
     elif probability is not None:  # `planned` gives every campaign without a rate a number of flights
-        yield from schedule(probability, campaign.alpha)
+        yield from look_schedule(probability, campaign.alpha)
 
 
-def _next(campaign: Campaign, verdict: Verdict) -> tuple[int, float, float] | None:
+def _next(campaign: Campaign, verdict: LimitVerdict) -> tuple[int, float, float] | None:
     """The next look."""
-    return next(islice(due(campaign, verdict.limit), len(verdict.looks), None), None)
+    return next(islice(looks_due(campaign, verdict.limit), len(verdict.looks), None), None)
 
 
-def least(campaign: Campaign, limit: Limit) -> int:
+def flights_to_show(campaign: Campaign, limit: EventLimit) -> int:
     """Flights without an event that would show a limit; 0 for one that is only to be bounded."""
     probability = campaign.probability(limit)
-    return 0 if probability is None else needed(probability, campaign.alpha * share(1))
+    return 0 if probability is None else flights_needed(probability, campaign.alpha * alpha_share(1))
 
 
-def smallest(flights: float, alpha: float) -> float:
+def provable_probability(flights: float, alpha: float) -> float:
     """Smallest limit per flight that so many flights without an event show at the first look."""
-    return -math.expm1(math.log(alpha * share(1)) / max(flights, 1.0))
+    return -math.expm1(math.log(alpha * alpha_share(1)) / max(flights, 1.0))
 
 
-def _reason(store: Store, number: int) -> str:
-    reasons = store.rows("SELECT reason FROM flight WHERE stage=? AND repeat=?", (BATCH.stage, number))
+def _reason(store: FlightStore, number: int) -> str:
+    reasons = store.rows("SELECT reason FROM flight WHERE stage=? AND repeat=?", (COUNT_BATCH.stage, number))
     return str(reasons[0][0]) if reasons else ""
 
 
 def _failure(campaign: Campaign, number: int, reason: str) -> str:
-    return f"{campaign.scenario.name}: flight {number}, seed {seed(campaign.hash, COUNT, number)}, failed: {reason}"
+    seed = certificate_seed(campaign.hash, COUNT_PURPOSE, number)
+    return f"{campaign.scenario.name}: flight {number}, seed {seed}, failed: {reason}"

@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from airflock.certificates.campaign import Campaign
-from airflock.runs.executors import Executor, Flight, Landed
-from airflock.runs.store import Batch, Store
+from airflock.runs import CandidateBatch, Executor, Flight, FlightResult, FlightStore
 
 
 @dataclass(frozen=True)
-class Flyer:
+class CampaignFlyer:
     """A campaign with its store of flights, who flies them and until when.
 
     until : moment of `time.monotonic` at which the budget of time is spent, s
@@ -19,12 +18,12 @@ class Flyer:
     """
 
     campaign: Campaign
-    store: Store
+    store: FlightStore
     executor: Executor
     until: float = math.inf
     note: Callable[[str], None] | None = None
 
-    def with_budget(self, budget: float) -> "Flyer":
+    def with_budget(self, budget: float) -> "CampaignFlyer":
         """The same, with so much time from now on, s."""
         return replace(self, until=time.monotonic() + budget)
 
@@ -34,17 +33,17 @@ class Flyer:
         return self.until - time.monotonic()
 
     @property
-    def time_over(self) -> bool:
+    def is_time_over(self) -> bool:
         """Whether the budget is spent."""
         return self.left < 0.0
 
-    def fly(self, batch: Batch, flights: Sequence[Flight]) -> Iterator[Landed]:
+    def fly(self, batch: CandidateBatch, tasks: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield each flight as soon as it is over and stored."""
-        for landed in self.executor.fly(flights):
+        for landed in self.executor.fly(tasks):
             self.store.land(batch, landed)
             yield landed
 
-    def say(self, text: str) -> None:
+    def report(self, text: str) -> None:
         """Report what begins, if anybody asked for that."""
         if self.note:
             self.note(text)

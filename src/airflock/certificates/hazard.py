@@ -11,7 +11,7 @@ SUSPICIOUS = 0.01  # a chance of less than this is no chance
 
 
 @dataclass(frozen=True)
-class Hazard:
+class EventTiming:
     """Events of the first half of flights against what an even rate would give.
 
     events, early : first events of a flight, and those in its first half
@@ -31,7 +31,7 @@ class Hazard:
         return "uneven" if self.chance < SUSPICIOUS else "even"
 
 
-def hazard(times: Sequence[float], flights: int, duration: float) -> Hazard:
+def event_timing(times: Sequence[float], flights: int, duration: float) -> EventTiming:
     """Compare the times (s) of first events of so many flights with an even rate.
 
     An even rate h leaves 1 - p = exp(-h T) of the flights without an event, and of those with one the share
@@ -41,4 +41,4 @@ def hazard(times: Sequence[float], flights: int, duration: float) -> Hazard:
     p = min(events / max(flights, 1), 1.0 - 1e-9)
     expected = 0.5 if p <= 0.0 else (1.0 - math.sqrt(1.0 - p)) / p
     chance = float(binomtest(early, events, expected).pvalue) if events else 1.0
-    return Hazard(events, early, expected, chance)
+    return EventTiming(events, early, expected, chance)

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.certificates.bounds import per_flight, per_hour
-from airflock.parts.metrics.registry import numbers_of, reports
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import ScenarioError, gathering
-from airflock.support.spelling import meant
+from airflock.certificates.bounds import probability_per_flight, rate_per_hour
+from airflock.parts.metrics import reported_values, scalar_names
+from airflock.scenarios import Scenario
+from airflock.support import ScenarioError, collect_errors, suggest
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 FORM = re.compile(rf"\s*(\w+)\s*(<=|>=|<|>)\s*({NUMBER})\s*(?:(at|in)\s*({NUMBER})\s*(%?)\s*(?:/\s*([a-z -]+?))?)?\s*")
@@ -18,11 +17,11 @@ UNITS = {"h": "h", "flock hour": "h", "hour": "h", "drone-h": "drone-h", "drone 
 OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 EXAMPLES = "write SCORE<VALUE at RATE/h, such as 'r_min<1 at 1e-3/h', or SCORE>=VALUE in SHARE, as 'phi_vel>=3 in 99%'"
 RAREST = 1e-18  # probability per flight below which a limit is a slip of the pen
-OF_R_COLL = ("n_coll", "phi_coll", "f_coll", "fitness")  # scores that metrics.r_coll changes
+R_COLL_METRICS = ("n_coll", "phi_coll", "f_coll", "fitness")  # scores that metrics.r_coll changes
 
 
 @dataclass(frozen=True)
-class Limit:
+class EventLimit:
     """An event of a flight, and how often it may happen.
 
     text  : as it was given
@@ -37,18 +36,18 @@ class Limit:
     value: float
     rate: float | None
     unit: str
-    timed: bool
+    is_timed: bool
 
     @property
     def event(self) -> str:
         """The event in short."""
         return f"{self.score}{self.sign}{self.value:g}"
 
-    def happened(self, row: Mapping[str, Any]) -> bool:
+    def has_happened(self, scores: Mapping[str, Any]) -> bool:
         """Whether the event happened in a flight; a score that is nan counts as one."""
-        found = row.get(self.score)
-        if self.score == "r_min" and row.get("closest") is not None:
-            found = row["closest"]
+        found = scores.get(self.score)
+        if self.score == "r_min" and scores.get("closest") is not None:
+            found = scores["closest"]
         if found is None or math.isnan(found):
             return True
         low = found < self.value if self.sign in ("<", ">=") else found <= self.value
@@ -60,25 +59,25 @@ class Limit:
             return None
         if self.unit == "flight":
             return self.rate
-        return per_flight(self.rate * (agents if self.unit == "drone-h" else 1.0), hours)
+        return probability_per_flight(self.rate * (agents if self.unit == "drone-h" else 1.0), hours)
 
-    def in_own_unit(self, probability: float, hours: float, agents: int) -> float:
+    def to_limit_unit(self, probability: float, hours: float, agents: int) -> float:
         """A probability per flight in the limit's own unit."""
         if self.unit == "flight":
             return probability
-        return per_hour(probability, hours) / (agents if self.unit == "drone-h" else 1.0)
+        return rate_per_hour(probability, hours) / (agents if self.unit == "drone-h" else 1.0)
 
 
-def read(text: str, scenario: Scenario) -> Limit:
+def parse_limit(text: str, scenario: Scenario) -> EventLimit:
     """A limit from its text. Raises ScenarioError, one line, with what is wrong."""
     where = f"limit '{text}'"
     found = FORM.fullmatch(text)
     if found is None:
         raise ScenarioError([f"{where}: cannot be read; {EXAMPLES}"])
     score, sign, value, word, rate, percent, unit = found.groups()
-    known = numbers_of(scenario.measures, scenario.metrics, scenario.goals.kind != "none")
+    known = scalar_names(scenario.measures, scenario.metrics, scenario.goals.kind != "none")
     if score not in known:
-        hint = meant(score, known, f"known: {', '.join(known)}")
+        hint = suggest(score, known, f"known: {', '.join(known)}")
         raise ScenarioError([f"{where}: {score}: unknown order parameter; {hint}"])
     often = None if rate is None else float(rate) * (0.01 if percent else 1.0)
     timed = _lasting(scenario, score, sign, float(value))
@@ -96,7 +95,7 @@ def read(text: str, scenario: Scenario) -> Limit:
         ranges = {"in": "the share lies outside (0, 100 %)", "at": "the rate must be above 0, and below 1 per flight"}
         fault = ranges[word]
     elif unit in ("h", "drone-h") and not timed:
-        _, meaning = reports(scenario.measures).get(score, ("", score))
+        _, meaning = reported_values(scenario.measures).get(score, ("", score))
         fault = f"{meaning} has no rate per hour; give it /flight, or as '{score}{OPPOSITE[sign]}{value} in 99%'"
     elif score == "r_min" and sign in (">", ">="):
         fault = f"near is what is dangerous; give 'r_min<{value} at ...', or 'r_min>={value} in 99%'"
@@ -104,7 +103,7 @@ def read(text: str, scenario: Scenario) -> Limit:
         fault = "a distance must be above 0 m"
     if fault:
         raise ScenarioError([f"{where}: {fault}"])
-    limit = Limit(text.strip(), score, sign, float(value), often, unit, timed)
+    limit = EventLimit(text.strip(), score, sign, float(value), often, unit, timed)
     allowed = limit.probability(scenario.flight.duration / 3600.0, scenario.agents)
     if allowed is not None and not RAREST <= allowed < 1.0:
         said = "every flight may have it" if allowed >= 1.0 else "no number of flights could show that"
@@ -123,17 +122,17 @@ def _lasting(scenario: Scenario, score: str, sign: str, value: float) -> bool:
     return False
 
 
-def read_all(texts: list[str], scenario: Scenario) -> tuple[Limit, ...]:
+def parse_limits(texts: list[str], scenario: Scenario) -> tuple[EventLimit, ...]:
     """Limits from their texts; all faults together."""
     faults: list[str] = []
     found = []
     for text in texts:
-        with gathering(faults):
-            found.append(read(text, scenario))
+        with collect_errors(faults):
+            found.append(parse_limit(text, scenario))
     if not texts:
         faults.append(f"no limit is given; {EXAMPLES}")
     radii = [limit.value for limit in found if limit.score == "r_min"]
-    others = [limit.score for limit in found if limit.score in OF_R_COLL]
+    others = [limit.score for limit in found if limit.score in R_COLL_METRICS]
     if radii and others and max(radii) > scenario.metrics.r_coll:
         faults.append(
             f"limits: {others[0]} is measured with metrics.r_coll = {scenario.metrics.r_coll:g} m, and r_min<"

@@ -6,24 +6,28 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airflock.certificates.branches import sound_split
-from airflock.certificates.campaign import FOLDER, Campaign
+from airflock.certificates.branches import check_split
+from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
 from airflock.certificates.certificate import Certificate
-from airflock.certificates.counting import Count, Watch, count
-from airflock.certificates.executing import executor_for, folder_of, planned
-from airflock.certificates.flyer import Flyer
-from airflock.certificates.hazard import Hazard, hazard
-from airflock.certificates.maps import bounds_over, sound_axes
-from airflock.certificates.request import campaign_of, sound_budget, sound_workers, tolerance_keys
-from airflock.runs.executors import Executor
-from airflock.runs.folder import Interrupted, open_folder, remove_unfinished, versions, write
-from airflock.runs.store import Store
-from airflock.scenarios import formats
-from airflock.scenarios.change import variant
-from airflock.scenarios.scenario import Scenario
-from airflock.support.asked import Asked
+from airflock.certificates.counting import CountResult, OnCountProgress, count_events
+from airflock.certificates.executing import campaign_executor, flight_folder, with_planned_flights
+from airflock.certificates.flyer import CampaignFlyer
+from airflock.certificates.hazard import EventTiming, event_timing
+from airflock.certificates.maps import check_map_axes, map_bounds
+from airflock.certificates.request import campaign_from_request, check_certify_budget, check_workers, tolerance_keys
+from airflock.runs import (
+    Executor,
+    FlightStore,
+    Interrupted,
+    open_folder,
+    program_versions,
+    remove_unfinished,
+    write_toml_file,
+)
+from airflock.scenarios import Scenario, formats, scenario_variant
+from airflock.support import ErrorCollector
 
-COUNTED = 2.0 / 3.0  # share of the budget that counting may take where tolerance is asked for
+COUNT_BUDGET_SHARE = 2.0 / 3.0  # share of the budget that counting may take where tolerance is asked for
 
 
 def certify(
@@ -46,7 +50,7 @@ def certify(
     scheduler: str | None = None,
     threads: int | None = None,
     timeout: float | None = None,
-    watch: Watch | None = None,
+    watch: OnCountProgress | None = None,
     trust: bool = False,
 ) -> Certificate:
     """Show by counting that an event is rare: exact bounds that hold over all looks, seeds fixed by the scenario.
@@ -115,89 +119,89 @@ def certify(
     >>> found.shown, found.verdicts[0].events
     (True, 0)
     """
-    found = variant(scenario, settings, law, trust=trust)
-    asked = Asked()
+    found = scenario_variant(scenario, settings, law, trust=trust)
+    asked = ErrorCollector()
     chosen: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-    campaign = asked.read(campaign_of, found, limit, confidence, flights, **chosen)
+    campaign = asked.read(campaign_from_request, found, limit, confidence, flights, **chosen)
     if split:
-        asked.read(sound_split, campaign)
+        asked.read(check_split, campaign)
     keys = asked.read(tolerance_keys, found, tolerance)
-    axes = asked.read(sound_axes, found, over) if over else {}
-    asked.read(sound_budget, budget)
-    asked.read(sound_workers, timeout, scheduler, device)
-    asked.refuse()
-    with folder_of(folder) as path:
-        executor = executor_for(campaign, scheduler, threads, timeout)
+    axes = asked.read(check_map_axes, found, over) if over else {}
+    asked.read(check_certify_budget, budget)
+    asked.read(check_workers, timeout, scheduler, device)
+    asked.raise_errors()
+    with flight_folder(folder) as path:
+        executor = campaign_executor(campaign, scheduler, threads, timeout)
         try:
-            campaign = planned(campaign, executor, budget, path, resume)
-            open_folder(path, campaign, resume=resume, kind=FOLDER)
-            return run(
+            campaign = with_planned_flights(campaign, executor, budget, path, resume)
+            open_folder(path, campaign, resume=resume, kind=CAMPAIGN_KIND)
+            return run_campaign(
                 campaign, path, executor, budget, watch, keys=keys, split=split, axes=axes, threads=threads,
-                kept=folder is not None,
+                is_stored=folder is not None,
             )  # fmt: skip
         finally:
             executor.close()
 
 
-def run(
+def run_campaign(
     campaign: Campaign,
     folder: Path,
     executor: Executor,
     budget: float,
-    watch: Watch | None = None,
+    on_progress: OnCountProgress | None = None,
     *,
     keys: Sequence[str] = (),
     split: bool = False,
     axes: Mapping[str, Sequence[float]] | None = None,
     threads: int | None = None,
-    note: Callable[[str], None] | None = None,
-    kept: bool = True,
+    notify: Callable[[str], None] | None = None,
+    is_stored: bool = True,
 ) -> Certificate:
     """Count, find tolerances of `keys`, split, and map over `axes`, in a folder that `open_folder` has accepted.
 
     note : told in a few words what begins; kept: whether the folder stays
     """
     began = time.monotonic()
-    where = str(folder / "scenario.toml") if kept else campaign.scenario.name
+    where = str(folder / "scenario.toml") if is_stored else campaign.scenario.name
 
     def left(share: float = 1.0) -> float:
         return share * (budget if campaign.flights else max(0.0, budget - (time.monotonic() - began)))
 
-    with Store(folder) as store:
-        store.begin(versions())
+    with FlightStore(folder) as store:
+        store.begin(program_versions())
         remove_unfinished(folder)
-        write(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
-        flyer = Flyer(campaign, store, executor, note=note)
+        write_toml_file(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
+        flyer = CampaignFlyer(campaign, store, executor, note=notify)
         try:
-            part = COUNTED if keys or split or axes else 1.0
-            counted = count(flyer if campaign.flights else flyer.with_budget(budget * part), watch)
+            part = COUNT_BUDGET_SHARE if keys or split or axes else 1.0
+            counted = count_events(flyer if campaign.flights else flyer.with_budget(budget * part), on_progress)
             rare: Mapping[str, Any] = {}
             tolerances: Mapping[str, Any] = {}
             if split:
-                from airflock.certificates.branches import split as splitting
+                from airflock.certificates.branches import estimate_by_splitting as splitting
 
                 rare = splitting(flyer.with_budget(left(0.5 if keys else 1.0)), counted, threads, where)
             if keys:
-                from airflock.certificates.tolerance import tolerance
+                from airflock.certificates.tolerance import find_tolerances
 
-                tolerances = tolerance(flyer.with_budget(left(0.5 if axes else 1.0)), counted, keys)
-            cells = bounds_over(flyer.with_budget(left()), axes) if axes else {}
+                tolerances = find_tolerances(flyer.with_budget(left(0.5 if axes else 1.0)), counted, keys)
+            cells = map_bounds(flyer.with_budget(left()), axes) if axes else {}
         except KeyboardInterrupt as stop:
             done = f"interrupted: {store.count('count'):,} flights"
-            if kept:
+            if is_stored:
                 raise Interrupted(f"{done} are stored in {folder}; continue with --resume") from stop
             raise Interrupted(f"{done} are not kept; with --out (in Python: folder=) they are, for --resume") from stop
     return Certificate(
-        campaign, tuple(counted.verdicts), hazards(campaign, counted), counted.rows, versions(),
+        campaign, tuple(counted.verdicts), event_timings(campaign, counted), counted.rows, program_versions(),
         time.monotonic() - began, counted.rate, tolerances, rare, cells, where,
     )  # fmt: skip
 
 
-def hazards(campaign: Campaign, counted: Count) -> dict[int, Hazard]:
+def event_timings(campaign: Campaign, counted: CountResult) -> dict[int, EventTiming]:
     """Whether events came evenly over a flight, for each limit whose event has a moment."""
     found = {}
-    timed = [i for i, limit in enumerate(campaign.limits) if limit.timed]
+    timed = [i for i, limit in enumerate(campaign.limits) if limit.is_timed]
     for place, i in enumerate(timed):
         times = [row["first"][place] for row in counted.rows if row.get("first") and row["first"][place] is not None]
-        found[i] = hazard(times, len(counted.rows), campaign.scenario.flight.duration)
+        found[i] = event_timing(times, len(counted.rows), campaign.scenario.flight.duration)
     return found

@@ -8,16 +8,16 @@ import hashlib
 import json
 from typing import Any
 
-from airflock.parts.sensors.registry import USUAL
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import StudyError
+from airflock.parts.sensors import DEFAULT_SENSOR
+from airflock.scenarios import Scenario
+from airflock.support import StudyError
 
 FIRST = 1 << 62
 BITS = 30  # numbers of flights within one part
-COUNT, TOLERANCE, SPLIT, MAP = range(4)  # parts of a certificate; they share no seed
+COUNT_PURPOSE, TOLERANCE_PURPOSE, SPLIT_PURPOSE, MAP_PURPOSE = range(4)  # parts of a certificate; they share no seed
 
 
-def identity(scenario: Scenario) -> str:
+def scenario_identity(scenario: Scenario) -> str:
     """Hash of everything that decides a flight of a scenario but its seed: its laws by name, its numbers and choices.
 
     What is only told (title, sources, published values) and how a flight is scored do not count.
@@ -32,7 +32,7 @@ def identity(scenario: Scenario) -> str:
     if not told["start"]["wall_clearance"]:  # as in flights from before there was one
         del told["start"]["wall_clearance"]
     told["laws"] = [scenario.model.name, scenario.vehicle.name]
-    if scenario.sensor.name != USUAL:  # so that certificates from before there were others stay what they are
+    if scenario.sensor.name != DEFAULT_SENSOR:  # so that certificates from before there were others stay what they are
         told["laws"].append(scenario.sensor.name)
     if "kind" not in told["radio"]:  # which tells those of the usual record apart
         told["laws"].append(scenario.transceiver.name)
@@ -41,8 +41,8 @@ def identity(scenario: Scenario) -> str:
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 
-def seed(scenario_hash: str, part: int, number: int) -> int:
+def certificate_seed(scenario_hash: str, purpose: int, index: int) -> int:
     """Seed of a flight of a certificate: of a part, COUNT or another, and its number from 0 on."""
-    if not 0 <= number < 1 << BITS:
-        raise StudyError(f"a certificate numbers at most {1 << BITS} flights; this would be number {number}")
-    return FIRST + ((int(scenario_hash, 16) % (1 << 30)) << (BITS + 2)) + (part << BITS) + number
+    if not 0 <= index < 1 << BITS:
+        raise StudyError(f"a certificate numbers at most {1 << BITS} flights; this would be number {index}")
+    return FIRST + ((int(scenario_hash, 16) % (1 << 30)) << (BITS + 2)) + (purpose << BITS) + index

@@ -23,7 +23,7 @@ MOST = 30  # levels
 ANCESTORS = 5  # distinct first flights of a repetition, below which it is not believed
 SURE = 0.99  # confidence of each comparison with counting
 
-Falls = Sequence[Sequence[float]]  # (sample, value) each time that a score fell below all before, of one flight
+RecordLows = Sequence[Sequence[float]]  # (sample, value) each time that a score fell below all before, of one flight
 
 
 @dataclass(frozen=True)
@@ -33,17 +33,17 @@ class Lineage:
     seed: int
     branches: tuple[tuple[int, int], ...] = ()
 
-    def branched(self, sample: int, world: int) -> "Lineage":
+    def branch(self, sample: int, world: int) -> "Lineage":
         """The same flight up to a sample, another one from there on."""
         return Lineage(self.seed, (*(b for b in self.branches if b[0] < sample), (sample, world)))
 
 
 @dataclass(frozen=True)
-class Particle:
+class LineageFlight:
     """A flight and how its score fell."""
 
     lineage: Lineage
-    falls: Falls
+    falls: RecordLows
 
     @property
     def least(self) -> float:
@@ -55,7 +55,9 @@ class Particle:
         return next(int(sample) for sample, value in self.falls if value <= level)
 
 
-Fly = Callable[[int, list[Lineage]], list[Falls]]  # number of the batch, its flights → how their scores fell
+FlyLineages = Callable[
+    [int, list[Lineage]], list[RecordLows]
+]  # number of the batch, its flights → how their scores fell
 
 
 @dataclass
@@ -67,7 +69,7 @@ class Repetition:
     """
 
     levels: list[tuple[float, float]]
-    last: list[Particle]
+    last: list[LineageFlight]
     seen: list[tuple[float, float, list[float]]] = field(default_factory=list)
     flights: int = 0
 
@@ -80,21 +82,21 @@ class Repetition:
         return found
 
     @property
-    def ancestors(self) -> int:
+    def ancestor_count(self) -> int:
         """Distinct first flights among those below the last level."""
         return len({particle.lineage.seed for particle in self.last})
 
 
-def repetition(
-    start: Sequence[Particle],
+def run_repetition(
+    start: Sequence[LineageFlight],
     counted: int,
     target: float,
-    fly: Fly,
-    back: float,
+    fly: FlyLineages,
+    mean_branch_lead: float,
     rng: np.random.Generator,
     *,
     size: int,
-    say: Callable[[float, float], None] | None = None,
+    notify: Callable[[float, float], None] | None = None,
 ) -> Repetition:
     """Go down level by level until `target`.
 
@@ -109,9 +111,9 @@ def repetition(
         if level <= target or not below:
             break
         flock = [below[i] for i in rng.permutation(np.resize(np.arange(len(below)), size))]
-        states: list[Particle] = []
+        states: list[LineageFlight] = []
         for move in range(MOVES):
-            flock = _moved(flock, level, fly, number * MOVES + move, back, rng)
+            flock = _moved(flock, level, fly, number * MOVES + move, mean_branch_lead, rng)
             states += flock
         made.flights += len(states)
         values = [particle.least for particle in states]
@@ -121,30 +123,30 @@ def repetition(
         p *= len(below) / len(states)
         made.levels.append((level, p))
         made.last = below
-        if say:
-            say(level, p)
+        if notify:
+            notify(level, p)
     return made
 
 
 def _moved(
-    flock: list[Particle], level: float, fly: Fly, batch: int, back: float, rng: np.random.Generator
-) -> list[Particle]:
+    flock: list[LineageFlight], level: float, fly: FlyLineages, batch: int, back: float, rng: np.random.Generator
+) -> list[LineageFlight]:
     """One step for each flight. The moment of branching depends on the crossing: the ratio exp(-(new - old) / back)."""
     size = len(flock)
     gaps, chances = rng.exponential(back, size), rng.random(size)
     crossings = [particle.crossing(level) for particle in flock]
     moments = [max(0, math.floor(at - gap)) for at, gap in zip(crossings, gaps, strict=True)]
-    asked = [p.lineage.branched(at, 1 + batch * size + i) for i, (p, at) in enumerate(zip(flock, moments, strict=True))]
+    asked = [p.lineage.branch(at, 1 + batch * size + i) for i, (p, at) in enumerate(zip(flock, moments, strict=True))]
     found = []
     for i, (lineage, falls) in enumerate(zip(asked, fly(batch, asked), strict=True)):
-        new = Particle(lineage, falls)
+        new = LineageFlight(lineage, falls)
         taken = new.least <= level and math.log(chances[i]) < -(new.crossing(level) - crossings[i]) / back
         found.append(new if taken else flock[i])
     return found
 
 
 @dataclass(frozen=True)
-class Estimate:
+class SplittingEstimate:
     """What the repetitions show together.
 
     probability, low, high : per flight, mean and 95 % t-interval of the logarithms; nan where refused says why
@@ -158,7 +160,9 @@ class Estimate:
     repetitions: tuple[Repetition, ...]
 
 
-def estimate(repetitions: Sequence[Repetition], target: float, values: Sequence[float]) -> Estimate:
+def estimate_probability(
+    repetitions: Sequence[Repetition], target: float, values: Sequence[float]
+) -> SplittingEstimate:
     """Join repetitions and compare them with counting.
 
     values : least score of each flight that was counted
@@ -166,7 +170,7 @@ def estimate(repetitions: Sequence[Repetition], target: float, values: Sequence[
     found = [r.probability(target) for r in repetitions]
     mean, low, high = _interval(found)
     refused = ""
-    few = median([r.ancestors for r in repetitions])
+    few = median([r.ancestor_count for r in repetitions])
     if any(p == 0.0 or math.isnan(p) for p in found):
         refused = f"{sum(p > 0.0 for p in found)} of {len(found)} repetitions came so far"
     elif few < ANCESTORS:
@@ -174,7 +178,7 @@ def estimate(repetitions: Sequence[Repetition], target: float, values: Sequence[
     else:
         refused = _disagreement(repetitions, [*_thresholds(repetitions, values, target), target], values)
     none = math.nan
-    return Estimate(target, *((none,) * 3 if refused else (mean, low, high)), refused, tuple(repetitions))
+    return SplittingEstimate(target, *((none,) * 3 if refused else (mean, low, high)), refused, tuple(repetitions))
 
 
 def _interval(found: Sequence[float]) -> tuple[float, float, float]:

@@ -3,7 +3,7 @@
 Every value that is tried flies the same seeds, so that values differ by nothing but themselves. A value is safe where
 the upper bound falls below the limit, and not shown where it does not within MOST flights, or where the lower bound
 exceeds it. Rare limits would need too many flights at each value: they are screened at LEVEL per flight. Numbers that
-are zero are moved up from a first value (`environment.FROM_ZERO`).
+are zero are moved up from a first value (`environment.FIRST_VALUE`).
 """
 
 import math
@@ -13,15 +13,14 @@ from dataclasses import replace
 from itertools import takewhile
 from typing import Any
 
-from airflock.certificates.bounds import Look, look, needed, schedule, share
-from airflock.certificates.campaign import Campaign, intervals
-from airflock.certificates.counting import Count
-from airflock.certificates.environment import FROM_ZERO, environment, worse
-from airflock.certificates.flyer import Flyer
-from airflock.certificates.seeds import TOLERANCE, seed
-from airflock.core.parameters import Quantity
-from airflock.runs.executors import Flight
-from airflock.runs.store import Batch
+from airflock.certificates.bounds import InterimLook, alpha_share, flights_needed, look_schedule, take_look
+from airflock.certificates.campaign import Campaign, read_intervals
+from airflock.certificates.counting import CountResult
+from airflock.certificates.environment import FIRST_VALUE, environment_numbers, worse_direction
+from airflock.certificates.flyer import CampaignFlyer
+from airflock.certificates.seeds import TOLERANCE_PURPOSE, certificate_seed
+from airflock.core import Quantity
+from airflock.runs import CandidateBatch, Flight
 
 LEVEL = 0.02  # probability per flight at which rare limits are screened
 MOST = 4.0  # flights at one value, as a multiple of those that show the level without an event
@@ -30,50 +29,50 @@ HALVINGS = 3  # after a value that is safe and one that is not are known
 TIME_OVER = "time was over"
 
 
-def tolerance(flyer: Flyer, counted: Count, keys: Sequence[str]) -> dict[str, Any]:
+def find_tolerances(flyer: CampaignFlyer, counted: CountResult, keys: Sequence[str]) -> dict[str, Any]:
     """Largest value of each key at which the events of all limits stay below a level, and the next that is not shown.
 
     Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal; of zero
     none), flights, and the interval that the scenario's file gives, if any.
     """
     campaign = flyer.campaign
-    level = level_of(campaign)
-    screen = Screen(flyer, level)
-    events = sum(any(limit.happened(row) for limit in campaign.limits) for row in counted.rows)
+    level = screening_level(campaign)
+    screen = ValueScreen(flyer, level)
+    events = sum(any(limit.has_happened(row) for limit in campaign.limits) for row in counted.rows)
     told: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
-    if not counted.rows or look(len(counted.rows), events, 1.0 - campaign.confidence, 0.0).high > level:
+    if not counted.rows or take_look(len(counted.rows), events, 1.0 - campaign.confidence, 0.0).high > level:
         told["reason"] = f"without any change, the scenario is not shown to stay below {100.0 * level:g} % per flight"
         return told
-    known, said = environment(campaign.scenario), intervals(campaign.scenario.document)
+    known, said = environment_numbers(campaign.scenario), read_intervals(campaign.scenario.document)
     for done, key in enumerate(keys):
-        flyer.say(f"tolerance of {key}")
+        flyer.report(f"tolerance of {key}")
         screen.share_time(len(keys) - done)
         axis = _axis(screen, key, *known[key])
         told["axis"].append(axis | ({"interval": list(said[key])} if key in said else {}))
     return told
 
 
-def level_of(campaign: Campaign) -> float:
+def screening_level(campaign: Campaign) -> float:
     """Probability per flight against which values are judged: that of the limits, or LEVEL where they are rarer."""
     return max([LEVEL, *(p for p in map(campaign.probability, campaign.limits) if p is not None)])
 
 
-class Screen:
+class ValueScreen:
     """Judges one value at a time against a level per flight, on seeds that all values share.
 
     end : moment of `time.monotonic` at which the time for all values is spent, s
     """
 
-    def __init__(self, flyer: Flyer, level: float, part: int = TOLERANCE):
-        self.flyer, self.level, self.part, self.end = flyer, level, part, flyer.until
+    def __init__(self, flyer: CampaignFlyer, level: float, purpose: int = TOLERANCE_PURPOSE):
+        self.flyer, self.level, self.purpose, self.end = flyer, level, purpose, flyer.until
         alpha = 1.0 - flyer.campaign.confidence
-        most = MOST * needed(level, alpha * share(1))
-        self.looks = list(takewhile(lambda due: due[0] <= most, schedule(level, alpha)))
+        most = MOST * flights_needed(level, alpha * alpha_share(1))
+        self.look_schedule = list(takewhile(lambda due: due[0] <= most, look_schedule(level, alpha)))
 
-    def begin(self, batch: Batch, parameters: Mapping[str, float]) -> None:
+    def begin(self, batch: CandidateBatch, parameters: Mapping[str, float]) -> None:
         """Fly the first flight of a value outside of the budget's time, so that its driver is compiled."""
         began, (flight,) = time.monotonic(), self._flights(parameters, [0])
-        if self.flyer.time_over or self.flyer.store.flown(batch):
+        if self.flyer.is_time_over or self.flyer.store.flown(batch):
             return
         for _ in self.flyer.fly(batch, [flight]):
             pass
@@ -88,20 +87,20 @@ class Screen:
 
     def _flights(self, parameters: Mapping[str, float], numbers: Sequence[int]) -> list[Flight]:
         campaign = self.flyer.campaign
-        own = [seed(campaign.hash, self.part, number) for number in numbers]
+        own = [certificate_seed(campaign.hash, self.purpose, number) for number in numbers]
         return [
             Flight(0, number, {**campaign.parameters(each), **parameters}, each)
             for number, each in zip(numbers, own, strict=True)
         ]
 
-    def judged(self, batch: Batch, parameters: Mapping[str, float]) -> tuple[str, Look | None]:
+    def judged(self, batch: CandidateBatch, parameters: Mapping[str, float]) -> tuple[str, InterimLook | None]:
         """safe, unsafe, open, or a reason why it cannot be flown; and the last look."""
         campaign = self.flyer.campaign
         flown = {number: values for (_, number), values in self.flyer.store.flown(batch).items()}
         events, done, last = 0, 0, None
-        for size, above, below in self.looks:
+        for size, above, below in self.look_schedule:
             missing = [number for number in range(done, size) if number not in flown]
-            if missing and self.flyer.time_over:
+            if missing and self.flyer.is_time_over:
                 return TIME_OVER, last
             for landed in self.flyer.fly(batch, self._flights(parameters, missing)):
                 flown[landed.flight.repeat] = landed.values
@@ -110,8 +109,8 @@ class Screen:
             rows = [flown[number] for number in range(done, size)]
             if any(row is None for row in rows):
                 return "cannot be flown", last
-            events += sum(any(limit.happened(row or {}) for limit in campaign.limits) for row in rows)
-            done, last = size, look(size, events, above, below)
+            events += sum(any(limit.has_happened(row or {}) for limit in campaign.limits) for row in rows)
+            done, last = size, take_look(size, events, above, below)
             if last.high < self.level:
                 return "safe", last
             if last.low > self.level:
@@ -119,18 +118,18 @@ class Screen:
         return "open", last
 
 
-def batch_of(part: str, parameters: Mapping[str, float]) -> Batch:
+def value_batch(stage: str, parameters: Mapping[str, float]) -> CandidateBatch:
     """Where flights at these values are kept: told by the values, so that a campaign may go on with other keys."""
-    return Batch(f"{part}: {', '.join(f'{key} = {value!r}' for key, value in parameters.items())}", 0, 0)
+    return CandidateBatch(f"{stage}: {', '.join(f'{key} = {value!r}' for key, value in parameters.items())}", 0, 0)
 
 
-class Trials:
+class ValueTrials:
     """Values of one number that are tried one after another.
 
     flights : flown at all of them; verdict : on the last one, as `Screen.judged` says it
     """
 
-    def __init__(self, screen: Screen, key: str, *, compiles: bool):
+    def __init__(self, screen: ValueScreen, key: str, *, compiles: bool):
         """`compiles`: the first flight may wait for another driver, which takes none of the time for flights."""
         self._screen, self._key, self._compiles = screen, key, compiles
         self.flights, self.verdict = 0, ""
@@ -138,7 +137,7 @@ class Trials:
     def safe(self, value: float) -> bool | None:
         """Whether a value is safe; None where time was over before that was known."""
         parameters = {self._key: value}
-        batch = batch_of("tolerance", parameters)
+        batch = value_batch("tolerance", parameters)
         self._screen.flyer.store.ask(batch, [[value]], [parameters])
         if self._compiles and not self.flights:
             self._screen.begin(batch, parameters)
@@ -147,13 +146,13 @@ class Trials:
         return None if self.verdict == TIME_OVER else self.verdict == "safe"
 
 
-def _axis(screen: Screen, key: str, how: Quantity, nominal: float) -> dict[str, Any]:
+def _axis(screen: ValueScreen, key: str, how: Quantity, nominal: float) -> dict[str, Any]:
     """Move one number until it is no longer safe, then halve the way between."""
-    first = nominal or FROM_ZERO[key]
-    last, end = first * REACH ** worse(key), ""
-    trials, safe, bad = Trials(screen, key, compiles=not nominal), nominal, math.nan
-    while worse(key) * (last - safe) > 1e-9 * last:
-        candidate = _whole(how, min(max(safe * 2.0 ** worse(key) or first, how.low), how.high))
+    first = nominal or FIRST_VALUE[key]
+    last, end = first * REACH ** worse_direction(key), ""
+    trials, safe, bad = ValueTrials(screen, key, compiles=not nominal), nominal, math.nan
+    while worse_direction(key) * (last - safe) > 1e-9 * last:
+        candidate = _whole(how, min(max(safe * 2.0 ** worse_direction(key) or first, how.low), how.high))
         if candidate == safe:
             end = f"the end of its range, {how.span}"
             break

@@ -6,19 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.given import with_values
-from airflock.check.report import Report, Truths, accepted, reported
-from airflock.check.scenes import MIRROR, turn_about_vertical
-from airflock.check.single import run
-from airflock.check.units import OTHERS, factor, rescaled
-from airflock.core.contract import Body
-from airflock.core.contract.declared import COMMANDS
-from airflock.core.parameters import choices
-from airflock.core.rules import law
-from airflock.core.vocabulary import answer, asks
-from airflock.parts.aero.wing import Parameters as Wing
-from airflock.scenarios.families import BODY
-from airflock.scenarios.seeds import sound_seed
+from airflock.check.given import parameters_with_values
+from airflock.check.report import Report, TruthTable, require_part, run_truths
+from airflock.check.scenes import MIRROR, rotation_about_vertical
+from airflock.check.single import run_in_single_precision
+from airflock.check.units import UNIT_SCALES, rescaled, unit_factor
+from airflock.core import COMMANDS, Body, argument_names, call_rule, choices, law
+from airflock.parts.aero import Parameters as Wing
+from airflock.scenarios import BODY_KIND, check_seed
 
 MOTIONS = 40  # random motions that each truth is tried on
 REMEMBERED = 5  # steps after which a body that remembers is looked at
@@ -28,7 +23,7 @@ VECTORS = {"v": "m/s", "m": "m/s", "c": "", "g": "1", "w": "m/s"}  # what `move`
 Motion = dict[str, NDArray[np.float64]]
 
 
-def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
+def check_body(body: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a body and return a report with one line a truth.
 
     A motion that is turned or seen in a mirror turns or mirrors its result; at rest the result is finite; a halved time
@@ -37,7 +32,7 @@ def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
 
     Parameters
     ----------
-    what : Body, module, class, mapping or str
+    body : Body, module, class, mapping or str
         A body: a Body, a namespace such as globals(), a name of ours, or a file that ends in .py.
     parameters : mapping, optional
         Values that differ from the defaults, by name.
@@ -62,14 +57,14 @@ def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
     >>> airflock.check_body("multirotor").broken
     ()
     """
-    found = accepted(BODY.given(what))
-    b = with_values(found.Parameters, parameters, "body")
+    found = require_part(BODY_KIND.from_caller(body))
+    b = parameters_with_values(found.Parameters, parameters, "body")
     speed = float(min(getattr(b, "speed", getattr(b, "speed_max", 5.0)), 5.0))
-    rng = np.random.default_rng(sound_seed(seed))
+    rng = np.random.default_rng(check_seed(seed))
     motions = [_motion(found, rng, speed) for _ in range(MOTIONS)]
-    turn = turn_about_vertical(1.1)
-    truths: Truths = {
-        "rule": ("the rule can be compiled", lambda: "".join(law.faults(found.move)[:1])),
+    turn = rotation_about_vertical(1.1)
+    truths: TruthTable = {
+        "rule": ("the rule can be compiled", lambda: "".join(law.rule_errors(found.move)[:1])),
         "rotation": ("a motion turned about the vertical turns", lambda: _turns(found, b, motions, turn, seed)),
         "mirror": ("a motion seen in a mirror is mirrored", lambda: _turns(found, b, motions, MIRROR, seed)),
         "rest": ("at rest, without a command, the velocity is finite", lambda: _rest(found, b)),
@@ -77,7 +72,7 @@ def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
         "units": ("in other units of length and time it is the same", lambda: _units(found, b, motions, seed)),
         "single precision": ("the rule does not turn float32 into doubles", lambda: _single(found, b, motions)),
     }
-    return reported(f"body {found.name}", truths, found.violates)
+    return run_truths(f"body {found.name}", truths, found.violates)
 
 
 def _motion(found: Body, rng: np.random.Generator, speed: float) -> Motion:
@@ -100,7 +95,7 @@ def _step(
     found: Body, b: Any, motion: Motion, dt: float, memory: Any, wing: Any = WING
 ) -> tuple[NDArray[np.float64], Any]:
     """Velocity (m/s) and Memory after one step."""
-    moved = answer(found.move, "move", _given(b, motion, dt, memory, wing), found.name)
+    moved = call_rule(found.move, "move", _given(b, motion, dt, memory, wing), found.name)
     return np.array(moved[:3]), moved[3] if found.Memory is not None else None
 
 
@@ -151,8 +146,8 @@ def _time_step(found: Body, b: Any, motions: list[Motion]) -> str:
 
 
 def _units(found: Body, b: Any, motions: list[Motion], seed: int) -> str:
-    for units in OTHERS:
-        scale = {name: factor(unit or COMMANDS[found.accepts], units) for name, unit in VECTORS.items()}
+    for units in UNIT_SCALES:
+        scale = {name: unit_factor(unit or COMMANDS[found.accepts], units) for name, unit in VECTORS.items()}
         other = rescaled(b, units)
         for number, motion in enumerate(motions):
             scaled = {k: scale[k] * v for k, v in motion.items()}
@@ -166,5 +161,5 @@ def _units(found: Body, b: Any, motions: list[Motion], seed: int) -> str:
 def _single(found: Body, b: Any, motions: list[Motion]) -> str:
     for motion in motions[:5]:
         given = _given(b, motion, 0.02, found.Memory() if found.Memory is not None else None)
-        run(found.move, {"b": choices(b)}, given, asks(found.move, "move", found.name))
+        run_in_single_precision(found.move, {"b": choices(b)}, given, argument_names(found.move, "move", found.name))
     return ""

@@ -2,14 +2,13 @@
 
 from typing import Any
 
-from airflock.scenarios import schema
-from airflock.scenarios.document import keyed
-from airflock.support.errors import ScenarioError
+from airflock.scenarios import schema, settings_dict
+from airflock.support import ScenarioError
 
 
-def with_values(record: type, values: Any, section: str) -> Any:
+def parameters_with_values(record: type, values: Any, section: str) -> Any:
     """A record of parameters with the values that a caller gives by name; the others keep their defaults."""
-    made, faults = schema.check(section, keyed(values, f"check of {section}"), record)
+    made, faults = schema.read_section(section, settings_dict(values, f"check of {section}"), record)
     if faults:
         raise ScenarioError(faults)
     return made

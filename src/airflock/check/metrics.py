@@ -8,22 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.report import Report, Truths, accepted, reported
-from airflock.check.scenes import MIRROR, turn_about_vertical
-from airflock.check.units import OTHERS, Units, factor, rescaled, rescaled_scenario
-from airflock.core.contract import Metric, MetricSet
-from airflock.core.rules import law
+from airflock.check.report import Report, TruthTable, require_part, run_truths
+from airflock.check.scenes import MIRROR, rotation_about_vertical
+from airflock.check.units import UNIT_SCALES, UnitScale, rescaled, rescaled_scenario, unit_factor
+from airflock.core import Metric, MetricSet, law
 from airflock.engine import measure_frames
-from airflock.scenarios.families import METRICS, Given
-from airflock.scenarios.making import make
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.seeds import sound_seed
+from airflock.scenarios import METRIC_SET_KIND, CallerParts, Scenario, build_scenario, check_seed
 
 AGENTS, INSTANTS, FLIGHTS = 6, 5, 8
 CLOSE = 1e-9
 CLOSE_IN_OTHER_UNITS = 1e-6  # guards such as TINY, and angles near zero, where a cosine tells little
 RULES = ("pair", "linked", "agent", "member", "cluster", "sample", "survey")
-Flock = NDArray[np.float64]  # (instant, agent, component): position (m) and velocity (m/s)
+FlockTrack = NDArray[np.float64]  # (instant, agent, component): position (m) and velocity (m/s)
 
 
 def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
@@ -60,18 +56,18 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     >>> airflock.check_metric("order").broken
     ()
     """
-    found = accepted(METRICS.given(what))
+    found = require_part(METRIC_SET_KIND.from_caller(what))
     scenario = _scenario(found, dimensions)
-    rng = np.random.default_rng(sound_seed(seed))
+    rng = np.random.default_rng(check_seed(seed))
     flocks = [_flock(rng, dimensions) for _ in range(FLIGHTS)]
-    turn = turn_about_vertical(rng.uniform(0.5, 2.5))
+    turn = rotation_about_vertical(rng.uniform(0.5, 2.5))
     order = rng.permutation(AGENTS)
     shift = np.array([37.0, -19.0, 8.0 * (dimensions == 3), 0.0, 0.0, 0.0])
 
-    def same(change: Callable[[Flock], Flock]) -> Callable[[], str]:
+    def same(change: Callable[[FlockTrack], FlockTrack]) -> Callable[[], str]:
         return lambda: _same(scenario, flocks, [change(flock) for flock in flocks], seed)
 
-    truths: Truths = {
+    truths: TruthTable = {
         "rules": ("every rule can be compiled", lambda: _rules(scenario.order_parameters)),
         "reports": ("every value has a unit and a meaning", lambda: _reports(scenario, flocks[0])),
         "rotation": (
@@ -89,7 +85,7 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
         ),
     }
     violates = {key: why for metric in found.metrics for key, why in metric.violates.items()}
-    return reported(f"metrics {found.name}", truths, violates | dict(found.violates))
+    return run_truths(f"metrics {found.name}", truths, violates | dict(found.violates))
 
 
 def _scenario(found: MetricSet, dimensions: int) -> Scenario:
@@ -100,10 +96,12 @@ def _scenario(found: MetricSet, dimensions: int) -> Scenario:
         "metrics.r_comm": 15.0, "metrics.r_b": 6.0, "metrics.t_settle": 0.0, "wing.segments": "5",
         "wing.tolerance": 1e-14,
     }  # fmt: skip
-    return make({"model": {"kind": "vasarhelyi_2018"}}, f"check of {found.name}", keys, given=Given(measures=found))
+    return build_scenario(
+        {"model": {"kind": "vasarhelyi_2018"}}, f"check of {found.name}", keys, caller_parts=CallerParts(measures=found)
+    )
 
 
-def _flock(rng: np.random.Generator, dims: int) -> Flock:
+def _flock(rng: np.random.Generator, dims: int) -> FlockTrack:
     """Agents some metres apart that move about for a few instants."""
     flat = np.array([1.0, 1.0, float(dims == 3)])
     places = rng.uniform(-12.0, 12.0, (1, AGENTS, 3)) + np.cumsum(rng.normal(0.0, 2.0, (INSTANTS, AGENTS, 3)), axis=0)
@@ -111,25 +109,25 @@ def _flock(rng: np.random.Generator, dims: int) -> Flock:
     return np.concatenate([places * flat, speeds * flat], axis=2)
 
 
-def _turned(flock: Flock, turn: NDArray[np.float64]) -> Flock:
+def _turned(flock: FlockTrack, turn: NDArray[np.float64]) -> FlockTrack:
     return np.concatenate([flock[:, :, :3] @ turn.T, flock[:, :, 3:] @ turn.T], axis=2)
 
 
-def _measured(scenario: Scenario, flock: Flock, q: Any = None, second: float = 1.0) -> dict[str, float]:
+def _measured(scenario: Scenario, flock: FlockTrack, q: Any = None, second: float = 1.0) -> dict[str, float]:
     """Order parameters of some instants, 0.2 s apart (or `second` as many), by the stages of a driver, uncompiled."""
     scenario = scenario if q is None else replace(scenario, metrics=q)
     period, dims = 0.2 * second, scenario.dimensions
     frames = np.concatenate([flock[:, :, :dims], flock[:, :, 3 : 3 + dims]], axis=2).transpose(0, 2, 1)
     values, _ = measure_frames(scenario, frames, period, device="python")
-    return scenario.measures.judged(values, flock.shape[1], period * len(flock), scenario.measured_by())
+    return scenario.measures.judged(values, flock.shape[1], period * len(flock), scenario.resolved_metrics())
 
 
 def _rules(metrics: Sequence[Metric]) -> str:
-    found = [fault for m in metrics for kind in RULES if (rule := getattr(m, kind)) for fault in law.faults(rule)]
+    found = [fault for m in metrics for kind in RULES if (rule := getattr(m, kind)) for fault in law.rule_errors(rule)]
     return found[0] if found else ""
 
 
-def _reports(scenario: Scenario, flock: Flock) -> str:
+def _reports(scenario: Scenario, flock: FlockTrack) -> str:
     known = _units_of(scenario)
     missing = [name for name in _measured(scenario, flock) if name not in known]
     return f"REPORTS tells nothing of {', '.join(missing)}" if missing else ""
@@ -142,7 +140,7 @@ def _units_of(scenario: Scenario) -> dict[str, str]:
     return {name: unit.split(" or ")[-1 if scenario.dimensions == 3 else 0] for name, unit in told.items()}
 
 
-def _same(scenario: Scenario, flocks: Sequence[Flock], others: Sequence[Flock], seed: int) -> str:
+def _same(scenario: Scenario, flocks: Sequence[FlockTrack], others: Sequence[FlockTrack], seed: int) -> str:
     for number, (flock, other) in enumerate(zip(flocks, others, strict=True)):
         fault = _apart(_measured(scenario, other), _measured(scenario, flock))
         if fault:
@@ -160,16 +158,16 @@ def _apart(values: dict[str, float], expected: dict[str, float], close: float = 
     return ""
 
 
-def _numbers(scenario: Scenario, flock: Flock) -> str:
+def _numbers(scenario: Scenario, flock: FlockTrack) -> str:
     bad = {name: value for name, value in _measured(scenario, flock).items() if math.isinf(value)}
     return ", ".join(f"{name} = {value}" for name, value in bad.items())
 
 
-def _units(scenario: Scenario, flocks: Sequence[Flock], seed: int) -> str:
+def _units(scenario: Scenario, flocks: Sequence[FlockTrack], seed: int) -> str:
     known = _units_of(scenario)
-    for units in OTHERS:
+    for units in UNIT_SCALES:
         other = rescaled_scenario(scenario, units)
-        q = rescaled(scenario.measured_by(), units)
+        q = rescaled(scenario.resolved_metrics(), units)
         scale = np.repeat([units.metre, units.metre / units.second], 3)
         for number, flock in enumerate(flocks):
             values = _measured(scenario, flock)
@@ -181,5 +179,5 @@ def _units(scenario: Scenario, flocks: Sequence[Flock], seed: int) -> str:
     return ""
 
 
-def _factor(known: dict[str, str], name: str, units: Units) -> float:
-    return factor(known.get(name, ""), units)
+def _factor(known: dict[str, str], name: str, units: UnitScale) -> float:
+    return unit_factor(known.get(name, ""), units)

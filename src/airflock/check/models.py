@@ -8,32 +8,39 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.report import Report, Truths, reported
+from airflock.check.report import Report, TruthTable, run_truths
 from airflock.check.scenes import (
-    AGENTS,
+    AGENT_COUNT,
     MIRROR,
-    Law,
+    Rotation,
     Scene,
-    Turn,
-    directions,
+    TestedLaw,
     in_units,
-    law_of,
-    shifted,
-    turn_about_vertical,
-    turned,
+    random_directions,
+    rotated,
+    rotation_about_vertical,
+    tested_law,
+    translated,
 )
-from airflock.check.single import run
-from airflock.check.units import OTHERS, factor, rescaled_scenario
-from airflock.core.agent import Heard, State, first_memory, meet_neighbours, meet_surfaces, pair_percept
-from airflock.core.contract import Model, model
-from airflock.core.contract.declared import COMMANDS
-from airflock.core.parameters import choices
-from airflock.core.vocabulary import Own, Percept, asks
-from airflock.engine import fly, plan_of
-from airflock.scenarios.document import keyed
-from airflock.scenarios.laws import find_model
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.seeds import sound_seed
+from airflock.check.single import run_in_single_precision
+from airflock.check.units import UNIT_SCALES, rescaled_scenario, unit_factor
+from airflock.core import (
+    COMMANDS,
+    HeardNeighbour,
+    Model,
+    Own,
+    Percept,
+    State,
+    argument_names,
+    choices,
+    initial_memory,
+    model,
+    pair_arguments,
+    sum_neighbours,
+    sum_surfaces,
+)
+from airflock.engine import fly_world, plan_of
+from airflock.scenarios import Scenario, check_seed, find_law, settings_dict
 
 SCENES = 12  # random scenes that each symmetry is tried on
 CLOSE = 1e-9  # of the largest command: more than rounding
@@ -89,24 +96,24 @@ def check_model(
     ()
     """
     if isinstance(law, (str, os.PathLike)):
-        law = find_model(str(law), trust=True)
+        law = find_law(str(law), trust=True)
     found = law if isinstance(law, Model) else model(law)
-    made = law_of(found, keyed(parameters, f"check of {found.name}"), dimensions)
-    rng = np.random.default_rng(sound_seed(seed))
+    made = tested_law(found, settings_dict(parameters, f"check of {found.name}"), dimensions)
+    rng = np.random.default_rng(check_seed(seed))
     scenes = [made.scene(rng) for _ in range(SCENES)]
-    turns = [turn_about_vertical(rng.uniform(0.1, 6.2)) for _ in scenes]
-    truths: Truths = {
+    turns = [rotation_about_vertical(rng.uniform(0.1, 6.2)) for _ in scenes]
+    truths: TruthTable = {
         "rotation": (
             "a scene turned about the vertical turns the command",
-            lambda: _same(made, scenes, [turned(s, t) for s, t in zip(scenes, turns, strict=True)], turns, seed),
+            lambda: _same(made, scenes, [rotated(s, t) for s, t in zip(scenes, turns, strict=True)], turns, seed),
         ),
         "translation": (
             "shifting the scene does not change the command",
-            lambda: _same(made, scenes, [shifted(s, made.length) for s in scenes], [np.eye(3)] * SCENES, seed),
+            lambda: _same(made, scenes, [translated(s, made.length) for s in scenes], [np.eye(3)] * SCENES, seed),
         ),
         "mirror": (
             "a scene seen in a mirror mirrors the command",
-            lambda: _same(made, scenes, [turned(s, MIRROR) for s in scenes], [MIRROR] * SCENES, seed),
+            lambda: _same(made, scenes, [rotated(s, MIRROR) for s in scenes], [MIRROR] * SCENES, seed),
         ),
         "renumbering": (
             "renumbering the agents does not change the command",
@@ -120,7 +127,7 @@ def check_model(
     }
     if compiled:
         truths["compiled"] = ("compiled, it flies as in plain Python", lambda: _compiled(made, seed))
-    return reported(f"model {found.name}", truths, found.violates)
+    return run_truths(f"model {found.name}", truths, found.violates)
 
 
 def _worst(
@@ -142,18 +149,20 @@ def _vector(values: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{value:.4g}" for value in values) + ")"
 
 
-def _same(law: Law, scenes: Sequence[Scene], others: Sequence[Scene], turns: Sequence[Turn], seed: int) -> str:
+def _same(
+    law: TestedLaw, scenes: Sequence[Scene], others: Sequence[Scene], turns: Sequence[Rotation], seed: int
+) -> str:
     expected = [turn @ law.command(scene) for scene, turn in zip(scenes, turns, strict=True)]
     return _worst([law.command(scene) for scene in others], expected, seed)
 
 
-def _renumbered(law: Law, scenes: Sequence[Scene], rng: np.random.Generator, seed: int) -> str:
+def _renumbered(law: TestedLaw, scenes: Sequence[Scene], rng: np.random.Generator, seed: int) -> str:
     orders = [rng.permutation(len(scene.states)).tolist() for scene in scenes]
     answers = [law.command(scene, order) for scene, order in zip(scenes, orders, strict=True)]
     return _worst(answers, [law.command(scene) for scene in scenes], seed)
 
 
-def _alone(law: Law, rng: np.random.Generator) -> str:
+def _alone(law: TestedLaw, rng: np.random.Generator) -> str:
     """No neighbours, no walls, no goal: the command has no part across the heading."""
     for _ in range(10):
         scene = law.scene(rng, 0)
@@ -172,7 +181,7 @@ def _alone(law: Law, rng: np.random.Generator) -> str:
     return ""
 
 
-def _pairs(law: Law, rng: np.random.Generator) -> str:
+def _pairs(law: TestedLaw, rng: np.random.Generator) -> str:
     """One neighbour from the same place to far away, and both at rest."""
     for distance in (0.0, 1e-9, 1e-3, 1.0, 1e3, 1e6):
         for still in (False, True):
@@ -191,18 +200,18 @@ def _pairs(law: Law, rng: np.random.Generator) -> str:
 
 def _flown(scenario: Scenario, start: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
     """Frames (time, component, agent) of a flight without a compiler."""
-    flown = fly(scenario, seed, precision=64, record=True, start=start, device="python")
+    flown = fly_world(scenario, seed, precision=64, record=True, start=start, device="python")
     assert flown.frames is not None
     return flown.frames
 
 
-def _start(law: Law, seed: int) -> NDArray[np.float64]:
+def _start(law: TestedLaw, seed: int) -> NDArray[np.float64]:
     rng, dims = np.random.default_rng(seed), law.scenario.dimensions
-    places = 0.6 * law.length * rng.uniform(-1.0, 1.0, (dims, AGENTS))
-    return np.vstack([places, law.speed * directions(rng, AGENTS, dims)[:, :dims].T])
+    places = 0.6 * law.length * rng.uniform(-1.0, 1.0, (dims, AGENT_COUNT))
+    return np.vstack([places, law.speed * random_directions(rng, AGENT_COUNT, dims)[:, :dims].T])
 
 
-def _time_step(law: Law, seed: int) -> str:
+def _time_step(law: TestedLaw, seed: int) -> str:
     """Positions at the end, without noise: the difference of two time steps shrinks when both are halved."""
     quiet, start = _quiet(law.scenario), _start(law, seed)
     ends = []
@@ -220,15 +229,15 @@ def _time_step(law: Law, seed: int) -> str:
 def _quiet(scenario: Scenario) -> Scenario:
     """The scenario without noise."""
     noise = {"noise": 0.0} if hasattr(scenario.body, "noise") else {}
-    return replace(scenario.unerring, body=replace(scenario.body, **noise))
+    return replace(scenario.without_sensor_errors, body=replace(scenario.body, **noise))
 
 
-def _units(law: Law, scenes: Sequence[Scene], seed: int) -> str:
+def _units(law: TestedLaw, scenes: Sequence[Scene], seed: int) -> str:
     """Every declared number in other units: commands, and frames of a flight with the same random numbers."""
     expected = [law.command(scene) for scene in scenes]
-    for units in OTHERS:
+    for units in UNIT_SCALES:
         other = replace(law, scenario=rescaled_scenario(law.scenario, units))
-        by = factor(COMMANDS[law.model.command], units)
+        by = unit_factor(COMMANDS[law.model.command], units)
         answers = [other.command(in_units(scene, units)) / by for scene in scenes]
         fault = _worst(answers, expected, seed, CLOSE_IN_FLIGHT)
         if fault:
@@ -236,12 +245,12 @@ def _units(law: Law, scenes: Sequence[Scene], seed: int) -> str:
     return _units_in_flight(law, seed)
 
 
-def _units_in_flight(law: Law, seed: int) -> str:
+def _units_in_flight(law: TestedLaw, seed: int) -> str:
     dims, start = law.scenario.dimensions, _start(law, seed)
     frames = _flown(law.scenario, start, seed)
     sizes = np.abs(frames).max(axis=(0, 2)) + 1e-9
-    for units in OTHERS:
-        known = (factor(unit, units) for unit in ("m", "m/s", COMMANDS[law.model.command]))
+    for units in UNIT_SCALES:
+        known = (unit_factor(unit, units) for unit in ("m", "m/s", COMMANDS[law.model.command]))
         scale = np.repeat(list(known), dims)[:, None]
         other = _flown(rescaled_scenario(law.scenario, units), start * scale[: 2 * dims], seed) / scale
         bad = np.argwhere(np.abs(other - frames) > CLOSE_IN_FLIGHT * sizes[:, None])
@@ -256,34 +265,34 @@ def _units_in_flight(law: Law, seed: int) -> str:
     return ""
 
 
-def _compiled(law: Law, seed: int) -> str:
+def _compiled(law: TestedLaw, seed: int) -> str:
     """The same flight by a compiled driver, in double precision."""
     start = _start(law, seed)
     plain = _flown(law.scenario, start, seed)
-    driver = fly(law.scenario, seed, precision=64, record=True, start=start).frames
+    driver = fly_world(law.scenario, seed, precision=64, record=True, start=start).frames
     assert driver is not None
     apart = np.abs(driver - plain).max(axis=(0, 2)) / (np.abs(plain).max(axis=(0, 2)) + 1e-9)
     return "" if apart.max() <= CLOSE_IN_FLIGHT else f"seed {seed}: frames differ by {apart.max():.2g} of their size"
 
 
-def _single(law: Law, scenes: Sequence[Scene]) -> str:
+def _single(law: TestedLaw, scenes: Sequence[Scene]) -> str:
     """Every scalar rule of the law, on the numbers of a few scenes."""
     plan = plan_of(law.scenario, precision=32)
     constants = plan.constants | {"p": dict(plan.model_choices) or choices(law.p)}
     found = law.model
     for scene in scenes[:5]:
         own, other = State(*scene.states[0].tolist()), State(*scene.states[1].tolist())
-        heard = [Heard(1, other, 0.0)]
+        heard = [HeardNeighbour(1, other, 0.0)]
         wall = tuple(scene.walls[0].tolist())
         f = 1.0 / float(np.linalg.norm(scene.states[0, 3:]))
-        given: dict[str, Any] = pair_percept(own, heard[0], 0) | {"p": law.p, "period": 0.2}
+        given: dict[str, Any] = pair_arguments(own, heard[0], 0) | {"p": law.p, "period": 0.2}
         given |= dict(zip(("distance", "nx", "ny", "nz"), wall, strict=True))
-        given |= {"own": Own(*own[3:], *(f * v for v in own[3:])), "memory": first_memory(found)}
-        given |= {"sums": meet_neighbours(found, law.p, own, heard, 0), "shared": law.solved(scene)}
-        given |= {"walls": meet_surfaces(found, law.p, own, [wall]), "wing": law.scenario.wing}
+        given |= {"own": Own(*own[3:], *(f * v for v in own[3:])), "memory": initial_memory(found)}
+        given |= {"sums": sum_neighbours(found, law.p, own, heard, 0), "shared": law.flock_solution(scene)}
+        given |= {"walls": sum_surfaces(found, law.p, own, [wall]), "wing": law.scenario.wing}
         given |= {"aero": law.scenario.aero, "percept": Percept(1.0, *(-scene.states[0, :3]).tolist())}
         for kind in ("neighbour", "boundary", "decide"):
             rule = getattr(found, kind)
             if rule is not None:
-                run(rule, constants, given, asks(rule, kind, found.name))
+                run_in_single_precision(rule, constants, given, argument_names(rule, kind, found.name))
     return ""

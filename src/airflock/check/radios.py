@@ -6,17 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from airflock.check.given import with_values
-from airflock.check.report import Report, Truths, accepted, reported
-from airflock.check.single import run
-from airflock.check.units import OTHERS, Units, rescaled
-from airflock.core.parameters import choices
-from airflock.core.radio import Radio
-from airflock.core.rules import law
-from airflock.core.vocabulary import VOCABULARY, answer, asks
-from airflock.core.vocabulary.radios import RULES
-from airflock.scenarios.families import RADIO
-from airflock.scenarios.seeds import sound_seed
+from airflock.check.given import parameters_with_values
+from airflock.check.report import Report, TruthTable, require_part, run_truths
+from airflock.check.single import run_in_single_precision
+from airflock.check.units import UNIT_SCALES, UnitScale, rescaled
+from airflock.core import RULES, VOCABULARY, Radio, argument_names, call_rule, choices, law
+from airflock.scenarios import RADIO_KIND, check_seed
 
 TRIES = 60  # random pairs that each truth is tried on
 CLOSE = 1e-9
@@ -25,7 +20,7 @@ LENGTHS, TIMES = ("distance", "dx", "dy", "dz", "ex", "ey", "ez", "x", "y", "z")
 SPEEDS = ("vx", "vy", "vz", "evx", "evy", "evz")
 
 
-def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
+def check_radio(radio: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a radio and return a report with one line a truth.
 
     Chances lie between 0 and 1 and delays are not negative; a packet of age 0 is believed as it is; what is
@@ -34,7 +29,7 @@ def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed:
 
     Parameters
     ----------
-    what : Radio, module, class, mapping or str
+    radio : Radio, module, class, mapping or str
         A radio: a Radio, a namespace such as globals(), a name of ours, or a file that ends in .py.
     parameters : mapping, optional
         Values that differ from the defaults, by name.
@@ -59,24 +54,24 @@ def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed:
     >>> airflock.check_radio("bursts").broken
     ()
     """
-    found = accepted(RADIO.given(what))
-    k = with_values(found.Parameters, parameters, "radio")
+    found = require_part(RADIO_KIND.from_caller(radio))
+    k = parameters_with_values(found.Parameters, parameters, "radio")
     pairs = list(_pairs(found, seed))
     rules = [rule for kind in RULES if (rule := getattr(found, kind)) is not None]
-    truths: Truths = {
-        "rule": ("every rule can be compiled", lambda: "".join(sum(map(law.faults, rules), [])[:1])),
+    truths: TruthTable = {
+        "rule": ("every rule can be compiled", lambda: "".join(sum(map(law.rule_errors, rules), [])[:1])),
         "chances": ("chances lie between 0 and 1, delays are not negative", lambda: _chances(found, k, pairs, seed)),
         "fresh": ("a packet of age 0 is believed as it is", lambda: _fresh(found, k, pairs, seed)),
         "place": ("shifting the sender shifts where it is believed to be", lambda: _place(found, k, pairs, seed)),
         "units": ("in other units of length and time it is the same", lambda: _units(found, k, pairs, seed)),
         "single precision": ("rules do not turn float32 into doubles", lambda: _single(found, k, pairs)),
     }
-    return reported(f"radio {found.name}", truths, found.violates)
+    return run_truths(f"radio {found.name}", truths, found.violates)
 
 
 def _pairs(found: Radio, seed: int) -> Iterator[dict[str, Any]]:
     """What rules may be asked with of random pairs of agents."""
-    rng = np.random.default_rng(sound_seed(seed))
+    rng = np.random.default_rng(check_seed(seed))
     names = {name for kind in RULES for name in VOCABULARY[kind]}
     for number in range(TRIES):
         offset = 30.0 * rng.normal(size=3)
@@ -96,7 +91,7 @@ def _pairs(found: Radio, seed: int) -> Iterator[dict[str, Any]]:
 
 def _asked(found: Radio, kind: str, given: Mapping[str, Any], k: Any) -> tuple[float, ...]:
     """Numbers that a rule answers."""
-    made = answer(getattr(found, kind), kind, {**given, "k": k}, found.name)
+    made = call_rule(getattr(found, kind), kind, {**given, "k": k}, found.name)
     if kind == "receive" and found.Packet is not None:
         return (float(made[0]), *map(float, made[1]))
     return tuple(map(float, made)) if isinstance(made, tuple) else (float(made),)
@@ -140,7 +135,7 @@ def _place(found: Radio, k: Any, pairs: list[dict[str, Any]], seed: int) -> str:
 
 
 def _units(found: Radio, k: Any, pairs: list[dict[str, Any]], seed: int) -> str:
-    for units in OTHERS:
+    for units in UNIT_SCALES:
         other = rescaled(k, units)
         for number, given in enumerate(pairs):
             for kind in _kinds(found, *RULES):
@@ -154,12 +149,12 @@ def _units(found: Radio, k: Any, pairs: list[dict[str, Any]], seed: int) -> str:
     return ""
 
 
-def _of_state(units: Units) -> list[float]:
+def _of_state(units: UnitScale) -> list[float]:
     """What a position and a velocity are measured in."""
     return [units.metre] * 3 + [units.metre / units.second] * 3
 
 
-def _scaled(given: Mapping[str, Any], units: Units) -> dict[str, Any]:
+def _scaled(given: Mapping[str, Any], units: UnitScale) -> dict[str, Any]:
     """The same pair in other units."""
     sizes = dict.fromkeys(LENGTHS, units.metre) | dict.fromkeys(TIMES, units.second)
     sizes |= dict.fromkeys(SPEEDS, units.metre / units.second)
@@ -170,5 +165,5 @@ def _single(found: Radio, k: Any, pairs: list[dict[str, Any]]) -> str:
     for kind in _kinds(found, *RULES):
         rule = getattr(found, kind)
         for given in pairs[:5]:
-            run(rule, {"k": choices(k)}, {**given, "k": k}, asks(rule, kind, found.name))
+            run_in_single_precision(rule, {"k": choices(k)}, {**given, "k": k}, argument_names(rule, kind, found.name))
     return ""

@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from airflock.support.errors import AirflockError, RuleError, ScenarioError
+from airflock.support import AirflockError, RuleError, ScenarioError
 
 # name → what it says, and a check that returns what is wrong, empty if nothing is
-Truths = dict[str, tuple[str, Callable[[], str]]]
-Found = TypeVar("Found")
+TruthTable = dict[str, tuple[str, Callable[[], str]]]
+Part = TypeVar("Part")
 
 
 class CheckError(AirflockError, AssertionError):
@@ -20,22 +20,22 @@ class Truth:
     """One truth: its name, what it says, what was found against it (empty: it holds), and the declared reason why."""
 
     name: str
-    says: str
+    statement: str
     fault: str = ""
     reason: str = ""
 
     @property
-    def broken(self) -> bool:
+    def is_broken(self) -> bool:
         """Whether it does not hold and nobody said so."""
         return bool(self.fault) and not self.reason
 
     def __str__(self) -> str:
         """One line for a person."""
         if not self.fault:
-            return f"holds   {self.name}: {self.says}"
+            return f"holds   {self.name}: {self.statement}"
         if self.reason:
             return f"breaks  {self.name}, as declared: {self.reason}"
-        return f"BREAKS  {self.name}: {self.says}; {self.fault}"
+        return f"BREAKS  {self.name}: {self.statement}; {self.fault}"
 
 
 @dataclass(frozen=True)
@@ -50,20 +50,20 @@ class Report:
         return "\n".join([f"{self.name}:", *(f"  {truth}" for truth in self.truths)])
 
     @property
-    def broken(self) -> tuple[str, ...]:
+    def broken_names(self) -> tuple[str, ...]:
         """Names of the truths that do not hold, declared or not."""
         return tuple(truth.name for truth in self.truths if truth.fault)
 
 
-def accepted(found: tuple[Found | None, list[str]]) -> Found:
+def require_part(part_and_errors: tuple[Part | None, list[str]]) -> Part:
     """What was found, of it and its faults; raises a ScenarioError if there are any."""
-    what, faults = found
+    what, faults = part_and_errors
     if faults or what is None:
         raise ScenarioError(faults)
     return what
 
 
-def reported(name: str, truths: Truths, violates: Mapping[str, str]) -> Report:
+def run_truths(name: str, truths: TruthTable, violates: Mapping[str, str]) -> Report:
     """Run all truths and report them; raises CheckError where one breaks that is not declared.
 
     violates : name → why a truth does not hold here. One that no list knows is an error, so that none is misspelled.
@@ -81,6 +81,6 @@ def reported(name: str, truths: Truths, violates: Mapping[str, str]) -> Report:
             fault = f"{type(error).__name__}: {error}"
         made.append(Truth(key, says, fault, violates.get(key, "")))
     report = Report(name, tuple(made))
-    if any(truth.broken for truth in made):
-        raise CheckError("\n".join(f"{name}: {truth}" for truth in made if truth.broken))
+    if any(truth.is_broken for truth in made):
+        raise CheckError("\n".join(f"{name}: {truth}" for truth in made if truth.is_broken))
     return report

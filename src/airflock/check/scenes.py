@@ -8,22 +8,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.flock import of_model
-from airflock.check.given import with_values
-from airflock.check.units import Units
-from airflock.core.agent import Heard, State, decide
-from airflock.core.contract import Model
-from airflock.core.vocabulary import Percept
-from airflock.scenarios.families import Given
-from airflock.scenarios.making import make
-from airflock.scenarios.scenario import Scenario
+from airflock.check.flock import flock_solver
+from airflock.check.given import parameters_with_values
+from airflock.check.units import UnitScale
+from airflock.core import HeardNeighbour, Model, Percept, State, decide
+from airflock.scenarios import CallerParts, Scenario, build_scenario
 
-AGENTS = 4  # in a flight
-Turn = NDArray[np.float64]
-MIRROR: Turn = np.diag([1.0, -1.0, 1.0])
+AGENT_COUNT = 4  # in a flight
+Rotation = NDArray[np.float64]
+MIRROR: Rotation = np.diag([1.0, -1.0, 1.0])
 
 
-class Walls(Percept):
+class WallPercept(Percept):
     """A percept that sees flat walls, as (distance, normal x y z)."""
 
     surfaces: Sequence[tuple[float, float, float, float]] = ()
@@ -52,7 +48,7 @@ class Scene(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Law:
+class TestedLaw:
     """A law with what its scenes are made of: lengths (m) and speeds (m/s) at which it does something."""
 
     model: Model
@@ -68,82 +64,87 @@ class Law:
     def scene(self, rng: np.random.Generator, neighbours: int = 4) -> Scene:
         """A random scene: neighbours from a hundredth to one and a half of its range, two walls, a goal."""
         dims = self.scenario.dimensions
-        away = self.length * rng.uniform(0.01, 1.5, (neighbours, 1)) * directions(rng, neighbours, dims)
-        speeds = self.speed * rng.uniform(0.2, 1.5, (neighbours + 1, 1)) * directions(rng, neighbours + 1, dims)
+        away = self.length * rng.uniform(0.01, 1.5, (neighbours, 1)) * random_directions(rng, neighbours, dims)
+        speeds = self.speed * rng.uniform(0.2, 1.5, (neighbours + 1, 1)) * random_directions(rng, neighbours + 1, dims)
         own = self.length * rng.normal(0.0, 1.0, 3) * (1.0, 1.0, float(dims == 3))
         states = np.hstack([np.vstack([own, own + away]), speeds])
-        walls = np.hstack([self.length * rng.uniform(0.05, 1.0, (2, 1)), directions(rng, 2, dims)])
-        return Scene(states, walls, self.length * directions(rng, 1, dims)[0], np.zeros(3))
+        walls = np.hstack([self.length * rng.uniform(0.05, 1.0, (2, 1)), random_directions(rng, 2, dims)])
+        return Scene(states, walls, self.length * random_directions(rng, 1, dims)[0], np.zeros(3))
 
     def command(self, scene: Scene, order: Sequence[int] | None = None) -> NDArray[np.float64]:
         """Command of agent 0; order: numbers that the agents go by, and the order in which it meets the others."""
         numbers = list(order) if order is not None else list(range(len(scene.states)))
         own = State(*scene.states[0].tolist())
-        heard = [Heard(numbers[j], State(*scene.states[j].tolist()), 0.0) for j in range(1, len(scene.states))]
+        heard = [HeardNeighbour(numbers[j], State(*scene.states[j].tolist()), 0.0) for j in range(1, len(scene.states))]
         heard.sort(key=lambda each: each.who)
         walls = [(d, nx, ny, nz) for d, nx, ny, nz in scene.walls.tolist()]
         period = self.scenario.sensors.period
-        percept = Walls(5.0 * period, *(scene.centre - scene.states[0, :3]).tolist(), *scene.goal.tolist())
+        percept = WallPercept(5.0 * period, *(scene.centre - scene.states[0, :3]).tolist(), *scene.goal.tolist())
         percept.surfaces = walls
         made = decide(
             self.model, self.p, own, heard, walls, time=5.0 * period, period=period, index=numbers[0], percept=percept,
-            shared=self.solved(scene), wing=self.scenario.wing, aero=self.scenario.aero,
+            shared=self.flock_solution(scene), wing=self.scenario.wing, aero=self.scenario.aero,
         )  # fmt: skip
         return np.array(made.command) * (1.0, 1.0, float(self.scenario.dimensions == 3))
 
-    def solved(self, scene: Scene) -> Any:
+    def flock_solution(self, scene: Scene) -> Any:
         """What the rule of the whole flock finds for agent 0."""
         count = replace(self.scenario.flight, agents=float(len(scene.states)))
-        solve = of_model(replace(self.scenario, flight=count))
+        solve = flock_solver(replace(self.scenario, flight=count))
         return solve([State(*row) for row in scene.states.tolist()])[0] if solve else None
 
 
-def law_of(found: Model, parameters: Mapping[str, Any], dimensions: int) -> Law:
+def tested_law(model: Model, parameters: Mapping[str, Any], dimensions: int) -> TestedLaw:
     """A law in a scene of its own size: a square arena of a few ranges, decisions every fifth step."""
-    p = with_values(found.Parameters, parameters, "model")
-    known = found.interaction_range or found.reach
+    p = parameters_with_values(model.Parameters, parameters, "model")
+    known = model.interaction_range or model.reach
     length = min(float(known(p)), 1e3) if known else 20.0
     keys = {f"model.{name}": value for name, value in parameters.items()}
-    keys |= {"agents": AGENTS, "world.dimensions": str(dimensions), "wing.segments": "5", "start.separation": 0.0}
+    keys |= {"agents": AGENT_COUNT, "world.dimensions": str(dimensions), "wing.segments": "5", "start.separation": 0.0}
     keys |= {"world.arena": "none", "start.kind": "ball", "start.radius": length, "radio.range": 10.0 * length}
-    scenario = make({"model": {}}, f"check of {found.name}", keys, given=Given(law=found))
-    speed = found.speed(p)
+    scenario = build_scenario({"model": {}}, f"check of {model.name}", keys, caller_parts=CallerParts(law=model))
+    speed = model.speed(p)
     speed = speed or min(float(getattr(scenario.body, "speed", getattr(scenario.body, "speed_max", 1.0))), 10.0)
     period = min(0.2, 0.05 * length / speed)
     dt = 0.2 * period
     times = {"dt": dt, "duration": 8.0 * period, "sensors.period": period, "metrics.period": period}
     side = {"world.arena": "square", "world.side": 4.0 * length, "world.height": 4.0 * length}
     keys |= times | side | {"radio.delay": period, "metrics.collision_period": dt}
-    return Law(found, make({"model": {}}, f"check of {found.name}", keys, given=Given(law=found)), length, speed)
+    return TestedLaw(
+        model,
+        build_scenario({"model": {}}, f"check of {model.name}", keys, caller_parts=CallerParts(law=model)),
+        length,
+        speed,
+    )
 
 
-def directions(rng: np.random.Generator, count: int, dims: int) -> NDArray[np.float64]:
+def random_directions(rng: np.random.Generator, count: int, dims: int) -> NDArray[np.float64]:
     """Random unit vectors (vector, axis)."""
     found = rng.normal(size=(count, 3)) * (1.0, 1.0, float(dims == 3))
     return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
-def turn_about_vertical(angle: float) -> Turn:
+def rotation_about_vertical(angle: float) -> Rotation:
     """A turn about the vertical by an angle, rad."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def turned(scene: Scene, turn: Turn) -> Scene:
+def rotated(scene: Scene, rotation: Rotation) -> Scene:
     """A scene turned, or seen in a mirror."""
-    states = np.hstack([scene.states[:, :3] @ turn.T, scene.states[:, 3:] @ turn.T])
-    walls = np.hstack([scene.walls[:, :1], scene.walls[:, 1:] @ turn.T])
-    return Scene(states, walls, turn @ scene.goal, turn @ scene.centre)
+    states = np.hstack([scene.states[:, :3] @ rotation.T, scene.states[:, 3:] @ rotation.T])
+    walls = np.hstack([scene.walls[:, :1], scene.walls[:, 1:] @ rotation.T])
+    return Scene(states, walls, rotation @ scene.goal, rotation @ scene.centre)
 
 
-def shifted(scene: Scene, length: float) -> Scene:
+def translated(scene: Scene, length: float) -> Scene:
     """A scene elsewhere, some lengths (m) away."""
     by = length * np.array([3.7, -1.9, 0.8])
     states = scene.states + np.hstack([by, np.zeros(3)])
     return scene._replace(states=states, centre=scene.centre + by)
 
 
-def in_units(scene: Scene, units: Units) -> Scene:
+def in_units(scene: Scene, units: UnitScale) -> Scene:
     """A scene in other units."""
     states = scene.states * np.repeat([units.metre, units.metre / units.second], 3)
     walls = scene.walls * (units.metre, 1.0, 1.0, 1.0)

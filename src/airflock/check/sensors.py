@@ -6,18 +6,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.given import with_values
-from airflock.check.report import Report, Truths, accepted, reported
-from airflock.check.single import run
-from airflock.check.units import OTHERS, Units, rescaled
-from airflock.core.agent import State
-from airflock.core.parameters import Quantity, choices, declarations
-from airflock.core.rules import law
-from airflock.core.sensing import added, measured
-from airflock.core.sensor import COMPONENTS, Sensor
-from airflock.core.vocabulary import asks
-from airflock.scenarios.families import SENSOR
-from airflock.scenarios.seeds import sound_seed
+from airflock.check.given import parameters_with_values
+from airflock.check.report import Report, TruthTable, require_part, run_truths
+from airflock.check.single import run_in_single_precision
+from airflock.check.units import UNIT_SCALES, UnitScale, rescaled
+from airflock.core import (
+    COMPONENTS,
+    Quantity,
+    Sensor,
+    State,
+    add_errors,
+    argument_names,
+    call_measure,
+    choices,
+    declarations,
+    law,
+)
+from airflock.scenarios import SENSOR_KIND, check_seed
 
 TRACKS, MEASUREMENTS = 8, 60  # random tracks that each truth is tried on, and how often each is measured
 LONG = 3000  # measurements after which an error is still bounded
@@ -25,7 +30,7 @@ CLOSE = 1e-9
 Track = NDArray[np.float64]  # (measurement, component) true position (m) and velocity (m/s)
 
 
-def check_sensor(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
+def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a sensor and return a report with one line a truth.
 
     A track that is shifted is measured shifted; errors stay bounded; where `exact` says so the truth is told; in other
@@ -34,7 +39,7 @@ def check_sensor(what: Any, parameters: Mapping[str, Any] | None = None, *, seed
 
     Parameters
     ----------
-    what : Sensor, module, class, mapping or str
+    sensor : Sensor, module, class, mapping or str
         A sensor: a Sensor, a namespace such as globals(), a name of ours, or a file that ends in .py.
     parameters : mapping, optional
         Values that differ from the defaults, by name.
@@ -59,22 +64,22 @@ def check_sensor(what: Any, parameters: Mapping[str, Any] | None = None, *, seed
     >>> airflock.check_sensor("gnss").broken
     ()
     """
-    found = accepted(SENSOR.given(what))
-    s = with_values(found.Parameters, parameters, "sensors")
+    found = require_part(SENSOR_KIND.from_caller(sensor))
+    s = parameters_with_values(found.Parameters, parameters, "sensors")
     period = s.period or 0.2
-    rng = np.random.default_rng(sound_seed(seed))
+    rng = np.random.default_rng(check_seed(seed))
     tracks = [_track(rng, period) for _ in range(TRACKS)]
     rule = found.measure or found.error
     assert rule is not None
-    truths: Truths = {
-        "rule": ("the rule can be compiled", lambda: "".join(law.faults(rule)[:1])),
+    truths: TruthTable = {
+        "rule": ("the rule can be compiled", lambda: "".join(law.rule_errors(rule)[:1])),
         "place": ("shifting the track shifts the measurements", lambda: _place(found, s, tracks, period, seed)),
         "bounded": ("errors stay finite", lambda: _bounded(found, s, period, seed)),
         "exact": ("where `exact` holds, it measures the true state", lambda: _exact(found, tracks, period, seed)),
         "units": ("in other units of length and time it is the same", lambda: _units(found, s, tracks, period)),
         "single precision": ("the rule does not turn float32 into doubles", lambda: _single(found, s, period)),
     }
-    return reported(f"sensor {found.name}", truths, found.violates)
+    return run_truths(f"sensor {found.name}", truths, found.violates)
 
 
 def _track(rng: np.random.Generator, period: float) -> Track:
@@ -97,11 +102,11 @@ def _believed(found: Sensor, s: Any, track: Track, period: float, seed: int) -> 
     for number, state in enumerate(track):
         draws = _draws(seed, number)
         if found.error is not None:
-            off = added(found, s, off, [draws[f"g{axis}"] for axis in range(3)], period)
+            off = add_errors(found, s, off, [draws[f"g{axis}"] for axis in range(3)], period)
             made[number] = state + np.array(off)
         else:
             true = [float(component) for component in state]
-            made[number], memory = measured(found, s, true, memory, number * period, period, draws)
+            made[number], memory = call_measure(found, s, true, memory, number * period, period, draws)
     return made
 
 
@@ -141,7 +146,7 @@ def _exact(found: Sensor, tracks: list[Track], period: float, seed: int) -> str:
 
 
 def _units(found: Sensor, s: Any, tracks: list[Track], period: float) -> str:
-    for units in OTHERS:
+    for units in UNIT_SCALES:
         scale, other = _scale(units), rescaled(s, units)
         for number, track in enumerate(tracks):
             scaled = _believed(found, other, track * scale, period * units.second, number)
@@ -151,7 +156,7 @@ def _units(found: Sensor, s: Any, tracks: list[Track], period: float) -> str:
     return ""
 
 
-def _scale(units: Units) -> Track:
+def _scale(units: UnitScale) -> Track:
     return np.array([units.metre] * 3 + [units.metre / units.second] * 3)
 
 
@@ -164,5 +169,5 @@ def _single(found: Sensor, s: Any, period: float) -> str:
         given: dict[str, Any] = {**dict(zip(COMPONENTS, (1.0, 2.0, 3.0, 0.5, 0.25, 0.125), strict=True)), **draws}
         given |= {"memory": memory, "time": number * period, "period": period, "s": s}
         given |= {"dx": 0.3, "dv": 0.1, "g": draws["g0"]}
-        run(rule, {"s": choices(s)}, given, asks(rule, kind, found.name))
+        run_in_single_precision(rule, {"s": choices(s)}, given, argument_names(rule, kind, found.name))
     return ""

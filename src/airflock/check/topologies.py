@@ -7,22 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.given import with_values
-from airflock.check.report import Report, Truths, accepted, reported
-from airflock.check.units import OTHERS, rescaled
-from airflock.core.maths import FAR, TINY
-from airflock.core.rules import law
-from airflock.core.topology import Topology
-from airflock.core.vocabulary import answer
-from airflock.parts.topologies.parameters import Parameters as Usual
-from airflock.scenarios.families import TOPOLOGY
-from airflock.scenarios.seeds import sound_seed
+from airflock.check.given import parameters_with_values
+from airflock.check.report import Report, TruthTable, require_part, run_truths
+from airflock.check.units import UNIT_SCALES, rescaled
+from airflock.core import FAR, TINY, Topology, call_rule, law
+from airflock.parts.topologies import Parameters as Usual
+from airflock.scenarios import TOPOLOGY_KIND, check_seed
 
 TRIES = 40  # random flocks that each truth is tried on
 UNHEARD = 0.2  # share of the others that an agent does not hear
 
 
-class Others(NamedTuple):
+class Neighbours(NamedTuple):
     """The others of one agent: offsets (other, axis) m, whether each is heard and hidden, fading of each signal."""
 
     offsets: NDArray[np.float64]
@@ -30,12 +26,12 @@ class Others(NamedTuple):
     hidden: NDArray[np.float64]
     fade: NDArray[np.float64]
 
-    def taken(self, order: Any) -> "Others":
+    def subset(self, order: Any) -> "Neighbours":
         """Some of them, or all in another order."""
-        return Others(*(column[order] for column in self))
+        return Neighbours(*(column[order] for column in self))
 
 
-def check_topology(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
+def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a topology and return a report with one line a truth.
 
     Everybody is met or not, and nobody who is not heard; the order of the others does not matter; turned about the
@@ -44,7 +40,7 @@ def check_topology(what: Any, parameters: Mapping[str, Any] | None = None, *, se
 
     Parameters
     ----------
-    what : Topology, module, class, mapping or str
+    topology : Topology, module, class, mapping or str
         A topology: a Topology, a namespace such as globals(), a name of ours, or a file that ends in .py.
     parameters : mapping, optional
         Values that differ from the defaults, by name.
@@ -69,30 +65,30 @@ def check_topology(what: Any, parameters: Mapping[str, Any] | None = None, *, se
     >>> airflock.check_topology("nearest", {"k": 3}).broken
     ()
     """
-    found = _gathered(what)
-    t = with_values(found.Parameters or Usual, parameters, "topology")
+    found = _gathered(topology)
+    t = parameters_with_values(found.Parameters or Usual, parameters, "topology")
     flocks = list(_flocks(found, seed))
-    truths: Truths = {
-        "rule": ("the rule can be compiled", lambda: "".join(law.faults(found.meet)[:1])),
+    truths: TruthTable = {
+        "rule": ("the rule can be compiled", lambda: "".join(law.rule_errors(found.meet)[:1])),
         "heard": ("each agent is met or not, and none that is not heard", lambda: _heard(found, t, flocks, seed)),
         "order": ("the order of the others does not matter", lambda: _order(found, t, flocks, seed)),
         "turned": ("turned about the vertical it is the same", lambda: _turned(found, t, flocks, seed)),
         "near": ("where it says NEAR, nobody farther matters", lambda: _near(found, t, flocks, seed)),
         "units": ("in another unit of length it is the same", lambda: _units(found, t, flocks, seed)),
     }
-    return reported(f"topology {found.name}", truths, found.violates)
+    return run_truths(f"topology {found.name}", truths, found.violates)
 
 
 def _gathered(what: Any) -> Topology:
-    found, faults = TOPOLOGY.given(what)
+    found, faults = TOPOLOGY_KIND.from_caller(what)
     if found is None and not faults:
         faults = [f"topology {what!r}: agents meet all whom they hear; there is no rule to check"]
-    return accepted((found, faults))
+    return require_part((found, faults))
 
 
-def _flocks(found: Topology, seed: int) -> Iterator[Others]:
+def _flocks(found: Topology, seed: int) -> Iterator[Neighbours]:
     """The others of an agent, at random places and on a lattice, some of them not heard."""
-    rng = np.random.default_rng(sound_seed(seed))
+    rng = np.random.default_rng(check_seed(seed))
     for number in range(TRIES):
         count = int(rng.integers(1, 25))
         offsets = 20.0 * rng.normal(size=(count, 3))
@@ -101,10 +97,10 @@ def _flocks(found: Topology, seed: int) -> Iterator[Others]:
         if found.flat or number % 2:
             offsets[:, 2] = 0.0
         hidden = (rng.random(count) < 0.3).astype(float)
-        yield Others(offsets, rng.random(count) >= UNHEARD, hidden, rng.normal(size=count))
+        yield Neighbours(offsets, rng.random(count) >= UNHEARD, hidden, rng.normal(size=count))
 
 
-def _met(found: Topology, t: Any, others: Others) -> NDArray[np.float64]:
+def _met(found: Topology, t: Any, others: Neighbours) -> NDArray[np.float64]:
     """The row that the rule fills; 2.0 where it fills nothing."""
     count, columns = len(others.offsets), others.offsets.T.tolist()
     squares = (others.offsets**2).sum(axis=1) + TINY
@@ -114,11 +110,11 @@ def _met(found: Topology, t: Any, others: Others) -> NDArray[np.float64]:
         "r2": np.where(others.heard, squares, FAR).tolist(), "hidden": others.hidden.tolist(),
         "fade": others.fade.tolist(), "heap": [FAR] * count, "weak": [FAR] * count,
     }  # fmt: skip
-    answer(found.meet, "meet", given, found.name)
+    call_rule(found.meet, "meet", given, found.name)
     return np.array(met)
 
 
-def _heard(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
+def _heard(found: Topology, t: Any, flocks: list[Neighbours], seed: int) -> str:
     for number, others in enumerate(flocks):
         met = _met(found, t, others)
         if not np.isin(met, (0.0, 1.0)).all():
@@ -128,17 +124,17 @@ def _heard(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
     return ""
 
 
-def _order(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
+def _order(found: Topology, t: Any, flocks: list[Neighbours], seed: int) -> str:
     rng = np.random.default_rng(seed)
     for number, others in enumerate(flocks):
         order = rng.permutation(len(others.offsets))
-        off = np.flatnonzero(_met(found, t, others.taken(order)) != _met(found, t, others)[order])
+        off = np.flatnonzero(_met(found, t, others.subset(order)) != _met(found, t, others)[order])
         if len(off):
             return f"flock {number} of seed {seed}: in another order other agents are met"
     return ""
 
 
-def _turned(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
+def _turned(found: Topology, t: Any, flocks: list[Neighbours], seed: int) -> str:
     for number, others in enumerate(flocks):
         angle = 0.7 + number
         c, s = math.cos(angle), math.sin(angle)
@@ -148,17 +144,17 @@ def _turned(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
     return ""
 
 
-def _near(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
+def _near(found: Topology, t: Any, flocks: list[Neighbours], seed: int) -> str:
     for number, others in enumerate(flocks if found.near else []):
         far = np.linalg.norm(others.offsets, axis=1)
         inside = far <= np.median(far)
-        if (_met(found, t, others.taken(inside)) != _met(found, t, others)[inside]).any():
+        if (_met(found, t, others.subset(inside)) != _met(found, t, others)[inside]).any():
             return f"flock {number} of seed {seed}: without those beyond {np.median(far):.3g} m others are met"
     return ""
 
 
-def _units(found: Topology, t: Any, flocks: list[Others], seed: int) -> str:
-    for units in OTHERS:
+def _units(found: Topology, t: Any, flocks: list[Neighbours], seed: int) -> str:
+    for units in UNIT_SCALES:
         other = rescaled(t, units)
         for number, others in enumerate(flocks):
             scaled = others._replace(offsets=others.offsets * units.metre)

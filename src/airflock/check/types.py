@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError
 
 
 def check_types(files: str | Path | Sequence[str | Path] = (), *, out: str | Path | None = None) -> NoReturn:

@@ -5,7 +5,7 @@ from typing import Any
 from airflock.cli import tables
 
 
-def show(certificate: Any) -> None:
+def print_certificate(certificate: Any) -> None:
     """Print all that it says, and what it does not say."""
     from rich.console import Console
 
@@ -27,7 +27,7 @@ def show(certificate: Any) -> None:
     _map(console, certificate.over)
     for text in certificate.splitting.get("statements", ()):
         line(text)
-    line(f"Not said: {'; '.join(certificate.not_said)}.", style="dim")
+    line(f"Not said: {'; '.join(certificate.disclaimers)}.", style="dim")
 
 
 def _verdicts(console: Any, certificate: Any) -> None:
@@ -35,7 +35,7 @@ def _verdicts(console: Any, certificate: Any) -> None:
     from rich import box
     from rich.table import Table
 
-    from airflock.certificates.certificate import bound
+    from airflock.certificates import upper_bound_in_unit
 
     campaign = certificate.campaign
     sure = f"{100.0 * campaign.confidence:g} %"
@@ -44,8 +44,14 @@ def _verdicts(console: Any, certificate: Any) -> None:
     for name in ("limit", "events", "flights", f"at most ({sure})", "verdict"):
         table.add_column(name, justify="right" if name in ("events", "flights") else "left")
     for verdict in certificate.verdicts:
-        said = "shown" if verdict.shown else "refuted" if verdict.refuted else "not shown"
-        table.add_row(verdict.limit.text, f"{verdict.events:,}", f"{verdict.flights:,}", bound(campaign, verdict), said)
+        said = "shown" if verdict.shown else "refuted" if verdict.is_refuted else "not shown"
+        table.add_row(
+            verdict.limit.text,
+            f"{verdict.events:,}",
+            f"{verdict.flights:,}",
+            upper_bound_in_unit(campaign, verdict),
+            said,
+        )
     console.print(table)
 
 
@@ -55,7 +61,7 @@ def _worst(console: Any, certificate: Any) -> None:
         if entry["limit"] in shown:
             continue
         shown.add(entry["limit"])
-        line = f"worst for {entry['limit']}: {tables.number(entry['value'])}"
+        line = f"worst for {entry['limit']}: {tables.format_number(entry['value'])}"
         moment = f" before {entry['first']:.0f} s" if "first" in entry else ""
         console.print(f"{line}{moment}; {entry['replay']}", highlight=False, markup=False, soft_wrap=True)
 
@@ -77,10 +83,10 @@ def _tolerances(console: Any, tolerance: Any) -> None:
             name, justify="left" if name in ("number", "") else "right", no_wrap=name == "number", overflow="fold"
         )
     for axis in tolerance["axis"]:
-        bad = tables.number(axis["not_shown"]) if "not_shown" in axis else ""
+        bad = tables.format_number(axis["not_shown"]) if "not_shown" in axis else ""
         factor = f"{axis['factor']:.3g}" if "factor" in axis else ""
         table.add_row(
-            axis["key"], tables.number(axis["nominal"]), tables.number(axis["safe"]), factor, bad,
+            axis["key"], tables.format_number(axis["nominal"]), tables.format_number(axis["safe"]), factor, bad,
             f"{axis['flights']:,}", axis.get("note", ""),
         )  # fmt: skip
     console.print(table)

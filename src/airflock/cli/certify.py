@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.cli.progress import counted, line
-from airflock.support.suffixes import PICTURES, SCENARIOS
+from airflock.cli.progress import counting_parts, progress_line
+from airflock.support import PICTURES, SCENARIOS
 
-Where = Annotated[
+ScenarioArgument = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset or a scenario file; with --check a certificate.")
 ]
 Limits = Annotated[
@@ -66,7 +66,7 @@ Device = Annotated[str, typer.Option(help="cpu, or python (not compiled, for deb
 
 def certify(
     ctx: typer.Context,
-    scenario: Where,
+    scenario: ScenarioArgument,
     limit: Limits = None,
     confidence: Annotated[float, typer.Option(help="Confidence that all limits hold together.")] = 0.95,
     budget: Budget = "10min",
@@ -98,71 +98,77 @@ def certify(
 
     Example: airflock certify vasarhelyi_2018/real_6ms --limit "r_min<1 at 0.1/h" --budget 10min --out certificate.toml
     """
-    asked = options.asked(ctx)
+    asked = options.collect_option_errors(ctx)
     if check:
-        asked.refuse()
+        asked.raise_errors()
         others = {
             "--limit": limit, "--flights": flights, "--out": out, "--resume": resume, "--tolerance": tolerance,
             "--tolerance-of": tolerance_of, "--split": split, "--map": over, "--uncertain": uncertain, "--plot": plot,
             "--scheduler": scheduler, "--set": changes, "--law": law, "--agents": agents, "--duration": duration,
         }  # fmt: skip
         left_out = ", ".join(name for name, value in others.items() if value)
-        options.refuse([f"--check: flies again what the certificate holds; leave out {left_out}"] if left_out else [])
+        options.raise_errors(
+            [f"--check: flies again what the certificate holds; leave out {left_out}"] if left_out else []
+        )
         _check(scenario, threads, trust, as_json)
         return
-    from airflock.certificates import request
-    from airflock.certificates.branches import sound_split
-    from airflock.certificates.maps import sound_axes
-    from airflock.cli.sweep import axis
+    from airflock.certificates import check_map_axes, check_split, request
+    from airflock.cli.sweep import parse_axis
 
-    asked.read(options.writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
-    seconds = asked.read(options.time_of, budget)
-    loaded = options.loaded(asked, scenario, options.changed(asked, changes, agents, duration), law, trust=trust)
-    asked.read(request.sound_confidence, confidence)
-    asked.read(request.sound_flights, flights)
-    asked.read(request.sound_flyer, precision, device)
+    asked.read(options.check_writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
+    seconds = asked.read(options.parse_seconds, budget)
+    loaded = options.collect_scenario(
+        asked, scenario, options.collect_settings(asked, changes, agents, duration), law, trust=trust
+    )
+    asked.read(request.check_confidence, confidence)
+    asked.read(request.check_flight_count, flights)
+    asked.read(request.check_flight_options, precision, device)
     how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-    campaign = asked.read(request.campaign_of, loaded, limit or [], confidence, flights, **how)
+    campaign = asked.read(request.campaign_from_request, loaded, limit or [], confidence, flights, **how)
     also: dict[str, Any] = {"split": split, "axes": {}}
     also["keys"] = asked.read(request.tolerance_keys, loaded, tolerance_of or tolerance)
     if split:
-        asked.read(sound_split, campaign)
+        asked.read(check_split, campaign)
     if over:
-        axes = asked.each(partial(axis, option="--map"), over)
-        also["axes"] = asked.read(sound_axes, loaded, asked.read(dict, axes))
-    asked.read(request.sound_workers, timeout, scheduler, device)
+        axes = asked.collect_each(partial(parse_axis, option="--map"), over)
+        also["axes"] = asked.read(check_map_axes, loaded, asked.read(dict, axes))
+    asked.read(request.check_workers, timeout, scheduler, device)
     if resume and out is None:
         asked.note("--resume: name the certificate whose flights are to be continued with --out")
-    asked.refuse()
-    tables.say_notes(campaign.scenario.notes)
+    asked.raise_errors()
+    tables.print_notes(campaign.scenario.notes)
     if scheduler is None:
-        options.compile_first(campaign.flown, precision, device)
+        options.compile_before_bar(campaign.flown, precision, device)
     flying = {"scheduler": scheduler, "threads": threads, "timeout": timeout}
     _end(_flown(campaign, seconds, out, resume, flying, also, quiet=as_json), out, plot, as_json)
 
 
 def _flown(
-    campaign: Any, seconds: float, out: Path | None, resume: bool, flying: dict[str, Any], also: dict[str, Any], *,
+    campaign: Any, seconds: float, out: Path | None, resume: bool, flying: dict[str, Any], extras: dict[str, Any], *,
     quiet: bool,
 ) -> Any:  # fmt: skip
     """Fly a campaign, in the folder beside `out` or one that is gone afterwards; its certificate.
 
     flying : scheduler, threads and timeout; also: what is asked for besides counting
     """
-    from airflock.certificates.campaign import FOLDER
-    from airflock.certificates.executing import executor_for, folder_of, planned
-    from airflock.certificates.run import run
-    from airflock.runs.folder import open_folder
+    from airflock.certificates import (
+        CAMPAIGN_KIND,
+        campaign_executor,
+        flight_folder,
+        run_campaign,
+        with_planned_flights,
+    )
+    from airflock.runs import open_folder
 
-    with folder_of(None if out is None else out.parent / f"{out.stem}_flights") as folder:
-        executor = executor_for(campaign, **flying)
+    with flight_folder(None if out is None else out.parent / f"{out.stem}_flights") as folder:
+        executor = campaign_executor(campaign, **flying)
         try:
-            campaign = planned(campaign, executor, seconds, folder, resume)
-            open_folder(folder, campaign, resume=resume, kind=FOLDER)
-            with counting(quiet) as (watch, note):
-                return run(
-                    campaign, folder, executor, seconds, watch, **also, threads=flying["threads"], note=note,
-                    kept=out is not None,
+            campaign = with_planned_flights(campaign, executor, seconds, folder, resume)
+            open_folder(folder, campaign, resume=resume, kind=CAMPAIGN_KIND)
+            with counting_progress(quiet) as (watch, note):
+                return run_campaign(
+                    campaign, folder, executor, seconds, watch, **extras, threads=flying["threads"], notify=note,
+                    is_stored=out is not None,
                 )  # fmt: skip
         finally:
             executor.close()
@@ -172,27 +178,26 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
     """Write, print, and leave with status 1 where something is not shown."""
     if out is not None:
         result.save(out)
-        tables.say(f"saved {out}")
+        tables.print_message(f"saved {out}")
     if plot is not None:
-        from airflock.view.plots.certificate import certificate
-        from airflock.view.plots.save import save_figure
+        from airflock.view import plot_certificate, save_figure
 
-        save_figure(certificate(result), plot)
-        tables.say(f"saved {plot}")
+        save_figure(plot_certificate(result), plot)
+        tables.print_message(f"saved {plot}")
     if as_json:
-        tables.emit_json({**result.document(), "seconds": result.seconds})
+        tables.print_json({**result.document(), "seconds": result.seconds})
     else:
-        from airflock.cli.certificate import show
+        from airflock.cli.certificate import print_certificate
 
-        show(result)
+        print_certificate(result)
     if not result.shown:
         raise typer.Exit(1)
 
 
 @contextmanager
-def counting(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[str], None]]]:
+def counting_progress(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[str], None]]]:
     """Progress of counting: flights up to the coming look, events so far, flights per second; then what else begins."""
-    with line(quiet) as told:
+    with progress_line(quiet) as told:
 
         def watch(p: Any) -> None:
             events = ", ".join(str(count) for count in p.events)
@@ -203,16 +208,16 @@ def counting(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[str
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
     """Check a certificate; status 1 where it does not hold."""
-    from airflock.certificates.check import check
+    from airflock.certificates import check_certificate
 
-    with counted(f"{path}: flights again", quiet=as_json) as done:
-        result = check(path, threads=threads, trust=trust, done=done)
+    with counting_parts(f"{path}: flights again", quiet=as_json) as done:
+        result = check_certificate(path, threads=threads, trust=trust, on_done=done)
     if as_json:
-        tables.emit_json({"same": result.same, **vars(result)})
+        tables.print_json({"same": result.same, **vars(result)})
     else:
-        tables.say_notes(result.notes)
+        tables.print_notes(result.notes)
         for fault in result.faults:
-            tables.say(f"airflock: {path}: {fault}")
+            tables.print_message(f"airflock: {path}: {fault}")
         said = "same bits, bounds computed again" if result.same else "does not hold"
         typer.echo(f"{path}: {result.flown} of {result.total:,} flights flown again: {said}")
     if not result.same:

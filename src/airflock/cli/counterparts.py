@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 
-class Counterpart(NamedTuple):
+class PythonCounterpart(NamedTuple):
     """One command: how it is called in Python, the function, and option → argument (or what stands for it).
 
     A function without a dot is a public name of `airflock`; the others, with their module, take more preparation.
@@ -18,181 +18,347 @@ class Counterpart(NamedTuple):
     options: Mapping[str, str]
 
 
-SETTINGS = {"changes": "settings", "agents": 'settings["agents"]', "duration": 'settings["duration"]'}
-CODE = {"law": "law", "trust": "trust"}
-LOADED = {"changes": "airflock.load(name, settings)", "agents": "airflock.load", "duration": "airflock.load"}
-LOADED |= {"law": "airflock.load", "trust": "airflock.load"}
-TABLE = {"as_json": "the value returned"}
-SEARCH = (
+SETTINGS_OPTIONS = {"changes": "settings", "agents": 'settings["agents"]', "duration": 'settings["duration"]'}
+CODE_OPTIONS = {"law": "law", "trust": "trust"}
+LOAD_OPTIONS = {"changes": "airflock.load(name, settings)", "agents": "airflock.load", "duration": "airflock.load"}
+LOAD_OPTIONS |= {"law": "airflock.load", "trust": "airflock.load"}
+JSON_OPTIONS = {"as_json": "the value returned"}
+SEARCH_OPTIONS = (
     "algorithm", "population", "generations", "seeds", "seed", "restarts", "flights", "racing", "start", "averages",
 )  # fmt: skip
-SEEDS = {"seeds": "seeds", "first_seed": "seeds"}
-FLOWN = {"threads": "threads", "precision": "precision", "device": "device"}
-MANY = {**FLOWN, "scheduler": "scheduler"}
+SEED_OPTIONS = {"seeds": "seeds", "first_seed": "seeds"}
+FLIGHT_OPTIONS = {"threads": "threads", "precision": "precision", "device": "device"}
+MANY_FLIGHT_OPTIONS = {**FLIGHT_OPTIONS, "scheduler": "scheduler"}
 
-COUNTERPARTS: dict[str, Counterpart] = {
-    "run": Counterpart(
-        "airflock.score(scenario, seeds=4)", "score",
-        {"scenario": "what", **SEEDS, **LOADED, **MANY, **TABLE, "save": "airflock.save", "plot": "airflock.plot"},
-    ),
-    "score": Counterpart(
-        "airflock.score(recording)", "score",
+COUNTERPARTS: dict[str, PythonCounterpart] = {
+    "run": PythonCounterpart(
+        "airflock.score(scenario, seeds=4)",
+        "score",
         {
-            "files": "what", "changes": "settings", "trust": "trust", **TABLE, "series": "airflock.over_time",
-            "aero": "aero", "groups": "groups", "body_length": "body_length",
+            "scenario": "what",
+            **SEED_OPTIONS,
+            **LOAD_OPTIONS,
+            **MANY_FLIGHT_OPTIONS,
+            **JSON_OPTIONS,
+            "save": "airflock.save",
+            "plot": "airflock.plot",
         },
     ),
-    "sweep": Counterpart(
-        'airflock.sweep(scenario, {"radio.delay": [0, 1, 2]})', "sweep",
+    "score": PythonCounterpart(
+        "airflock.score(recording)",
+        "score",
         {
-            "scenario": "what", "over": "over", **SEEDS, **SETTINGS, **CODE, **MANY, **TABLE,
-            "table": "the table returned", "plot": "airflock.plots.heatmap", "show": "a column of the table returned",
+            "files": "what",
+            "changes": "settings",
+            "trust": "trust",
+            **JSON_OPTIONS,
+            "series": "airflock.over_time",
+            "aero": "aero",
+            "groups": "groups",
+            "body_length": "body_length",
         },
     ),
-    "evolve": Counterpart(
-        'airflock.evolve("vasarhelyi_2018/6ms", "study")', "evolve",
+    "sweep": PythonCounterpart(
+        'airflock.sweep(scenario, {"radio.delay": [0, 1, 2]})',
+        "sweep",
         {
-            "scenario": "what", "out": "out", **SETTINGS, **TABLE, "resume": "resume", "scheduler": "scheduler",
-            "timeout": "timeout", "sensitivity": "sensitivity", "device": "device", "threads": "threads",
-            "quiet": "watch", "trust": "trust", "limit": "limit", "fast": "fast",
-            **dict.fromkeys(SEARCH, "search_keys"),
+            "scenario": "what",
+            "over": "over",
+            **SEED_OPTIONS,
+            **SETTINGS_OPTIONS,
+            **CODE_OPTIONS,
+            **MANY_FLIGHT_OPTIONS,
+            **JSON_OPTIONS,
+            "table": "the table returned",
+            "plot": "airflock.plots.heatmap",
+            "show": "a column of the table returned",
         },
     ),
-    "harden": Counterpart(
-        'airflock.harden("study/best.toml", range(100))', "harden",
+    "evolve": PythonCounterpart(
+        'airflock.evolve("vasarhelyi_2018/6ms", "study")',
+        "evolve",
         {
-            "scenario": "scenario", **SEEDS, "cost": "cost", "limit": "limit", "threads": "threads", **TABLE,
-            "changes": LOADED["changes"],
-            "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.search.harden.document",
+            "scenario": "what",
+            "out": "out",
+            **SETTINGS_OPTIONS,
+            **JSON_OPTIONS,
+            "resume": "resume",
+            "scheduler": "scheduler",
+            "timeout": "timeout",
+            "sensitivity": "sensitivity",
+            "device": "device",
+            "threads": "threads",
+            "quiet": "watch",
+            "trust": "trust",
+            "limit": "limit",
+            "fast": "fast",
+            **dict.fromkeys(SEARCH_OPTIONS, "search_keys"),
         },
     ),
-    "certify": Counterpart(
-        'airflock.certify("mine.toml", "r_min<1 at 1e-3/h")', "certify",
+    "harden": PythonCounterpart(
+        'airflock.harden("study/best.toml", range(100))',
+        "harden",
         {
-            "scenario": "scenario", "limit": "limit", "out": "airflock.certificates.certificate.Certificate.save",
-            "tolerance_of": "tolerance", "check": "airflock.certificates.check.check", "changes": "settings", **CODE,
-            "agents": 'settings["agents"]', "duration": 'settings["duration"]', **TABLE,
-            "plot": "airflock.view.plots.certificate.certificate",
+            "scenario": "scenario",
+            **SEED_OPTIONS,
+            "cost": "cost",
+            "limit": "limit",
+            "threads": "threads",
+            **JSON_OPTIONS,
+            "changes": LOAD_OPTIONS["changes"],
+            "trust": "airflock.load",
+            "duration": "airflock.load",
+            "out": "airflock.search.harden.hardened_document",
+        },
+    ),
+    "certify": PythonCounterpart(
+        'airflock.certify("mine.toml", "r_min<1 at 1e-3/h")',
+        "certify",
+        {
+            "scenario": "scenario",
+            "limit": "limit",
+            "out": "airflock.certificates.certificate.Certificate.save",
+            "tolerance_of": "tolerance",
+            "check": "airflock.certificates.check.check_certificate",
+            "changes": "settings",
+            **CODE_OPTIONS,
+            "agents": 'settings["agents"]',
+            "duration": 'settings["duration"]',
+            **JSON_OPTIONS,
+            "plot": "airflock.view.plots.certificate.plot_certificate",
             **{
                 name: name
                 for name in (
-                    "confidence", "budget", "flights", "resume", "tolerance", "split", "over", "uncertain", "scheduler",
-                    "timeout", "threads", "precision", "device",
+                    "confidence",
+                    "budget",
+                    "flights",
+                    "resume",
+                    "tolerance",
+                    "split",
+                    "over",
+                    "uncertain",
+                    "scheduler",
+                    "timeout",
+                    "threads",
+                    "precision",
+                    "device",
                 )
             },
         },
     ),
-    "tune": Counterpart(
-        'airflock.tune("mine.toml", "tuned")', "tune",
+    "tune": PythonCounterpart(
+        'airflock.tune("mine.toml", "tuned")',
+        "tune",
         {
-            "scenario": "scenario", "out": "out", **SETTINGS, **TABLE,
+            "scenario": "scenario",
+            "out": "out",
+            **SETTINGS_OPTIONS,
+            **JSON_OPTIONS,
             **{name: name for name in ("budget", "limit", "confidence", "like", "heard", "warm", "resume")},
-            "threads": "threads", "trust": "trust",
+            "threads": "threads",
+            "trust": "trust",
         },
     ),
-    "plot": Counterpart(
-        'airflock.plot("flight.nc", "series")', "plot",
+    "plot": PythonCounterpart(
+        'airflock.plot("flight.nc", "series")',
+        "plot",
         {
-            "what": "what", "kind": "kind", "seed": "seed", "begin": "start", "end": "stop", **SETTINGS, **CODE,
+            "what": "what",
+            "kind": "kind",
+            "seed": "seed",
+            "begin": "start",
+            "end": "stop",
+            **SETTINGS_OPTIONS,
+            **CODE_OPTIONS,
             "out": "airflock.plots.save_figure",
         },
     ),
-    "video": Counterpart(
-        'airflock.video(recording, "flight.mp4")', "video",
+    "video": PythonCounterpart(
+        'airflock.video(recording, "flight.mp4")',
+        "video",
         {
-            "what": "recording", "out": "path", "seed": "airflock.simulate", "begin": "start", "end": "stop",
-            "fps": "fps", "speed": "speed", "space": "space", "chart": "chart", **LOADED,
+            "what": "recording",
+            "out": "path",
+            "seed": "airflock.simulate",
+            "begin": "start",
+            "end": "stop",
+            "fps": "fps",
+            "speed": "speed",
+            "space": "space",
+            "chart": "chart",
+            **LOAD_OPTIONS,
         },
     ),
-    "watch": Counterpart(
-        'airflock.watch("vasarhelyi_2018/4ms")', "watch",
+    "watch": PythonCounterpart(
+        'airflock.watch("vasarhelyi_2018/4ms")',
+        "watch",
         {
-            "scenario": "scenario", "changes": "settings", "agents": 'settings["agents"]', "seed": "seed",
-            "host": "host", "port": "port", "against": "against", "radio": "radios", "key": "key", **CODE,
+            "scenario": "scenario",
+            "changes": "settings",
+            "agents": 'settings["agents"]',
+            "seed": "seed",
+            "host": "host",
+            "port": "port",
+            "against": "against",
+            "radio": "radios",
+            "key": "key",
+            **CODE_OPTIONS,
         },
     ),
-    "replay": Counterpart(
-        "airflock.replay(recording)", "replay",
+    "replay": PythonCounterpart(
+        "airflock.replay(recording)",
+        "replay",
         {
-            "what": "recording", "page": "airflock.view.replays.Replay.save", "seed": "airflock.simulate", "rate": "rate",
-            "colour": "colour", **LOADED,
+            "what": "recording",
+            "page": "airflock.view.replays.Replay.save",
+            "seed": "airflock.simulate",
+            "rate": "rate",
+            "colour": "colour",
+            **LOAD_OPTIONS,
         },
     ),
-    "display": Counterpart(
-        'airflock.display(["AIR", "heart.png"], 200)', "display",
+    "display": PythonCounterpart(
+        'airflock.display(["AIR", "heart.png"], 200)',
+        "display",
         {
-            "shapes": "shapes", "drones": "drones", "failing": "failing", "failure": "failure", "points": "points",
-            "spacing": "spacing", "seed": "seed", "changes": "settings", **TABLE,
-            "save": "airflock.displays.show.recording_of", "plot": "airflock.plots.stood",
+            "shapes": "shapes",
+            "drones": "drones",
+            "failing": "failing",
+            "failure": "failure",
+            "points": "points",
+            "spacing": "spacing",
+            "seed": "seed",
+            "changes": "settings",
+            **JSON_OPTIONS,
+            "save": "airflock.displays.show.recording_of",
+            "plot": "airflock.plots.stood",
         },
     ),
-    "import": Counterpart(
-        'airflock.load_tracks("fish.csv", unit="mm")', "load_tracks",
+    "import": PythonCounterpart(
+        'airflock.load_tracks("fish.csv", unit="mm")',
+        "load_tracks",
         {
-            "files": "what", "save": "airflock.save", **TABLE,
+            "files": "what",
+            "save": "airflock.save",
+            **JSON_OPTIONS,
             **{
                 name: name
                 for name in (
-                    "map", "unit", "scale", "time_unit", "fps", "keypoint", "axes", "origin", "rate", "bridge",
-                    "begin", "end", "same_clock", "accept", "decimal", "delimiter", "precision",
+                    "map",
+                    "unit",
+                    "scale",
+                    "time_unit",
+                    "fps",
+                    "keypoint",
+                    "axes",
+                    "origin",
+                    "rate",
+                    "bridge",
+                    "begin",
+                    "end",
+                    "same_clock",
+                    "accept",
+                    "decimal",
+                    "delimiter",
+                    "precision",
                 )
             },
         },
     ),
-    "export": Counterpart(
-        'airflock.export(recording, "flight.csv")', "export",
+    "export": PythonCounterpart(
+        'airflock.export(recording, "flight.csv")',
+        "export",
         {"recording": "recording", "out": "path", "layout": "layout"},
     ),
-    "identify": Counterpart(
-        'airflock.identify(files, "vasarhelyi_2018/real_6ms")', "identify",
+    "identify": PythonCounterpart(
+        'airflock.identify(files, "vasarhelyi_2018/real_6ms")',
+        "identify",
         {
-            "files": "what", "like": "like", "heard": "heard", "standing": "standing", "same_clock": "same_clock",
-            "begin": "begin", "end": "end",
-            "accept": "accept", "changes": "airflock.load", **TABLE,
-            "out": "airflock.estimate.identify.run.Identified.document",
-            **dict.fromkeys(("conservative", "uncertain"), "airflock.estimate.identify.run.Identified.document"),
-            "plot": "airflock.view.plots.identified.identified", "plan": "airflock.estimate.identify.plan.flight_card",
-            "flights": "airflock.estimate.identify.check.posterior",
+            "files": "what",
+            "like": "like",
+            "heard": "heard",
+            "standing": "standing",
+            "same_clock": "same_clock",
+            "begin": "begin",
+            "end": "end",
+            "accept": "accept",
+            "changes": "airflock.load",
+            **JSON_OPTIONS,
+            "out": "airflock.estimate.identification.run.Identified.document",
+            **dict.fromkeys(("conservative", "uncertain"), "airflock.estimate.identification.run.Identified.document"),
+            "plot": "airflock.view.plots.identified.plot_identified",
+            "plan": "airflock.estimate.identification.plan.flight_card",
+            "flights": "airflock.estimate.identification.check.check_against_logs",
             **dict.fromkeys(("map", "unit", "time_unit", "axes", "decimal", "delimiter"), "options"),
         },
     ),
-    "infer": Counterpart(
-        'airflock.infer(recording, ["couzin_2002", "vicsek_1995"])', "infer",
+    "infer": PythonCounterpart(
+        'airflock.infer(recording, ["couzin_2002", "vicsek_1995"])',
+        "infer",
         {
-            "tracks": "tracks", "models": "models", "changes": "settings", "flights": "check", "seed": "seed",
-            "trust": "trust", **TABLE, "out": "airflock.estimate.infer.result.Inferred.document",
-            "plot": "airflock.view.plots.inferred.inferred",
+            "tracks": "tracks",
+            "models": "models",
+            "changes": "settings",
+            "flights": "check",
+            "seed": "seed",
+            "trust": "trust",
+            **JSON_OPTIONS,
+            "out": "airflock.estimate.inference.result.Inferred.document",
+            "plot": "airflock.view.plots.inferred.plot_inferred",
         },
     ),
-    "fleet": Counterpart(
-        'airflock.fleet("vasarhelyi_2018/real_4ms", seeds=5)', "fleet",
+    "fleet": PythonCounterpart(
+        'airflock.fleet("vasarhelyi_2018/real_4ms", seeds=5)',
+        "fleet",
         {
-            "scenario": "scenario", **SEEDS, **SETTINGS, "trust": "trust", **TABLE, "against": "beside",
-            "card_file": "card", "save": "the recordings of the value returned",
+            "scenario": "scenario",
+            **SEED_OPTIONS,
+            **SETTINGS_OPTIONS,
+            "trust": "trust",
+            **JSON_OPTIONS,
+            "against": "beside",
+            "card_file": "card",
+            "save": "the recordings of the value returned",
             **{name: name for name in ("vehicle", "body", "mode", "join", "faults", "silence", "ground")},
         },
     ),
-    "fly": Counterpart(  # missions, nodes and orders are commands' work; a program of one's own asks the law
+    "fly": PythonCounterpart(  # missions, nodes and orders are commands' work; a program of one's own asks the law
         "airflock.core.pilot.Pilot(model, p, place, index=0, period=0.2)", "airflock.core.pilot.Pilot", {}
     ),
-    "paper": Counterpart(
-        'airflock.paper("vasarhelyi_2018", only="s2")', "paper",
-        {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads",
-         "breaks": "airflock_papers.breaks.fly", "keep": "airflock_papers.quick.fly", **TABLE},
+    "paper": PythonCounterpart(
+        'airflock.paper("vasarhelyi_2018", only="s2")',
+        "paper",
+        {
+            "name": "name",
+            "only": "only",
+            "quick": "quick",
+            "seeds": "seeds",
+            "threads": "threads",
+            "breaks": "airflock_papers.breaks.fly",
+            "keep": "airflock_papers.quick.fly",
+            **JSON_OPTIONS,
+        },
     ),
-    "presets": Counterpart(
-        "airflock.presets()", "presets",
-        {"name": "airflock.load", "for_speed": "airflock.starting_set", **TABLE},
+    "presets": PythonCounterpart(
+        "airflock.presets()",
+        "presets",
+        {"name": "airflock.load", "for_speed": "airflock.starting_set", **JSON_OPTIONS},
     ),
-    "keys": Counterpart('airflock.keys("radio")', "keys", {"section": "section", **TABLE}),
-    "validate": Counterpart(
-        'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings", **CODE, **TABLE}
+    "keys": PythonCounterpart('airflock.keys("radio")', "keys", {"section": "section", **JSON_OPTIONS}),
+    "validate": PythonCounterpart(
+        'airflock.validate("mine.toml")',
+        "validate",
+        {"files": "name", "changes": "settings", **CODE_OPTIONS, **JSON_OPTIONS},
     ),
-    "types": Counterpart('airflock.check_types("mine.py")', "check_types", {"files": "files", "out": "out", **TABLE}),
-    "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.support.cache.clear_cache"}),
-}  # fmt: skip
+    "types": PythonCounterpart(
+        'airflock.check_types("mine.py")', "check_types", {"files": "files", "out": "out", **JSON_OPTIONS}
+    ),
+    "doctor": PythonCounterpart(
+        "airflock.doctor()", "doctor", {**JSON_OPTIONS, "clear": "airflock.support.cache.clear_cache"}
+    ),
+}
 # public functions that no command needs: they are what a program does between two of them
-LIBRARY = (
+LIBRARY_FUNCTIONS = (
     "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body", "fault",
     "sensor", "radio", "metric", "metric_set", "check_model", "check_body", "check_metric", "check_sensor",
     "check_radio", "check_topology", "quantity", "choice",

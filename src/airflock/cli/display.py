@@ -6,8 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.support.errors import gathering
-from airflock.support.suffixes import PICTURES, RECORDINGS
+from airflock.support import PICTURES, RECORDINGS, collect_errors
 
 
 def display(
@@ -32,34 +31,32 @@ def display(
 
     Example: airflock display AIR FLOCK heart.png --failing 0.1 --plot show.png
     """
-    from airflock.displays.displays import plan
-    from airflock.displays.show import fly_show
+    from airflock.displays import fly_show, plan_shapes
 
     faults: list[str] = []
-    with gathering(faults):
-        options.writable((save, RECORDINGS), (plot, PICTURES), reads=shapes)
+    with collect_errors(faults):
+        options.check_writable((save, RECORDINGS), (plot, PICTURES), reads=shapes)
     settings: dict[str, Any] = {}
-    with gathering(faults):
-        settings = options.settings(changes)
+    with collect_errors(faults):
+        settings = options.parse_settings(changes)
     layouts = []
-    with gathering(faults):
-        layouts = plan(shapes, drones, failing, failure, points, spacing, settings, "--")
-    options.refuse(faults)
+    with collect_errors(faults):
+        layouts = plan_shapes(shapes, drones, failing, failure, points, spacing, settings, "--")
+    options.raise_errors(faults)
     show = fly_show(layouts, drones, failing, failure, seed, settings)
-    rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.formed, strict=True)]
+    rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.shape_reports, strict=True)]
     if save is not None:
-        from airflock.displays.show import recording_of
-        from airflock.recordings.files import save as save_recording
+        from airflock.displays import recording_of
+        from airflock.recordings import save as save_recording
 
-        tables.say(f"saved {save_recording(recording_of(show), save)}")
+        tables.print_message(f"saved {save_recording(recording_of(show), save)}")
     if plot is not None:
-        from airflock.view.plots.display import stood
-        from airflock.view.plots.save import save_figure
+        from airflock.view import save_figure, stood
 
         save_figure(stood(show, shapes), plot)
-        tables.say(f"saved {plot}")
+        tables.print_message(f"saved {plot}")
     if as_json:
-        tables.emit_json({"drones": drones, "failing": failing, "failure": failure, "seed": seed, "shapes": rows})
+        tables.print_json({"drones": drones, "failing": failing, "failure": failure, "seed": seed, "shapes": rows})
         return
     _print(rows)
 
@@ -79,5 +76,5 @@ def _print(rows: list[dict[str, Any]]) -> None:
     for title in names.values():
         table.add_column(title, justify="right", no_wrap=True)
     for row in rows:
-        table.add_row(row["shape"], *(tables.number(float(row[key])) for key in names))
+        table.add_row(row["shape"], *(tables.format_number(float(row[key])) for key in names))
     Console().print(table)

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.cli.progress import searching
-from airflock.support.asked import WRONG, or_else
+from airflock.cli.progress import search_progress
+from airflock.support import INVALID, value_or_default
 
 
 def evolve(
@@ -88,12 +88,17 @@ def evolve(
 
     Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
     """
-    from airflock.runs.executors.cluster import sound_timeout
-    from airflock.runs.folder import open_folder
-    from airflock.search.request import asked_for, sound_device, sound_method
-    from airflock.search.run import executor_for, on_device, run
+    from airflock.runs import check_timeout, open_folder
+    from airflock.search import (
+        check_sensitivity_method,
+        check_study_device,
+        evolve_request,
+        resolve_device,
+        run_study,
+        study_executor,
+    )
 
-    asked = options.asked(ctx)
+    asked = options.collect_option_errors(ctx)
     given = {
         "algorithm": algorithm,
         "population": population,
@@ -107,35 +112,35 @@ def evolve(
         "averages": averages,
     }
     found = asked.read(
-        asked_for,
+        evolve_request,
         scenario,
-        or_else(options.changed(asked, changes, agents, duration), {}),
-        search_keys={key: value for key, value in given.items() if value is not None and value is not WRONG},
+        value_or_default(options.collect_settings(asked, changes, agents, duration), {}),
+        search_keys={key: value for key, value in given.items() if value is not None and value is not INVALID},
         limit=limit or (),
         trust=trust,
         fast=fast,
         folder=out if resume else None,
     )
-    asked.read(sound_method, sensitivity)
-    asked.read(sound_timeout, timeout)
-    asked.read(sound_device, device, scheduler)
-    asked.refuse()
+    asked.read(check_sensitivity_method, sensitivity)
+    asked.read(check_timeout, timeout)
+    asked.read(check_study_device, device, scheduler)
+    asked.raise_errors()
     study, taken = found
-    study = on_device(study, device)
+    study = resolve_device(study, device)
     open_folder(out, study, resume=resume)
-    tables.say_notes(
+    tables.print_notes(
         [*(note for each in study.scenarios for note in each.notes), *study.notes, *([taken] if taken else [])]
     )
     begin = time.perf_counter()
-    executor = executor_for(study, scheduler, threads, timeout)
-    with searching(study, quiet or as_json) as (watch, note):
-        result = run(study, out, executor, watch, note, sensitivity=sensitivity)
+    executor = study_executor(study, scheduler, threads, timeout)
+    with search_progress(study, quiet or as_json) as (watch, note):
+        result = run_study(study, out, executor, watch, note, sensitivity=sensitivity)
     if as_json:
-        tables.emit_json({**result.document(), "folder": str(out), "seconds": time.perf_counter() - begin})
+        tables.print_json({**result.document(), "folder": str(out), "seconds": time.perf_counter() - begin})
     elif not quiet:
         _print(result)
-    if result.dead:
-        tables.say(f"airflock: {result.scenario.name}: {result.dead}")
+    if result.dead_reason:
+        tables.print_message(f"airflock: {result.scenario.name}: {result.dead_reason}")
         raise typer.Exit(1)
 
 
@@ -144,7 +149,7 @@ def _print(result: Any) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from airflock.search.safe import told
+    from airflock.search import limit_report_line
 
     title = f"{result.scenario.name}: {result.fitness:.4f} ± {result.sd:.2g} on {result.seeds} fresh seeds"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
@@ -158,13 +163,13 @@ def _print(result: Any) -> None:
     console.print(table)
     console.print(
         f"95 % interval {result.low:.4f} … {result.high:.4f}; luckiest of the search {result.largest:.4f}; "
-        f"{result.above} of {result.candidates} candidates reach the mean; {result.failed} failed",
+        f"{result.above} of {result.candidate_count} candidates reach the mean; {result.failed} failed",
         highlight=False,
     )
     for entry in result.limits:
-        console.print(told(entry), highlight=False, markup=False, soft_wrap=True)
+        console.print(limit_report_line(entry), highlight=False, markup=False, soft_wrap=True)
     for name, (mean, low, high) in result.scenarios.items():
         console.print(f"in {name}: {mean:.4f} ({low:.4f} … {high:.4f})", highlight=False, markup=False)
-    if result.dead:
+    if result.dead_reason:
         return
     console.print(f"fly it: airflock run {result.folder / 'best.toml'}", highlight=False, markup=False, soft_wrap=True)

@@ -7,10 +7,9 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.support.asked import Asked
-from airflock.support.errors import CardError
+from airflock.support import CardError, ErrorCollector
 
-KILL = "; the motors stop when kill --confirm follows within 5 s"
+KILL_NOTE = "; the motors stop when kill --confirm follows within 5 s"
 
 
 def order(
@@ -30,39 +29,35 @@ def order(
 
     Example: airflock fly order mission.json start --radio 'udp:0.0.0.0:14601>192.168.1.255:14600'
     """
-    from airflock.drones.mavlink import orders
-    from airflock.drones.mavlink.keys import read_key
-    from airflock.drones.mavlink.signing import Signer
-    from airflock.drones.onboard.card import read_card
-    from airflock.drones.onboard.ports import sound_port
+    from airflock.drones import PacketSigner, check_port, orders, read_card, read_key
 
-    asked = Asked()
-    what = orders.Do.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
+    asked = ErrorCollector()
+    what = orders.OrderKind.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
     if what is None or do == "confirm_kill":
         asked.note(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
     if (do == "goto") != (point is not None):
         asked.note("--point LAT,LON,ALT belongs to goto, and goto needs it")
-    where = asked.read(options.place_on_earth, "--point", point) if point else (0.0, 0.0, 0.0)
+    where = asked.read(options.parse_position, "--point", point) if point else (0.0, 0.0, 0.0)
     card = asked.read(read_card, card_file)
-    asked.read(_sound_target, card, target)
+    asked.read(_check_target, card, target)
     if point:
-        asked.read(_within, card, where, point)
+        asked.read(_check_inside_fence, card, where, point)
     key = asked.read(read_key, card_file.with_suffix(".key"))
     private = asked.read(read_key, card_file.with_suffix(".operator"))
-    asked.read(sound_port, radio)
-    asked.refuse()
+    asked.read(check_port, radio)
+    asked.raise_errors()
     assert what is not None
     utc = time.time_ns() // 1000
     place = (round(where[0] * 1e7), round(where[1] * 1e7), round(where[2] * 1e3))
-    command = orders.Order(what, target, card.mission, utc, utc + round(delay * 1e6), place)
-    _send(radio, orders.message(command, private), Signer(key, orders.OPERATOR))
-    effect = KILL if what is orders.Do.KILL else ""
-    tables.say(f"sent {what.name} to {f'drone {target}' if target else 'all'}{effect}")
+    command = orders.OperatorOrder(what, target, card.mission, utc, utc + round(delay * 1e6), place)
+    _send(radio, orders.order_message(command, private), PacketSigner(key, orders.OPERATOR_SYSTEM))
+    effect = KILL_NOTE if what is orders.OrderKind.KILL else ""
+    tables.print_message(f"sent {what.name} to {f'drone {target}' if target else 'all'}{effect}")
 
 
 def _send(radio: str, message: Any, sign: Any) -> None:
     """Send an order five times; raises CardError where the port cannot."""
-    from airflock.drones.onboard.ports import open_port
+    from airflock.drones import open_port
 
     port = open_port(radio)
     try:
@@ -74,19 +69,19 @@ def _send(radio: str, message: Any, sign: Any) -> None:
         port.close()
 
 
-def _sound_target(card: Any, target: int) -> None:
+def _check_target(card: Any, target: int) -> None:
     """Refuse a drone that is no member of the mission."""
     if target and target not in card.members:
         raise CardError([f"--target {target}: the card's members are {', '.join(map(str, card.members))}"])
 
 
-def _within(card: Any, where: tuple[float, float, float], point: str) -> None:
+def _check_inside_fence(card: Any, option: tuple[float, float, float], point: str) -> None:
     """Refuse what no drone would obey: a point outside the card's fence, which they refuse, each by itself."""
-    x, y, z = card.site.local(*where)
+    x, y, z = card.site.local(*option)
     if not card.low <= z <= card.high:
         line = (
             f"--point {point}: lies {z:.4g} m above the site; the fence reaches from {card.low:g} to {card.high:g} m "
-            f"(ALT is above sea level, the site's is {where[2] - z:g} m)"
+            f"(ALT is above sea level, the site's is {option[2] - z:g} m)"
         )
         raise CardError([line])
     far = card.fence.outside(x, y)

@@ -8,15 +8,13 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from airflock.cli import options, tables
-from airflock.support.asked import WRONG, Asked, or_else
-from airflock.support.errors import CardError
-from airflock.support.spelling import meant
+from airflock.support import INVALID, CardError, ErrorCollector, suggest, value_or_default
 
-DATAGRAM = 95  # bytes of a signed status packet
-OVERHEAD = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64
-PREAMBLE = 2e-4  # s of a packet before its first bit; WiFi's long preamble
-NOWHERE = (0.0, 0.0, 0.0)
-SHARE = 0.6  # of the channel's time that a flock may take; our choice: random access breaks down beyond
+DATAGRAM_BYTES = 95  # bytes of a signed status packet
+OVERHEAD_BYTES = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64
+PREAMBLE_SECONDS = 2e-4  # s of a packet before its first bit; WiFi's long preamble
+DEFAULT_SITE = (0.0, 0.0, 0.0)
+MAX_AIRTIME_SHARE = 0.6  # of the channel's time that a flock may take; our choice: random access breaks down beyond
 FAST_BITS, SLOW_BITS = 6e6, 250e3  # bit/s: WiFi's multicast rate as it should be set; IEEE 802.15.4
 
 
@@ -53,43 +51,48 @@ def prepare(
     """
     import secrets
 
-    from airflock.drones.mavlink.orders import new_keys
-    from airflock.drones.onboard.card import card_of, hash_of
-    from airflock.fleets.prepare import MARGIN, beside_the_scenario, card_document, left_off
+    from airflock.drones import card_hash, new_operator_keys, parse_card
+    from airflock.fleets import DEFAULT_FENCE_MARGIN, deviation_notes, make_card_document, omission_notes
 
-    asked = options.asked(ctx)
-    where, systems = asked.read(options.place_on_earth, "--site", site), asked.read(_members, members)
-    asked.read(options.writable, (out, (".json",)))
-    files = Files(out, out.with_suffix(".key"), out.with_suffix(".operator"))
+    asked = options.collect_option_errors(ctx)
+    where, systems = asked.read(options.parse_position, "--site", site), asked.read(_members, members)
+    asked.read(options.check_writable, (out, (".json",)))
+    files = MissionFiles(out, out.with_suffix(".key"), out.with_suffix(".operator"))
     asked.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
-    loaded = options.loaded(asked, scenario, asked.read(options.settings, changes), trust=trust)
+    loaded = options.collect_scenario(asked, scenario, asked.read(options.parse_settings, changes), trust=trust)
     safety = _limits(limits, loaded, asked)
-    private, public = new_keys()
+    private, public = new_operator_keys()
 
     def card_for(scenario: Any) -> dict[str, Any]:
-        made = card_document(
-            scenario, site=or_else(where, NOWHERE), members=or_else(systems, [1]),
-            mission=1 + secrets.randbelow(2**32 - 1), expires=int(time.time() + 3600.0 * or_else(hours, 1.0)),
-            operator=public, autopilot=autopilot, height=or_else(height, None), margin=or_else(margin, MARGIN),
+        made = make_card_document(
+            scenario,
+            site=value_or_default(where, DEFAULT_SITE),
+            members=value_or_default(systems, [1]),
+            mission=1 + secrets.randbelow(2**32 - 1),
+            expires=int(time.time() + 3600.0 * value_or_default(hours, 1.0)),
+            operator=public,
+            autopilot=autopilot,
+            height=value_or_default(height, None),
+            margin=value_or_default(margin, DEFAULT_FENCE_MARGIN),
             safety=safety,
-        )  # fmt: skip
-        card_of({**made, "hash": hash_of(made)}, str(out))
+        )
+        parse_card({**made, "hash": card_hash(made)}, str(out))
         return made
 
     document = asked.read(card_for, loaded)
-    loads = asked.read(_airtimes, systems, document, fast_bits, slow_bits)
-    asked.refuse()
+    loads = asked.read(_check_airtimes, systems, document, fast_bits, slow_bits)
+    asked.raise_errors()
     card = _write_mission(files, document, private)
-    beside = beside_the_scenario(loaded, card.safety, len(card.members))
-    tables.say_notes([*loaded.notes, *left_off(loaded), *beside])
+    beside = deviation_notes(loaded, card.safety, len(card.members))
+    tables.print_notes([*loaded.notes, *omission_notes(loaded), *beside])
     if as_json:
         radio = {each.radio: each.share for each in loads}
-        tables.emit_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})
+        tables.print_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})
     else:
-        _say_prepared(files, card, loads)
+        _print_summary(files, card, loads)
 
 
-class Files(NamedTuple):
+class MissionFiles(NamedTuple):
     """What a preparation writes: the card, the mission's key and the operator's key."""
 
     card: Path
@@ -110,49 +113,49 @@ class Airtime(NamedTuple):
     def fault(self, count: int) -> str:
         """Why so many drones cannot use it, and what helps."""
         return (
-            f"{self.radio} radio: {count} drones would take {self.share:.0%} of its time; at most {SHARE:.0%}: "
+            f"{self.radio} radio: {count} drones would take {self.share:.0%} of its time; "
+            f"at most {MAX_AIRTIME_SHARE:.0%}: "
             f"lower the rate (--limit {self.limit}=...) or raise --{self.radio}-bits"
         )
 
 
-def airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
+def radio_airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
     """What `count` drones take of the fast and the slow radio, from their rates in bit/s and the card's limits."""
     loads = []
     for radio, limit, bits in (("fast", "status_period", fast), ("slow", "slow_period", slow)):
-        packet = PREAMBLE + 8.0 * (DATAGRAM + OVERHEAD) / bits
+        packet = PREAMBLE_SECONDS + 8.0 * (DATAGRAM_BYTES + OVERHEAD_BYTES) / bits
         loads.append(Airtime(radio, limit, count * packet / float(safety[limit])))
     return loads
 
 
-def _airtimes(systems: list[int], document: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
+def _check_airtimes(systems: list[int], document: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
     """What the drones of a card take of their radios. Raises CardError where that is too much."""
-    loads = airtimes(len(systems), document["safety"], fast, slow)
-    if faults := [each.fault(len(systems)) for each in loads if each.share > SHARE]:
+    loads = radio_airtimes(len(systems), document["safety"], fast, slow)
+    if faults := [each.fault(len(systems)) for each in loads if each.share > MAX_AIRTIME_SHARE]:
         raise CardError(faults)
     return loads
 
 
-def _limits(given: list[str] | None, scenario: Any, asked: Asked) -> dict[str, Any]:
+def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> dict[str, Any]:
     """Limits of the card that --limit changes; what is wrong is noted, and left out."""
-    from airflock.core.parameters import declarations
-    from airflock.drones.onboard.safety import Safety
-    from airflock.fleets.prepare import limits_of
+    from airflock.core import declarations
+    from airflock.drones import SafetyLimits
+    from airflock.fleets import default_safety
 
-    known = [name for name, _, _ in declarations(Safety)]
-    safety = or_else(asked.read(options.settings, given, option="--limit"), {})
+    known = [name for name, _, _ in declarations(SafetyLimits)]
+    safety = value_or_default(errors.read(options.parse_settings, pairs, option="--limit"), {})
     wrong = [name for name in safety if name not in known]
-    asked.note(*(f"--limit {name}: is not a limit; {meant(name, known, ', '.join(known))}" for name in wrong))
+    errors.note(*(f"--limit {name}: is not a limit; {suggest(name, known, ', '.join(known))}" for name in wrong))
     safety = {name: value for name, value in safety.items() if name in known}
-    changed = asked.read(lambda flown: replace(limits_of(flown), **safety), scenario)
-    return {} if changed is WRONG else safety
+    changed = errors.read(lambda flown: replace(default_safety(flown), **safety), scenario)
+    return {} if changed is INVALID else safety
 
 
-def _write_mission(files: Files, document: dict[str, Any], private: bytes) -> Any:
+def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes) -> Any:
     """Write card and keys, all of them or none; private: the operator's key. The card that was written."""
     import secrets
 
-    from airflock.drones.mavlink.keys import write_key
-    from airflock.drones.onboard.card import write_card
+    from airflock.drones import write_card, write_key
 
     try:
         card = write_card(files.card, document)
@@ -165,16 +168,16 @@ def _write_mission(files: Files, document: dict[str, Any], private: bytes) -> An
     return card
 
 
-def _say_prepared(files: Files, card: Any, loads: list[Airtime]) -> None:
+def _print_summary(files: MissionFiles, card: Any, loads: list[Airtime]) -> None:
     """Say what was written, how high the drones may fly, and how autopilots have to be set."""
-    tables.say(f"wrote {files.card} (hash {card.hash[:8]}), {files.key}, {files.operator}")
+    tables.print_message(f"wrote {files.card} (hash {card.hash[:8]}), {files.key}, {files.operator}")
     top = card.layer(card.members[-1])
-    tables.say(f"fence {card.low:g} to {card.high:g} m above the site; layers up to {top:g} m")
+    tables.print_message(f"fence {card.low:g} to {card.high:g} m above the site; layers up to {top:g} m")
     for load in loads:
-        tables.say(f"{load.radio} radio: {load.share:.0%} of its time, by an estimate from its bit rate")
-    for guard in card.autopilot.guards:
+        tables.print_message(f"{load.radio} radio: {load.share:.0%} of its time, by an estimate from its bit rate")
+    for guard in card.autopilot.parameter_checks:
         why = guard.reason(card.safety.speed_max, card.safety.response)
-        tables.say(f"set {guard.name} {guard.told()}: {why}")
+        tables.print_message(f"set {guard.name} {guard.told()}: {why}")
 
 
 def _members(text: str) -> list[int]:

@@ -6,12 +6,10 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.cli.progress import counted
-from airflock.support.asked import if_right, or_else
-from airflock.support.errors import ScenarioError
-from airflock.support.suffixes import SCENARIOS
+from airflock.cli.progress import counting_parts
+from airflock.support import SCENARIOS, ScenarioError, invalid_if, value_or_default
 
-NUMBER = 6  # columns that a number takes: a narrow terminal must not cut it off
+NUMBER_WIDTH = 6  # columns that a number takes: a narrow terminal must not cut it off
 
 
 def harden(
@@ -46,47 +44,47 @@ def harden(
 
     Example: airflock harden study --out flyable.toml
     """
-    from airflock.runs.folder import write
-    from airflock.search.harden import MOST, asked_for, document, harden
+    from airflock.runs import write_toml_file
+    from airflock.search import MAX_ROUNDS, harden, hardened_document, hardening_request
 
-    asked = options.asked(ctx)
-    settings = asked.read(options.settings, changes, None, duration)
-    optima = if_right(settings, asked.read(_optima, scenario, or_else(settings, {}), trust))
-    places = asked.read(_places, out, len(or_else(optima, [])), scenario)
-    asked.read(asked_for, optima, or_else(cost, 0.0), limit or ())
-    numbers = asked.read(options.seeds_of, first_seed, seeds)
-    asked.refuse()
-    tables.say_notes(note for each in optima for note in each.notes)
-    with counted(f"{scenario}: flights", MOST * seeds * len(optima), quiet=as_json) as done:
+    asked = options.collect_option_errors(ctx)
+    settings = asked.read(options.parse_settings, changes, None, duration)
+    optima = invalid_if(settings, asked.read(_optima, scenario, value_or_default(settings, {}), trust))
+    places = asked.read(_output_files, out, len(value_or_default(optima, [])), scenario)
+    asked.read(hardening_request, optima, value_or_default(cost, 0.0), limit or ())
+    numbers = asked.read(options.seeds_from, first_seed, seeds)
+    asked.raise_errors()
+    tables.print_notes(note for each in optima for note in each.notes)
+    with counting_parts(f"{scenario}: flights", MAX_ROUNDS * seeds * len(optima), quiet=as_json) as done:
         steps = harden(optima, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
     for each, place in zip(optima, places, strict=True):
-        write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")
+        write_toml_file(place, hardened_document(each, steps[-1]), "Hardened; see airflock harden --help.")
     if as_json:
         rows = [step.as_dict() for step in steps]
-        tables.emit_json({"scenario": optima[0].name, "seeds": seeds, "out": str(out), "steps": rows})
+        tables.print_json({"scenario": optima[0].name, "seeds": seeds, "out": str(out), "steps": rows})
     else:
         _print(optima[0].name, steps, seeds)
-        tables.say(f"saved {', '.join(map(str, places))}")
+        tables.print_message(f"saved {', '.join(map(str, places))}")
     if not steps[-1].kept:
         raise typer.Exit(1)
 
 
-def _places(out: Path, optima: int, where: str) -> list[Path]:
+def _output_files(out: Path, optima: int, where: str) -> list[Path]:
     """Files to write, one for each optimum."""
     places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, optima + 1))]
-    options.writable(*((place, SCENARIOS) for place in places), reads=[where])
+    options.check_writable(*((place, SCENARIOS) for place in places), reads=[where])
     return places
 
 
-def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
+def _optima(source: str, settings: dict[str, Any], trust: bool) -> list[Any]:
     """The optimum, or that of each scenario of a study's folder."""
-    from airflock.scenarios.files import load
-    from airflock.search.result import BEST, further_best
+    from airflock.scenarios import load
+    from airflock.search import BEST_FILE, further_best_files
 
-    folder = Path(where)
-    if folder.is_dir() and not (folder / BEST).is_file():
-        raise ScenarioError([f"{where}: holds no {BEST}: its search is not over, or nothing flies in it"])
-    files = [folder / BEST, *further_best(folder)] if folder.is_dir() else [where]
+    folder = Path(source)
+    if folder.is_dir() and not (folder / BEST_FILE).is_file():
+        raise ScenarioError([f"{source}: holds no {BEST_FILE}: its search is not over, or nothing flies in it"])
+    files = [folder / BEST_FILE, *further_best_files(folder)] if folder.is_dir() else [source]
     return [load(path, settings, trust=trust) for path in files]
 
 
@@ -99,7 +97,7 @@ def _print(name: str, steps: list[Any], seeds: int) -> None:
     table = Table(title=f"{name}: {seeds} paired flights a step", box=box.SIMPLE_HEAD, title_justify="left")
     table.add_column("step")
     for column in ("fitness", "r_min, m", "n_coll", "f_wall", "contacts", "clearance, m"):
-        table.add_column(column, justify="right", min_width=NUMBER)
+        table.add_column(column, justify="right", min_width=NUMBER_WIDTH)
     for step in steps:
         walls = f"{step.parts['f_wall']:.3g}" if "f_wall" in step.parts else ""
         contacts = f"{100.0 * step.contacts:.0f} %" if step.contacts == step.contacts else ""

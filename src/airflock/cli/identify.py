@@ -6,9 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import imports, options, tables
-from airflock.cli.progress import counted
-from airflock.support.errors import AirflockError, gathering
-from airflock.support.suffixes import PICTURES, SCENARIOS
+from airflock.cli.progress import counting_parts
+from airflock.support import PICTURES, SCENARIOS, AirflockError, collect_errors
 
 
 def identify(
@@ -53,27 +52,26 @@ def identify(
 
     Example: airflock identify logs/*.ulg --heard heard.csv --like vasarhelyi_2018/real_6ms --out mine.toml
     """
-    from airflock.estimate.identify.run import identify as find
-    from airflock.estimate.identify.run import read_heard
-    from airflock.recordings.imports.track import Options
-    from airflock.scenarios.files import load
+    from airflock.estimate import identify as find, read_heard
+    from airflock.recordings import ImportOptions
+    from airflock.scenarios import load
 
     faults: list[str] = []
-    with gathering(faults):
-        options.writable((out, SCENARIOS), (plot, PICTURES), reads=[like, heard, *files])
-    with gathering(faults):
-        scenario = load(like, options.settings(changes))
-    with gathering(faults):
-        how = imports.mapped(map)
-    with gathering(faults):
+    with collect_errors(faults):
+        options.check_writable((out, SCENARIOS), (plot, PICTURES), reads=[like, heard, *files])
+    with collect_errors(faults):
+        scenario = load(like, options.parse_settings(changes))
+    with collect_errors(faults):
+        how = imports.parse_mapping(map)
+    with collect_errors(faults):
         ground = _span(standing)
-    with gathering(faults):
+    with collect_errors(faults):
         packets = None if heard is None else read_heard(heard)
     if conservative is not None and not 0.0 < conservative < 1.0:
         faults.append(f"--conservative {conservative:g} lies outside (0, 1); 0.95 is usual")
-    options.refuse(faults)
-    with imports.reading(len(files), as_json) as done:
-        reading = Options(
+    options.raise_errors(faults)
+    with imports.reading_progress(len(files), as_json) as done:
+        reading = ImportOptions(
             map=how, unit=unit, time_unit=time_unit, axes=axes, decimal=decimal, delimiter=delimiter, done=done
         )
         result = find(
@@ -86,21 +84,20 @@ def identify(
         )
     check = _checked(result, flights, as_json)
     if out is not None:
-        from airflock.runs.folder import write
+        from airflock.runs import write_toml_file
 
-        write(out, result.document(conservative, uncertain=uncertain))
-        tables.say(f"saved {out}")
+        write_toml_file(out, result.document(conservative, uncertain=uncertain))
+        tables.print_message(f"saved {out}")
     if plot is not None:
-        from airflock.view.plots.identified import identified
-        from airflock.view.plots.save import save_figure
+        from airflock.view import plot_identified, save_figure
 
-        save_figure(identified(result, check), plot)
-        tables.say(f"saved {plot}")
+        save_figure(plot_identified(result, check), plot)
+        tables.print_message(f"saved {plot}")
     if as_json:
-        tables.emit_json(_plain(result, check))
+        tables.print_json(_json_values(result, check))
         return
     for note in result.notes:
-        tables.say(f"note: {note}")
+        tables.print_message(f"note: {note}")
     _table(result)
     if check is not None:
         _verdicts(check, result, flights)
@@ -123,18 +120,18 @@ def _span(text: str) -> tuple[float, float] | None:
 
 def _checked(result: Any, flights: int, quiet: bool) -> Any:
     """Posterior check, if there is something to check."""
-    from airflock.estimate.identify.check import posterior
+    from airflock.estimate import check_against_logs
 
     if not flights or not result.settings():
         return None
-    with counted("check: flights", flights, quiet=quiet) as done:
-        return posterior(result.scenario(), result.logs, flights, done, comparable=result.comparable)
+    with counting_parts("check: flights", flights, quiet=quiet) as done:
+        return check_against_logs(result.scenario(), result.logs, flights, done, comparable=result.has_one_clock)
 
 
 def _table(result: Any) -> None:
     from rich.console import Console
 
-    from airflock.estimate.identify.numbers import NEVER_TOLD
+    from airflock.estimate import UNIDENTIFIABLE
 
     console = Console()
     if result.settings():
@@ -146,7 +143,7 @@ def _table(result: Any) -> None:
         )
     for line in _reasons(result):
         console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
-    for key, reason in NEVER_TOLD.items():
+    for key, reason in UNIDENTIFIABLE.items():
         console.print(f"  {key}: {reason}", highlight=False, markup=False, soft_wrap=True)
 
 
@@ -164,7 +161,7 @@ def _numbers_table(result: Any) -> Any:
     from rich import box
     from rich.table import Table
 
-    from airflock.estimate.identify.numbers import UNITS
+    from airflock.estimate import KEY_UNITS
 
     table = Table(
         title=f"{result.logs.drones} drones, like {result.like.name}", box=box.SIMPLE_HEAD, title_justify="left"
@@ -175,10 +172,10 @@ def _numbers_table(result: Any) -> Any:
     table.add_column("from")
     for key, number in result.numbers.items():
         if number.told:
-            like = "" if number.like is None else tables.number(number.like)
+            like = "" if number.like is None else tables.format_number(number.like)
             span = f"{number.low:.3g} to {number.high:.3g}"
-            unit = UNITS[key] if UNITS[key] != "1" else ""
-            table.add_row(key, tables.number(number.value), span, unit, like, number.origin)
+            unit = KEY_UNITS[key] if KEY_UNITS[key] != "1" else ""
+            table.add_row(key, tables.format_number(number.value), span, unit, like, number.origin)
     return table
 
 
@@ -189,16 +186,16 @@ def _verdicts(check: Any, result: Any, flights: int) -> None:
     console.print(f"check: {flights} flights of the identified scenario against the log")
     for name, (own, low, high) in check.found.items():
         verdict = "ok" if low <= own <= high else "OUTSIDE: not explained"
-        line = f"  {name} {tables.number(own)} in [{low:.4g}, {high:.4g}] {verdict}"
+        line = f"  {name} {tables.format_number(own)} in [{low:.4g}, {high:.4g}] {verdict}"
         console.print(line, highlight=False, markup=False)
-    if not result.comparable:
+    if not result.has_one_clock:
         console.print("  distances are left out: it is not known whether the clocks agree (--same-clock)")
 
 
 def _card(result: Any) -> None:
     from rich.console import Console
 
-    from airflock.estimate.identify.plan import flight_card
+    from airflock.estimate import flight_card
 
     console = Console()
     card = flight_card(result.like)
@@ -207,11 +204,11 @@ def _card(result: Any) -> None:
         lacking = [key for key in part.keys if key not in result.numbers or not result.numbers[key].told]
         need = f"for {', '.join(lacking)}" if lacking else "all told already"
         console.print(f"{number}. {part.title}, {part.seconds:.0f} s ({need})", highlight=False, markup=False)
-        console.print(f"   {part.how}", highlight=False, markup=False)
+        console.print(f"   {part.instructions}", highlight=False, markup=False)
 
 
-def _plain(result: Any, check: Any) -> dict[str, Any]:
-    from airflock.estimate.identify.plan import flight_card
+def _json_values(result: Any, check: Any) -> dict[str, Any]:
+    from airflock.estimate import flight_card
 
     numbers = {
         key: {"like": n.like, "from": n.origin, "reason": n.reason}

@@ -7,9 +7,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.cli.progress import counted
-from airflock.support.errors import RecordingError, gathering
-from airflock.support.suffixes import RECORDINGS
+from airflock.cli.progress import counting_parts
+from airflock.support import RECORDINGS, RecordingError, collect_errors
 
 Files = Annotated[
     list[Path],
@@ -43,7 +42,7 @@ Decimal = Annotated[str, typer.Option(help="Decimal point of a text file: . or ,
 Delimiter = Annotated[str, typer.Option(help="Separator between columns of a text file.", show_default="detected")]
 
 
-def mapped(pairs: list[str] | None) -> dict[str, str]:
+def parse_mapping(pairs: list[str] | None) -> dict[str, str]:
     """Targets and expressions of --map; := and = are the same."""
     columns: dict[str, str] = {}
     faults = []
@@ -96,19 +95,18 @@ def import_tracks(
 
     Example: airflock import drone*.csv --map t:=time_us*1e-6 --map x:=pos_e --map y:=pos_n --map id:=file --same-clock
     """
-    from airflock.recordings.files import save as save_recording
-    from airflock.recordings.imports.load import load_tracks
+    from airflock.recordings import load_tracks, save as save_recording
 
     faults: list[str] = []
-    with gathering(faults):
-        options.writable((save, RECORDINGS), reads=files)
-    with gathering(faults):
-        how = mapped(map)
-    with gathering(faults):
+    with collect_errors(faults):
+        options.check_writable((save, RECORDINGS), reads=files)
+    with collect_errors(faults):
+        how = parse_mapping(map)
+    with collect_errors(faults):
         place = _origin(origin)
-    options.refuse(faults)
+    options.raise_errors(faults)
     notes: list[str] = []
-    with reading(len(files), as_json) as done:
+    with reading_progress(len(files), as_json) as done:
         recording = load_tracks(
             files, map=how, unit=unit, scale=scale, time_unit=time_unit, fps=fps, keypoint=keypoint, axes=axes,
             origin=place, rate=rate, bridge=bridge, begin=begin, end=end, same_clock=same_clock,
@@ -118,20 +116,20 @@ def import_tracks(
     save_recording(recording, save)
     if as_json:
         sizes = {str(name): int(size) for name, size in recording.sizes.items()}
-        tables.emit_json({"saved": str(save), "sizes": sizes, "fps": recording.attrs["fps"], "notes": notes})
+        tables.print_json({"saved": str(save), "sizes": sizes, "fps": recording.attrs["fps"], "notes": notes})
         return
     for note in notes:
-        tables.say(f"note: {note}")
-    tables.say(f"saved {save}")
+        tables.print_message(f"note: {note}")
+    tables.print_message(f"saved {save}")
 
 
-def reading(files: int, quiet: bool) -> Any:
+def reading_progress(files: int, quiet: bool) -> Any:
     """A bar that follows the share of each file that has been read."""
     from contextlib import contextmanager
 
     @contextmanager
     def shown() -> Any:
-        with counted("reading", 100 * files, quiet=quiet) as step:
+        with counting_parts("reading", 100 * files, quiet=quiet) as step:
             state = {"file": 0, "share": 0.0, "told": 0}
 
             def done(share: float) -> None:
@@ -162,7 +160,7 @@ def _origin(text: str) -> tuple[float, float, float] | None:
     return numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0
 
 
-class Layout(StrEnum):
+class ExportLayout(StrEnum):
     """Names of the dimensions of netCDF, or fields of a table."""
 
     MOVEMENT = "movement"
@@ -174,18 +172,16 @@ def export(
     recording: Annotated[Path, typer.Argument(metavar="FILE.nc", help="A recording.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help=".csv, .parquet or .nc (movement).")],
     layout: Annotated[
-        Layout, typer.Option(help="For .nc: for current movement, or up to 0.16; for .csv: as a PX4 log.")
-    ] = Layout.MOVEMENT,
+        ExportLayout, typer.Option(help="For .nc: for current movement, or up to 0.16; for .csv: as a PX4 log.")
+    ] = ExportLayout.MOVEMENT,
 ) -> None:
     """Write a recording for other tools: a long table with units in its headers, or a dataset of movement.
 
     Example: airflock export flight.nc --out flight.csv
     """
-    from airflock.recordings.exports.export import ENDINGS
-    from airflock.recordings.exports.export import export as write
-    from airflock.recordings.files import load_recording
+    from airflock.recordings import SUFFIXES, export as write, load_recording
 
-    options.writable((out, ENDINGS), reads=[recording])
+    options.check_writable((out, SUFFIXES), reads=[recording])
     write(load_recording(recording), out, layout=layout.value)
-    ned = "; x is north, as in PX4: airflock import --axes ned reads it" if layout is Layout.PX4 else ""
-    tables.say(f"saved {out}{ned}")
+    ned = "; x is north, as in PX4: airflock import --axes ned reads it" if layout is ExportLayout.PX4 else ""
+    tables.print_message(f"saved {out}{ned}")

@@ -8,11 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.cli.progress import line
-from airflock.support.errors import AirflockError, gathering
-from airflock.support.suffixes import PICTURES, SCENARIOS
+from airflock.cli.progress import progress_line
+from airflock.support import PICTURES, SCENARIOS, AirflockError, collect_errors
 
-LAWS = "couzin_2002,reynolds_1987,vicsek_1995,vasarhelyi_2018"
+DEFAULT_LAWS = "couzin_2002,reynolds_1987,vicsek_1995,vasarhelyi_2018"
 Tracks = Annotated[
     list[Path],
     typer.Argument(
@@ -31,7 +30,7 @@ def infer(
             metavar="LAW,FILE,...",
             help="Laws by name, presets, scenario files, or files with laws of your own.",
         ),
-    ] = LAWS,
+    ] = DEFAULT_LAWS,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE.toml", help="Scenario to write, with the law found.")
     ] = None,
@@ -51,34 +50,33 @@ def infer(
 
     Example: airflock infer fish.nc --models couzin_2002,reynolds_1987,vicsek_1995 --out best.toml --plot forces.png
     """
-    from airflock.estimate.infer.run import infer as find
+    from airflock.estimate import infer as find
 
     faults: list[str] = []
-    with gathering(faults):
-        options.writable((out, SCENARIOS), (plot, PICTURES), reads=[*models.split(","), *tracks])
+    with collect_errors(faults):
+        options.check_writable((out, SCENARIOS), (plot, PICTURES), reads=[*models.split(","), *tracks])
     settings: dict[str, Any] = {}
-    with gathering(faults):
-        settings = options.settings(changes)
+    with collect_errors(faults):
+        settings = options.parse_settings(changes)
     laws = [name.strip() for name in models.split(",") if name.strip()]
     if not laws:
         faults.append("--models names no law; write for instance --models couzin_2002,vicsek_1995")
     faults += [f"{path}: no such file" for path in tracks if not path.exists()]
-    options.refuse(faults)
-    with _telling(as_json) as done:
+    options.raise_errors(faults)
+    with _fit_progress(as_json) as done:
         result = find(tracks, laws, settings=settings, check=flights, seed=seed, trust=trust, done=done)
     if plot is not None:
-        from airflock.view.plots.inferred import inferred
-        from airflock.view.plots.save import save_figure
+        from airflock.view import plot_inferred, save_figure
 
-        save_figure(inferred(result), plot)
-        tables.say(f"saved {plot}")
+        save_figure(plot_inferred(result), plot)
+        tables.print_message(f"saved {plot}")
     if out is not None and result.best is not None:
-        from airflock.runs.folder import write
+        from airflock.runs import write_toml_file
 
-        write(out, result.document())
-        tables.say(f"saved {out}")
+        write_toml_file(out, result.document())
+        tables.print_message(f"saved {out}")
     if as_json:
-        tables.emit_json(_plain(result))
+        tables.print_json(_json_values(result))
         return
     _table(result)
     if result.best is not None:
@@ -89,9 +87,9 @@ def infer(
 
 
 @contextmanager
-def _telling(quiet: bool) -> Iterator[Callable[[str], None]]:
+def _fit_progress(quiet: bool) -> Iterator[Callable[[str], None]]:
     """Progress: which law is fitted, and how many steps that took so far."""
-    with line(quiet) as told:
+    with progress_line(quiet) as told:
         told.update("reading")
         steps: dict[str, int] = {}
 
@@ -108,7 +106,7 @@ def _table(result: Any) -> None:
     from rich.table import Table
 
     fitted, every = result.fitted
-    title = f"{result.individuals} individuals, {result.steps} steps; fitted on {fitted} of {every} frames"
+    title = f"{result.individual_count} individuals, {result.steps} steps; fitted on {fitted} of {every} frames"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("law", "gain", "ahead", "AIC", "in 95 %", "left over", "numbers"):
         table.add_column(name, justify="left" if name == "law" else "right", no_wrap=True)
@@ -131,15 +129,15 @@ def _numbers(result: Any) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from airflock.estimate.infer.result import between
+    from airflock.estimate import ends_text
 
     table = Table(title=f"numbers of {result.best.name}", box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("number", "value", "unit", "95 % for it alone", "95 % for all together"):
         table.add_column(name, justify="right" if name == "value" else "left", no_wrap=True)
     for key, number in result.best.numbers.items():
         table.add_row(
-            key, f"{number.value:.4g}", "" if number.unit == "1" else number.unit, between(number.low, number.high),
-            between(number.least, number.most),
+            key, f"{number.value:.4g}", "" if number.unit == "1" else number.unit, ends_text(number.low, number.high),
+            ends_text(number.least, number.most),
         )  # fmt: skip
     console = Console()
     console.print(table)
@@ -158,7 +156,7 @@ def _check(result: Any) -> None:
         console.print(f"  {name} {own:.4g} in [{low:.4g}, {high:.4g}] {verdict}", highlight=False, markup=False)
 
 
-def _plain(result: Any) -> dict[str, Any]:
+def _json_values(result: Any) -> dict[str, Any]:
     """What was found as plain values."""
     laws = [
         {name: getattr(law, name) for name in ("name", "gain", "error", "ahead", "criterion", "inside", "missed")}

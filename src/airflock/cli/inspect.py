@@ -6,8 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.support.errors import AirflockError, gathering
-from airflock.support.untrusted import from_outside, is_file, read_text
+from airflock.support import AirflockError, as_error, collect_errors, is_file, read_text
 
 
 def presets(
@@ -27,20 +26,20 @@ def presets(
 
     known = files.presets()
     if for_speed is not None:
-        from airflock.scenarios.scaling import starting_set
+        from airflock.scenarios import starting_set
 
         _show(starting_set(for_speed), as_json)
         return
     if name is not None:
         if name not in known and not is_file(name):
             files.load(name)  # complains about a wrong name
-        with from_outside(name):
+        with as_error(name):
             text = read_text(known.get(name) or name)
         _show(text, as_json and bool(files.load(name)))  # a file that is none is refused as any other
         return
     titles = {key: str(files.load(key).document.get("title", "")) for key in known}
     if as_json:
-        tables.emit_json(titles)
+        tables.print_json(titles)
         return
     width = max(len(key) for key in titles)
     for key, title in titles.items():
@@ -50,7 +49,7 @@ def presets(
 def _show(text: str, as_json: bool) -> None:
     """Print a scenario as it is written, or as one JSON object."""
     if as_json:
-        tables.emit_json(tomllib.loads(text))
+        tables.print_json(tomllib.loads(text))
     else:
         typer.echo(text, nl=False)
 
@@ -70,31 +69,31 @@ def validate(
 
     Example: airflock validate mine.toml
     """
-    changed = options.settings(changes)
+    changed = options.parse_settings(changes)
     checked = []
     for name in files:
         entry = _checked(name, changed, law, trust)
         checked.append(entry)
         if not as_json and entry["verdict"] is not None:
             for note in entry["notes"]:
-                tables.say(f"note: {name}: {note}")
+                tables.print_message(f"note: {name}: {note}")
             typer.echo(f"{name}: {entry['verdict']}")
     faults = [fault for entry in checked for fault in entry["faults"]]
     if not as_json:
-        options.refuse(faults)
+        options.raise_errors(faults)
         return
-    tables.emit_json({"files": checked})
+    tables.print_json({"files": checked})
     if faults:
         raise typer.Exit(2)
 
 
 def _checked(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> dict[str, Any]:
     """Verdict, notes and faults of one file; each fault begins with its name."""
-    from airflock.search.validation import Valid, validate
+    from airflock.search import ValidationReport, validate
 
     found: list[str] = []
-    valid: Valid | None = None
-    with gathering(found):
+    valid: ValidationReport | None = None
+    with collect_errors(found):
         valid = validate(name, changed, law, trust=trust)
     faults = [fault if name in fault else f"{name}: {fault}" for fault in found]
     return {
@@ -114,19 +113,21 @@ def doctor(
     Example: airflock doctor
     """
     if clear:
-        from airflock.support.cache import clear_cache, usual_folder
+        from airflock.support import clear_cache, default_cache_folder
 
         count, size = clear_cache()
         if as_json:
-            tables.emit_json({"cache": str(usual_folder()), "removed": count, "freed_mb": round(size / 1e6, 1)})
+            tables.print_json(
+                {"cache": str(default_cache_folder()), "removed": count, "freed_mb": round(size / 1e6, 1)}
+            )
         else:
-            typer.echo(f"{usual_folder()}: {count} drivers removed, {size / 1e6:.1f} MB")
+            typer.echo(f"{default_cache_folder()}: {count} drivers removed, {size / 1e6:.1f} MB")
         return
-    from airflock.recordings.health import doctor as examine
+    from airflock.recordings import doctor as examine
 
     found = examine()
     if as_json:
-        tables.emit_json(found)
+        tables.print_json(found)
     else:
         for key, text in found.items():
             typer.echo(f"{key:<16} {text}")

@@ -7,7 +7,7 @@ import typer
 from airflock.cli import options, tables
 
 if TYPE_CHECKING:
-    from airflock.scenarios.keys import Key
+    from airflock.scenarios import Key
 
 
 def keys(
@@ -29,7 +29,7 @@ def keys(
 
     listed_keys = known.keys(section)
     if as_json:
-        tables.emit_json([{**key._asdict(), "options": list(key.options)} for key in listed_keys])
+        tables.print_json([{**key._asdict(), "options": list(key.options)} for key in listed_keys])
         return
     if section is None:
         width = max(map(len, known.sections()))

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.cli.progress import counted
-from airflock.support.suffixes import PAGES, PICTURES, VIDEOS
+from airflock.cli.progress import counting_parts
+from airflock.support import PAGES, PICTURES, VIDEOS
 
 
-class Kind(StrEnum):
+class PictureKind(StrEnum):
     """What to draw."""
 
     TRAJECTORIES = "trajectories"
@@ -34,7 +34,7 @@ End = Annotated[float | None, typer.Option(help="Last instant shown, s.", show_d
 
 def plot(
     what: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")],
-    kind: Annotated[Kind, typer.Option(help="What to draw.")] = Kind.TRAJECTORIES,
+    kind: Annotated[PictureKind, typer.Option(help="What to draw.")] = PictureKind.TRAJECTORIES,
     out: Out = Path("flight.png"),
     seed: Seed = 0,
     begin: Begin = None,
@@ -52,25 +52,26 @@ def plot(
 
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """
-    options.writable((out, PICTURES))
-    from airflock.scenarios.files import load
-    from airflock.view.plots.picture import plot as picture
-    from airflock.view.plots.save import save_figure
+    options.check_writable((out, PICTURES))
+    from airflock.scenarios import load
+    from airflock.view import plot as picture, save_figure
 
-    settings = options.settings(changes, agents, duration)
+    settings = options.parse_settings(changes, agents, duration)
     window: dict[str, Any] = {"start": begin, "stop": end}
     if what.lower().endswith(".nc"):
         figure = picture(what, kind, settings=settings, law=law, trust=trust, **window)
     else:
         scenario = load(what, settings, law, trust=trust)
-        tables.say_notes(scenario.notes)
+        tables.print_notes(scenario.notes)
         figure = picture(scenario, kind, seed=seed, **window)
     save_figure(figure, out)
-    tables.say(f"saved {out}")
+    tables.print_message(f"saved {out}")
 
 
 def video(
-    what: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")],
+    source: Annotated[
+        str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")
+    ],
     out: Out = Path("flight.mp4"),
     seed: Seed = 0,
     begin: Begin = None,
@@ -97,31 +98,37 @@ def video(
 
     Example: airflock video kidger/city --duration 60 --speed 2 --space --chart flocked --out flight.mp4
     """
-    options.writable((out, VIDEOS))
-    from airflock.recordings.scores import courses
-    from airflock.scenarios.files import load
-    from airflock.view.plots.film_stage import check_chart
-    from airflock.view.plots.picture import flight_of, named
-    from airflock.view.plots.video import ffmpeg, frame_count
-    from airflock.view.plots.video import video as make_video
+    options.check_writable((out, VIDEOS))
+    from airflock.recordings import time_series_names
+    from airflock.scenarios import load
+    from airflock.view import (
+        check_chart,
+        frame_count,
+        import_ffmpeg,
+        naming_file,
+        recording_or_flight,
+        video as make_video,
+    )
 
-    settings = options.settings(changes, agents, duration)
-    ffmpeg()  # before anything flies, as all that can be refused
-    if what.lower().endswith(".nc"):
-        recording = flight_of(what, seed, settings, law, trust=trust)
+    settings = options.parse_settings(changes, agents, duration)
+    import_ffmpeg()  # before anything flies, as all that can be refused
+    if source.lower().endswith(".nc"):
+        recording = recording_or_flight(source, seed, settings, law, trust=trust)
     else:
-        scenario = load(what, settings, law, trust=trust)
-        tables.say_notes(scenario.notes)
-        check_chart(chart, courses(scenario) if chart else [], scenario.name)
-        recording = flight_of(scenario, seed)
+        scenario = load(source, settings, law, trust=trust)
+        tables.print_notes(scenario.notes)
+        check_chart(chart, time_series_names(scenario) if chart else [], scenario.name)
+        recording = recording_or_flight(scenario, seed)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
-    with named(what), counted("pictures", frame_count(recording, **choice)) as done:
+    with naming_file(source), counting_parts("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, space=space, chart=chart, **choice)
-    tables.say(f"saved {out}")
+    tables.print_message(f"saved {out}")
 
 
 def replay(
-    what: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")],
+    source: Annotated[
+        str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")
+    ],
     page: Annotated[Path, typer.Option("--html", "--out", "-o", metavar="FILE.html", help="File to write.")] = Path(
         "flight.html"
     ),
@@ -140,21 +147,19 @@ def replay(
 
     Example: airflock replay flight.nc --html show.html --colour cluster
     """
-    options.writable((page, PAGES))
-    from airflock.scenarios.files import load
-    from airflock.view.plots.picture import flight_of, named
-    from airflock.view.replays import check_colour
-    from airflock.view.replays import replay as make_replay
+    options.check_writable((page, PAGES))
+    from airflock.scenarios import load
+    from airflock.view import check_colour, naming_file, recording_or_flight, replay as make_replay
 
-    settings = options.settings(changes, agents, duration)
-    if what.lower().endswith(".nc"):
-        recording = flight_of(what, seed, settings, law, trust=trust)
+    settings = options.parse_settings(changes, agents, duration)
+    if source.lower().endswith(".nc"):
+        recording = recording_or_flight(source, seed, settings, law, trust=trust)
     else:
-        scenario = load(what, settings, law, trust=trust)
-        tables.say_notes(scenario.notes)
+        scenario = load(source, settings, law, trust=trust)
+        tables.print_notes(scenario.notes)
         check_colour(scenario, colour)
-        recording = flight_of(scenario, seed)
-    with named(what):
+        recording = recording_or_flight(scenario, seed)
+    with naming_file(source):
         replay_page = make_replay(recording, rate=rate, colour=colour)
     replay_page.save(page)
-    tables.say(f"saved {page} ({len(replay_page.text) / 1e6:.1f} MB)")
+    tables.print_message(f"saved {page} ({len(replay_page.text) / 1e6:.1f} MB)")

@@ -37,20 +37,20 @@ from airflock.cli import (
     types,
     watch,
 )
-from airflock.cli.usage import at_home, usage_fault
-from airflock.cli.verb import Verb
-from airflock.support.errors import AirflockError, bounded, bounded_lines, printable, reason
+from airflock.cli.usage import expand_home, usage_error
+from airflock.cli.verb import VerbCommand
+from airflock.support import AirflockError, os_error_message, printable, shortened, shortened_lines
 
-HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
+PROGRAM_HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
 
 Try [bold]airflock run vasarhelyi_2018/4ms[/bold]. Every verb has --help with an example.
 """
 
 
-MOMENT = 0.05  # s
+INTERRUPT_DELAY = 0.05  # s
 
 
-class Verbs(TyperGroup):
+class VerbGroup(TyperGroup):
     """The verbs; a wrong command line and Ctrl-C end like any other fault, with one line and status 2."""
 
     def main(
@@ -63,7 +63,7 @@ class Verbs(TyperGroup):
         **extra: Any,
     ) -> Any:
         """Run a command line; raise an AirflockError where it is wrong."""
-        words = [at_home(word) for word in (sys.argv[1:] if args is None else args)]
+        words = [expand_home(word) for word in (sys.argv[1:] if args is None else args)]
         try:
             result = super().main(words, prog_name, complete_var, False, windows_expand_args, **extra)
         except typer.Abort as stop:
@@ -74,7 +74,7 @@ class Verbs(TyperGroup):
             if type(fault).__name__ == "NoArgsIsHelpError":
                 fault.show()  # type: ignore[attr-defined]
                 sys.exit(2)
-            raise AirflockError(usage_fault(fault, words)) from fault
+            raise AirflockError(usage_error(fault, words)) from fault
         return sys.exit(result if isinstance(result, int) else 0) if standalone_mode else result
 
     def invoke(self, ctx: Any) -> Any:
@@ -88,14 +88,14 @@ class Verbs(TyperGroup):
 
 
 app = typer.Typer(
-    cls=Verbs,
-    help=HELP,
+    cls=VerbGroup,
+    help=PROGRAM_HELP,
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
+VERBS_BY_PANEL: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Fly, measure, look": {
         "run": run.run, "watch": watch.watch, "plot": look.plot, "video": look.video, "replay": look.replay,
         "score": run.score, "sweep": sweep.sweep, "display": display.display,
@@ -114,22 +114,22 @@ PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "paper": paper.paper, "doctor": inspect.doctor,
     },
 }  # fmt: skip
-for _panel, _verbs in PANELS.items():
+for _panel, _verbs in VERBS_BY_PANEL.items():
     for _name, _verb in _verbs.items():
         if isinstance(_verb, typer.Typer):
             app.add_typer(_verb, name=_name, rich_help_panel=_panel)
         else:
-            app.command(_name, cls=Verb, rich_help_panel=_panel)(_verb)
+            app.command(_name, cls=VerbCommand, rich_help_panel=_panel)(_verb)
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(is_requested: bool) -> None:
+    if is_requested:
         typer.echo(f"airflock {__version__}")
         raise typer.Exit
 
 
 @app.callback()
-def _options(
+def _root_callback(
     version: bool = typer.Option(
         False, "--version", callback=_version, is_eager=True, help="Show the version and stop."
     ),
@@ -140,10 +140,10 @@ def _options(
 def main() -> None:
     """Run the command; bad input ends with one line per fault and exit status 2, and so does SIGTERM."""
     if threading.current_thread() is threading.main_thread():  # only there are signals heard
-        signal.signal(signal.SIGTERM, _stop)
-        sys.unraisablehook = _again
+        signal.signal(signal.SIGTERM, _on_sigterm)
+        sys.unraisablehook = _repeat_interrupt
     atexit.register(gc.freeze)  # a last look for garbage among what a compiler leaves takes 0.6 s
-    warnings.showwarning = _note
+    warnings.showwarning = _show_warning
     try:
         try:
             app(standalone_mode=True)
@@ -157,30 +157,30 @@ def main() -> None:
     except (KeyboardInterrupt, BdbQuit) as stop:  # while the verb is looked up, or after it; a debugger that is left
         _end("interrupted", stop)
     except OSError as fault:
-        _end(f"{fault.filename or 'output'}: {reason(fault)}", fault)
+        _end(f"{fault.filename or 'output'}: {os_error_message(fault)}", fault)
     except MemoryError as fault:
         _end(f"needs more memory than there is: {fault}; ask for fewer agents, flights or samples", fault)
     except Exception as fault:  # the border: whatever else goes wrong is one line, too
-        from airflock.scenarios.own_code import raised_there
+        from airflock.scenarios import user_error_line
 
-        if told := raised_there(fault):  # on the device python: compiled, a rule raises nothing
+        if told := user_error_line(fault):  # on the device python: compiled, a rule raises nothing
             _end(told, fault)
         _end(f"unexpected {type(fault).__name__}: {fault}; please report it; AIRFLOCK_DEBUG=1 shows where", fault)
 
 
-def _note(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
     """What Airflock warns of, as a line; what libraries say to programmers is not for who gives commands."""
     if category is UserWarning:
-        sys.stderr.write(f"note: {bounded(printable(str(message)))}\n")
+        sys.stderr.write(f"note: {shortened(printable(str(message)))}\n")
 
 
-def _stop(number: int, _: Any) -> NoReturn:
+def _on_sigterm(number: int, _: Any) -> NoReturn:
     """SIGTERM, as batch systems send it, ends like Ctrl-C; a second one does not disturb what is being put away."""
     signal.signal(number, signal.SIG_IGN)
     raise KeyboardInterrupt
 
 
-def _again(lost: Any) -> None:
+def _repeat_interrupt(lost: Any) -> None:
     """An interruption that fell into a finaliser, where Python can only tell of it, comes again a moment later.
 
     Numba's compiler drops objects with finalisers at every turn: Ctrl-C and SIGTERM were lost in one of 200 tries.
@@ -188,17 +188,19 @@ def _again(lost: Any) -> None:
     if not (lost.exc_type and issubclass(lost.exc_type, KeyboardInterrupt)):
         sys.__unraisablehook__(lost)
     elif threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _stop)
-        later = threading.Timer(MOMENT, _thread.interrupt_main, (signal.SIGTERM,))  # by then this function has ended
+        signal.signal(signal.SIGTERM, _on_sigterm)
+        later = threading.Timer(
+            INTERRUPT_DELAY, _thread.interrupt_main, (signal.SIGTERM,)
+        )  # by then this function has ended
         later.daemon = True
         later.start()
 
 
-def _end(text: str, fault: BaseException) -> NoReturn:
+def _end(text: str, error: BaseException) -> NoReturn:
     if os.environ.get("AIRFLOCK_DEBUG"):
-        traceback.print_exception(fault)
-    for line in bounded_lines(text.splitlines()):
+        traceback.print_exception(error)
+    for line in shortened_lines(text.splitlines()):
         sys.stderr.write(f"airflock: {printable(line)}\n")
-    if isinstance(fault, OSError):
+    if isinstance(error, OSError):
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115  what could not be written must not be tried again at exit
     sys.exit(2)

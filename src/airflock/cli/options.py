@@ -8,13 +8,20 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.cli.verb import FAULTS
-from airflock.support.asked import Asked, if_right, or_else
-from airflock.support.errors import ScenarioError, gathering
-from airflock.support.suffixes import suffix_fault
-from airflock.support.untrusted import from_outside, is_file, toml_value
+from airflock.cli.verb import ERRORS_KEY
+from airflock.support import (
+    ErrorCollector,
+    ScenarioError,
+    as_error,
+    collect_errors,
+    invalid_if,
+    is_file,
+    parse_toml_value,
+    suffix_error,
+    value_or_default,
+)
 
-SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+SECONDS_PER_UNIT = {"s": 1.0, "min": 60.0, "h": 3600.0}
 Where = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset's name or a scenario file.", show_default=False)
 ]
@@ -51,12 +58,12 @@ PlotFile = Annotated[
 SaveFile = Annotated[Path | None, typer.Option("--save", metavar="FILE.nc", help="Save the recordings as netCDF.")]
 
 
-def asked(context: typer.Context) -> Asked:
+def collect_option_errors(context: typer.Context) -> ErrorCollector:
     """What a verb is asked for, with the numbers of its command line that are none or lie outside their ranges."""
-    return Asked(context.meta.get(FAULTS, ()))
+    return ErrorCollector(context.meta.get(ERRORS_KEY, ()))
 
 
-def settings(
+def parse_settings(
     pairs: list[str] | None, agents: int | None = None, duration: str | None = None, option: str = "--set"
 ) -> dict[str, Any]:
     """Keys and values from --set (or another option) and its short forms; values are read as TOML, or else as text."""
@@ -67,55 +74,55 @@ def settings(
         if not equals or not key.strip():
             faults.append(f"{option} {pair}: write KEY=VALUE, for instance {option} model.p_rep=0.14")
             continue
-        with gathering(faults):
-            values[key.strip()] = value(text, f"{option} {key.strip()}")
+        with collect_errors(faults):
+            values[key.strip()] = parse_option_value(text, f"{option} {key.strip()}")
     short: dict[str, tuple[str, float]] = {}
     if agents is not None:
         short["agents"] = (str(agents), agents)
     if duration is not None:
-        with gathering(faults):
-            short["duration"] = (duration, time_of(duration, "--duration"))
-    faults += _outside(short)
-    refuse(faults)
+        with collect_errors(faults):
+            short["duration"] = (duration, parse_seconds(duration, "--duration"))
+    faults += _range_errors(short)
+    raise_errors(faults)
     return values | {key: number for key, (_, number) in short.items()}
 
 
-def _outside(short: Mapping[str, tuple[str, float]]) -> list[str]:
+def _range_errors(short_options: Mapping[str, tuple[str, float]]) -> list[str]:
     """What lies outside its range of --agents and --duration, each as it is written and as a number."""
-    if not short:
+    if not short_options:
         return []
-    from airflock.core.parameters import Quantity, declarations, quantity_fault
-    from airflock.scenarios.sections import Flight
+    from airflock.core import Quantity, declarations, quantity_error
+    from airflock.scenarios import Flight
 
     known = {name: declared for name, declared, _ in declarations(Flight) if isinstance(declared, Quantity)}
     return [
         f"--{key} {written} lies outside {known[key].span}"
-        for key, (written, number) in short.items()
-        if quantity_fault(float(number), known[key])
+        for key, (written, number) in short_options.items()
+        if quantity_error(float(number), known[key])
     ]
 
 
-def time_of(text: str, option: str = "--budget") -> float:
+def parse_seconds(text: str, option: str = "--budget") -> float:
     """Seconds of a time such as 90s, 10min or 2h; ScenarioError for anything else."""
     match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
     if match is None or not 0.0 < float(match[1]) < math.inf:
         raise ScenarioError([f"{option} {text}: write a time above 0 such as 90s, 10min or 2h"])
-    return float(match[1]) * SECONDS[match[2] or "s"]
+    return float(match[1]) * SECONDS_PER_UNIT[match[2] or "s"]
 
 
-def value(text: str, where: str) -> Any:
+def parse_option_value(text: str, option: str) -> Any:
     """A TOML value, or the text itself if it is none; `where` names the option in faults."""
-    with from_outside(where):
-        return toml_value(text)
+    with as_error(option):
+        return parse_toml_value(text)
 
 
-def refuse(faults: list[str]) -> None:
+def raise_errors(errors: list[str]) -> None:
     """End with all faults that were gathered, if there are any."""
-    if faults:
-        raise ScenarioError(faults)
+    if errors:
+        raise ScenarioError(errors)
 
 
-def writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequence[str | Path | None] = ()) -> None:
+def check_writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequence[str | Path | None] = ()) -> None:
     """Refuse files to be written, each with its possible endings, that cannot be; before any work is done.
 
     reads : what the command reads, names of presets among it: none of these files is written over
@@ -126,7 +133,7 @@ def writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequence[str 
     for path, endings in outputs:
         if path is None:
             continue
-        folder, wrong = path.parent, suffix_fault(path, endings)
+        folder, wrong = path.parent, suffix_error(path, endings)
         if wrong:
             faults.append(wrong)
         if not folder.is_dir():
@@ -135,21 +142,21 @@ def writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequence[str 
             faults.append(f"{path}: cannot be written")
         elif path.exists() and any(is_file(read) and path.samefile(read) for read in reads if read is not None):
             faults.append(f"{path}: is an input and would be overwritten; give another file to write")
-    refuse(faults)
+    raise_errors(faults)
 
 
-def tell_time(scenarios: Sequence[Any], threads: int | None, device: str) -> None:
+def announce_run_time(scenarios: Sequence[Any], threads: int | None, device: str) -> None:
     """Tell beforehand about how long flights on the processor will take, where that is more than a minute."""
-    from airflock.cli.tables import say
-    from airflock.scenarios.cost import time_note
-    from airflock.support.threads import cores
+    from airflock.cli.tables import print_message
+    from airflock.scenarios import run_time_note
+    from airflock.support import available_cores
 
-    note = time_note(scenarios, threads or cores()) if device == "cpu" else ""
+    note = run_time_note(scenarios, threads or available_cores()) if device == "cpu" else ""
     if note:
-        say(f"note: {note} on {min(threads or cores(), cores())} cores")
+        print_message(f"note: {note} on {min(threads or available_cores(), available_cores())} cores")
 
 
-def compile_first(scenario: Any, precision: int, device: str) -> None:
+def compile_before_bar(scenario: Any, precision: int, device: str) -> None:
     """Compile what flies a scenario on the processor before a bar on the terminal begins, whose rate is of flights."""
     import sys
 
@@ -159,38 +166,42 @@ def compile_first(scenario: Any, precision: int, device: str) -> None:
         compile_for(scenario, precision=precision)
 
 
-def changed(asked: Asked, changes: list[str] | None, agents: int | None, duration: str | None) -> dict[str, Any]:
-    """What `settings` makes of these options, the others being judged where the number of agents is none."""
-    return if_right(agents, asked.read(settings, changes, or_else(agents, None), duration))
+def collect_settings(
+    errors: ErrorCollector, changes: list[str] | None, agents: int | None, duration: str | None
+) -> dict[str, Any]:
+    """What `parse_settings` makes of these options, the others being judged where the number of agents is none."""
+    return invalid_if(agents, errors.read(parse_settings, changes, value_or_default(agents, None), duration))
 
 
-def loaded(asked: Asked, name: str, changed: Mapping[str, Any], law: str | None = None, *, trust: bool) -> Any:
+def collect_scenario(
+    errors: ErrorCollector, name: str, settings: Mapping[str, Any], law: str | None = None, *, trust: bool
+) -> Any:
     """The scenario of a name with what is changed; the name and its file are judged where a change is none."""
-    from airflock.scenarios.files import load
+    from airflock.scenarios import load
 
-    return if_right(changed, asked.read(load, name, or_else(changed, {}), law, trust=trust))
+    return invalid_if(settings, errors.read(load, name, value_or_default(settings, {}), law, trust=trust))
 
 
-def seeds_of(first: int, count: int) -> list[int]:
+def seeds_from(first: int, count: int) -> list[int]:
     """The seeds of --first-seed and --seeds."""
-    from airflock.scenarios.seeds import sound_seeds
+    from airflock.scenarios import check_seeds
 
-    return sound_seeds(range(first, first + count))
+    return check_seeds(range(first, first + count))
 
 
-def sound_flying(device: str, precision: int, scheduler: str | None = None) -> None:
+def check_flight_options(device: str, precision: int, scheduler: str | None = None) -> None:
     """Refuse a device that nobody knows, a number of bits that is none, and workers with another device than a cpu."""
-    from airflock.runs.executors.cluster import fly_on_their_cpu
-    from airflock.support.hardware import sound_device, sound_precision
+    from airflock.runs import check_worker_device
+    from airflock.support import check_device, check_precision
 
-    together = Asked()
-    together.read(sound_device, device)
-    together.read(sound_precision, precision)
-    together.read(fly_on_their_cpu, scheduler, device)
-    together.refuse()
+    together = ErrorCollector()
+    together.read(check_device, device)
+    together.read(check_precision, precision)
+    together.read(check_worker_device, scheduler, device)
+    together.raise_errors()
 
 
-def place_on_earth(option: str, text: str) -> tuple[float, float, float]:
+def parse_position(option: str, text: str) -> tuple[float, float, float]:
     """Latitude and longitude (degrees) and altitude (m) from text."""
     try:
         latitude, longitude, altitude = (float(part) for part in text.split(","))

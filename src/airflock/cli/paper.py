@@ -45,7 +45,7 @@ def paper(
 
     claims = recompute(name, only=only, quick=quick, seeds=seeds, threads=threads)
     if as_json:
-        tables.emit_json([claim.as_dict() for claim in claims])
+        tables.print_json([claim.as_dict() for claim in claims])
         return
     from airflock_papers.claims import print_claims
 
@@ -56,11 +56,10 @@ def _all(
     quick: bool, breaks: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]
 ) -> None:
     """Every paper: in its small form, or every claim under its change, against what is committed."""
-    from airflock.cli.papers import installed
-    from airflock.support.cache import cache_folder
-    from airflock.support.errors import AirflockError
+    from airflock.cli.papers import require_papers
+    from airflock.support import AirflockError, cache_folder
 
-    installed()
+    require_papers()
     from airflock_papers import quick as tier
 
     wrong = [option for option, given in others.items() if given]
@@ -72,10 +71,10 @@ def _all(
         _all_breaks(keep or cache_folder() / "papers" / "breaks", threads, as_json)
         return
     before = tier.committed()
-    rows = tier.fly(keep or cache_folder() / "papers" / "quick", tables.say, threads)
+    rows = tier.fly(keep or cache_folder() / "papers" / "quick", tables.print_message, threads)
     changed = tier.changed(before, rows)
     if as_json:
-        tables.emit_json({"claims": [row._asdict() for row in rows], "changed": [row._asdict() for row in changed]})
+        tables.print_json({"claims": [row._asdict() for row in rows], "changed": [row._asdict() for row in changed]})
     else:
         for row in changed:
             told = f"{row.committed or 'not committed'} is now {row.found or 'not flown'}"
@@ -93,11 +92,11 @@ def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
     from airflock_papers import breaks
 
     before = breaks.committed()
-    rows = breaks.fly_all(folder, tables.say, threads)
+    rows = breaks.fly_all(folder, tables.print_message, threads)
     worse = breaks.worse(before, rows)
     if as_json:
         listed = [each.row._asdict() | {"elsewhere": each.elsewhere} for each in worse]
-        tables.emit_json({"claims": [row._asdict() for row in rows], "worse": listed})
+        tables.print_json({"claims": [row._asdict() for row in rows], "worse": listed})
     else:
         for row, elsewhere in worse:
             why = f" (not judged: turned red on {elsewhere})" if elsewhere else ""
@@ -110,14 +109,14 @@ def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
 
 def _breaks(name: str, only: str | None, seeds: int | None, threads: int | None, as_json: bool) -> None:
     """Each claim under the change that must break it."""
-    from airflock.cli.papers import find
+    from airflock.cli.papers import find_paper
 
-    paper = find(name)
+    paper = find_paper(name)
     from airflock_papers import breaks
 
     rows = breaks.fly(paper, only=only, seeds=seeds, threads=threads)
     if as_json:
-        tables.emit_json([row._asdict() for row in rows])
+        tables.print_json([row._asdict() for row in rows])
     else:
         for row in rows:
             typer.echo(f"{row.id}: {row.result} with {row.change} ({row.ours:.4g}, then {row.changed:.4g})")

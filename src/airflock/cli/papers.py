@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError
 
 PACKAGE = "airflock_papers"  # looked for when it is asked for: Airflock flies without it
 
@@ -50,20 +50,20 @@ def paper(
     Traceback (most recent call last):
     airflock.support.errors.AirflockError: vasarhely_2018: unknown paper; did you mean vasarhelyi_2018?
     """
-    found: list[Any] = find(name).run(only=only, quick=quick, seeds=seeds, threads=threads)
+    found: list[Any] = find_paper(name).run(only=only, quick=quick, seeds=seeds, threads=threads)
     return found
 
 
-def find(name: str) -> Any:
+def find_paper(name: str) -> Any:
     """The publication of this name.
 
     Raises AirflockError if airflock-papers is not installed, or there is no such paper.
     """
-    installed()
+    require_papers()
     return import_module(f"{PACKAGE}.catalogue").find(name)
 
 
-def installed() -> None:
+def require_papers() -> None:
     """Raise AirflockError, with what to install, unless airflock-papers is there."""
     try:
         import_module(PACKAGE)

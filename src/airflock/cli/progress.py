@@ -11,11 +11,11 @@ from typing import Any, Protocol
 
 from airflock.cli import tables
 
-FIRST, EVERY = 10.0, 30.0  # s: before the first line of a log, and at least between two
-SHARE = 0.1  # of the time so far that passes at least between two lines: a day gives some seventy
+FIRST_LINE_AFTER, LINE_INTERVAL = 10.0, 30.0  # s: before the first line of a log, and at least between two
+INTERVAL_SHARE = 0.1  # of the time so far that passes at least between two lines: a day gives some seventy
 
 
-class Line(Protocol):
+class ProgressLine(Protocol):
     """What is under way, told again whenever it changes."""
 
     def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
@@ -26,18 +26,18 @@ class Line(Protocol):
 
 
 @contextmanager
-def line(quiet: bool = False) -> Iterator[Line]:
+def progress_line(quiet: bool = False) -> Iterator[ProgressLine]:
     """The line for where standard error goes: none if quiet, a bar on a terminal, or lines for a log."""
     if quiet:
-        yield Silent()
+        yield SilentProgress()
     elif sys.stderr.isatty():
-        with _bar() as bar:
+        with _progress_bar() as bar:
             yield bar
     else:
-        yield Log()
+        yield LogProgress()
 
 
-class Silent:
+class SilentProgress:
     """Nothing is told of progress, nor what would stay above it."""
 
     def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
@@ -47,35 +47,35 @@ class Silent:
         """Print nothing."""
 
 
-class Log:
+class LogProgress:
     """Plain lines for a file or the log of a cluster, each with what is done, how fast, and how long it will take."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
         self._clock, self._lock = clock, Lock()
         self._began = clock()
-        self._next = self._began + FIRST
-        self._pace = Pace(clock)
+        self._next_line_at = self._began + FIRST_LINE_AFTER
+        self._time_left = TimeLeft(clock)
 
     def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
         """Print a line if the last one is long enough ago."""
         with self._lock:
-            self._pace.update(done, total)
+            self._time_left.update(done, total)
             now = self._clock()
-            if now < self._next:
+            if now < self._next_line_at:
                 return
-            self._next = now + max(EVERY, SHARE * (now - self._began))
+            self._next_line_at = now + max(LINE_INTERVAL, INTERVAL_SHARE * (now - self._began))
             amount = f": {done:,.0f}" if done else ""
             amount = f": {done:,.0f} of {total:,.0f} ({done / total:.0%})" if total else amount
-            left = self._pace.left
-            ends = "" if left is None else f", {spoken(left)} left"
+            left = self._time_left.left
+            ends = "" if left is None else f", {format_duration(left)} left"
             self.say(f"{text}{amount}{ends}")
 
     def say(self, text: str) -> None:
         """Print a line that stays."""
-        tables.say(text)
+        tables.print_message(text)
 
 
-class Pace:
+class TimeLeft:
     """How fast work goes: `left` is the time (s) that it will still take, None where nobody knows.
 
     What was done before it was first looked at, by a run that was cut off, took no time. Less done than before
@@ -97,7 +97,7 @@ class Pace:
         self.left = None if not total or gained <= 0.0 else (total - done) * (now - self._since) / gained
 
 
-def spoken(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """A time as one says it: 40 s, 12 min, 3.5 h."""
     if seconds < 100.0:
         return f"{seconds:.0f} s"
@@ -105,7 +105,7 @@ def spoken(seconds: float) -> str:
 
 
 @contextmanager
-def _bar() -> Iterator[Line]:
+def _progress_bar() -> Iterator[ProgressLine]:
     """A line that moves: what is under way, a bar, its share, and the time that is left."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
@@ -114,7 +114,7 @@ def _bar() -> Iterator[Line]:
         TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TaskProgressColumn(),
         TextColumn("{task.fields[left]}"), TimeElapsedColumn(),
     )  # fmt: skip
-    pace = Pace()
+    pace = TimeLeft()
     with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as drawn:
         task: Any = None
 
@@ -122,7 +122,7 @@ def _bar() -> Iterator[Line]:
             def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
                 nonlocal task
                 pace.update(done, total)
-                left = "" if pace.left is None else f"{spoken(pace.left)} left"
+                left = "" if pace.left is None else f"{format_duration(pace.left)} left"
                 if task is None:
                     task = drawn.add_task(text, total=total, left=left)
                 drawn.update(task, description=text, completed=done, total=total, left=left)
@@ -134,9 +134,9 @@ def _bar() -> Iterator[Line]:
 
 
 @contextmanager
-def counted(label: str, total: int | None = None, quiet: bool = False) -> Iterator[Callable[[], None]]:
+def counting_parts(label: str, total: int | None = None, quiet: bool = False) -> Iterator[Callable[[], None]]:
     """Progress of so many equal parts (None: nobody knows); yields a function to call after each."""
-    with line(quiet) as told:
+    with progress_line(quiet) as told:
         lock, done = Lock(), 0
 
         def one() -> None:
@@ -150,14 +150,14 @@ def counted(label: str, total: int | None = None, quiet: bool = False) -> Iterat
 
 
 @contextmanager
-def searching(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[bool], None]]]:
+def search_progress(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[bool], None]]]:
     """Progress of a search: generation, best, mean, flights per second; then of the finalists."""
-    from airflock.search.race import ROUNDS
+    from airflock.search import RACE_ROUNDS
 
     finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
-    finals += round(sum(share * seeds for share, seeds in ROUNDS) * study.whole("pool"))
+    finals += round(sum(share * seeds for share, seeds in RACE_ROUNDS) * study.whole("pool"))
     began, flown = time.perf_counter(), itertools.count(1)
-    with line(quiet) as told:
+    with progress_line(quiet) as told:
 
         def watch(p: Any) -> None:
             rate = p.fresh / max(time.perf_counter() - began, 1e-9)

@@ -7,10 +7,10 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from airflock.cli import options, tables
-from airflock.cli.progress import counted
-from airflock.support.suffixes import PICTURES, RECORDINGS, TABLES
+from airflock.cli.progress import counting_parts
+from airflock.support import PICTURES, RECORDINGS, TABLES
 
-Scores = Mapping[str, Any]  # order parameters, or keys with their values, by name
+ScoreValues = Mapping[str, Any]  # order parameters, or keys with their values, by name
 
 
 def run(
@@ -35,72 +35,76 @@ def run(
 
     Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
     """
-    from airflock.engine import picked
-    from airflock.runs.executors.scores import scores
+    from airflock.engine import pick_device
+    from airflock.runs import score_scenarios
 
-    asked = options.asked(ctx)
-    asked.read(options.writable, (save, RECORDINGS), (plot, PICTURES))
-    changed = options.changed(asked, changes, agents, duration)
-    found = options.loaded(asked, scenario, changed, law, trust=trust)
-    numbers = asked.read(options.seeds_of, first_seed, seeds)
-    asked.read(options.sound_flying, device, precision, scheduler)
-    asked.refuse()
-    tables.say_notes(found.notes)
+    asked = options.collect_option_errors(ctx)
+    asked.read(options.check_writable, (save, RECORDINGS), (plot, PICTURES))
+    changed = options.collect_settings(asked, changes, agents, duration)
+    found = options.collect_scenario(asked, scenario, changed, law, trust=trust)
+    numbers = asked.read(options.seeds_from, first_seed, seeds)
+    asked.read(options.check_flight_options, device, precision, scheduler)
+    asked.raise_errors()
+    tables.print_notes(found.notes)
     flights = [found] * seeds
     if scheduler is None:
-        device = picked(flights, device, precision=precision, say=tables.say)
-        options.tell_time(flights, threads, device)
-        options.compile_first(found, precision, device)
+        device = pick_device(flights, device, precision=precision, notify=tables.print_message)
+        options.announce_run_time(flights, threads, device)
+        options.compile_before_bar(found, precision, device)
     chosen: dict[str, Any] = {"scheduler": scheduler, "threads": threads, "precision": precision, "device": device}
-    with counted(f"{found.name}: flights", seeds, quiet=as_json) as done:
-        rows = scores(flights, numbers, **chosen, done=done)
-    _tell(found, numbers, rows, changed, as_json)
+    with counting_parts(f"{found.name}: flights", seeds, quiet=as_json) as done:
+        rows = score_scenarios(flights, numbers, **chosen, on_done=done)
+    _print_scores(found, numbers, rows, changed, as_json)
     if save or plot:  # after the scores, which a full disk does not take away
         _record(found, numbers, precision, device, save, plot)
 
 
-def _tell(scenario: Any, numbers: Sequence[int], rows: Sequence[Scores], changed: Scores, as_json: bool) -> None:
+def _print_scores(
+    scenario: Any, numbers: Sequence[int], rows: Sequence[ScoreValues], changed_keys: ScoreValues, as_json: bool
+) -> None:
     """Print what flights came to, beside the paper's figures; changed : keys that are not as in the file."""
-    from airflock.parts.metrics.registry import reports
-    from airflock.recordings.rare import remarks, upper_bound
+    from airflock.parts.metrics import reported_values
+    from airflock.recordings import rare_event_notes, upper_probability_bound
 
     seeds = len(numbers)
     if as_json:
-        from airflock.recordings.flights import plain
+        from airflock.recordings import to_plain_values
 
         runs = [{"seed": seed, **row} for seed, row in zip(numbers, rows, strict=True)]
-        bound = upper_bound(sum(row.get("n_coll", 0.0) > 0.0 for row in rows), seeds)
+        bound = upper_probability_bound(sum(row.get("n_coll", 0.0) > 0.0 for row in rows), seeds)
         bounds = {"collision_bound": bound} if seeds > 1 and "n_coll" in rows[0] else {}
-        result = {"scenario": {"name": scenario.name, **plain(scenario.document)}, "seeds": seeds, "runs": runs}
-        tables.emit_json({**result, **tables.statistics(rows), **bounds})
+        result = {
+            "scenario": {"name": scenario.name, **to_plain_values(scenario.document)},
+            "seeds": seeds,
+            "runs": runs,
+        }
+        tables.print_json({**result, **tables.column_statistics(rows), **bounds})
         return
     count = f"{seeds} flights" if seeds > 1 else f"seed {numbers[0]}"
     title = f"{scenario.name}: {scenario.agents} agents, {scenario.flight.duration:g} s, {count}"
-    published = {} if changed else scenario.published
-    tables.score_table(title, rows, published, reports(scenario.measures))
-    for remark in remarks(rows, numbers):
-        tables.say(remark)
+    published = {} if changed_keys else scenario.published
+    tables.print_score_table(title, rows, published, reported_values(scenario.measures))
+    for remark in rare_event_notes(rows, numbers):
+        tables.print_message(remark)
 
 
 def _record(
     scenario: Any, numbers: Sequence[int], precision: int, device: str, save: Path | None, plot: Path | None
 ) -> None:
     """Fly again with the trajectories kept (the same bits), and write what was asked for."""
-    from airflock.recordings.files import save as save_recording
-    from airflock.recordings.flights import simulate
+    from airflock.recordings import save as save_recording, simulate
 
     for seed in numbers if save else numbers[:1]:
         recording = simulate(scenario, seed, precision=precision, device=device)
         if save:
             many = len(numbers) > 1
             path = save.with_name(f"{save.stem}-seed{seed}{save.suffix}") if many else save
-            tables.say(f"saved {save_recording(recording, path)}")
+            tables.print_message(f"saved {save_recording(recording, path)}")
         if plot and seed == numbers[0]:
-            from airflock.view.plots.save import save_figure
-            from airflock.view.plots.trajectories import trajectories
+            from airflock.view import save_figure, trajectories
 
             save_figure(trajectories(recording), plot)
-            tables.say(f"saved {plot}")
+            tables.print_message(f"saved {plot}")
 
 
 def score(
@@ -134,17 +138,17 @@ def score(
 
     Example: airflock score fish.nc --body-length 0.04 --series course.csv
     """
-    from airflock.recordings.isolated import Opening
+    from airflock.recordings import ReaderProcess
 
-    options.writable((series, TABLES))
-    changed = options.settings(changes)
+    options.check_writable((series, TABLES))
+    changed = options.parse_settings(changes)
     if body_length is not None:
-        from airflock.recordings.lengths import in_bodies
+        from airflock.recordings import body_length_settings
 
-        changed = in_bodies(body_length) | changed
-    with Opening(files[0]) as first:  # another process opens it while this one imports
+        changed = body_length_settings(body_length) | changed
+    with ReaderProcess(files[0]) as first:  # another process opens it while this one imports
         if groups:
-            _tell_groups([first, *files[1:]], files, changed, trust, as_json)
+            _print_group_scores([first, *files[1:]], files, changed, trust, as_json)
             return
         measured = [
             _measured(source, path, changed, trust, aero)
@@ -152,31 +156,31 @@ def score(
         ]
         if series is not None:
             _save_series(measured, series)
-        _tell_measured(measured, as_json)
+        _print_measured(measured, as_json)
 
 
-def _tell_groups(what: Sequence[Any], files: Sequence[Path], changed: Scores, trust: bool, as_json: bool) -> None:
+def _print_group_scores(
+    sources: Sequence[Any], files: Sequence[Path], changed: ScoreValues, trust: bool, as_json: bool
+) -> None:
     """Measure the groups of recordings, and print what was found."""
-    from airflock.parts.metrics.registry import reports
-    from airflock.recordings.files import load_recording
-    from airflock.recordings.flown_scenario import scenario_of
-    from airflock.recordings.groups import BETWEEN, group_scores
+    from airflock.parts.metrics import reported_values
+    from airflock.recordings import PAIR_METRICS, group_scores, load_recording, scenario_of_recording
 
     runs = []
-    for source, path in zip(what, files, strict=True):
+    for source, path in zip(sources, files, strict=True):
         recording = load_recording(source)
-        about = reports(scenario_of(recording, changed, trust=trust).measures) | BETWEEN
+        about = reported_values(scenario_of_recording(recording, changed, trust=trust).measures) | PAIR_METRICS
         table = group_scores(recording, changed, trust=trust)
         rows = {str(name): row.dropna().to_dict() for name, row in table.iterrows()}
         runs.append({"file": str(path), "groups": rows})
         if not as_json:
             for name, row in rows.items():
-                tables.score_table(f"{path}: {name}", [row], {}, about)
+                tables.print_score_table(f"{path}: {name}", [row], {}, about)
     if as_json:
-        tables.emit_json({"runs": runs})
+        tables.print_json({"runs": runs})
 
 
-class Measured(NamedTuple):
+class MeasuredRecording(NamedTuple):
     """One recording, measured.
 
     values, course : order parameters, and a table of them over time; about : unit and meaning of each by name
@@ -185,31 +189,38 @@ class Measured(NamedTuple):
     """
 
     path: Path
-    values: Scores
-    course: Any
+    values: ScoreValues
+    score_series: Any
     about: Mapping[str, tuple[str, str]]
     faults: Any
-    not_told: Any
-    coarse: str
+    unmeasured: Any
+    frame_note: str
 
 
-def _measured(source: Any, path: Path, changed: Scores, trust: bool, aero: bool) -> Measured:
+def _measured(source: Any, path: Path, changed: ScoreValues, trust: bool, aero: bool) -> MeasuredRecording:
     """Measure a recording; source : its path, or the Opening that reads it; changed : keys of how it is measured."""
-    from airflock.parts.metrics.registry import reports
-    from airflock.recordings.attributes import faults
-    from airflock.recordings.files import load_recording
-    from airflock.recordings.flown_scenario import aero_settings, scenario_of
-    from airflock.recordings.scores import between_frames, measure, not_told
+    from airflock.parts.metrics import reported_values
+    from airflock.recordings import (
+        between_frames_note,
+        load_recording,
+        measure_recording,
+        power_settings,
+        recorded_faults,
+        scenario_of_recording,
+        undefined_metrics_of,
+    )
 
     recording = load_recording(source)
-    settings = aero_settings(recording, changed) if aero else changed
-    values, course = measure(recording, settings, trust=trust)
-    scenario = scenario_of(recording, settings, trust=trust)
-    untold, coarse = not_told(recording, scenario, settings), between_frames(recording, scenario)
-    return Measured(path, values, course, reports(scenario.measures), faults(recording), untold, coarse)
+    settings = power_settings(recording, changed) if aero else changed
+    values, course = measure_recording(recording, settings, trust=trust)
+    scenario = scenario_of_recording(recording, settings, trust=trust)
+    untold, coarse = undefined_metrics_of(recording, scenario, settings), between_frames_note(recording, scenario)
+    return MeasuredRecording(
+        path, values, course, reported_values(scenario.measures), recorded_faults(recording), untold, coarse
+    )
 
 
-def _save_series(measured: Sequence[Measured], path: Path) -> None:
+def _save_series(measured: Sequence[MeasuredRecording], path: Path) -> None:
     """Write order parameters over time of all recordings as one table."""
     import io
 
@@ -218,15 +229,14 @@ def _save_series(measured: Sequence[Measured], path: Path) -> None:
     from airflock.support import atomic
 
     text = io.StringIO()
-    pd.concat([each.course.assign(file=str(each.path)) for each in measured]).to_csv(text)
-    atomic.write(path, text.getvalue())
-    tables.say(f"saved {path}")
+    pd.concat([each.score_series.assign(file=str(each.path)) for each in measured]).to_csv(text)
+    atomic.write_file(path, text.getvalue())
+    tables.print_message(f"saved {path}")
 
 
-def _tell_measured(measured: Sequence[Measured], as_json: bool) -> None:
+def _print_measured(measured: Sequence[MeasuredRecording], as_json: bool) -> None:
     """Print order parameters of recordings, what befell their agents, and what could not be measured."""
-    from airflock.recordings.attributes import told_faults
-    from airflock.recordings.lengths import told as told_unsaid
+    from airflock.recordings import faults_line, missing_lengths_note as told_unsaid
 
     rows = [each.values for each in measured]
     if as_json:
@@ -235,19 +245,19 @@ def _tell_measured(measured: Sequence[Measured], as_json: bool) -> None:
                 "file": str(each.path),
                 **each.values,
                 **({"faults": each.faults} if each.faults else {}),
-                **({"not_told": each.not_told} if each.not_told else {}),
+                **({"not_told": each.unmeasured} if each.unmeasured else {}),
             }
             for each in measured
         ]
-        tables.emit_json({"runs": runs, **tables.statistics(rows)})
+        tables.print_json({"runs": runs, **tables.column_statistics(rows)})
         return
     about = {name: entry for each in measured for name, entry in each.about.items()}
-    tables.score_table(", ".join(str(each.path) for each in measured), rows, {}, about)
+    tables.print_score_table(", ".join(str(each.path) for each in measured), rows, {}, about)
     for each in measured:
         if each.faults:
-            tables.say(f"{each.path}: {told_faults(each.faults)}")
+            tables.print_message(f"{each.path}: {faults_line(each.faults)}")
     for each in measured:
-        if each.not_told:
-            tables.say(f"{each.path}: {told_unsaid(each.not_told)}")
-        if each.coarse:
-            tables.say(f"{each.path}: {each.coarse}")
+        if each.unmeasured:
+            tables.print_message(f"{each.path}: {told_unsaid(each.unmeasured)}")
+        if each.frame_note:
+            tables.print_message(f"{each.path}: {each.frame_note}")

@@ -9,12 +9,10 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.cli.progress import counted
-from airflock.support.asked import WRONG, Asked, if_right, or_else
-from airflock.support.errors import ScenarioError
-from airflock.support.suffixes import PICTURES, TABLES
+from airflock.cli.progress import counting_parts
+from airflock.support import INVALID, PICTURES, TABLES, ErrorCollector, ScenarioError, invalid_if, value_or_default
 
-MOST_VALUES = 100_000  # of one key, and points of a whole grid
+MAX_GRID_POINTS = 100_000  # of one key, and points of a whole grid
 
 
 def sweep(
@@ -54,44 +52,46 @@ def sweep(
 
     Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
     """
-    from airflock.recordings.sweeps import flown, grid, scenarios_at, shown
+    from airflock.recordings import fly_points, grid_points, metric_to_show, scenarios_at
 
-    asked = options.asked(ctx)
-    asked.read(options.writable, (table, TABLES), (plot, PICTURES))
-    fixed = options.changed(asked, changes, agents, duration)
+    asked = options.collect_option_errors(ctx)
+    asked.read(options.check_writable, (table, TABLES), (plot, PICTURES))
+    fixed = options.collect_settings(asked, changes, agents, duration)
     axes = _axes(over, plot, asked)
-    points = asked.read(grid, axes)
-    scenarios = if_right(fixed, asked.read(scenarios_at, scenario, points, or_else(fixed, {}), law, trust=trust))
-    name = asked.read(shown, show, scenarios)
-    numbers = asked.read(options.seeds_of, first_seed, seeds)
-    asked.read(options.sound_flying, device, precision, scheduler)
-    asked.refuse()
-    tables.say_notes(alike(dict.fromkeys(note for found in scenarios for note in found.notes)))
+    points = asked.read(grid_points, axes)
+    scenarios = invalid_if(
+        fixed, asked.read(scenarios_at, scenario, points, value_or_default(fixed, {}), law, trust=trust)
+    )
+    name = asked.read(metric_to_show, show, scenarios)
+    numbers = asked.read(options.seeds_from, first_seed, seeds)
+    asked.read(options.check_flight_options, device, precision, scheduler)
+    asked.raise_errors()
+    tables.print_notes(merge_similar_notes(dict.fromkeys(note for found in scenarios for note in found.notes)))
     if scheduler is None:
-        options.tell_time([found for found in scenarios for _ in numbers], threads, device)
-        options.compile_first(scenarios[0], precision, device)
-    with counted(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
+        options.announce_run_time([found for found in scenarios for _ in numbers], threads, device)
+        options.compile_before_bar(scenarios[0], precision, device)
+    with counting_parts(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
         chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
-        tidy = flown(points, scenarios, numbers, **chosen, say=tables.say, scheduler=scheduler)
+        tidy = fly_points(points, scenarios, numbers, **chosen, notify=tables.print_message, scheduler=scheduler)
     _keep(tidy, list(axes), name, scenarios[0], table, plot)
     if as_json:
-        tables.emit_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})
+        tables.print_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})
     else:
         _print(tidy, list(axes), name)
 
 
-def _axes(over: list[str], plot: Path | None, asked: Asked) -> dict[str, list[Any]]:
+def _axes(over: list[str], plot: Path | None, errors: ErrorCollector) -> dict[str, list[Any]]:
     """Keys that are swept, with the values of each; of those that can be read, the rest being noted."""
-    axes = [found for text in over if (found := asked.read(axis, text)) is not WRONG]
-    asked.read(distinct, [text.partition("=")[0].strip() for text in over], plot)
-    return asked.read(_bounded, axes)
+    axes = [found for text in over if (found := errors.read(parse_axis, text)) is not INVALID]
+    errors.read(check_distinct_keys, [text.partition("=")[0].strip() for text in over], plot)
+    return errors.read(_bounded, axes)
 
 
 def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
     """Axes of a grid that is not too large."""
     size = math.prod(len(values) for _, values in axes)
-    if size > MOST_VALUES:
-        raise ScenarioError([f"--over: a grid of {size} points is more than {MOST_VALUES}"])
+    if size > MAX_GRID_POINTS:
+        raise ScenarioError([f"--over: a grid of {size} points is more than {MAX_GRID_POINTS}"])
     return dict(axes)
 
 
@@ -100,17 +100,16 @@ def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | No
     if table is not None:
         from airflock.support import atomic
 
-        atomic.write(table, tidy.to_csv(index=False))
-        tables.say(f"saved {table}")
+        atomic.write_file(table, tidy.to_csv(index=False))
+        tables.print_message(f"saved {table}")
     if plot is not None:
-        from airflock.view.plots.heatmap import heatmap
-        from airflock.view.plots.save import save_figure
+        from airflock.view import heatmap, save_figure
 
         save_figure(heatmap(tidy, keys, show, scenario=scenario), plot)
-        tables.say(f"saved {plot}")
+        tables.print_message(f"saved {plot}")
 
 
-def alike(notes: Iterable[str]) -> Iterator[str]:
+def merge_similar_notes(notes: Iterable[str]) -> Iterator[str]:
     """The first of all notes that differ in numbers alone, and how many are like it."""
     kinds: dict[str, list[str]] = {}
     for note in notes:
@@ -119,7 +118,7 @@ def alike(notes: Iterable[str]) -> Iterator[str]:
         yield f"{first} ({len(more)} more like it)" if more else first
 
 
-def distinct(keys: Sequence[str], plot: Path | None) -> None:
+def check_distinct_keys(keys: Sequence[str], plot: Path | None) -> None:
     """Refuse a key that is swept twice, and a picture of more keys than it has axes."""
     faults = [f"--over {key}: given {keys.count(key)} times; give all its values in one --over" for key in keys]
     faults = [fault for fault, key in zip(faults, keys, strict=True) if keys.count(key) > 1]
@@ -129,7 +128,7 @@ def distinct(keys: Sequence[str], plot: Path | None) -> None:
         raise ScenarioError(list(dict.fromkeys(faults)))
 
 
-def axis(text: str, option: str = "--over") -> tuple[str, list[Any]]:
+def parse_axis(text: str, option: str = "--over") -> tuple[str, list[Any]]:
     """Key and values from KEY=a,b,c or KEY=low:high:count, as an option was given."""
     key, equals, values = text.partition("=")
     key = key.strip()
@@ -139,13 +138,13 @@ def axis(text: str, option: str = "--over") -> tuple[str, list[Any]]:
             low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
         except ValueError as fault:
             raise ScenarioError([f"{option} {text}: write low:high:count, for instance radio.delay=0:2:5"]) from fault
-        if not 1 <= count <= MOST_VALUES:
-            raise ScenarioError([f"{option} {text}: the count lies outside [1, {MOST_VALUES}]"])
+        if not 1 <= count <= MAX_GRID_POINTS:
+            raise ScenarioError([f"{option} {text}: the count lies outside [1, {MAX_GRID_POINTS}]"])
         step = (high - low) / max(count - 1, 1)
         return key, [low + step * i for i in range(count)]
     if not equals or not values or len(parts) == 2:
         raise ScenarioError([f"{option} {text}: write KEY=a,b,c or KEY=low:high:count"])
-    numbers = [options.value(part, f"{option} {key}") for part in values.split(",")]
+    numbers = [options.parse_option_value(part, f"{option} {key}") for part in values.split(",")]
     if any(isinstance(value, (dict, list)) for value in numbers):
         raise ScenarioError([f"{option} {text}: a table or a list cannot be swept; give numbers or choices"])
     return key, numbers

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 
-def statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+def column_statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     """Mean, standard deviation and median of each column; of a column of lists, those of each place.
 
     A value that is nan (a time of what never happened) is left out; where all are, the statistics are nan.
@@ -24,8 +24,8 @@ def statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     return summary
 
 
-def _moments(given: Sequence[Any]) -> tuple[float, float, float]:
-    values = sorted(v for v in map(float, given) if not math.isnan(v))
+def _moments(numbers: Sequence[Any]) -> tuple[float, float, float]:
+    values = sorted(v for v in map(float, numbers) if not math.isnan(v))
     n = len(values)
     if not n:
         return math.nan, math.nan, math.nan
@@ -34,18 +34,18 @@ def _moments(given: Sequence[Any]) -> tuple[float, float, float]:
     return mean, spread, 0.5 * (values[(n - 1) // 2] + values[n // 2])
 
 
-def number(x: Any, missing: str = "never") -> str:
+def format_number(x: Any, missing: str = "never") -> str:
     """A number with four significant digits, `missing` where it is nan (a time's `never`); a list side by side."""
     if isinstance(x, (list, tuple)):
         return ", ".join(f"{v:.3g}" if v == v else missing for v in x)
     return f"{x:.4g}" if x == x else missing
 
 
-def score_table(
+def print_score_table(
     title: str,
     rows: Sequence[Mapping[str, Any]],
     published: Mapping[str, tuple[float, float | None]],
-    about: Mapping[str, tuple[str, str]],
+    units_and_meanings: Mapping[str, tuple[str, str]],
 ) -> None:
     """Print order parameters beside what a paper reports; about: unit and meaning by name.
 
@@ -55,7 +55,7 @@ def score_table(
     from rich.console import Console
     from rich.table import Table
 
-    summary = statistics(rows)
+    summary = column_statistics(rows)
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     table.add_column("order parameter", style="bold")
     table.add_column("mean ± sd" if len(rows) > 1 else "value", justify="right")
@@ -65,19 +65,19 @@ def score_table(
         table.add_column("published", justify="right", style="cyan")
     table.add_column("unit")
     table.add_column("meaning", style="dim")
-    untold = [key for key, mean in summary["mean"].items() if _untold(key, mean) and key not in published]
+    untold = [key for key, mean in summary["mean"].items() if _is_unmeasured(key, mean) and key not in published]
     for key in [key for key in summary["mean"] if key not in untold]:
-        unit, meaning = about.get(key, ("", ""))
+        unit, meaning = units_and_meanings.get(key, ("", ""))
         missing = "never" if key.startswith("time_to_") else "nan"  # only an event can never happen
-        mean = number(summary["mean"][key], missing)
+        mean = format_number(summary["mean"][key], missing)
         spread = summary["std"][key]
         single = len(rows) == 1 or isinstance(spread, list) or spread != spread
         cells = [key, mean if single else f"{mean} ± {spread:.2g}"]
-        cells += [number(summary["median"][key], missing)] if len(rows) > 1 else []
+        cells += [format_number(summary["median"][key], missing)] if len(rows) > 1 else []
         if published:
             entry = published.get(key)
             spread = "" if entry is None or entry[1] is None else f" ± {entry[1]:.2g}"
-            cells += ["" if entry is None else f"{number(entry[0])}{spread}"]
+            cells += ["" if entry is None else f"{format_number(entry[0])}{spread}"]
         table.add_row(*cells, unit, meaning)
     Console().print(table)
     if untold:
@@ -86,34 +86,34 @@ def score_table(
         )
 
 
-def _untold(key: str, mean: Any) -> bool:
+def _is_unmeasured(key: str, mean: Any) -> bool:
     """Whether no flight has such a number; an event that never happened is told as `never`."""
     values = mean if isinstance(mean, (list, tuple)) else [mean]
     return not key.startswith("time_to_") and bool(values) and all(math.isnan(value) for value in values)
 
 
-def emit_json(value: Any) -> None:
+def print_json(value: Any) -> None:
     """Print JSON on one line; numbers that are no JSON (never expected) become null."""
-    sys.stdout.write(json.dumps(clean(value), ensure_ascii=False) + "\n")
+    sys.stdout.write(json.dumps(to_json_value(value), ensure_ascii=False) + "\n")
 
 
-def clean(value: Any) -> Any:
+def to_json_value(value: Any) -> Any:
     """Plain Python values with finite numbers."""
     if isinstance(value, Mapping):
-        return {str(key): clean(entry) for key, entry in value.items()}
+        return {str(key): to_json_value(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [clean(entry) for entry in value]
+        return [to_json_value(entry) for entry in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value.item() if hasattr(value, "item") else value
 
 
-def say_notes(notes: Iterable[str]) -> None:
+def print_notes(notes: Iterable[str]) -> None:
     """What is read otherwise than it is written or hardly meant, once each; before anything is flown or written."""
     for text in dict.fromkeys(notes):
-        say(f"note: {text}")
+        print_message(f"note: {text}")
 
 
-def say(text: str) -> None:
+def print_message(text: str) -> None:
     """A line for a person, on the error stream so that it never mixes with output."""
     sys.stderr.write(f"{text}\n")

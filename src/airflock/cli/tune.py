@@ -6,9 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.cli.progress import line
-from airflock.support.asked import or_else
-from airflock.support.errors import ScenarioError
+from airflock.cli.progress import progress_line
+from airflock.support import ScenarioError, value_or_default
 
 
 def tune(
@@ -65,29 +64,27 @@ def tune(
 
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
-    from airflock.certificates.request import sound_confidence
-    from airflock.search.tune.folder import kept_plan
-    from airflock.search.tune.request import request_of
-    from airflock.search.tune.run import tune
+    from airflock.certificates import check_confidence
+    from airflock.search import load_plan, make_request, tune
 
-    asked = options.asked(ctx)
-    seconds = asked.read(options.time_of, budget)
-    settings = options.changed(asked, changes, agents, duration)
-    base = options.loaded(asked, asked.read(_named, scenario, like, heard), settings, trust=trust)
-    start = asked.read(_as_it_will_fly, base, like)
-    plan = asked.read(kept_plan, out, start, resume) if like is None else None  # with logs, of what they will tell
+    asked = options.collect_option_errors(ctx)
+    seconds = asked.read(options.parse_seconds, budget)
+    settings = options.collect_settings(asked, changes, agents, duration)
+    base = options.collect_scenario(asked, asked.read(_start_scenario, scenario, like, heard), settings, trust=trust)
+    start = asked.read(_tuned_scenario, base, like)
+    plan = asked.read(load_plan, out, start, resume) if like is None else None  # with logs, of what they will tell
     if confidence is not None:
-        asked.read(sound_confidence, confidence)
-    asked.read(request_of, start, limit or (), confidence, or_else(plan, None))
-    asked.refuse()
-    tables.say_notes(start.notes)
-    options.compile_first(base, 32, "cpu")
+        asked.read(check_confidence, confidence)
+    asked.read(make_request, start, limit or (), confidence, value_or_default(plan, None))
+    asked.raise_errors()
+    tables.print_notes(start.notes)
+    options.compile_before_bar(base, 32, "cpu")
     what: Any = base if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
     if like is not None:
         how |= {"like": base, "heard": heard}
     shown: list[str] = []
-    with line(as_json) as told:
+    with progress_line(as_json) as told:
 
         def watch(p: Any) -> None:
             told.update(p.stage + (f", {p.told}" if p.told else ""), p.done, p.total)
@@ -98,14 +95,14 @@ def tune(
 
         tuning = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
     if as_json:
-        tables.emit_json(tuning.document())
+        tables.print_json(tuning.document())
     else:
         _print(tuning, shown)
     if not tuning.shown:
         raise typer.Exit(1)
 
 
-def _named(scenario: list[str], like: str | None, heard: Path | None) -> str:
+def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -> str:
     """The scenario that names law, field and speed: the one that is tuned or, with logs, what they are like."""
     if like is not None:
         return like
@@ -116,18 +113,18 @@ def _named(scenario: list[str], like: str | None, heard: Path | None) -> str:
     return scenario[0]
 
 
-def _as_it_will_fly(base: Any, like: str | None) -> Any:
+def _tuned_scenario(base: Any, like: str | None) -> Any:
     """The scenario from which tuning starts; with logs it is not known yet, but takes the same limits."""
-    from airflock.search.tune.start import start_of
+    from airflock.search import prepare_start
 
-    return base if like is not None else start_of(base)[0]
+    return base if like is not None else prepare_start(base)[0]
 
 
 def _print(tuning: Any, shown: list[str]) -> None:
     """What was found, and those notes that were not told while it was sought."""
     from rich.console import Console
 
-    from airflock.search.safe import told
+    from airflock.search import limit_report_line
 
     console = Console()
 
@@ -140,7 +137,7 @@ def _print(tuning: Any, shown: list[str]) -> None:
     r = tuning.result
     line(f"evolved: fitness {r.fitness:.4f} ({r.low:.4f} to {r.high:.4f}) on {r.seeds} fresh seeds")
     for entry in r.limits:
-        line(f"evolved: {told(entry)}")
+        line(f"evolved: {limit_report_line(entry)}")
     line(f"hardened: {tuning.steps[-1].verdict}" if tuning.steps else f"not hardened: {tuning.why}")
     for text in tuning.certificate.statements:
         line(text)

@@ -17,6 +17,6 @@ def types(
 
     Example: airflock types mine.py
     """
-    from airflock.check.types import check_types
+    from airflock.check import check_types
 
     check_types(files or (), out=out)

@@ -6,71 +6,75 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from airflock.support.spelling import meant
+from airflock.support import suggest
 
-PLACES = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
-ALIKE = 0.75  # of options, as in `spelling.meant`: both begin with --, and --budget is not --quiet
-ONE_SEED = "--seed"  # written for the seed of a flight, one letter from --seeds, which says how many fly
+OUTPUT_OPTIONS = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
+SIMILARITY_CUTOFF = 0.75  # of options, as in `spelling.suggest`: both begin with --, and --budget is not --quiet
+SEED_OPTION = "--seed"  # written for the seed of a flight, one letter from --seeds, which says how many fly
 
 
-def at_home(word: str) -> str:
+def expand_home(word: str) -> str:
     """A word of a command line, ~ being the home folder, also where a shell leaves it in: --save=~/flight.nc."""
     option, equals, value = word.partition("=")
     return f"{option}={os.path.expanduser(value)}" if equals else os.path.expanduser(word)
 
 
-def usage_fault(fault: Any, words: Sequence[str]) -> str:
+def usage_error(error: Any, words: Sequence[str]) -> str:
     """One line for what typer refuses; `words` are those of the command line.
 
     Typer's classes of faults have moved between its versions, so they are told apart by what they carry.
     """
-    context = getattr(fault, "ctx", None)
-    verb = _path(context).partition(" ")[2]
-    return f"{verb}: {_said(fault, context, words)}" if verb else _said(fault, context, words)
+    context = getattr(error, "ctx", None)
+    verb = _command_path(context).partition(" ")[2]
+    return f"{verb}: {_message(error, context, words)}" if verb else _message(error, context, words)
 
 
-def infinite(context: Any) -> list[tuple[str, str]]:
+def non_finite_errors(context: Any) -> list[tuple[str, str]]:
     """Options with a range that were given nan or inf: the parameter's name, and one line."""
     faults = []
     for parameter in context.command.params:
-        value, ends = context.params.get(parameter.name), _ends(parameter)
+        value, ends = context.params.get(parameter.name), _range_ends(parameter)
         if isinstance(value, float) and not math.isfinite(value) and ends != (None, None):
-            verb = _path(context).partition(" ")[2]
-            said = f"{verb}: {_name(parameter)} {value:g} is not a finite number; give {_span(*ends)}"
+            verb = _command_path(context).partition(" ")[2]
+            said = f"{verb}: {_parameter_name(parameter)} {value:g} is not a finite number; give {_range_text(*ends)}"
             faults.append((str(parameter.name), said))
     return faults
 
 
-def _said(fault: Any, context: Any, words: Sequence[str]) -> str:
-    kind, message = type(fault).__name__, str(getattr(fault, "message", "") or fault.format_message())
-    parameter = getattr(fault, "param", None)
+def _message(error: Any, context: Any, words: Sequence[str]) -> str:
+    kind, message = type(error).__name__, str(getattr(error, "message", "") or error.format_message())
+    parameter = getattr(error, "param", None)
     if kind == "NoSuchOption":
         known = [name for one in context.command.params for name in one.opts] if context is not None else []
-        same = [name for name in PLACES if name in known and fault.option_name in (*PLACES, "--output")]
-        hint = f"; did you mean {same[0]}?" if same else _near(fault.option_name, [*known, "--help"], context, ALIKE)
-        if fault.option_name == ONE_SEED and "--first-seed" in known:
+        same = [name for name in OUTPUT_OPTIONS if name in known and error.option_name in (*OUTPUT_OPTIONS, "--output")]
+        hint = (
+            f"; did you mean {same[0]}?"
+            if same
+            else _suggestion(error.option_name, [*known, "--help"], context, SIMILARITY_CUTOFF)
+        )
+        if error.option_name == SEED_OPTION and "--first-seed" in known:
             hint = "; did you mean --first-seed (of one flight), or --seeds (how many flights)?"
-        return f"{fault.option_name}: unknown option{hint}"
+        return f"{error.option_name}: unknown option{hint}"
     unknown = re.match(r"No such command '(.*?)'", message)
     if unknown is not None:
-        return f"{unknown[1]}: unknown command{_near(unknown[1], list(context.command.commands), context)}"
+        return f"{unknown[1]}: unknown command{_suggestion(unknown[1], list(context.command.commands), context)}"
     if kind == "MissingParameter" and parameter is not None:
-        return f"{_name(parameter)} is missing{_example(context)}"
+        return f"{_parameter_name(parameter)} is missing{_example_text(context)}"
     if kind == "BadParameter" and parameter is not None:
-        return _refused(parameter, words, message)
+        return _value_error_text(parameter, words, message)
     if kind == "BadOptionUsage":
         if "does not take a value" in message:
-            return f"{fault.option_name} takes no value; write it alone"
-        return f"{fault.option_name} needs a value"
+            return f"{error.option_name} takes no value; write it alone"
+        return f"{error.option_name} needs a value"
     extra = re.match(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)", message)
     if extra is not None:
-        takes = [_name(one) for one in context.command.params if one.param_type_name == "argument"]
+        takes = [_parameter_name(one) for one in context.command.params if one.param_type_name == "argument"]
         more = f"; it takes {' '.join(takes)} and options" if takes else "; it takes options alone"
-        return f"unexpected {extra[1]}{more}{_example(context)}"
-    return str(fault.format_message()).strip().rstrip(".") + _example(context)
+        return f"unexpected {extra[1]}{more}{_example_text(context)}"
+    return str(error.format_message()).strip().rstrip(".") + _example_text(context)
 
 
-def _path(context: Any) -> str:
+def _command_path(context: Any) -> str:
     """The command as a person writes it, however Python was started."""
     names = []
     while context is not None and context.parent is not None:
@@ -79,18 +83,18 @@ def _path(context: Any) -> str:
     return " ".join(["airflock", *reversed(names)])
 
 
-def _near(name: str, known: Sequence[str], context: Any, cutoff: float = 0.5) -> str:
-    return meant(name, known, f"; {_path(context)} --help lists them", lead="; ", cutoff=cutoff)
+def _suggestion(name: str, known: Sequence[str], context: Any, cutoff: float = 0.5) -> str:
+    return suggest(name, known, f"; {_command_path(context)} --help lists them", lead="; ", cutoff=cutoff)
 
 
-def _example(context: Any) -> str:
+def _example_text(context: Any) -> str:
     """The example of a verb's help."""
     text = getattr(getattr(context, "command", None), "help", None) or ""
     match = re.search(r"Example: (.+)", text)
     return f"; for instance: {match[1].strip()}" if match else ""
 
 
-def _name(parameter: Any) -> str:
+def _parameter_name(parameter: Any) -> str:
     """What a person writes: the longest name of an option, or the metavar of an argument."""
     options = [name for name in parameter.opts if name.startswith("-")]
     if options:
@@ -98,16 +102,16 @@ def _name(parameter: Any) -> str:
     return str(parameter.metavar or parameter.name.upper())
 
 
-def _refused(parameter: Any, words: Sequence[str], message: str) -> str:
+def _value_error_text(parameter: Any, words: Sequence[str], message: str) -> str:
     """A value that has the wrong kind, lies outside its range, or is none of its choices."""
-    name, value = _name(parameter), _given(parameter, words)
+    name, value = _parameter_name(parameter), _given_value(parameter, words)
     choices = _choices(parameter)
     if value is not None and choices:
-        return f"{name} {value} is none of {', '.join(choices)}{meant(value, choices, lead='; ')}"
-    low, high = _ends(parameter)
+        return f"{name} {value} is none of {', '.join(choices)}{suggest(value, choices, lead='; ')}"
+    low, high = _range_ends(parameter)
     if value is None or (low is None and high is None and "valid" not in message):
         return f"{name}: {message.strip().rstrip('.')}"
-    span = _span(low, high)
+    span = _range_text(low, high)
     give = "" if low is None and high is None else f"; give {span}"
     try:
         number = float(value)
@@ -117,7 +121,7 @@ def _refused(parameter: Any, words: Sequence[str], message: str) -> str:
     return f"{name} {value} lies outside {span}" if outside else f"{name} {value} is not a whole number{give}"
 
 
-def _given(parameter: Any, words: Sequence[str]) -> str | None:
+def _given_value(parameter: Any, words: Sequence[str]) -> str | None:
     """The last value that a command line gives to an option; None if that cannot be told."""
     last = None
     for word, after in zip(words, [*words[1:], None], strict=True):
@@ -127,7 +131,7 @@ def _given(parameter: Any, words: Sequence[str]) -> str | None:
     return last
 
 
-def _ends(parameter: Any) -> tuple[float | None, float | None]:
+def _range_ends(parameter: Any) -> tuple[float | None, float | None]:
     """Lowest and highest allowed number of an option."""
     ends = []
     for name in ("min", "max"):
@@ -136,7 +140,7 @@ def _ends(parameter: Any) -> tuple[float | None, float | None]:
     return ends[0], ends[1]
 
 
-def _span(low: float | None, high: float | None) -> str:
+def _range_text(low: float | None, high: float | None) -> str:
     """A range for a person."""
     return f"[{'-inf' if low is None else f'{low:.10g}'}, {'inf' if high is None else f'{high:.10g}'}]"
 

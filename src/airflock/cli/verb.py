@@ -7,20 +7,19 @@ from typing import Any
 import typer
 from typer.core import TyperCommand
 
-from airflock.cli.usage import infinite, usage_fault
-from airflock.support.asked import WRONG
-from airflock.support.errors import AirflockError
+from airflock.cli.usage import non_finite_errors, usage_error
+from airflock.support import INVALID, AirflockError
 
-FAULTS = "airflock.parts.faults"  # of a command line, in the context of its verb
-VALUES = ("BadParameter", "MissingParameter")  # faults of one option alone
-NUMBERS = ("IntParamType", "FloatParamType", "IntRange", "FloatRange")  # kinds of options
+ERRORS_KEY = "airflock.parts.faults"  # of a command line, in the context of its verb
+VALUE_ERROR_NAMES = ("BadParameter", "MissingParameter")  # faults of one option alone
+NUMBER_TYPE_NAMES = ("IntParamType", "FloatParamType", "IntRange", "FloatRange")  # kinds of options
 
 
-class Verb(TyperCommand):
+class VerbCommand(TyperCommand):
     """A command whose options are judged one by one; nan and inf are refused where an option has a range.
 
     A verb that takes its context goes on with numbers that are `WRONG`, and refuses them with all else that it finds
-    wrong (`options.asked`); any other ends before it begins.
+    wrong (`options.collect_option_errors`); any other ends before it begins.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -30,13 +29,13 @@ class Verb(TyperCommand):
         try:
             rest = super().parse_args(ctx, list(args))
         except Exception as fault:
-            if type(fault).__name__ not in VALUES:
+            if type(fault).__name__ not in VALUE_ERROR_NAMES:
                 raise
             rest, faults, carried = self._one_by_one(ctx, args)
-        for name, line in infinite(ctx):
-            ctx.params[name] = WRONG
+        for name, line in non_finite_errors(ctx):
+            ctx.params[name] = INVALID
             faults.append(line)
-        ctx.meta[FAULTS] = faults
+        ctx.meta[ERRORS_KEY] = faults
         if faults and not (carried and _takes_context(self.callback)):
             raise AirflockError("\n".join(faults))
         return rest
@@ -49,18 +48,20 @@ class Verb(TyperCommand):
             try:
                 _, rest = parameter.handle_parse_result(ctx, given, rest)
             except Exception as fault:
-                if type(fault).__name__ not in VALUES:
+                if type(fault).__name__ not in VALUE_ERROR_NAMES:
                     raise
-                faults.append(usage_fault(fault, args))
-                number = type(fault).__name__ == VALUES[0] and type(parameter.type).__name__ in NUMBERS
+                faults.append(usage_error(fault, args))
+                number = (
+                    type(fault).__name__ == VALUE_ERROR_NAMES[0] and type(parameter.type).__name__ in NUMBER_TYPE_NAMES
+                )
                 carried = carried and number and not parameter.multiple
-                ctx.params[parameter.name] = WRONG
+                ctx.params[parameter.name] = INVALID
         if rest and not ctx.allow_extra_args:
             carried = False
             try:
-                ctx.fail(f"Got unexpected extra argument(s) ({' '.join(rest)})")
+                ctx.begin_fault(f"Got unexpected extra argument(s) ({' '.join(rest)})")
             except Exception as fault:
-                faults.append(usage_fault(fault, args))
+                faults.append(usage_error(fault, args))
         return rest, faults, carried
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.support.errors import StudioError
+from airflock.support import StudioError
 
 
 def watch(
@@ -53,18 +53,18 @@ def watch(
 
     Example: airflock watch mission.json --radio udp:0.0.0.0:14600
     """
-    from airflock.studio.watch import watch as open_page
+    from airflock.studio import watch as open_page
 
     open_page(
-        scenario, options.settings(changes, agents), seed, law=law, trust=trust, host=host, port=port,
-        against=_rival(against or []), radios=radio or [], key=key, say=tables.say,
+        scenario, options.parse_settings(changes, agents), seed, law=law, trust=trust, host=host, port=port,
+        against=_comparison(against or []), radios=radio or [], key=key, say=tables.print_message,
     )  # fmt: skip
 
 
-def _rival(given: list[str]) -> str | dict[str, Any] | None:
+def _comparison(value: list[str]) -> str | dict[str, Any] | None:
     """What flies beside the scenario: a name, or keys with values."""
-    if any("=" not in each for each in given) and len(given) > 1:
-        raise StudioError(f"--against {' '.join(given)}: give one preset or file, or only KEY=VALUE")
-    if given and "=" not in given[0]:
-        return given[0]
-    return options.settings(given, option="--against") if given else None
+    if any("=" not in each for each in value) and len(value) > 1:
+        raise StudioError(f"--against {' '.join(value)}: give one preset or file, or only KEY=VALUE")
+    if value and "=" not in value[0]:
+        return value[0]
+    return options.parse_settings(value, option="--against") if value else None

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from airflock.core.contract import Model
 from airflock.core.maths import FAR, TINY, norm
-from airflock.core.vocabulary import Own, Percept, answer
+from airflock.core.vocabulary import Own, Percept, call_rule
 
 START = {"sum": 0.0, "min": FAR, "max": -FAR}  # what a reduction gives where nothing is reduced
 
@@ -25,7 +25,7 @@ class State(NamedTuple):
     vz: float
 
 
-class Heard(NamedTuple):
+class HeardNeighbour(NamedTuple):
     """A neighbour as heard: who it is (its index in the flock), its state, and the age of these data, s.
 
     fade  : normal number by which its signal is weaker than its distance says; 0 where nothing is drawn
@@ -50,7 +50,7 @@ def decide(
     model: Model,
     p: Any,
     own: State,
-    neighbours: Iterable[Heard],
+    neighbours: Iterable[HeardNeighbour],
     surfaces: Iterable[tuple[float, float, float, float]],
     memory: Any = None,
     *,
@@ -82,9 +82,9 @@ def decide(
     f = 1.0 / norm(vx, vy, vz)
     given: dict[str, Any] = {
         "own": Own(vx, vy, vz, f * vx, f * vy, f * vz),
-        "sums": meet_neighbours(model, p, own, neighbours, index, group),
-        "walls": meet_surfaces(model, p, own, surfaces),
-        "memory": first_memory(model) if memory is None else memory,
+        "sums": sum_neighbours(model, p, own, neighbours, index, group),
+        "walls": sum_surfaces(model, p, own, surfaces),
+        "memory": initial_memory(model) if memory is None else memory,
         "percept": percept or Percept(time, centre[0] - own.x, centre[1] - own.y, centre[2] - own.z),
         "period": period,
         "shared": shared,
@@ -92,38 +92,38 @@ def decide(
         "aero": aero,
         "p": p,
     }
-    result = answer(model.decide, "decide", given, model.name)
+    result = call_rule(model.decide, "decide", given, model.name)
     x, y, z = result[:3]
     if model.added is not None:
-        more = answer(model.added.decide, "decide", given, model.added.name)
+        more = call_rule(model.added.decide, "decide", given, model.added.name)
         x, y, z = x + more[0], y + more[1], z + more[2]
     return Decision((x, y, z), result[3] if len(result) > 3 else memory)
 
 
-def first_memory(model: Model) -> Any:
+def initial_memory(model: Model) -> Any:
     """Memory of an agent before its first decision; None if the model keeps none."""
     return model.Memory() if model.Memory is not None else None
 
 
-def meet_neighbours(
-    model: Model, p: Any, own: State, neighbours: Iterable[Heard], index: int, group: float = -1.0
+def sum_neighbours(
+    model: Model, p: Any, own: State, neighbours: Iterable[HeardNeighbour], index: int, group: float = -1.0
 ) -> Any:
     """The model's Sums over all neighbours within its reach; None without Sums."""
     if model.Sums is None:
         return None
     if model.neighbour is None:
         return _zeros(model.Sums)
-    near = answer(model.reach, "reach", {"p": p}, model.name) if model.reach is not None else FAR
+    near = call_rule(model.reach, "reach", {"p": p}, model.name) if model.reach is not None else FAR
     terms = []
     for heard in neighbours:
-        given = pair_percept(own, heard, index, group)
+        given = pair_arguments(own, heard, index, group)
         if given["r2"] <= near * near + TINY:  # which r2 carries as a guard: a neighbour at exactly the reach counts
             given["p"] = p
-            terms.append(answer(model.neighbour, "neighbour", given, model.name))
-    return reduced(model.Sums, model.reduce, terms)
+            terms.append(call_rule(model.neighbour, "neighbour", given, model.name))
+    return reduce_records(model.Sums, model.reduce, terms)
 
 
-def meet_surfaces(model: Model, p: Any, own: State, surfaces: Iterable[tuple[float, float, float, float]]) -> Any:
+def sum_surfaces(model: Model, p: Any, own: State, surfaces: Iterable[tuple[float, float, float, float]]) -> Any:
     """The model's Walls, summed over all surfaces; None without Walls."""
     if model.Walls is None:
         return None
@@ -132,11 +132,11 @@ def meet_surfaces(model: Model, p: Any, own: State, surfaces: Iterable[tuple[flo
     terms = []
     for distance, nx, ny, nz in surfaces:
         given = {"distance": distance, "nx": nx, "ny": ny, "nz": nz, "vx": own.vx, "vy": own.vy, "vz": own.vz, "p": p}
-        terms.append(answer(model.boundary, "boundary", given, model.name))
-    return reduced(model.Walls, {}, terms)
+        terms.append(call_rule(model.boundary, "boundary", given, model.name))
+    return reduce_records(model.Walls, {}, terms)
 
 
-def pair_percept(own: State, heard: Heard, index: int, group: float = -1.0) -> dict[str, Any]:
+def pair_arguments(own: State, heard: HeardNeighbour, index: int, group: float = -1.0) -> dict[str, Any]:
     """Everything that a neighbour rule may ask for, SI; differences are neighbour minus own; group : the own one."""
     other = heard.state
     dx, dy, dz = other.x - own.x, other.y - own.y, other.z - own.z
@@ -153,7 +153,7 @@ def pair_percept(own: State, heard: Heard, index: int, group: float = -1.0) -> d
     }  # fmt: skip
 
 
-def reduced(record: type[Any], how: Mapping[str, str], terms: Iterable[tuple[float, ...]]) -> Any:
+def reduce_records(record: type[Any], how: Mapping[str, str], terms: Iterable[tuple[float, ...]]) -> Any:
     """One record from many: each field summed, or its least or greatest value where `how` says so."""
     fields: tuple[str, ...] = record._fields
     ways = [how.get(name, "sum") for name in fields]
@@ -163,11 +163,11 @@ def reduced(record: type[Any], how: Mapping[str, str], terms: Iterable[tuple[flo
             totals = [total + value for total, value in zip(totals, term, strict=True)]
         return record(*totals)
     for term in terms:
-        totals = [combined(way, total, value) for way, total, value in zip(ways, totals, term, strict=True)]
+        totals = [reduce_values(way, total, value) for way, total, value in zip(ways, totals, term, strict=True)]
     return record(*totals)
 
 
-def combined(how: str, total: float, value: float) -> float:
+def reduce_values(how: str, total: float, value: float) -> float:
     """A total with one more value: sum, min or max."""
     return total + value if how == "sum" else (min(total, value) if how == "min" else max(total, value))
 

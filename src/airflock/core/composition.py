@@ -1,27 +1,27 @@
 """Composition: two laws as one, the commands of both added up.
 
 What comes out is a model like any other, so whatever flies a model flies it: drivers, plain Python, a drone. Its
-`decide` is that of the first law, and `added` holds the second one, whose command whoever asks for a command adds.
+`decide` is that of the first law, and `add_laws` holds the second one, whose command whoever asks for a command adds.
 """
 
 from dataclasses import replace
 from inspect import signature
 
 from airflock.core.contract import Model
-from airflock.support.errors import RuleError
+from airflock.support import RuleError
 
 OWN = ("p", "sums", "walls", "memory")  # what only the first law can have: there is one record of each
 RULES = ("neighbour", "boundary", "Memory", "reach", "sight", "wall_reach")
 
 
-def added(base: Model, extra: Model) -> Model:
+def add_laws(base: Model, extra: Model) -> Model:
     """The law `base` with the command of `extra` added to its own.
 
     `extra` may have a rule of the whole flock where `base` has none; its `decide` takes no parameters `p` of the model,
     only records that a scenario has once. Raises RuleError where the two do not fit. Equal arguments give the same
     rules, and so the same driver.
     """
-    for fault in faults(base, extra):
+    for fault in composition_errors(base, extra):
         raise RuleError(fault)
     return replace(
         base,
@@ -34,7 +34,7 @@ def added(base: Model, extra: Model) -> Model:
     )
 
 
-def faults(base: Model, extra: Model) -> list[str]:
+def composition_errors(base: Model, extra: Model) -> list[str]:
     """Why two laws cannot be added, one line each."""
     found = []
     if base.command != extra.command:

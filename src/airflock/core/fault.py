@@ -12,13 +12,13 @@ from functools import cached_property
 from math import inf
 from typing import Any
 
-from airflock.core.contract import names_of
+from airflock.core.contract import namespace_names
 from airflock.core.parameters import Parameters, choices, number_names
-from airflock.core.vocabulary import answer, asks
-from airflock.support.errors import RuleError
+from airflock.core.vocabulary import argument_names, call_rule
+from airflock.support import RuleError
 
 # rule → how many numbers it returns, and what they are
-RULES: Mapping[str, tuple[int, str]] = {
+FAULT_RULES: Mapping[str, tuple[int, str]] = {
     "sense": (6, "position (m) and velocity (m/s) that the agent believes and sends"),
     "tell": (6, "position (m) and velocity (m/s) that it sends instead"),
     "radio": (2, "how far its packets carry and how far it hears, m; negative for not at all"),
@@ -29,8 +29,8 @@ RULES: Mapping[str, tuple[int, str]] = {
 }
 STATE = tuple(f"at_{letter}{axis}" for letter in ("", "v") for axis in "xyz")  # "at_x" to "at_vz"
 # who asks `sense` or `tell`, and for which state: the one believed, the one sent of it, and that which is told instead
-ASKED: Mapping[str, str] = {"believed": "sense", "sent": "sense", "told": "tell"}
-KEYS = ("kind", "at", "until", "lasts", "per_hour", "agents", "group", "number")  # of an entry of [[faults]]
+DISTURBED_STATES: Mapping[str, str] = {"believed": "sense", "sent": "sense", "told": "tell"}
+ENTRY_KEYS = ("kind", "at", "until", "lasts", "per_hour", "agents", "group", "number")  # of an entry of [[faults]]
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,12 @@ class Fault:
     doc: str = ""
 
     def __hash__(self) -> int:
-        return hash((self.name, *(getattr(self, kind) for kind in RULES)))
+        return hash((self.name, *(getattr(self, kind) for kind in FAULT_RULES)))
 
     @property
     def rules(self) -> dict[str, Callable[..., Any]]:
         """Its rules by the stage that asks them."""
-        return {kind: getattr(self, kind) for kind in RULES if getattr(self, kind) is not None}
+        return {kind: getattr(self, kind) for kind in FAULT_RULES if getattr(self, kind) is not None}
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -82,26 +82,26 @@ class Fault:
         return namedtuple(self.name.title().replace("_", ""), self.fields)
 
     @property
-    def onset(self) -> tuple[str, ...]:
+    def onset_names(self) -> tuple[str, ...]:
         """What of the agent's true state and command its rules want to know as it was when the fault began."""
-        asked = {(kind, name) for kind, rule in self.rules.items() for name in asks(rule, kind, self.name)}
-        asked -= {(kind, name) for kind in ASKED.values() for name in STATE}
+        asked = {(kind, name) for kind, rule in self.rules.items() for name in argument_names(rule, kind, self.name)}
+        asked -= {(kind, name) for kind in DISTURBED_STATES.values() for name in STATE}
         return tuple(sorted({name for _, name in asked if name.startswith("at_")}))
 
-    def gone_after(self, numbers: Any) -> float:
+    def time_to_absence(self, numbers: Any) -> float:
         """Time from its beginning until the agent leaves the flight, s; inf for never. numbers : its `Parameters`."""
         if self.leaves is None:
             return inf
         given = {"f": self.record(*(getattr(numbers, name) for name in self.fields))}
-        return float(answer(self.leaves, "leaves", given, self.name))
+        return float(call_rule(self.leaves, "leaves", given, self.name))
 
-    def kept(self, asked: str) -> tuple[str, ...]:
+    def kept(self, state: str) -> tuple[str, ...]:
         """What of the state that a rule disturbs it wants to know as it was last before the fault, such as "at_x".
 
-        asked : one of ASKED, as which the rule `sense` or `tell` is asked
+        state : one of ASKED, as which the rule `sense` or `tell` is asked
         """
-        rule = self.rules.get(ASKED[asked])
-        names = () if rule is None else asks(rule, ASKED[asked], self.name)
+        rule = self.rules.get(DISTURBED_STATES[state])
+        names = () if rule is None else argument_names(rule, DISTURBED_STATES[state], self.name)
         return tuple(name for name in STATE if name in names)
 
 
@@ -135,18 +135,22 @@ def fault(namespace: Any, name: str = "") -> Fault:
     >>> sorted(airflock.fault(Sluggish).rules)
     ['motion']
     """
-    found, name = names_of(namespace, name)
-    rules = {kind: found[kind] for kind in RULES if callable(found.get(kind))}
+    found, name = namespace_names(namespace, name)
+    rules = {kind: found[kind] for kind in FAULT_RULES if callable(found.get(kind))}
     if not rules:
-        raise RuleError(f"fault {name} has no rule; give one or more of {', '.join(RULES)}")
+        raise RuleError(f"fault {name} has no rule; give one or more of {', '.join(FAULT_RULES)}")
     for kind, rule in rules.items():
-        asks(rule, kind, name)
+        argument_names(rule, kind, name)
     record = found.get("Parameters", Parameters)
-    taken = [key for key in number_names(record) if key in KEYS]
+    taken = [key for key in number_names(record) if key in ENTRY_KEYS]
     if taken:
         raise RuleError(f"fault {name}: Parameters.{taken[0]}: the name has a meaning of its own in [[faults]]")
     made = Fault(name, record, doc=str(found.get("__doc__") or ""), **rules)
-    kept = [key for key in number_names(record) if key == "onset" or key.startswith(("at_", *(f"{a}_" for a in ASKED)))]
+    kept = [
+        key
+        for key in number_names(record)
+        if key == "onset" or key.startswith(("at_", *(f"{a}_" for a in DISTURBED_STATES)))
+    ]
     if kept:
         raise RuleError(f"fault {name}: Parameters.{kept[0]}: a flight keeps something else of that name; give another")
     if choices(record()):

@@ -11,12 +11,11 @@ from functools import cache
 from math import isfinite
 from typing import Any, NamedTuple
 
-from airflock.core.vectors import MOST, Vector, Vectors
-from airflock.support.errors import ParameterError
-from airflock.support.numeric import is_number
+from airflock.core.vectors import MAX_COMPONENTS, VectorFields, VectorMeta
+from airflock.support import ParameterError, is_number
 
 
-def with_unit(text: str, unit: str) -> str:
+def format_with_unit(text: str, unit: str) -> str:
     """A number or a range followed by its unit; a plain number, of unit 1, by nothing."""
     return text if unit in ("", "1") else f"{text} {unit}"
 
@@ -36,7 +35,7 @@ class Quantity(NamedTuple):
     @property
     def span(self) -> str:
         """The allowed range with its unit, for people to read."""
-        return with_unit(f"[{self.low:g}, {self.high:g}]", self.unit)
+        return format_with_unit(f"[{self.low:g}, {self.high:g}]", self.unit)
 
 
 class Choice(NamedTuple):
@@ -127,11 +126,15 @@ def quantity(
     """
     if size is not None:
         parts = default if isinstance(default, tuple) else (default,) * size
-        if not 1 <= size <= MOST or len(parts) != size or None in parts:
-            raise ParameterError(f"size = {size}: give 1 to {MOST} components and a default for each ({meaning})")
+        if not 1 <= size <= MAX_COMPONENTS or len(parts) != size or None in parts:
+            raise ParameterError(
+                f"size = {size}: give 1 to {MAX_COMPONENTS} components and a default for each ({meaning})"
+            )
         words = [f"{meaning}, {k + 1} of {size}" for k in range(size)]
         rest: dict[str, Any] = {"low": low, "high": high, "source": source, "whole": whole, "usual": usual}
-        return Vector(tuple(quantity(part, unit, meaning=of, **rest) for part, of in zip(parts, words, strict=True)))
+        return VectorFields(
+            tuple(quantity(part, unit, meaning=of, **rest) for part, of in zip(parts, words, strict=True))
+        )
     if isinstance(default, tuple):
         raise ParameterError(f"default = {default} of several numbers needs their size ({meaning})")
     if usual is not None and not low <= usual[0] < usual[1] <= high:
@@ -214,7 +217,7 @@ def _declared(item: Field[Any]) -> Declaration:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(metaclass=Vectors):
+class Parameters(metaclass=VectorMeta):
     """Base of every record of parameters: numbers become floats, and all faults are reported together.
 
     A record is a frozen dataclass whose fields are declared by `quantity` and `choice`. Raises ParameterError.
@@ -238,13 +241,13 @@ class Parameters(metaclass=Vectors):
                 if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**1023:
                     value = float(value)
                     object.__setattr__(self, name, value)  # 1 and 1.0 must not compile two kernels
-                fault = quantity_fault(value, declared)
+                fault = quantity_error(value, declared)
             elif isinstance(declared, Choice):
-                fault = choice_fault(value, declared)
+                fault = choice_error(value, declared)
             elif isinstance(declared, Text):
                 fault = "" if isinstance(value, str) else f"= {value!r} is no text"
             else:
-                fault = points_fault(value, declared)
+                fault = points_error(value, declared)
                 if not fault:
                     object.__setattr__(self, name, _frozen(value))
             if fault:
@@ -253,24 +256,24 @@ class Parameters(metaclass=Vectors):
             raise ParameterError("\n".join(faults))
 
 
-def quantity_fault(value: Any, declared: Quantity) -> str:
+def quantity_error(value: Any, declared: Quantity) -> str:
     """What is wrong with a value, as the rest of a sentence; empty if nothing is."""
     if value is None and declared.optional:
         return ""
     if not isinstance(value, float):
         return f"= {value!r} is not a number; give {declared.span}"
     if not declared.low <= value <= declared.high:
-        return f"= {with_unit(f'{value:g}', declared.unit)} lies outside {declared.span}"
+        return f"= {format_with_unit(f'{value:g}', declared.unit)} lies outside {declared.span}"
     return f"= {value:g} is not a whole number" if declared.whole and value != int(value) else ""
 
 
-def choice_fault(value: Any, declared: Choice) -> str:
+def choice_error(value: Any, declared: Choice) -> str:
     """What is wrong with a choice, as the rest of a sentence; empty if nothing is."""
     known = isinstance(value, str) and value in declared.options
     return "" if known else f"= {value!r} is none of {', '.join(declared.options)}"
 
 
-def points_fault(value: Any, declared: Points) -> str:
+def points_error(value: Any, declared: Points) -> str:
     """What is wrong with a list of points or polygons, as the rest of a sentence; empty if nothing is."""
     try:
         sound = _are_points(_frozen(value), declared.depth, declared.axes)

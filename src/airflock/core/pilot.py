@@ -7,19 +7,26 @@ from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from airflock.core.agent import Decision, Heard, State, decide, first_memory
+from airflock.core.agent import Decision, HeardNeighbour, State, decide, initial_memory
 from airflock.core.contract import Body, Model
-from airflock.core.hearing import Hearing, Packet, carried, lasts
+from airflock.core.hearing import PacketPolicy, ReceivedPacket, extrapolated_state, packet_counts
 from airflock.core.maths import norm
-from airflock.core.senses import Senses, Vector, World
-from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import back, complete, could_be_near, counts, of_standing, stands_until
-from airflock.core.topology import Topology, met_of
-from airflock.core.vocabulary import Percept, answer, asks
-from airflock.support.errors import RuleError
+from airflock.core.senses import BoundPercept, Vector, WorldMap
+from airflock.core.silence import (
+    SilenceParameters,
+    back,
+    could_be_near,
+    counts,
+    for_standing_neighbour,
+    stands_until,
+    with_defaults,
+)
+from airflock.core.topology import Topology, met_neighbours
+from airflock.core.vocabulary import Percept, argument_names, call_rule
+from airflock.support import RuleError
 
 
-def level(state: State) -> State:
+def flattened(state: State) -> State:
     """A state in the plane."""
     x, y, _, vx, vy, _ = state
     return State(x, y, 0.0, vx, vy, 0.0)
@@ -45,28 +52,45 @@ class Pilot:
     """
 
     def __init__(
-        self, model: Model, p: Any, place: World, *, index: int, period: float, hearing: Hearing | None = None,
-        body: Body | None = None, b: Any = None, silence: Silence | None = None, flat: bool = False, seed: int = 0,
-        wing: Any = None, aero: Any = None, told: bool = False, topology: Topology | None = None, t: Any = None,
+        self,
+        model: Model,
+        p: Any,
+        place: WorldMap,
+        *,
+        index: int,
+        period: float,
+        hearing: PacketPolicy | None = None,
+        body: Body | None = None,
+        b: Any = None,
+        silence: SilenceParameters | None = None,
+        flat: bool = False,
+        seed: int = 0,
+        wing: Any = None,
+        aero: Any = None,
+        gets_flock_solution: bool = False,
+        topology: Topology | None = None,
+        t: Any = None,
         groups: Sequence[int] = (),
-    ):  # fmt: skip
+    ):
         self.model, self.p, self.place, self.index, self.period = model, p, place, index, period
-        self.hearing, self.flat, self.seed = hearing or Hearing(), flat, seed
-        self.silence = complete(silence, model.speed(p)) if silence is not None and silence.rule == "stop" else None
-        self._of_standing = of_standing(self.silence) if self.silence is not None else None
-        self.body, self.b, self.wing, self.aero, self.told = body, b, wing, aero, told
+        self.hearing, self.flat, self.seed = hearing or PacketPolicy(), flat, seed
+        self.silence = (
+            with_defaults(silence, model.speed(p)) if silence is not None and silence.rule == "stop" else None
+        )
+        self._of_standing = for_standing_neighbour(self.silence) if self.silence is not None else None
+        self.body, self.b, self.wing, self.aero, self.told = body, b, wing, aero, gets_flock_solution
         self.topology, self.t, self.groups = topology, t, groups
-        self.memory = first_memory(model)
+        self.memory = initial_memory(model)
         self.stopped: Vector | None = None
         self.stands_until = 0.0
-        self.packets: dict[int, Packet] = {}
+        self.packets: dict[int, ReceivedPacket] = {}
         self.decisions = 0
         self.senses: Percept | None = None
         self._check()
 
     def _check(self) -> None:
         """Refuse the law now rather than in flight: one decision with a neighbour and a wall, which must be finite."""
-        asked = [name for rule in self.model.deciding for name in asks(rule, "decide", self.model.name)]
+        asked = [name for rule in self.model.decide_rules for name in argument_names(rule, "decide", self.model.name)]
         if not self.told and (self.model.flock is not None or "shared" in asked):
             raise RuleError(f"{self.model.name} decides for the whole flock at once; no single drone can fly it")
         if self.model.command != "velocity" and (self.body is None or self.body.accepts != self.model.command):
@@ -79,52 +103,56 @@ class Pilot:
         walls = [(5.0, 1.0, 0.0, 0.0), *self.place.surfaces(0.0, 0.0, 0.0)]
         record: Any = self.model.Shared
         shared = None if record is None else record(*(0.0 for _ in record._fields))
-        for near in ([], [Heard(self.index + 1, other, 0.0)]):
-            made = self._decided(own, near, walls, 0.0, Senses.of(self.place, own, 0.0), shared)
+        for near in ([], [HeardNeighbour(self.index + 1, other, 0.0)]):
+            made = self._decided(own, near, walls, 0.0, BoundPercept.of(self.place, own, 0.0), shared)
             setpoint = self.setpoint(own, made.command)
             if not all(map(isfinite, setpoint)):
                 raise RuleError(f"{self.model.name} commands {setpoint}, which is not a velocity")
 
-    def hear(self, who: int, state: State, sent_at: float, now: float, *, stands: bool = False) -> bool:
+    def receive(self, sender: int, state: State, sent_at: float, now: float, *, is_standing: bool = False) -> bool:
         """Take note of a neighbour's state that held at sent_at (s); False if it is old, of the future or nan.
 
         stands : it says that it holds or returns, so that less is to be feared of it once it is lost
         """
-        known = self.packets.get(who)
-        if who == self.index or not all(map(isfinite, state)) or not sent_at <= now + self.hearing.early:
+        known = self.packets.get(sender)
+        if sender == self.index or not all(map(isfinite, state)) or not sent_at <= now + self.hearing.early:
             return False
-        if known is not None and self.hearing.in_order and sent_at <= known.sent_at:
+        if known is not None and self.hearing.drop_reordered and sent_at <= known.sent_at:
             return False
-        self.packets[who] = Packet(state, sent_at, self.decisions, stands)
+        self.packets[sender] = ReceivedPacket(state, sent_at, self.decisions, is_standing)
         return True
 
-    def group_of(self, who: int) -> float:
+    def group_of(self, agent: int) -> float:
         """Number of an agent's group; -1 where it is in none."""
-        return float(self.groups[who]) if 0 <= who < len(self.groups) else -1.0
+        return float(self.groups[agent]) if 0 <= agent < len(self.groups) else -1.0
 
-    def set_clock(self, ahead: float) -> None:
+    def shift_clock(self, ahead: float) -> None:
         """The own clock has been set forward by so much, s: by it, all that was heard is older."""
         self.stands_until -= ahead
         for packet in self.packets.values():
             packet.sent_at -= ahead
 
-    def forget(self, who: int) -> None:
+    def forget(self, neighbour: int) -> None:
         """Drop what is known of a neighbour: it has told that it is on the ground, or has left the flock."""
-        self.packets.pop(who, None)
+        self.packets.pop(neighbour, None)
 
-    def heard(self, now: float) -> list[Heard]:
+    def heard(self, now: float) -> list[HeardNeighbour]:
         """All neighbours whose data are fresh enough, by their number."""
         found, rule = [], self.hearing
         for who, packet in sorted(self.packets.items()):
             age = now - packet.sent_at
-            over = rule.once and (self.silence is not None or packet.came < self.decisions)  # by silence: `counts`
+            over = rule.once and (
+                self.silence is not None or packet.arrived_at < self.decisions
+            )  # by silence: `counts`
             told = age <= rule.forget and not over
-            if rule.radio is not None and not lasts(rule.radio, rule.k, age):
+            if rule.radio is not None and not packet_counts(rule.radio, rule.k, age):
                 continue
             if told or (self.silence is not None and counts(age, self.silence) > 0.5):
-                state = packet.carried(now) if rule.extrapolate else packet.state
-                state = state if rule.radio is None else carried(rule.radio, rule.k, state, age)
-                found.append(Heard(who, level(state) if self.flat else state, age, group=self.group_of(who)))
+                state = packet.extrapolated(now) if rule.extrapolate else packet.state
+                state = state if rule.radio is None else extrapolated_state(rule.radio, rule.k, state, age)
+                found.append(
+                    HeardNeighbour(who, flattened(state) if self.flat else state, age, group=self.group_of(who))
+                )
         return found
 
     def lost_near(self, own: State, now: float) -> bool:
@@ -156,7 +184,7 @@ class Pilot:
 
     def decide(
         self, own: State, now: float, percept: Percept | None = None, goal: Vector | None = None, *,
-        time: float | None = None, only: Container[int] | None = None, shared: Any = None,
+        time: float | None = None, visible: Container[int] | None = None, shared: Any = None,
         fades: Mapping[int, float] | None = None,
     ) -> Decision:  # fmt: skip
         """The law's command from the own state as measured, and its new memory; or what keeps it where it stopped.
@@ -170,11 +198,11 @@ class Pilot:
         fades   : normal numbers by which signals are weaker, by who sends them, where somebody draws them
         """
         if self.flat:
-            own, goal = level(own), None if goal is None else (*goal[:2], 0.0)
+            own, goal = flattened(own), None if goal is None else (*goal[:2], 0.0)
         time = now if time is None else time
-        self.senses = percept or Senses.of(self.place, own, time, goal, (self.seed, self.decisions, self.index))
-        near = [self._beside(own, heard, fades) for heard in self.heard(now) if only is None or heard.who in only]
-        near = met_of(self.topology, self.t, own, near, self.place)
+        self.senses = percept or BoundPercept.of(self.place, own, time, goal, (self.seed, self.decisions, self.index))
+        near = [self._beside(own, heard, fades) for heard in self.heard(now) if visible is None or heard.who in visible]
+        near = met_neighbours(self.topology, self.t, own, near, self.place)
         made = self._decided(own, near, self.place.surfaces(own.x, own.y, own.z), time, self.senses, shared)
         self.decisions += 1
         self.memory = made.memory
@@ -182,15 +210,15 @@ class Pilot:
         x, y, z = made.command if stays is None else stays
         return Decision((x, y, 0.0) if self.flat else (x, y, z), made.memory)
 
-    def _beside(self, own: State, heard: Heard, fades: Mapping[int, float] | None) -> Heard:
+    def _beside(self, own: State, heard: HeardNeighbour, fades: Mapping[int, float] | None) -> HeardNeighbour:
         """A neighbour at its image nearest to own, with what weakens its signal."""
         state, fade = self.place.beside(own, heard.state), fades.get(heard.who, 0.0) if fades else 0.0
         if state is heard.state and fade == heard.fade:
             return heard
-        return Heard(heard.who, state, heard.age, fade, heard.group)
+        return HeardNeighbour(heard.who, state, heard.age, fade, heard.group)
 
     def _decided(
-        self, own: State, near: list[Heard], walls: Iterable[tuple[float, float, float, float]], time: float,
+        self, own: State, near: list[HeardNeighbour], walls: Iterable[tuple[float, float, float, float]], time: float,
         percept: Percept, shared: Any,
     ) -> Decision:  # fmt: skip
         return decide(
@@ -204,7 +232,7 @@ class Pilot:
         if self.model.command == "velocity":
             return made.command
         if self.flat:
-            own = level(own)
+            own = flattened(own)
         stays = self.stay(own, now)
         x, y, z = self.setpoint(own, made.command) if stays is None else stays
         return (x, y, 0.0) if self.flat else (x, y, z)
@@ -217,5 +245,5 @@ class Pilot:
         still = {"g": (0.0, 0.0, 0.0), "w": (0.0, 0.0, 0.0), "v": own[3:], "m": own[3:], "c": command}
         given: dict[str, Any] = {a + axis: v[c] for a, v in still.items() for c, axis in enumerate("xyz")}
         rule: Callable[..., Any] = self.body.move
-        x, y, z = answer(rule, "move", given | {"dt": self.period, "b": self.b}, self.body.name)[:3]
+        x, y, z = call_rule(rule, "move", given | {"dt": self.period, "b": self.b}, self.body.name)[:3]
         return x, y, z

@@ -11,20 +11,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from airflock.core.contract import names_of
-from airflock.core.contract.own_records import beginnings_of, check_memory, parameters_with
+from airflock.core.contract import namespace_names
+from airflock.core.contract.own_records import check_memory_record, initial_values, merge_parameters
 from airflock.core.parameters import Parameters, number_names, quantity
-from airflock.core.vocabulary import asks
+from airflock.core.vocabulary import argument_names
 from airflock.core.vocabulary.radios import RULES
-from airflock.support.errors import RuleError
+from airflock.support import RuleError
 
 S5 = "Vásárhelyi et al. 2018, Table S5"
-FEW = 3  # packets of each rate in a decision, up to which `missed_few` serves
-LINKS = ("fast", "slow")  # how `missed` asks how many packets the first and the second of RATES send in a decision
+FEW_PACKETS = 3  # packets of each rate in a decision, up to which `missed_few` serves
+LINK_NAMES = ("fast", "slow")  # how `missed` asks how many packets the first and the second of RATES send in a decision
 
 
 @dataclass(frozen=True, kw_only=True)
-class Packets(Parameters):
+class PacketParameters(Parameters):
     """What every radio has: a delay, a range, and a loss that grows with the square of the distance."""
 
     delay: float = quantity(
@@ -110,18 +110,20 @@ class Radio:
         return hash((self.name, *(getattr(self, rule) for rule in RULES)))
 
     @property
-    def keeps(self) -> bool:
+    def keeps_packets(self) -> bool:
         """Whether the newest packet counts until the next one comes."""
         return any(rule is not None for rule in (self.missed, self.receive, self.late, self.see))
 
     @property
-    def beginnings(self) -> tuple[float, ...]:
+    def initial_packet(self) -> tuple[float, ...]:
         """What each field of its Packet is at the start of a flight."""
-        return beginnings_of(self.Packet)
+        return initial_values(self.Packet)
 
-    def asks(self, *names: str) -> bool:
+    def asks_for(self, *names: str) -> bool:
         """Whether one of its rules asks for any of these names."""
-        found = {name for kind in RULES if (rule := getattr(self, kind)) for name in asks(rule, kind, self.name)}
+        found = {
+            name for kind in RULES if (rule := getattr(self, kind)) for name in argument_names(rule, kind, self.name)
+        }
         return bool(found & set(names))
 
 
@@ -155,9 +157,9 @@ def radio(namespace: Any, name: str = "") -> Radio:
     >>> airflock.radio(Nearby).Parameters().range
     80.0
     """
-    found, name = names_of(namespace, name)
+    found, name = namespace_names(namespace, name)
     rules = {kind: found[kind] for kind in RULES if callable(found.get(kind))}
-    asked = {kind: asks(rule, kind, name) for kind, rule in rules.items()}
+    asked = {kind: argument_names(rule, kind, name) for kind, rule in rules.items()}
     if not rules:
         raise RuleError(f"radio {name} has no rule; give missed or receive, late, see, carry, lasts")
     if "missed" in rules and "receive" in rules:
@@ -167,13 +169,13 @@ def radio(namespace: Any, name: str = "") -> Radio:
     if set(rules) <= {"carry", "lasts", "missed_few"}:
         raise RuleError(f"radio {name} has only {' and '.join(rules)}; give missed, receive, late or see as well")
     packet = found.get("Packet")
-    check_memory(f"radio {name}", "receive", asked.get("receive", ()), packet, "Packet")
-    record = parameters_with(Packets, found.get("Parameters"), f"radio {name}")
+    check_memory_record(f"radio {name}", "receive", asked.get("receive", ()), packet, "Packet")
+    record = merge_parameters(PacketParameters, found.get("Parameters"), f"radio {name}")
     rates = tuple(found.get("RATES", ()))
     unknown = [rate for rate in rates if rate not in number_names(record)]
-    if unknown or len(rates) > len(LINKS):
+    if unknown or len(rates) > len(LINK_NAMES):
         raise RuleError(f"radio {name}: RATES = {rates} are not at most two numbers of Parameters")
-    wanted = set(asked.get("missed", ())) & set(LINKS) - set(LINKS[: len(rates)])
+    wanted = set(asked.get("missed", ())) & set(LINK_NAMES) - set(LINK_NAMES[: len(rates)])
     if wanted:
         raise RuleError(f"radio {name}: missed asks for {sorted(wanted)[0]}, which RATES does not name")
     return Radio(name, record, Packet=packet, rates=rates, violates=dict(found.get("VIOLATES", {})), **rules)

@@ -88,7 +88,7 @@ def draw(c0, c1, c2, c3, k0, k1):
     return philox(c0, c1, c2, c3, k0, k1)
 
 
-def words(seed, stream, world, step, agent, draw=0):
+def random_words(seed, stream, world, step, agent, draw=0):
     """Four random words of 32 bits for one consumer; seed may use 64 bits, the others 32, draw 8."""
     return philox(agent, step, stream + 256 * draw, world, seed, seed >> 32)
 
@@ -100,7 +100,7 @@ def pair_number(receiver, sender, agents):
 
 def pair_uniform(seed, stream, world, step, receiver, sender, agents):
     """Uniform number of one receiver and one sender, strictly between 0 and 1, in one step."""
-    return uniform(words(seed, stream, world, step, pair_number(receiver, sender, agents))[receiver & 3])
+    return uniform(random_words(seed, stream, world, step, pair_number(receiver, sender, agents))[receiver & 3])
 
 
 def uniform(word):

@@ -11,7 +11,7 @@ Vector = tuple[float, float, float]
 STILL: Vector = (0.0, 0.0, 0.0)
 
 
-class World(Protocol):
+class WorldMap(Protocol):
     """What a pilot asks of the world: `world.place.Place` answers from a map."""
 
     def beside(self, own: State, other: State, /) -> State:
@@ -28,26 +28,31 @@ class World(Protocol):
     ) -> float:  # fmt: skip
         """Free distance of a sphere, m."""
 
-    def blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
+    def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
         """Whether an obstacle or the scene stands between two places, m."""
 
 
-class Senses(Percept):
+class BoundPercept(Percept):
     """What one agent perceives at one decision, bound to a map of the world and to its own random numbers."""
 
-    place: World
+    place: WorldMap
     at: State
-    asker: tuple[int, int, int]
+    random_key: tuple[int, int, int]
     rays: int
 
     @classmethod
     def of(
-        cls, place: World, own: State, time: float, goal: Vector | None = None, asker: tuple[int, int, int] = (0, 0, 0)
+        cls,
+        place: WorldMap,
+        own: State,
+        time: float,
+        goal: Vector | None = None,
+        asker: tuple[int, int, int] = (0, 0, 0),
     ) -> Self:
         """Percept at a position; goal: where it is (m), if there is one; asker: seed, number of decision and agent."""
         offset = STILL if goal is None else (goal[0] - own.x, goal[1] - own.y, goal[2] - own.z)
         found = cls(time, -own.x, -own.y, -own.z, *offset)
-        found.place, found.at, found.asker, found.rays = place, own, asker, 0
+        found.place, found.at, found.random_key, found.rays = place, own, asker, 0
         return found
 
     def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
@@ -61,10 +66,10 @@ class Senses(Percept):
 
     def normal(self, draw: int) -> float:
         """Normal random number of this agent and decision."""
-        words = random.words(self.asker[0], random.MODEL, 0, *self.asker[1:], draw)
+        words = random.random_words(self.random_key[0], random.MODEL, 0, *self.random_key[1:], draw)
         return float(random.normal_pair(words[0], words[1])[0])
 
     def uniform(self, draw: int) -> float:
         """Uniform random number of this agent and decision."""
-        words = random.words(self.asker[0], random.MODEL, 0, *self.asker[1:], draw)
+        words = random.random_words(self.random_key[0], random.MODEL, 0, *self.random_key[1:], draw)
         return float(random.uniform(words[0]))

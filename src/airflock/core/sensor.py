@@ -9,18 +9,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from airflock.core.contract import names_of
-from airflock.core.contract.own_records import beginnings_of, check_memory, parameters_with
+from airflock.core.contract import namespace_names
+from airflock.core.contract.own_records import check_memory_record, initial_values, merge_parameters
 from airflock.core.parameters import Parameters, quantity
-from airflock.core.vocabulary import answer, asks
-from airflock.support.errors import RuleError
+from airflock.core.vocabulary import argument_names, call_rule
+from airflock.support import RuleError
 
-FIRST = 8  # draw of the stream SENSOR for g0 to g3; then g4 to g7, g8 to g11, u0 to u3. Before it: errors along axes
+FIRST_DRAW = (
+    8  # draw of the stream SENSOR for g0 to g3; then g4 to g7, g8 to g11, u0 to u3. Before it: errors along axes
+)
 COMPONENTS = ("x", "y", "z", "vx", "vy", "vz")  # what `measure` returns, before its Memory
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sampled(Parameters):
+class SensorParameters(Parameters):
     """What every sensor has: how often an agent measures, and so decides."""
 
     period: float = quantity(
@@ -64,17 +66,17 @@ class Sensor:
         return hash((self.name, self.measure, self.error))
 
     @property
-    def beginnings(self) -> tuple[float, ...]:
+    def initial_memory(self) -> tuple[float, ...]:
         """What each field of its Memory is at the start of a flight."""
-        return beginnings_of(self.Memory)
+        return initial_values(self.Memory)
 
     def is_exact(self, s: Any) -> bool:
         """Whether it tells the truth with these numbers."""
         return self.exact is not None and bool(self.exact(s))
 
-    def lacks(self, **given: Any) -> list[str]:
+    def bound_errors(self, **arguments: Any) -> list[str]:
         """What this sensor cannot measure, by what `bounds` may ask for."""
-        return [] if self.bounds is None else list(answer(self.bounds, "bounds", given, self.name))
+        return [] if self.bounds is None else list(call_rule(self.bounds, "bounds", arguments, self.name))
 
 
 def sensor(namespace: Any, name: str = "") -> Sensor:
@@ -107,16 +109,16 @@ def sensor(namespace: Any, name: str = "") -> Sensor:
     >>> airflock.sensor(Coarse).Parameters().period
     0.2
     """
-    found, name = names_of(namespace, name)
+    found, name = namespace_names(namespace, name)
     rules = [kind for kind in ("measure", "error") if callable(found.get(kind))]
     if len(rules) != 1:
         raise RuleError(f"sensor {name} has {' and '.join(rules) or 'no rule'}; give measure, or error")
     memory = found.get("Memory")
-    check_memory(f"sensor {name}", "measure", asks(found[rules[0]], rules[0], name), memory)
+    check_memory_record(f"sensor {name}", "measure", argument_names(found[rules[0]], rules[0], name), memory)
     for kind in ("exact", "bounds"):
         if found.get(kind) is not None:
-            asks(found[kind], kind, name)
-    parameters = parameters_with(Sampled, found.get("Parameters"), f"sensor {name}")
+            argument_names(found[kind], kind, name)
+    parameters = merge_parameters(SensorParameters, found.get("Parameters"), f"sensor {name}")
     return Sensor(
         name, parameters, found.get("measure"), found.get("error"), memory,
         found.get("exact"), found.get("bounds"), dict(found.get("VIOLATES", {})),

@@ -10,8 +10,7 @@ Of forty simulated flights with 15 s of silence, forty came below 3 m without th
 from dataclasses import dataclass, replace
 
 from airflock.core.maths import shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core.parameters import Parameters as Record, choice, quantity
 
 SPARE = 0.5  # s; our choice: two decisions without news; with 1 s, four flights of 40 came below 3 m
 GRACE = 1e-3  # s; two clocks that count the same decisions differ by less
@@ -20,7 +19,7 @@ OURS = "our choice, from flights of 10 drones at 4 m/s with 15 s of silence"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class SilenceParameters(Record):
     """When an agent stops because a neighbour that it has lost could be near."""
 
     rule: str = choice(
@@ -53,7 +52,10 @@ class Parameters(Record):
     )
 
 
-def complete(s: Parameters, speed: float, delay: float = 0.0, rule: str | None = None) -> Parameters:
+Parameters = SilenceParameters  # the name under which a rule's file declares its numbers
+
+
+def with_defaults(s: SilenceParameters, speed: float, delay: float = 0.0, rule: str | None = None) -> SilenceParameters:
     """The same numbers with what was left to the scenario filled in, and another rule if one is given.
 
     speed : that the law prefers, m/s; 0 where it prefers none, which counts as 4 m/s
@@ -64,7 +66,7 @@ def complete(s: Parameters, speed: float, delay: float = 0.0, rule: str | None =
     return replace(s, closing=closing, patience=patience, rule=rule or s.rule)
 
 
-def of_standing(s: Parameters) -> Parameters:
+def for_standing_neighbour(s: SilenceParameters) -> SilenceParameters:
     """The same numbers for a lost neighbour that said that it holds or returns: its reach grows half as fast.
 
     Its distance is measured from where an agent is now, so that half of twice the flock's speed still covers one that

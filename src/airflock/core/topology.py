@@ -4,23 +4,23 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from airflock.core.agent import Heard, State
-from airflock.core.contract import names_of
+from airflock.core.agent import HeardNeighbour, State
+from airflock.core.contract import namespace_names
 from airflock.core.maths import FAR, TINY
 from airflock.core.parameters import Choice, Parameters, declarations
-from airflock.core.vocabulary import answer, asks
-from airflock.support.errors import RuleError
+from airflock.core.vocabulary import argument_names, call_rule
+from airflock.support import RuleError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Nothing(Parameters):
+class NoParameters(Parameters):
     """No number."""
 
 
-class Seen(Protocol):
+class SightProtocol(Protocol):
     """A world that hides agents from each other."""
 
-    def blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
+    def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
         """Whether something stands between two places, m."""
 
 
@@ -46,9 +46,9 @@ class Topology:
     def __hash__(self) -> int:
         return hash((self.name, self.meet))
 
-    def asks(self, name: str) -> bool:
+    def asks_for(self, name: str) -> bool:
         """Whether the rule asks for something by this name."""
-        return name in asks(self.meet, "meet", self.name)
+        return name in argument_names(self.meet, "meet", self.name)
 
 
 def topology(namespace: Any, name: str = "") -> Topology:
@@ -58,11 +58,11 @@ def topology(namespace: Any, name: str = "") -> Topology:
 
     Raises RuleError if it has no such rule, or one that asks for what there is not.
     """
-    found, name = names_of(namespace, name)
-    rule, record = found.get("meet"), found.get("Parameters", Nothing)
+    found, name = namespace_names(namespace, name)
+    rule, record = found.get("meet"), found.get("Parameters", NoParameters)
     if not callable(rule):
         raise RuleError(f"topology {name} has no rule; give meet(n, r2, met), which fills met")
-    if "met" not in asks(rule, "meet", name):
+    if "met" not in argument_names(rule, "meet", name):
         raise RuleError(f"topology {name}: meet does not ask for met, the row that it fills")
     if not (isinstance(record, type) and issubclass(record, Parameters)):
         raise RuleError(f"topology {name}: Parameters is not a frozen dataclass derived from airflock.Parameters")
@@ -73,13 +73,13 @@ def topology(namespace: Any, name: str = "") -> Topology:
     return Topology(name, rule, flat, near, record, dict(found.get("VIOLATES", {})))
 
 
-def met_of(
+def met_neighbours(
     topology: Topology | None,
     t: Any,
     own: State,
-    heard: Iterable[Heard],
-    place: Seen | None = None,
-) -> list[Heard]:
+    heard: Iterable[HeardNeighbour],
+    place: SightProtocol | None = None,
+) -> list[HeardNeighbour]:
     """Those among the heard whom an agent meets, in their order.
 
     topology, t : kind and its parameters; None: all
@@ -95,13 +95,13 @@ def met_of(
     count = len(found)
     squares = [dx * dx + dy * dy + dz * dz + TINY for dx, dy, dz in offsets]
     hidden = [0.0] * count
-    if place is not None and topology.asks("hidden"):
-        hidden = [1.0 if place.blocked(x, y, z, h.state.x, h.state.y, h.state.z) else 0.0 for h in found]
+    if place is not None and topology.asks_for("hidden"):
+        hidden = [1.0 if place.is_blocked(x, y, z, h.state.x, h.state.y, h.state.z) else 0.0 for h in found]
     met = [0.0] * count
     given = {
         "n": count, "r2": squares, "hidden": hidden, "fade": [h.fade for h in found], "met": met, "t": t,
         "dx": [d[0] for d in offsets], "dy": [d[1] for d in offsets], "dz": [d[2] for d in offsets],
         "heap": [FAR] * count, "weak": [FAR] * count,
     }  # fmt: skip
-    answer(topology.meet, "meet", given, topology.name)
+    call_rule(topology.meet, "meet", given, topology.name)
     return [h for h, taken in zip(found, met, strict=True) if taken > 0.5]

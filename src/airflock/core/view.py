@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.core.agent import Heard, State
+from airflock.core.agent import HeardNeighbour, State
 
 
 @dataclass(frozen=True)
-class View:
+class AgentView:
     """What one agent perceived at a decision, and what came of it.
 
     agent, time : its number; time of the decision, s
@@ -26,7 +26,7 @@ class View:
     time: float
     true: State
     own: State
-    heard: tuple[Heard, ...]
+    heard: tuple[HeardNeighbour, ...]
     met: tuple[bool, ...]
     terms: tuple[Any, ...]
     alike: tuple[Any, ...]

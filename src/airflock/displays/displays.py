@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.displays.shapes import points_of
-from airflock.displays.show import FAILURES, Show, fly_show, scenario_of
-from airflock.support.errors import ScenarioError, gathering
+from airflock.displays.shapes import shape_points
+from airflock.displays.show import FAILURE_KINDS, Show, display_scenario, fly_show
+from airflock.support import ScenarioError, collect_errors
 
 
 def display(
@@ -67,11 +67,11 @@ def display(
     >>> show.formed[0].drones, show.formed[0].collisions
     (4, 0)
     """
-    planned = plan(shapes, drones, failing, failure, points, spacing, settings)
+    planned = plan_shapes(shapes, drones, failing, failure, points, spacing, settings)
     return fly_show(planned, drones, failing, failure, seed, dict(settings or {}))
 
 
-def plan(
+def plan_shapes(
     shapes: Sequence[str],
     drones: int,
     failing: float,
@@ -79,28 +79,29 @@ def plan(
     points: int | None,
     spacing: float,
     settings: Mapping[str, Any] | None,
-    dash: str = "",
+    name_prefix: str = "",
 ) -> list[NDArray[np.float64]]:
     """Points (point, 3) of each shape, m; raises ScenarioError with all faults. `dash` goes before names in faults."""
     faults = []
     if not 0.0 <= failing <= 0.9:
-        faults.append(f"{dash}failing = {failing:g} lies outside [0, 0.9]")
+        faults.append(f"{name_prefix}failing = {failing:g} lies outside [0, 0.9]")
     if not 0.0 < spacing < math.inf:
-        faults.append(f"{dash}spacing = {spacing:g} m is not above 0")
+        faults.append(f"{name_prefix}spacing = {spacing:g} m is not above 0")
         spacing = 3.0  # by which the rest is judged
-    if failure not in FAILURES:
-        faults.append(f"{dash}failure = {failure!r} is none of {', '.join(FAILURES)}")
+    if failure not in FAILURE_KINDS:
+        faults.append(f"{name_prefix}failure = {failure!r} is none of {', '.join(FAILURE_KINDS)}")
     count = drones if points is None else points
     if drones > count:
         faults.append(
-            f"{dash}drones = {drones} are more than {dash}points = {count}; give each drone a point, or fly fewer"
+            f"{name_prefix}drones = {drones} are more than {name_prefix}points = {count}; "
+            "give each drone a point, or fly fewer"
         )
-    with gathering(faults):
-        scenario_of(drones, dict(settings or {}))
+    with collect_errors(faults):
+        display_scenario(drones, dict(settings or {}))
     found = []
     for number, shape in enumerate(shapes):
-        with gathering(faults):
-            found.append(points_of(shape, count, spacing, seed=number))
+        with collect_errors(faults):
+            found.append(shape_points(shape, count, spacing, seed=number))
     if faults:
         raise ScenarioError(faults)
     return found

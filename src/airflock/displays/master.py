@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.displays.assignment import Lengths, Places, assign, better
-from airflock.displays.detours import CLEAR, Progress, beside, in_the_way, longer
+from airflock.displays.assignment import ExtraLengths, Positions, assign_points, is_better_assignment
+from airflock.displays.detours import CLEARANCE, StuckDetector, detour_lengths, detour_point, hulls_in_the_way
 from airflock.engine import Flight
-from airflock.parts.bodies.falling import fall
-from airflock.scenarios.change import remade
-from airflock.scenarios.scenario import Scenario
-from airflock.world.goals import glide
+from airflock.parts.bodies import fall
+from airflock.scenarios import Scenario, rebuilt
+from airflock.world import glide
 
 NEAR = 1.0  # m; a drone is placed within
 CHECK = 5.0  # s; how often the master looks once all should be there
@@ -20,11 +19,11 @@ LOOK = 1.0  # s; how often it looks for drones that make no progress
 PATIENCE = 60.0  # s; how long it waits for a shape at most
 HALF = 0.35  # m; half side of the box that stands for a drone that hovers
 
-Frames = NDArray[np.float64]
+FrameArray = NDArray[np.float64]
 
 
 @dataclass
-class Formed:
+class ShapeReport:
     """How one shape was formed.
 
     time     : until every surviving drone was within 1 m of its point, s; nan if never
@@ -40,11 +39,11 @@ class Formed:
     collisions: int
     struck: int
     hulls: int
-    reassigned: int
-    detours: int
+    reassignment_count: int
+    detour_count: int
 
 
-class Master:
+class ShowControl:
     """Who gives the drones their points, and sees what becomes of them.
 
     flight  : of all drones, from the first shape to the last
@@ -55,32 +54,32 @@ class Master:
     hulls   : places of those that hover; falling : position and velocity (6,) of those that fall
     """
 
-    def __init__(self, scenario: Scenario, ranks: Places, points: Places, seed: int, *, failing: bool):
+    def __init__(self, scenario: Scenario, waiting_points: Positions, points: Positions, seed: int, *, failing: bool):
         self.scenario, self.period, self.points = scenario, scenario.metrics.period, points
-        self.target = assign(ranks, points, np.zeros(len(points), bool))
-        self.around: dict[int, Places] = {}
-        self.tried: dict[int, list[Places]] = {}
+        self.target = assign_points(waiting_points, points, np.zeros(len(points), bool))
+        self.around: dict[int, Positions] = {}
+        self.tried: dict[int, list[Positions]] = {}
         self.hulls: list[NDArray[np.float64]] = []
-        self.falling: list[NDArray[np.float64]] = []
-        self.formed: list[Formed] = []
-        self.struck = self.reassigned = self.detours = 0
-        self.marks: list[int] = []  # how many windows of scores had been closed when a shape was begun
-        start = np.zeros((6, len(ranks)))
-        start[:3] = ranks.T
+        self.falling_drones: list[NDArray[np.float64]] = []
+        self.shape_reports: list[ShapeReport] = []
+        self.struck = self.reassignment_count = self.detour_count = 0
+        self.score_windows: list[int] = []  # how many windows of scores had been closed when a shape was begun
+        start = np.zeros((6, len(waiting_points)))
+        start[:3] = waiting_points.T
         keys: dict[str, Any] = {"goals.points": self._aims(), "duration": PATIENCE}
-        self.flight = Flight(remade(scenario, keys), seed, precision=64, record=True, start=start, absence=failing)
-        self.progress, self.looked = Progress(LOOK), 0.0
-        self.way, self.left = (np.zeros((0, 3)), np.zeros((0, 3))), (0.0, 0.0)
+        self.flight = Flight(rebuilt(scenario, keys), seed, precision=64, record=True, start=start, absence=failing)
+        self.progress, self.last_look_time = StuckDetector(LOOK), 0.0
+        self.last_way, self.left = (np.zeros((0, 3)), np.zeros((0, 3))), (0.0, 0.0)
         self._set_out()
 
-    def form(self, points: Frames, failures: list[tuple[int, str, float]]) -> None:
+    def form(self, points: FrameArray, failures: list[tuple[int, str, float]]) -> None:
         """Fly until the shape stands; failures: who, how, and when as a share of the way."""
         self.points, self.begun, self.placed = points, self.flight.time, float("nan")
-        self.struck = self.reassigned = self.detours = 0
+        self.struck = self.reassignment_count = self.detour_count = 0
         self.around, self.tried = {}, {}
-        if self.formed:
+        if self.shape_reports:
             self._assign(first=True)
-        self.marks.append(len(self.flight.windows))
+        self.score_windows.append(len(self.flight.windows))
         planned = self._under_way()
         for who, how, share in sorted(failures, key=lambda f: f[2]):
             self._fly(max(share * planned - (self.flight.time - self.begun), 0.0))
@@ -91,30 +90,43 @@ class Master:
             self._fly(self._under_way() + CHECK if self._assign() else CHECK)
         far = self._distances()
         # collisions and contacts are known when the flight is closed
-        told = float(far.mean()), float(far.max()), len(far), 0, self.struck, 0, self.reassigned, self.detours
-        self.formed.append(Formed(self.placed, *told))
+        told = (
+            float(far.mean()),
+            float(far.max()),
+            len(far),
+            0,
+            self.struck,
+            0,
+            self.reassignment_count,
+            self.detour_count,
+        )
+        self.shape_reports.append(ShapeReport(self.placed, *told))
 
-    def closed(self) -> list[Formed]:
+    def finish(self) -> list[ShapeReport]:
         """End the flight with its last sample; the figures of all shapes, with the collisions of their windows."""
         self.flight.change({"duration": self.flight.time})
         scores = [window.scores for window in self.flight.windows] + [self.flight.finish()]
-        for formed, first, last in zip(self.formed, self.marks, [*self.marks[1:], len(scores)], strict=True):
+        for formed, first, last in zip(
+            self.shape_reports, self.score_windows, [*self.score_windows[1:], len(scores)], strict=True
+        ):
             formed.collisions = int(sum(found["n_coll"] for found in scores[first:last]))
             formed.hulls = int(sum(found["n_env_coll"] for found in scores[first:last]))
-        return self.formed
+        return self.shape_reports
 
     def _assign(self, *, first: bool = False, failed: bool = False) -> bool:
         """Assign points again where that saves way; whether it did. What stands in the way is sent in any case."""
         there, blocked = self.flight.present, np.zeros(len(self.points), bool)
         for hull in self.hulls:
-            blocked |= np.linalg.norm(self.points - hull, axis=1) < CLEAR
+            blocked |= np.linalg.norm(self.points - hull, axis=1) < CLEARANCE
         places = self.flight.state[:3, there].T
-        more: Lengths = longer(places, self.points, np.array(self.hulls)) if self.tried and self.hulls else 0.0
-        found = assign(places, self.points, blocked, more)
+        more: ExtraLengths = (
+            detour_lengths(places, self.points, np.array(self.hulls)) if self.tried and self.hulls else 0.0
+        )
+        found = assign_points(places, self.points, blocked, more)
         anew = first or bool(blocked[self.target[there]].any())
-        anew = anew or better(places, self.points, self.target[there], found, more)
+        anew = anew or is_better_assignment(places, self.points, self.target[there], found, more)
         if anew:
-            self.reassigned += 0 if first else 1
+            self.reassignment_count += 0 if first else 1
             self.target[there] = found
         self.target[~there] = self.target[there][0]  # who has failed goes nowhere: any point that is free will do
         if anew or failed:
@@ -130,9 +142,9 @@ class Master:
     def _set_out(self) -> None:
         """Note when and where all set out for their aims; to the same aims they go on."""
         aims, places = np.array(self._aims()), self.flight.state[:3].T
-        if not np.array_equal(aims, self.way[1]):
+        if not np.array_equal(aims, self.last_way[1]):
             far = np.linalg.norm(aims - places, axis=1)[self.flight.present].max()
-            self.way, self.left = (places.copy(), aims), (self.flight.time, 1.5 * far / self.scenario.goals.speed)
+            self.last_way, self.left = (places.copy(), aims), (self.flight.time, 1.5 * far / self.scenario.goals.speed)
             self.progress.begin()
 
     def _mind(self) -> None:
@@ -143,13 +155,13 @@ class Master:
         for who in past:  # or who has failed on the way
             del self.around[who]
         since, lasts = self.flight.time - self.left[0], self.left[1]
-        held = np.flatnonzero(self.progress.look(places, glide(*self.way, since, lasts)))
+        held = np.flatnonzero(self.progress.look(places, glide(*self.last_way, since, lasts)))
         if len(held):
             self._send_out(held, places)
         elif past:
             self._tell()
 
-    def _send_out(self, held: NDArray[np.int64], places: Places) -> None:
+    def _send_out(self, held: NDArray[np.int64], places: Positions) -> None:
         """Give those who are held up another point where that saves way, or a way around who hovers or waits."""
         standing = self.progress.standing(places)
         self.tried = {int(who): [] for who in held} | self.tried
@@ -157,14 +169,14 @@ class Master:
         for who in held:
             met = np.array([*self.hulls, *places[standing & (np.arange(len(places)) != who)]]).reshape(-1, 3)
             point = self.points[self.target[who]]
-            if not in_the_way(places[who][None], point[None], met).any():
+            if not hulls_in_the_way(places[who][None], point[None], met).any():
                 self.around.pop(int(who), None)
                 continue
             others = np.delete(places, who, axis=0)
             tried = np.array(self.tried[int(who)]).reshape(-1, 3)
-            self.around[int(who)] = beside(places[who], point, met, others, tried)
+            self.around[int(who)] = detour_point(places[who], point, met, others, tried)
             self.tried[int(who)].append(self.around[int(who)])
-            self.detours += 1
+            self.detour_count += 1
         self._tell()
 
     def _aims(self) -> list[list[float]]:
@@ -176,7 +188,7 @@ class Master:
         """How long all are under way to their points, s."""
         return 1.5 * float(self._distances().max()) / self.scenario.goals.speed + 4.0
 
-    def _distances(self) -> Frames:
+    def _distances(self) -> FrameArray:
         there = self.flight.present
         away = self.flight.state[:3, there].T - self.points[self.target[there]]
         return np.asarray(np.linalg.norm(away, axis=1))
@@ -191,7 +203,7 @@ class Master:
         if how == "hover":
             self.hulls.append(state[:3])
         else:
-            self.falling.append(state)
+            self.falling_drones.append(state)
         self._assign(failed=how == "hover")
 
     def _fly(self, seconds: float) -> None:
@@ -202,8 +214,8 @@ class Master:
             flight.change({"duration": flight.time + samples * self.period + PATIENCE})
         for _ in range(samples):
             flight.advance(self.period)
-            if flight.time > self.looked + LOOK - 0.5 * self.period:
-                self.looked = flight.time
+            if flight.time > self.last_look_time + LOOK - 0.5 * self.period:
+                self.last_look_time = flight.time
                 self._mind()
             self._drop(flight.state[:3, flight.present])
             if not self._stands():
@@ -211,10 +223,10 @@ class Master:
             elif np.isnan(self.placed):
                 self.placed = flight.time - self.begun
 
-    def _drop(self, places: Frames) -> None:
+    def _drop(self, places: FrameArray) -> None:
         """Move the drones that fall, and count those that they strike; places (3, drone) of those that fly."""
         reach, left = self.scenario.metrics.r_coll, []
-        for body in self.falling:
+        for body in self.falling_drones:
             touching = np.zeros(places.shape[1], bool)
             for _ in range(10):  # a fall of 10 m/s takes 10 cm in a tenth of a frame
                 body = np.array(fall(body[0], body[1], body[2], body[3], body[4], body[5], 0.1 * self.period))
@@ -223,4 +235,4 @@ class Master:
                 touching = near
             if body[2] > 0.0:
                 left.append(body)
-        self.falling = left
+        self.falling_drones = left

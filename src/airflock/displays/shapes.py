@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from airflock.support.errors import AirflockError, SceneError
-from airflock.support.untrusted import own_path
+from airflock.support import AirflockError, SceneError, expand_path
 
 Points = NDArray[np.float64]
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".gif")
@@ -28,14 +27,14 @@ LEAN = 0.5  # m back for each m up
 ROUNDS = 40  # of Lloyd's iteration
 
 
-def points_of(shape: str, count: int, spacing: float = 3.0, height: float = 15.0, seed: int = 0) -> Points:
+def shape_points(shape: str, count: int, spacing: float = 3.0, height: float = 15.0, seed: int = 0) -> Points:
     """Points (count, 3) of a shape, m: at least spacing (m) apart, all above height (m), centred over the origin.
 
     shape : the path of an image or mesh, or any other text, which is written
 
     Raises AirflockError where the file is missing, of another kind, too large, damaged or empty.
     """
-    path = own_path(shape)
+    path = expand_path(shape)
     rng = np.random.default_rng(seed)
     kind = path.suffix.lower()
     if kind in IMAGES or kind in MESHES:
@@ -117,10 +116,10 @@ def _evenly(filled: NDArray[np.bool_], count: int, rng: np.random.Generator) -> 
 
 def _spread_over_mesh(path: Path, count: int, rng: np.random.Generator) -> Points:
     """Points on the surface, each as far as can be from those before."""
-    from airflock.world.scenes.meshes import read
+    from airflock.world import read_mesh
 
     try:
-        mesh: Any = read(path)
+        mesh: Any = read_mesh(path)
     except SceneError as fault:  # there is no scene.file here
         raise AirflockError(str(fault).replace("scene.file = ", "")) from fault
     corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]

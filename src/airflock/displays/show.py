@@ -8,15 +8,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.displays.master import Formed, Frames, Master
+from airflock.displays.master import FrameArray, ShapeReport, ShowControl
 from airflock.engine import Flight
-from airflock.recordings.flights import recording_of as recorded
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import AirflockError
+from airflock.recordings import recording_of as recorded
+from airflock.scenarios import Scenario, load
+from airflock.support import AirflockError
 
 FILE = Path(__file__).parent / "display.toml"
-FAILURES = ("fall", "hover", "both")
+FAILURE_KINDS = ("fall", "hover", "both")
 
 
 @dataclass
@@ -25,8 +24,8 @@ class Show:
     last frame of each shape; the scenario, the seed, and the flight, which is one from the first shape to the last.
     """
 
-    formed: list[Formed]
-    frames: Frames
+    shape_reports: list[ShapeReport]
+    frames: FrameArray
     period: float
     ends: list[int]
     scenario: Scenario
@@ -39,13 +38,13 @@ def recording_of(show: Show) -> xr.Dataset:
     return recorded(show.flight)
 
 
-def scenario_of(drones: int, settings: dict[str, Any] | None = None) -> Scenario:
+def display_scenario(drones: int, settings: dict[str, Any] | None = None) -> Scenario:
     """Scenario of a display, with keys changed."""
     there = [[3.0 * i, 0.0, 10.0] for i in range(drones)]
     return load(FILE, {"agents": drones, "goals.points": there, **(settings or {})})
 
 
-def ranks(count: int, spacing: float = 3.0, height: float = 10.0) -> Frames:
+def waiting_points(count: int, spacing: float = 3.0, height: float = 10.0) -> FrameArray:
     """Where drones wait before the first shape: points (count, 3) of a level square, m."""
     side = int(np.ceil(np.sqrt(count)))
     number = np.arange(count)
@@ -69,8 +68,8 @@ def fly_show(
 
     Raises AirflockError where a shape has fewer points than there are drones.
     """
-    if failure not in FAILURES:
-        raise AirflockError(f"failure = {failure!r} is none of {', '.join(FAILURES)}")
+    if failure not in FAILURE_KINDS:
+        raise AirflockError(f"failure = {failure!r} is none of {', '.join(FAILURE_KINDS)}")
     if not 0.0 <= failing < 1.0:
         raise AirflockError(f"failing = {failing:g} lies outside [0, 1)")
     for number, points in enumerate(shapes):
@@ -79,11 +78,11 @@ def fly_show(
     rng = np.random.default_rng([seed, 3])
     doomed = rng.permutation(drones)[: round(failing * drones)]
     legs = np.array_split(doomed, len(shapes))
-    kinds = {int(who): FAILURES[i % 2] if failure == "both" else failure for i, who in enumerate(doomed)}
-    scenario = scenario_of(drones, settings)
-    show = Master(scenario, ranks(drones), shapes[0], seed, failing=bool(len(doomed)))
+    kinds = {int(who): FAILURE_KINDS[i % 2] if failure == "both" else failure for i, who in enumerate(doomed)}
+    scenario = display_scenario(drones, settings)
+    show = ShowControl(scenario, waiting_points(drones), shapes[0], seed, failing=bool(len(doomed)))
     ends = []
     for points, failures in zip(shapes, legs, strict=True):
         show.form(points, [(int(who), kinds[int(who)], float(rng.uniform())) for who in failures])
         ends.append(round(show.flight.time / show.period))
-    return Show(show.closed(), show.flight.frames[:, :6], show.period, ends, show.scenario, seed, show.flight)
+    return Show(show.finish(), show.flight.frames[:, :6], show.period, ends, show.scenario, seed, show.flight)

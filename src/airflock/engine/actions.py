@@ -5,20 +5,28 @@ from typing import Any, Self
 
 import numpy as np
 
-from airflock.core.contract.declared import COMMANDS
-from airflock.engine.presence import join, leave
-from airflock.engine.readings import Readings
-from airflock.scenarios.change import changed, named
-from airflock.scenarios.document import keyed
-from airflock.scenarios.events import Event, agent_number, are_several, vector, vectors
-from airflock.scenarios.places import spot_fault, start_in_box
-from airflock.support.errors import FlightError
+from airflock.core import COMMANDS
+from airflock.engine.presence import add_agent, remove_agents
+from airflock.engine.readings import FlightObservations
+from airflock.scenarios import (
+    Event,
+    are_several,
+    check_agent,
+    named_fault_entries,
+    position_error,
+    settings_dict,
+    to_vector,
+    to_vectors,
+    with_settings,
+    wrap_start,
+)
+from airflock.support import FlightError
 
 FARTHEST = 1e6  # m from the centre: the largest arena; beyond it single precision does not hold a step of motion
 FASTEST = 1e3  # m/s; our choice: faster than anything that these bodies are made for
 
 
-class Actions(Readings):
+class FlightActions(FlightObservations):
     """A flight whose agents are overruled, changed, hit, taken out and put back."""
 
     def sense(self) -> Self:
@@ -43,10 +51,10 @@ class Actions(Readings):
             raise FlightError(
                 f"sense: agents decide every {every} steps; the next decision is at step {coming}, this is {self.step}"
             )
-        self._course.take_over()
-        if not self._course.sensed:
+        self._course.apply_pending_change()
+        if not self._course.has_sensed:
             self._course.call(self.step, self.step + 1, 2)
-            self._course.sensed = True
+            self._course.has_sensed = True
         return self
 
     def command(self, agent: int | Sequence[int], value: Any) -> Self:
@@ -65,9 +73,9 @@ class Actions(Readings):
         [3.0, 0.0]
         """
         numbers, unit = self._those(agent), COMMANDS[self.scenario.model.command]
-        given = vectors("command", value, len(numbers), self.scenario.dimensions, unit)
+        given = to_vectors("command", value, len(numbers), self.scenario.dimensions, unit)
         self.sense()
-        self._course.put("c", numbers, given)
+        self._course.set_rows("c", numbers, given)
         self._course.note("command", agent=_said(agent, numbers), value=given)
         return self
 
@@ -86,14 +94,14 @@ class Actions(Readings):
         >>> flight.advance(0.5).change({"model.p_rep": 0.2}).scenario.parameters.p_rep
         0.2
         """
-        settings = keyed(settings, self.scenario.name)
+        settings = settings_dict(settings, self.scenario.name)
         return self._change(settings, Event(self.step, "change", settings), wait)
 
     def _change(self, settings: Mapping[str, Any], event: Event, wait: bool) -> Self:
         """Set keys of the scenario anew, as an event says."""
-        if self._course.ended:
+        if self._course.has_ended:
             raise FlightError(f"{self.scenario.name}: the flight has ended at t = {self.time:g} s; nothing can change")
-        self._course.change(changed(self._course.latest, settings), event, wait)
+        self._course.change(with_settings(self._course.latest_scenario, settings), event, wait)
         return self
 
     def push(self, agent: int | Sequence[int], velocity: Any) -> Self:
@@ -112,10 +120,10 @@ class Actions(Readings):
         [1.0, 0.0]
         """
         numbers = self._those(agent)
-        given = vectors("velocity", velocity, len(numbers), self.scenario.dimensions, "m/s")
+        given = to_vectors("velocity", velocity, len(numbers), self.scenario.dimensions, "m/s")
         _within("velocity", given, FASTEST, "m/s", "a push is at most so much")
         self._course.begin()
-        self._course.put("v", numbers, given, add=True)
+        self._course.set_rows("v", numbers, given, add=True)
         self._course.note("push", agent=_said(agent, numbers), velocity=given)
         return self
 
@@ -134,13 +142,13 @@ class Actions(Readings):
         [10.0, -20.0]
         """
         numbers = self._those(agent)
-        given = vectors("position", position, len(numbers), self.scenario.dimensions, "m")
+        given = to_vectors("position", position, len(numbers), self.scenario.dimensions, "m")
         if len(numbers) > 1 and not isinstance(given[0], list):
             raise FlightError(f"position = {given}: {len(numbers)} agents in one place; give one row for each")
         spots = self._free("place", numbers, given)
         self._course.begin()
-        self._course.put("", numbers, spots)
-        self._state.look_at_pairs()
+        self._course.set_rows("", numbers, spots)
+        self._state.reset_pair_distances()
         self._course.note("place", agent=_said(agent, numbers), position=given)
         return self
 
@@ -148,10 +156,10 @@ class Actions(Readings):
         """Places (agent, axis) as they are in a periodic box. Raises FlightError where an agent cannot be there."""
         _within("position", given, FARTHEST, "m", "that is the largest arena")
         spots = np.broadcast_to(np.array(given, float), (len(numbers), self.scenario.dimensions)).T
-        fault = spot_fault(self.scenario, spots, numbers)
+        fault = position_error(self.scenario, spots, numbers)
         if fault:
             raise FlightError(f"{what}: {fault}")
-        return start_in_box(self.scenario, spots).T
+        return wrap_start(self.scenario, spots).T
 
     def fault(self, kind: str, agents: Sequence[int] | int | None = None, *, wait: bool = True, **numbers: Any) -> Self:
         """Let a fault begin, as an entry of [[faults]] with at = now does. A new window of scores begins.
@@ -169,11 +177,11 @@ class Actions(Readings):
         3
         """
         whom = {} if agents is None else {"agents": [*agents] if isinstance(agents, Iterable) else [agents]}
-        given = keyed({"kind": kind, **whom, **numbers}, self.scenario.name)
-        base = self._course.latest
-        at = (self.step + (1 if self._course.sensed else 0)) * self.scenario.flight.dt
+        given = settings_dict({"kind": kind, **whom, **numbers}, self.scenario.name)
+        base = self._course.latest_scenario
+        at = (self.step + (1 if self._course.has_sensed else 0)) * self.scenario.flight.dt
         entry = {"at": at, **given}
-        return self._change({"faults": [*named(base), entry]}, Event(self.step, "fault", given), wait)
+        return self._change({"faults": [*named_fault_entries(base), entry]}, Event(self.step, "fault", given), wait)
 
     def remove(self, agent: int | Sequence[int], reason: str = "") -> Self:
         """Let an agent, or several, drop out: landed or failed. From now on nobody meets, hears, feels or counts them.
@@ -191,8 +199,8 @@ class Actions(Readings):
         """
         numbers = self._those(agent)
         self._course.begin()
-        self._course.let_come_and_go()
-        leave(self._state, numbers)
+        self._course.allow_absence()
+        remove_agents(self._state, numbers)
         self._course.note("remove", agent=_said(agent, numbers), **({"reason": str(reason)} if reason else {}))
         return self
 
@@ -210,15 +218,15 @@ class Actions(Readings):
         >>> int(flight.remove(3).add(3, [0.0, 0.0]).present.sum())
         100
         """
-        number = agent_number(agent, self.agents)
+        number = check_agent(agent, self.agents)
         if self.present[number]:
             raise FlightError(f"add: agent {number} is there already")
         dims = self.scenario.dimensions
-        at = vector("position", position, dims, "m")
+        at = to_vector("position", position, dims, "m")
         spot = self._free("add", [number], at)[0].tolist()
-        v = vector("velocity", [0.0] * dims if velocity is None else velocity, dims, "m/s")
+        v = to_vector("velocity", [0.0] * dims if velocity is None else velocity, dims, "m/s")
         _within("velocity", v, FASTEST, "m/s", "an agent joins at most so fast")
-        join(self._state, number, spot, v)
+        add_agent(self._state, number, spot, v)
         self._course.note("add", agent=number, position=at, velocity=v)
         return self
 

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import airflock
 from airflock.engine.drivers import is_compiled
-from airflock.engine.state import State
+from airflock.engine.state import DriverState
 
 SCRIPT = Path(__file__).with_name("one_driver.py")
 
 
-def compile_aside(state: State) -> State:
+def compile_in_background(state: DriverState) -> DriverState:
     """Have a state's driver compiled by another process, and load it; for a thread that may wait. Returns the state.
 
     Where no process can be started, or it fails for any reason, this thread compiles and says what is wrong.
@@ -30,7 +30,7 @@ def compile_aside(state: State) -> State:
     return state.compile()
 
 
-def _in_a_process(state: State) -> None:
+def _in_a_process(state: DriverState) -> None:
     """Let a process compile a state's driver, and wait for its end. Raises OSError where none can be started."""
     driver = state.driver
     file = Path(str(driver.__file__))

@@ -16,7 +16,7 @@ from typing import Any
 
 from numba.core.caching import IndexDataCacheFile
 
-from airflock.engine.compile_lock import one_at_a_time
+from airflock.engine.compile_lock import locked_compile
 
 ENDING = ".seal"
 
@@ -24,9 +24,9 @@ ENDING = ".seal"
 class SealedFiles(IndexDataCacheFile):  # type: ignore[misc]
     """Index and code of one compiled function, read only under an unbroken seal."""
 
-    def __init__(self, found: IndexDataCacheFile, digest: str):
+    def __init__(self, original: IndexDataCacheFile, digest: str):
         """Take the place of Numba's own for a driver of this digest."""
-        self.__dict__.update(vars(found))
+        self.__dict__.update(vars(original))
         self._digest = digest
 
     def load(self, key: Any) -> Any:
@@ -77,7 +77,7 @@ class SealedFiles(IndexDataCacheFile):  # type: ignore[misc]
         return found.hexdigest().encode()
 
 
-def seal(module: ModuleType, digest: str) -> None:
+def seal_functions(module: ModuleType, digest: str) -> None:
     """Put the compiled functions of a driver under seals, and have one process at a time compile them."""
     for found in vars(module).values():
         cache: Any = getattr(found, "_cache", None)
@@ -85,7 +85,7 @@ def seal(module: ModuleType, digest: str) -> None:
         if isinstance(files, IndexDataCacheFile):
             cache._cache_file = SealedFiles(files, digest)
             cache._impl.rebuild = _or_nothing(cache._impl.rebuild)
-            found.compile = one_at_a_time(found.compile, Path(cache.cache_path))
+            found.compile = locked_compile(found.compile, Path(cache.cache_path))
 
 
 def _or_nothing(rebuild: Callable[..., Any]) -> Callable[..., Any]:

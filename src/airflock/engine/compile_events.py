@@ -8,25 +8,25 @@ from contextlib import contextmanager
 
 from numba.core.event import Event, Listener
 
-from airflock.support.threads import heed
+from airflock.support import check_interrupted
 
 COMPILING = "compiling … (only once for this kind of flight; later flights start at once)"
 PATIENCE = 1.0  # s
 
 
-class Heeding(Listener):  # type: ignore[misc]  # Numba has no types
+class InterruptListener(Listener):  # type: ignore[misc]  # Numba has no types
     """Each thread that compiles hears of its own passes."""
 
     def on_start(self, event: Event) -> None:
         """Give up the work of this thread if it was interrupted. Raises GivenUp."""
-        heed()
+        check_interrupted()
 
     def on_end(self, event: Event) -> None:
         """Nothing; the next pass is asked."""
 
 
 @contextmanager
-def told_if_long() -> Iterator[None]:
+def message_if_slow() -> Iterator[None]:
     """Say once that something is compiled, if it takes longer than PATIENCE, to a person who waits for it."""
     if not _watched():
         yield

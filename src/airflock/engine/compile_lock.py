@@ -14,8 +14,8 @@ from typing import Any
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import trigger_event
 
-from airflock.engine.compile_shortcuts import implementations, seldom_collected
-from airflock.engine.thread_waiting import waiting_briefly
+from airflock.engine.compile_shortcuts import import_numpy_implementations, rare_gc
+from airflock.engine.thread_waiting import short_spin
 from airflock.support import locks
 
 NAME = "lock"
@@ -23,7 +23,7 @@ LOOK = 0.05  # s from one try to the next
 PATIENCE = 300.0  # s; whoever holds a lock for longer has been stopped, and is waited for no more
 
 
-def one_at_a_time(compile_: Callable[[Any], Any], folder: Path) -> Callable[[Any], Any]:
+def locked_compile(compile_: Callable[[Any], Any], folder: Path) -> Callable[[Any], Any]:
     """What compiles a function for a signature, or loads it from a folder, by one process at a time.
 
     Where the folder holds an index, the function is loaded, for which nobody waits.
@@ -32,16 +32,16 @@ def one_at_a_time(compile_: Callable[[Any], Any], folder: Path) -> Callable[[Any
     def under_lock(signature: Any) -> Any:
         with (
             global_compiler_lock,
-            seldom_collected(),
-            waiting_briefly(),
+            rare_gc(),
+            short_spin(),
         ):  # the first of all reads half of Numba's modules
-            implementations()
+            import_numpy_implementations()
             return compile_(signature)
 
     def locked(signature: Any) -> Any:
         if any(folder.glob("*.nbi")):
             return under_lock(signature)
-        with alone(folder):
+        with folder_lock(folder):
             found = under_lock(signature)  # which loads what another process has compiled meanwhile
         if gc.isenabled():
             gc.collect()  # what a compiler leaves: whoever flies would have to wait for it soon
@@ -51,7 +51,7 @@ def one_at_a_time(compile_: Callable[[Any], Any], folder: Path) -> Callable[[Any
 
 
 @contextmanager
-def alone(folder: Path, patience: float = PATIENCE) -> Iterator[bool]:
+def folder_lock(folder: Path, timeout: float = PATIENCE) -> Iterator[bool]:
     """Hold the lock of a folder; whether it is held. It is not where the file system knows no locks.
 
     While it waits, who listens to the compiler's passes is told of each try: an interruption is heard.
@@ -60,7 +60,7 @@ def alone(folder: Path, patience: float = PATIENCE) -> Iterator[bool]:
     try:
         with suppress(OSError):  # a folder that was removed meanwhile, a full disk: then all compile
             handle = os.open(folder / NAME, os.O_RDWR | os.O_CREAT, 0o600)
-        yield handle >= 0 and _taken(handle, time.monotonic() + patience)
+        yield handle >= 0 and _taken(handle, time.monotonic() + timeout)
     finally:
         if handle >= 0:
             os.close(handle)

@@ -20,13 +20,13 @@ from numba.core.postproc import PostProcessor
 from numba.core.typing import templates
 from numba.core.typing.context import BaseContext
 
-from airflock.engine.never_collected import never_collected
+from airflock.engine.never_collected import frozen_imports
 
 TRIED = (0, 62), (0, 68)  # first and last version of Numba of which this was tried, beside 0.65
-KNOWN = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
+IS_TESTED_VERSION = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
 SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
 
-Spared = tuple[Any, str, Callable[..., Any]]  # whose, which of its functions, and what is called in its place
+Replacement = tuple[Any, str, Callable[..., Any]]  # whose, which of its functions, and what is called in its place
 
 _signatures: dict[Hashable, Any] = {}
 _sizes: dict[Hashable, int] = {}
@@ -36,30 +36,30 @@ _once: dict[Callable[..., Any], Any] = {}
 
 
 @contextmanager
-def sparing(*more: Spared) -> Iterator[None]:
+def shortcuts(*more: Replacement) -> Iterator[None]:
     """Around the passes over one function, below Numba's lock; may be entered again for another one that it calls."""
-    with exchanging(*(*SPARED, *more) if KNOWN else ()):
+    with patched(*(*SPARED, *more) if IS_TESTED_VERSION else ()):
         yield
 
 
 @contextmanager
-def exchanging(*spared: Spared) -> Iterator[None]:
+def patched(*spared: Replacement) -> Iterator[None]:
     """Exchange parts of Numba and collect garbage seldom, by one thread at a time."""
     with ExitStack() as changed:
-        changed.enter_context(seldom_collected())
+        changed.enter_context(rare_gc())
         for owner, name, spare in spared:
             changed.enter_context(_exchanged(owner, name, spare))
         yield
 
 
-def implementations() -> None:
+def import_numpy_implementations() -> None:
     """Read the modules in which Numba implements NumPy without SciPy, which takes longer than all the others.
 
     Numba imports it to learn that it is there; what needs it looks again when it is called. Below Numba's lock.
     """
-    if not KNOWN or "numba.np.arraymath" in sys.modules:
+    if not IS_TESTED_VERSION or "numba.np.arraymath" in sys.modules:
         return
-    with never_collected():
+    with frozen_imports():
         from numba.np import linalg
 
         usual = linalg.ensure_blas
@@ -77,7 +77,7 @@ def _there() -> None:
 
 
 @contextmanager
-def seldom_collected() -> Iterator[None]:
+def rare_gc() -> Iterator[None]:
     """Look for garbage seldom; to be held below Numba's lock, one thread at a time."""
     usual = gc.get_threshold()
     gc.set_threshold(max(usual[0], SELDOM[0]) if usual[0] else 0, *map(max, usual[1:], SELDOM[1:]))
@@ -106,13 +106,13 @@ def _exchanged(owner: Any, name: str, spare: Callable[..., Any]) -> Iterator[Non
         setattr(owner, name, usual)
 
 
-def call_type(usual: Callable[..., Any], function: Any, context: Any, given: Any, named: Any) -> Any:
+def cached_call_type(original: Callable[..., Any], function: Any, context: Any, arguments: Any, named: Any) -> Any:
     """Signature of a call of a function of Numba's, which its typing and its lowering ask for each statement."""
     if named:
-        return usual(function, context, given, named)
-    key = context, function, tuple(given)
+        return original(function, context, arguments, named)
+    key = context, function, tuple(arguments)
     if key not in _signatures:
-        _signatures[key] = usual(function, context, given, named)
+        _signatures[key] = original(function, context, arguments, named)
     return _signatures[key]
 
 
@@ -127,11 +127,11 @@ def _size(usual: Callable[..., int], context: Any, kind: Any) -> int:
     return _sizes[key]
 
 
-def processed(usual: Callable[..., None], processor: Any, emit_dels: bool = False, **named: Any) -> None:
+def post_processed(original: Callable[..., None], processor: Any, emit_dels: bool = False, **named: Any) -> None:
     """Blocks in order after a pass. Which variables live where is computed only if it is asked for."""
     code = processor.func_ir
     if code.is_generator:
-        usual(processor, emit_dels, **named)
+        original(processor, emit_dels, **named)
         return
     there = vars(sys.modules[type(processor).__module__])  # Numba has this twice: numba-cuda brings its own
     code.blocks = there["transforms"].canonicalize_cfg(code.blocks)
@@ -141,10 +141,10 @@ def processed(usual: Callable[..., None], processor: Any, emit_dels: bool = Fals
         processor._insert_var_dels(**named)
 
 
-def rewritten(usual: Callable[..., Any], blocks: dict[int, Any], states: Any, handler: Any) -> dict[int, Any]:
+def rename_in_blocks(original: Callable[..., Any], blocks: dict[int, Any], states: Any, handler: Any) -> dict[int, Any]:
     """Blocks with versions of one variable: of those that name it. The others stay as they are."""
     naming = {label: block for label, block in blocks.items() if states["varname"] in _named(block)}
-    made = usual(naming, states, handler)
+    made = original(naming, states, handler)
     for label, block in made.items():
         block.named = naming[label].named
     return {label: made.get(label, block) for label, block in blocks.items()}
@@ -170,7 +170,7 @@ def _without_exits(usual: Callable[..., Any], code: Any) -> Any:
     return usual(code) if held else code
 
 
-def registered() -> Hashable:
+def registry_sizes() -> Hashable:
     """What grows when Numba gets new implementations, of operators and functions, or of modules that hold some."""
     lowered = sum(len(getattr(builtin_registry, kind)) for kind in RegistryLoader.registry_items)
     typed = templates.builtin_registry
@@ -179,10 +179,10 @@ def registered() -> Hashable:
 
 def _refreshed(usual: Callable[..., None], context: Any) -> None:
     """Look for new implementations, where there are any since a context last looked."""
-    now = registered()
+    now = registry_sizes()
     if _fresh.get(context) != now:
         usual(context)
-        _fresh[context] = registered()
+        _fresh[context] = registry_sizes()
 
 
 def _unchanged(usual: Callable[..., None]) -> None:
@@ -203,8 +203,8 @@ def _told(usual: Callable[..., None], kind: str, *given: Any, **named: Any) -> N
         usual(kind, *given, **named)
 
 
-SPARED: tuple[Spared, ...] = (
-    (types.functions.BaseFunction, "get_call_type", call_type),
+SPARED: tuple[Replacement, ...] = (
+    (types.functions.BaseFunction, "get_call_type", cached_call_type),
     (base.BaseContext, "get_abi_sizeof", _size),
     (base, "_has_loc", _takes_place),
     (base.BaseContext, "refresh", _refreshed),
@@ -212,9 +212,9 @@ SPARED: tuple[Spared, ...] = (
     (config, "reload_config", _unchanged),
     (binding, "get_process_triple", _known),
     (codegen.CPUCodegen, "_check_llvm_bugs", _known),
-    (PostProcessor, "run", processed),
+    (PostProcessor, "run", post_processed),
     (interpreter, "peep_hole_delete_with_exit", _without_exits),
-    (ssa, "_run_block_rewrite", rewritten),
+    (ssa, "_run_block_rewrite", rename_in_blocks),
     (event, "start_event", _told),
     (event, "end_event", _told),
 )

@@ -17,15 +17,15 @@ from numba.core.imputils import RegistryLoader, builtin_registry
 from numba.core.typed_passes import NativeLowering, NativeParforLowering, NopythonRewrites, NopythonTypeInference
 from numba.core.untyped_passes import InlineClosureLikes
 
-from airflock.engine.compile_shortcuts import sparing
-from airflock.engine.libraries import SPREAD, DriverLibrary, InlinedLibrary
-from airflock.support.machine import vector_bits
+from airflock.engine.compile_shortcuts import shortcuts
+from airflock.engine.libraries import PARALLEL_REPLACEMENT, DriverLibrary, InlinedLibrary
+from airflock.support import vector_bits
 
 LATER = ("make_function", "build_list", "build_set", "build_map")  # what closures and arrays out of lists begin with
 ARRAY_VALUED = ("unary", "binop", "inplace_binop", "call")  # what is rewritten where its value is a whole array
 
 
-class QuickFlags(Flags):  # type: ignore[misc]  # Numba has no types, here and below
+class HashedFlags(Flags):  # type: ignore[misc]  # Numba has no types, here and below
     """Flags of one compilation; Numba compares and hashes them for every operator that it meets."""
 
     _usual = {name: option.default for name, option in Flags.options.items()}
@@ -43,7 +43,7 @@ class QuickFlags(Flags):  # type: ignore[misc]  # Numba has no types, here and b
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
-class Lowering(NativeLowering):  # type: ignore[misc]
+class DriverLowering(NativeLowering):  # type: ignore[misc]
     """Lowering of a function of a driver."""
 
     _name = "driver_lowering"
@@ -58,7 +58,7 @@ class Lowering(NativeLowering):  # type: ignore[misc]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
-class InlinedLowering(Lowering):
+class InlinedLowering(DriverLowering):
     """Lowering of a function that only compiled functions call."""
 
     _name = "inlined_lowering"
@@ -77,7 +77,7 @@ class InlinedLowering(Lowering):
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
-class SpreadLowering(InlinedLowering):
+class ParallelLowering(InlinedLowering):
     """Lowering of a function that only compiled functions call, whose loops are spread over threads."""
 
     _name = "spread_lowering"
@@ -85,7 +85,7 @@ class SpreadLowering(InlinedLowering):
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
-class Closures(InlineClosureLikes):  # type: ignore[misc]
+class ClosurePass(InlineClosureLikes):  # type: ignore[misc]
     """Inlining of closures and of arrays out of lists, where a function has any."""
 
     _name = "closures_if_any"
@@ -97,7 +97,7 @@ class Closures(InlineClosureLikes):  # type: ignore[misc]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
-class ArrayRewrites(NopythonRewrites):  # type: ignore[misc]
+class ArrayRewritePass(NopythonRewrites):  # type: ignore[misc]
     """Rewriting of expressions whose values are whole arrays, and of texts as indices, where a function has any."""
 
     _name = "array_rewrites_if_any"
@@ -126,7 +126,7 @@ def _holds_array(kind: Any) -> bool:
     return isinstance(kind, types.Array) or any(_holds_array(part) for part in parts)
 
 
-class Remembering:
+class CachingTypingContext:
     """A typing context that remembers which form of an operator or a function of Numba's takes which types."""
 
     _known: dict[Hashable, Any] = {}
@@ -137,7 +137,7 @@ class Remembering:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._context, name)
 
-    def resolve_function_type(self, function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
+    def resolve_function_type(self, function: Any, arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
         """Signature of a call. Only a function of the driver's own is asked each time: that has it compiled.
 
         It is compiled once for whole numbers, not once more for each that stands in the text of a caller. Not so what
@@ -145,13 +145,15 @@ class Remembering:
         Functions that stand once in a driver are there for all lengths.
         """
         own = isinstance(function, types.Dispatcher)
-        if own and (_stands_once(function) or not any(_holds_array(one) for one in given)):
-            given = tuple(types.unliteral(one) if isinstance(one, types.IntegerLiteral) else one for one in given)
+        if own and (_stands_once(function) or not any(_holds_array(one) for one in arguments)):
+            arguments = tuple(
+                types.unliteral(one) if isinstance(one, types.IntegerLiteral) else one for one in arguments
+            )
         if named or isinstance(function, (types.Dispatcher, types.RecursiveCall)):
-            return self._context.resolve_function_type(function, given, named)
-        key = self._context, function, given
+            return self._context.resolve_function_type(function, arguments, named)
+        key = self._context, function, arguments
         if key not in self._known:
-            found = self._context.resolve_function_type(function, given, named)
+            found = self._context.resolve_function_type(function, arguments, named)
             if found is None:
                 return None
             self._known[key] = found
@@ -159,14 +161,14 @@ class Remembering:
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
-class Typing(NopythonTypeInference):  # type: ignore[misc]
+class CachedTypeInference(NopythonTypeInference):  # type: ignore[misc]
     """Type inference that resolves no call twice."""
 
     _name = "remembering_type_inference"
 
     def run_pass(self, state: Any) -> bool:
         """Infer all types of a function."""
-        context, state.typingctx = state.typingctx, Remembering(state.typingctx)
+        context, state.typingctx = state.typingctx, CachingTypingContext(state.typingctx)
         try:
             return bool(super().run_pass(state))
         finally:
@@ -178,7 +180,7 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
 
     def __init__(self, *given: Any):
         *before, flags, named = given
-        super().__init__(*before, QuickFlags(flags), named)  # type: ignore[call-arg]
+        super().__init__(*before, HashedFlags(flags), named)  # type: ignore[call-arg]
         self.state.targetctx.refresh = _when_grown(self.state.targetctx.refresh)  # of this function's own copy
 
     def define_pipelines(self) -> list[Any]:
@@ -186,11 +188,11 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
         found = DefaultPassBuilder.define_nopython_pipeline(self.state)
         inner = self.state.flags.no_cpython_wrapper
         other = {
-            InlineClosureLikes: Closures,
-            NopythonTypeInference: Typing,
-            NopythonRewrites: ArrayRewrites,
-            NativeLowering: InlinedLowering if inner else Lowering,
-            NativeParforLowering: SpreadLowering if inner else NativeParforLowering,
+            InlineClosureLikes: ClosurePass,
+            NopythonTypeInference: CachedTypeInference,
+            NopythonRewrites: ArrayRewritePass,
+            NativeLowering: InlinedLowering if inner else DriverLowering,
+            NativeParforLowering: ParallelLowering if inner else NativeParforLowering,
         }
         made = PassManager("driver")
         made.passes = [(other.get(kind, kind), said) for kind, said in found.passes]
@@ -198,7 +200,7 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
         return [made]
 
     def _compile_core(self) -> Any:
-        with sparing(SPREAD):  # below Numba's lock: one thread at a time
+        with shortcuts(PARALLEL_REPLACEMENT):  # below Numba's lock: one thread at a time
             return super()._compile_core()
 
 

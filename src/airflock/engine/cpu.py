@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.drivers import driver_of, flying
+from airflock.engine.drivers import compile_messages, driver_of
 from airflock.engine.plan import Plan
-from airflock.engine.state import State
-from airflock.engine.tables import Tables
-from airflock.support.threads import heed
+from airflock.engine.state import DriverState
+from airflock.engine.tables import WorldTables
+from airflock.support import check_interrupted
 
 
 @dataclass(frozen=True)
-class Flown:
+class DriverResult:
     """What a driver leaves behind.
 
     values : order parameters combined over time, and the time to each goal (a list, s; nan: never)
@@ -36,30 +36,32 @@ class Flown:
         return True if self.absent is None else ~self.absent
 
 
-def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None, device: str = "cpu") -> Flown:
+def fly_on_cpu(plan: Plan, tables: WorldTables, start: NDArray[Any] | None = None, device: str = "cpu") -> DriverResult:
     """Fly one world from its tables, from step 0 to its end.
 
     start : (component, agent), m and m/s, where the plan asks for it
     """
-    state = State(plan, tables, driver_of(plan, device), start)
+    state = DriverState(plan, tables, driver_of(plan, device), start)
     steps, every = state.whole("steps"), state.whole("sample_every")
     frames = (
         np.full((steps // every + 1, 3 * plan.dimensions, state.agents), np.nan, tables.row.dtype)
         if plan.record
         else None
     )
-    with flying(state.driver, plan.model.name):
-        status = advance(state, 0, steps + 1, frames)
-    if frames is not None and state.ended:
+    with compile_messages(state.driver, plan.model.name):
+        status = advance_in_chunks(state, 0, steps + 1, frames)
+    if frames is not None and state.has_ended:
         frames = frames[: -(-status // every)]
-    return Flown(state.values(), frames, state.motion, min(status, 0), ~state.present if plan.absence else None)
+    return DriverResult(state.values(), frames, state.motion, min(status, 0), ~state.present if plan.absence else None)
 
 
 BEAT = 0.1  # s; about how long a compiled call flies until Ctrl-C and the like are heard
 FIRST = 200_000  # agents times steps of the first of them; some 10 ms
 
 
-def advance(state: State, first: int, last: int, frames: NDArray[Any] | None = None, half: int = 0) -> int:
+def advance_in_chunks(
+    state: DriverState, first: int, last: int, frames: NDArray[Any] | None = None, half: int = 0
+) -> int:
     """Fly the steps first to last - 1 in parts of about BEAT, between which an interruption is heard.
 
     frames : (sample, component, agent) for all samples of these steps, or None
@@ -67,8 +69,8 @@ def advance(state: State, first: int, last: int, frames: NDArray[Any] | None = N
     """
     steps, step, every = max(1, FIRST // state.agents), first, state.whole("sample_every")
     skipped = -(-first // every)
-    while step < last and not state.ended:
-        heed()
+    while step < last and not state.has_ended:
+        check_interrupted()
         part, begun = min(step + steps, last), time.monotonic()
         rest = None if frames is None else frames[-(-step // every) - skipped :]
         done = state.advance(step, part, half, rest)

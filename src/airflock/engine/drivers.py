@@ -8,20 +8,20 @@ from types import ModuleType
 from typing import Any
 
 from airflock.engine import interpreted
-from airflock.engine.passes.driver import flight
+from airflock.engine.passes.driver import flight_driver_text
 from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
-from airflock.support.errors import RuleError
+from airflock.support import RuleError
 
 
 def flight_text(plan: Plan) -> str:
     """Text of the driver that flies a plan, the same whether samples are kept; each recording says by which."""
-    return _text(plan.built(record=False) if plan.record else plan)
+    return _text(plan.built(keep_frames=False) if plan.record else plan)
 
 
 @lru_cache(maxsize=256)
 def _text(plan: Plan) -> str:
-    return flight(plan)
+    return flight_driver_text(plan)
 
 
 @cache
@@ -50,18 +50,18 @@ def is_compiled(driver: ModuleType) -> bool:
     return is_loaded(driver) or any(Path(driver.advance.stats.cache_path).glob("*.nbi"))
 
 
-def flying(driver: ModuleType, model: str) -> AbstractContextManager[None]:
-    """Around calls of a driver: `compiling`, if it has to be compiled first."""
-    return calling(driver.advance, model)
+def compile_messages(driver: ModuleType, model: str) -> AbstractContextManager[None]:
+    """Around calls of a driver: `rule_errors_of_compiler`, if it has to be compiled first."""
+    return function_compile_messages(driver.advance, model)
 
 
-def calling(function: Any, model: str) -> AbstractContextManager[None]:
-    """Around calls of a function of a driver: `compiling`, if it has to be compiled first."""
-    return nullcontext() if getattr(function, "overloads", True) else compiling(model)
+def function_compile_messages(function: Any, model: str) -> AbstractContextManager[None]:
+    """Around calls of a function of a driver: `rule_errors_of_compiler`, if it has to be compiled first."""
+    return nullcontext() if getattr(function, "overloads", True) else rule_errors_of_compiler(model)
 
 
 @contextmanager
-def compiling(model: str) -> Iterator[None]:
+def rule_errors_of_compiler(model: str) -> Iterator[None]:
     """Turn what the compiler says of a rule into one line; an interruption is heard after each of its passes.
 
     Whoever waits for it at a terminal or in a notebook is told. Raises RuleError, GivenUp.
@@ -69,10 +69,10 @@ def compiling(model: str) -> Iterator[None]:
     from numba.core.errors import NumbaError
     from numba.core.event import install_listener
 
-    from airflock.engine.compile_events import Heeding, told_if_long
+    from airflock.engine.compile_events import InterruptListener, message_if_slow
 
     try:
-        with install_listener("numba:run_pass", Heeding()), told_if_long():
+        with install_listener("numba:run_pass", InterruptListener()), message_if_slow():
             yield
     except NumbaError as fault:
         lines = [line.strip() for line in str(fault).splitlines()]

@@ -4,19 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from airflock.core.contract import Body, Metric, Model
-from airflock.core.fault import Fault
-from airflock.core.radio import Radio
-from airflock.core.sensor import Sensor
-from airflock.core.topology import Topology
-from airflock.parts.bodies.registry import BODIES
-from airflock.parts.radios.registry import RADIOS
-from airflock.parts.radios.registry import USUAL as USUAL_RADIO
-from airflock.parts.sensors.registry import SENSORS, USUAL
+from airflock.core import Body, Fault, Metric, Model, Radio, Sensor, Topology
+from airflock.parts.bodies import BODIES
+from airflock.parts.radios import DEFAULT_RADIO as USUAL_RADIO, RADIOS
+from airflock.parts.sensors import DEFAULT_SENSOR, SENSORS
 from airflock.world import arena, rays
 
 
-class OwnLaw(NamedTuple):
+class GroupLaw(NamedTuple):
     """A law that groups of a flock fly by, beside that of the others.
 
     choices : its compile-time constants, by name
@@ -29,7 +24,7 @@ class OwnLaw(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Build:
+class BuildOptions:
     """How a driver is built, whatever the scenario says.
 
     bits        : 32 or 64 per number
@@ -41,7 +36,7 @@ class Build:
     """
 
     bits: int = 32
-    record: bool = False
+    keep_frames: bool = False
     given_start: bool = False
     grid: bool = False
     near: bool = False
@@ -49,7 +44,7 @@ class Build:
 
 
 @dataclass(frozen=True)
-class Facts:
+class PlanProperties:
     """Compile-time side of a flight: what the scenario says, and how it is built. `Plan` tells what follows from it.
 
     build     : how it is built; bits, record, given_start and grid read it
@@ -92,38 +87,38 @@ class Facts:
     ray: Callable[..., float] = rays.to_nothing
     body: Body = BODIES["multirotor"]
     body_choices: tuple[tuple[str, str], ...] = ()
-    sensor: Sensor = SENSORS[USUAL]
+    sensor: Sensor = SENSORS[DEFAULT_SENSOR]
     sensor_choices: tuple[tuple[str, str], ...] = ()
-    edge: Callable[..., Any] | None = None
+    edge_rule: Callable[..., Any] | None = None
     start: str = "arena"
     scene: bool = False
-    meshed: bool = False
+    has_mesh: bool = False
     goals: bool = False
     stop: bool = False
     wing_choices: tuple[tuple[str, str], ...] = ()
     aero_choices: tuple[tuple[str, str], ...] = ()
-    herd: bool = False
+    is_shepherd: bool = False
     own: bool = False
     sequential: bool = False
     dimensions: int = 2
-    noisy: bool = True
+    has_sensor_error: bool = True
     delayed: bool = True
     lossy: bool = False
     radio: Radio = RADIOS[USUAL_RADIO]
     radio_choices: tuple[tuple[str, str], ...] = ()
     few: bool = True
-    silent: bool = False
+    stops_for_lost: bool = False
     windy: bool = False
     dryden: bool = False
     obstacles: bool = False
     obstacle: Callable[..., Any] = arena.convex_obstacle
-    polygon: bool = False
-    raised: bool = False
+    polygonal: bool = False
+    off_centre_height: bool = False
     faults: tuple[Fault, ...] = ()
     varied: tuple[tuple[str, str], ...] = ()
     topology: Topology | None = None
     fading: bool = False
-    laws: tuple[OwnLaw, ...] = ()
+    laws: tuple[GroupLaw, ...] = ()
     law: int | None = None
-    grouped: bool = False
-    build: Build = Build()
+    uses_groups: bool = False
+    build: BuildOptions = BuildOptions()

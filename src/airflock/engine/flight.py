@@ -7,16 +7,14 @@ from typing import Any, NoReturn
 import numpy as np
 
 from airflock.engine import failure, notebook
-from airflock.engine.actions import Actions
-from airflock.engine.course import Course
+from airflock.engine.actions import FlightActions
+from airflock.engine.course import FlightState
 from airflock.engine.snapshots import Snapshot
-from airflock.scenarios.events import Event, events_of
-from airflock.scenarios.files import loaded
-from airflock.scenarios.seeds import sound_seed
-from airflock.support.errors import FlightError
+from airflock.scenarios import Event, check_seed, load_if_named, to_events
+from airflock.support import FlightError
 
 
-class Flight(Actions):
+class Flight(FlightActions):
     """One flight of a scenario, open: it goes on when it is told to, and may be changed on its way.
 
     Its bits are those of the closed flight, whatever the parts in which it is advanced. A change is a scenario: checked
@@ -60,13 +58,15 @@ class Flight(Actions):
     ):
         if device not in self.DEVICES:
             raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(self.DEVICES)}")
-        seed = sound_seed(seed)
-        self._course = Course(loaded(scenario).in_flight(seed), seed, precision, record, start, device, absence)
-        self._planned = events_of(events)
+        seed = check_seed(seed)
+        self._course = FlightState(
+            load_if_named(scenario).with_drawn_scene(seed), seed, precision, record, start, device, absence
+        )
+        self._planned = to_events(events)
         if world:
-            self._course.to_world(world)
+            self._course.switch_world(world)
         while self._planned and self._planned[0].step == 0 and self._planned[0].kind == "branch":
-            self._course.to_world(self._planned.pop(0).data.get("world"))  # before the start is drawn
+            self._course.switch_world(self._planned.pop(0).data.get("world"))  # before the start is drawn
 
     def __repr__(self) -> str:
         """Which flight it is, and how far it is."""
@@ -76,12 +76,12 @@ class Flight(Actions):
 
     def _repr_html_(self) -> str:
         """Where it stands and its scores so far, for a notebook."""
-        return notebook.html(self)
+        return notebook.flight_html(self)
 
     @property
     def ready(self) -> bool:
         """Whether it flies at once; otherwise its driver is compiled first."""
-        return self._course.ready
+        return self._course.is_ready
 
     def compile(self, *, aside: bool = False) -> "Flight":
         """Have its driver compiled, and fly nothing; in any thread, while nothing else is asked of it. Returns it.
@@ -144,7 +144,7 @@ class Flight(Actions):
     def _advance(self, last: int) -> None:
         first = self.step
         self._course.advance(last)
-        if self.step > first and not self._state.finite:
+        if self.step > first and not self._state.is_finite:
             self._fail(first)
 
     def _fail(self, first: int) -> NoReturn:
@@ -155,8 +155,8 @@ class Flight(Actions):
         twin._fly_to(first)
         for event in twin._planned:
             twin.event(event.kind, **event.data)
-        step = failure.first_bad_step(twin._state, first, self.step, 1 if twin._course.sensed else 0)
-        raise FlightError(failure.not_finite(self.scenario, self.seed, bad, step))
+        step = failure.first_bad_step(twin._state, first, self.step, 1 if twin._course.has_sensed else 0)
+        raise FlightError(failure.not_finite_message(self.scenario, self.seed, bad, step))
 
     def finish(self) -> dict[str, Any]:
         """Fly to the end, take the last sample, and return the scores of the last window.
@@ -175,7 +175,7 @@ class Flight(Actions):
         """
         while not self.over:  # a change on the way may make it longer
             self._fly_to(self._course.steps)
-        if self.step == self._course.steps and not self._state.ended:
+        if self.step == self._course.steps and not self._state.has_ended:
             self._advance(self._course.steps + 1)
         return self.scores()
 
@@ -198,9 +198,9 @@ class Flight(Actions):
         if kind == "fault":
             return self.fault(**{"kind": "", **data})
         if kind == "branch":
-            self._course.to_world(data.get("world"))
+            self._course.switch_world(data.get("world"))
             return self
-        (event,) = events_of([Event(self.step, kind, data)])
+        (event,) = to_events([Event(self.step, kind, data)])
         try:
             done: Flight = getattr(self, event.kind)(**data)
         except TypeError as fault:
@@ -252,9 +252,9 @@ class Flight(Actions):
         np.True_
         """
         twin = copy(self)
-        twin._course, twin._planned = self._course.twin(), list(self._planned)
+        twin._course, twin._planned = self._course.copy(), list(self._planned)
         if world is not None and world != self.world:
-            twin._course.to_world(world)
+            twin._course.switch_world(world)
         return twin
 
     def again(self) -> "Flight":

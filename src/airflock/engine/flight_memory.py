@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.initial_rows import first_memories
-from airflock.engine.layout import aligned_zeros, layout_of
+from airflock.engine.initial_rows import law_memories
+from airflock.engine.layout import aligned_zeros, buffer_layout
 from airflock.engine.passes import grid
-from airflock.engine.passes.flock import scratch_of
-from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.passes.flock import scratch_arrays
+from airflock.engine.plan import INTEGER_NAMES, Plan
 from airflock.engine.stages.approach import BEGUN, ENDED, GAP
 from airflock.engine.stages.state import own_row
-from airflock.engine.tables import Tables
-from airflock.world.scenes.tree import AWAY
+from airflock.engine.tables import WorldTables
+from airflock.world import FAR_AWAY
 
-AGENTS, RING = WHOLE.index("agents"), WHOLE.index("ring")
+AGENTS, RING = INTEGER_NAMES.index("agents"), INTEGER_NAMES.index("ring")
 
 
-class FlightMemory:
+class DriverMemory:
     """Memory of one flight, and the driver that reads and writes it.
 
     plan, driver : what is fixed at compile time, and the functions that were made of it
@@ -30,28 +30,28 @@ class FlightMemory:
     agents       : number of agents
     """
 
-    def __init__(self, plan: Plan, tables: Tables, driver: ModuleType, start: NDArray[Any] | None = None):
+    def __init__(self, plan: Plan, tables: WorldTables, driver: ModuleType, start: NDArray[Any] | None = None):
         real = tables.row.dtype
         agents, ring = int(tables.whole[AGENTS]), int(tables.whole[RING])
-        scratch = scratch_of(plan, tables.row, agents)
+        scratch = scratch_arrays(plan, tables.row, agents)
         kept = tuple((name, size) for parts in scratch for name, size, spare in parts if not spare)
         counts = (len(driver.ROWS), agents, ring, len(tables.goals), len(tables.later), tables.shapes.shape)
-        layout = layout_of(plan, real, *counts, kept)
+        layout = buffer_layout(plan, real, *counts, kept)
         self.plan, self.driver, self.tables, self.agents = plan, driver, tables, agents
-        self.buffer, self.arrays = layout.filled()
+        self.buffer, self.arrays = layout.new_buffer()
         own = self.arrays
         own["row"][:], own["whole"][:] = tables.row, tables.whole
         for c, axis in enumerate(plan.axes):  # a driver that fills up vectors may go on where one that does not began
-            own["work"][driver.ROWS[axis], agents:] = AWAY
-            own["past"][:, c, agents:] = AWAY
+            own["work"][driver.ROWS[axis], agents:] = FAR_AWAY
+            own["past"][:, c, agents:] = FAR_AWAY
         for name, begin in plan.beginnings.items():
             if name in driver.ROWS:
                 own["work"][driver.ROWS[name]] = begin
         if len(tables.goals):
             own["aim"][:3] = tables.goals[0]
-        self.fill_own()
+        self.fill_varied()
         if plan.laws:  # of one law they stand in the layout
-            own["mem"][:] = first_memories(plan, self.laws, real)
+            own["mem"][:] = law_memories(plan, self.laws, real)
         if len(tables.later):
             own["later"][:], own["shapes"][:] = tables.later, tables.shapes
         self._motion = [driver.ROWS[name] for name in plan.motion]
@@ -63,7 +63,7 @@ class FlightMemory:
         self.solvers = tuple(
             tuple(np.zeros(size, real) if spare else own[name] for name, size, spare in parts) for parts in scratch
         )
-        self.cells = grid.memory(plan, agents, aligned_zeros)
+        self.cells = grid.grid_memory(plan, agents, aligned_zeros)
         self._given = self._arrays()
 
     def arguments(self, first: int, last: int, half: int = 0, frames: NDArray[Any] | None = None) -> tuple[Any, ...]:
@@ -97,7 +97,7 @@ class FlightMemory:
         )  # fmt: skip
 
     @property
-    def ended(self) -> bool:
+    def has_ended(self) -> bool:
         """Whether the flight has ended at a collision."""
         return bool(self.arrays["held"][ENDED] > 0.5)
 
@@ -122,7 +122,7 @@ class FlightMemory:
         """Motion step as the driver reads it, s."""
         return float(self.arrays["row"][self.plan.spans["c"]][self.plan.records["c"].index("dt")])
 
-    def fill_own(self) -> None:
+    def fill_varied(self) -> None:
         """Write the numbers that differ among agents, each to its agent."""
         slots = self.slots if self.begun else None
         for (letter, name), values in zip(self.plan.columns, self.tables.own, strict=True):
@@ -140,7 +140,7 @@ class FlightMemory:
         return np.zeros(work.shape[1], np.int64) if row is None else work[row].astype(np.int64)
 
     @property
-    def finite(self) -> bool:
+    def is_finite(self) -> bool:
         """Whether the positions and velocities of all agents are finite."""
         # as bytes: `all` of so few takes three times as long
         return not any(0 in np.isfinite(run, told).tobytes() for run, told in self._moving)
@@ -152,17 +152,17 @@ class FlightMemory:
         runs = [self.arrays["work"][rows[0] : rows[-1] + 1].reshape(-1) for rows in together]
         return [(run, np.zeros(run.shape, bool)) for run in runs]
 
-    def look_at_pairs(self) -> None:
+    def reset_pair_distances(self) -> None:
         """Forget how far pairs are apart: what was changed from outside may have brought them together."""
         self.arrays["held"][GAP] = 0.0
 
     def whole(self, name: str) -> int:
         """An integer of this flight."""
-        return int(self.arrays["whole"][WHOLE.index(name)])
+        return int(self.arrays["whole"][INTEGER_NAMES.index(name)])
 
-    def set_whole(self, name: str, value: int) -> None:
+    def set_integer(self, name: str, value: int) -> None:
         """Set an integer of this flight."""
-        self.arrays["whole"][WHOLE.index(name)] = value
+        self.arrays["whole"][INTEGER_NAMES.index(name)] = value
 
     def rows(self, names: Sequence[str]) -> NDArray[Any]:
         """Rows of the work table by name, (row, agent); agents by number. A copy.
@@ -172,7 +172,7 @@ class FlightMemory:
         found: NDArray[Any] = self.arrays["work"][[self.driver.ROWS[name] for name in names], : self.agents]
         return found if (slot := self.slots) is None else found[:, slot]
 
-    def put(self, names: Sequence[str], values: NDArray[Any]) -> None:
+    def set_rows(self, names: Sequence[str], values: NDArray[Any]) -> None:
         """Write rows of the work table, (row, agent), agents by number."""
         places = [self.driver.ROWS[name] for name in names]
         slot = np.arange(self.agents) if self.slots is None else self.slots

@@ -5,17 +5,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.fault_columns import kept_rows
-from airflock.engine.initial_rows import first_memories, rows_of_metrics
-from airflock.engine.passes.flock import scratch_of
-from airflock.engine.passes.slots import sorted_by_cells
+from airflock.engine.fault_columns import fault_memory_rows
+from airflock.engine.initial_rows import law_memories, metric_memory_rows
+from airflock.engine.passes.flock import scratch_arrays
+from airflock.engine.passes.slots import sorts_by_cells
 from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import BEGUN
 from airflock.engine.stages.state import fault_row
-from airflock.engine.state import State
+from airflock.engine.state import DriverState
 
 
-def carry(old: State, new: State, step: int) -> None:
+def hand_over(old: DriverState, new: DriverState, step: int) -> None:
     """Fill `new`, of the same agents and dimensions, with what `old` holds before `step`.
 
     Rows that only the new plan has are filled from what they stand for: a measured position from the true one, what a
@@ -45,27 +45,27 @@ def carry(old: State, new: State, step: int) -> None:
     for name in _solved(old, new):
         new.arrays[name][...] = old.arrays[name]
     new.arrays["held"][BEGUN] = old.arrays["held"][BEGUN]
-    new.set_whole("agents", old.here)
-    new.fill_own()
+    new.set_integer("agents", old.here)
+    new.fill_varied()
     _memories(old, new, lanes)
 
 
-def _lanes(old: State, new: State) -> NDArray[np.int64]:
+def _lanes(old: DriverState, new: DriverState) -> NDArray[np.int64]:
     """Of each lane of the new driver the lane that it takes over; agents that are absent come last.
 
     A driver that sorts agents by cells may find them in any order; the others have them in the order of their numbers.
     """
     found = np.arange(new.arrays["work"].shape[1])
-    if old.slots is not None and not sorted_by_cells(new.plan):
+    if old.slots is not None and not sorts_by_cells(new.plan):
         there = np.argsort(~old.present, kind="stable")
         found[: old.agents] = old.slots[there]
     return found
 
 
-def _rows(old: State, new: State, lanes: NDArray[np.int64]) -> None:
+def _rows(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) -> None:
     """Rows of the work table, whole lanes."""
     work, before, had = new.arrays["work"], old.arrays["work"], old.driver.ROWS
-    repeated = kept_rows(new.plan)
+    repeated = fault_memory_rows(new.plan)
     other = {name for name in new.plan.beginnings if not _goes_on(name, old.plan, new.plan)}
     for name, place in new.driver.ROWS.items():
         if name in other:  # another body or sensor begins to remember anew
@@ -82,10 +82,10 @@ def _rows(old: State, new: State, lanes: NDArray[np.int64]) -> None:
         new.order[:] = np.arange(new.agents)
 
 
-def _memories(old: State, new: State, lanes: NDArray[np.int64]) -> None:
+def _memories(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) -> None:
     """What laws remember of each agent; by a law with another Memory an agent begins anew."""
     laws, real = new.laws, new.arrays["mem"].dtype
-    new.arrays["mem"][:] = first_memories(new.plan, laws, real)
+    new.arrays["mem"][:] = law_memories(new.plan, laws, real)
     before, now = old.plan.memories, new.plan.memories
     keeps = np.array([[one is other and one is not None for one in before] for other in now])
     kept, count = keeps[laws, old.laws[lanes]], min(len(old.arrays["mem"]), len(new.arrays["mem"]))
@@ -97,7 +97,7 @@ def _goes_on(row: str, old: Plan, new: Plan) -> bool:
     return old.body == new.body if row.startswith("body") else old.senses and old.sensor == new.sensor
 
 
-def _under_way(old: State, new: State, step: int, lanes: NDArray[np.int64]) -> NDArray[Any]:
+def _under_way(old: DriverState, new: DriverState, step: int, lanes: NDArray[np.int64]) -> NDArray[Any]:
     """The ring of past states for the delay of the new plan, (slot, component, lane).
 
     Decision k hears slot k modulo the ring, the states of step k * decide_every - delay. With a shorter delay newer
@@ -122,18 +122,18 @@ def _under_way(old: State, new: State, step: int, lanes: NDArray[np.int64]) -> N
     return made
 
 
-def _remembered(old: State, new: State, lanes: NDArray[np.int64]) -> None:
+def _remembered(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) -> None:
     """What metrics of both plans remember of each agent."""
-    before = rows_of_metrics(old.plan)
-    for metric, rows in rows_of_metrics(new.plan).items():
+    before = metric_memory_rows(old.plan)
+    for metric, rows in metric_memory_rows(new.plan).items():
         if metric in before:
             new.arrays["memory"][rows] = old.arrays["memory"][before[metric]][:, lanes]
 
 
-def _solved(old: State, new: State) -> list[str]:
+def _solved(old: DriverState, new: DriverState) -> list[str]:
     """What rules of the whole flock carry from call to call, where wings are what they were; else it is found anew."""
     wing = new.plan.spans["wing"]
     if old.plan != new.plan or not np.array_equal(old.arrays["row"][wing], new.arrays["row"][wing]):
         return []
-    scratch = scratch_of(new.plan, new.tables.row, new.agents)
+    scratch = scratch_arrays(new.plan, new.tables.row, new.agents)
     return [name for parts in scratch for name, _, spare in parts if not spare]

@@ -8,35 +8,35 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.initial_rows import first_memories, memories, of_pairs
-from airflock.engine.plan import WHOLE, Plan
-from airflock.engine.stages.approach import HELD
-from airflock.engine.stages.decide import NEAR
-from airflock.engine.totals import sums_of
+from airflock.engine.initial_rows import law_memories, metric_memories, pair_values
+from airflock.engine.plan import INTEGER_NAMES, Plan
+from airflock.engine.stages.approach import HELD_SIZE
+from airflock.engine.stages.decide import MAX_GATHERED
+from airflock.engine.totals import initial_sums
 
 LANES = 16  # rows are padded to whole vectors of the widest machine
-LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
+CACHE_LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
 
 
-class Layout(NamedTuple):
+class BufferLayout(NamedTuple):
     """Where the arrays of a state lie in its buffer, and what they hold before a flight.
 
     places : name, first byte, shape and kind of each array, each from a cache line on
     """
 
     places: tuple[tuple[str, int, tuple[int, ...], Any], ...]
-    beginning: NDArray[np.uint8]
+    initial_bytes: NDArray[np.uint8]
 
-    def filled(self) -> tuple[NDArray[np.uint8], dict[str, NDArray[Any]]]:
+    def new_buffer(self) -> tuple[NDArray[np.uint8], dict[str, NDArray[Any]]]:
         """A new buffer as it is before a flight, and its arrays by name."""
-        buffer = aligned(np.empty, len(self.beginning))
-        buffer[:] = self.beginning
+        buffer = align(np.empty, len(self.initial_bytes))
+        buffer[:] = self.initial_bytes
         arrays = {name: np.ndarray(shape, kind, buffer, place) for name, place, shape, kind in self.places}
         return buffer, arrays
 
 
 @lru_cache(maxsize=64)
-def layout_of(
+def buffer_layout(
     plan: Plan,
     real: Any,
     count: int,
@@ -46,25 +46,33 @@ def layout_of(
     later: int,
     shapes: tuple[int, int],
     kept: tuple[Any, ...],
-) -> Layout:
+) -> BufferLayout:
     """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
-    m = lanes(agents)
+    m = lane_count(agents)
     label = np.int32 if plan.bits == 32 else np.int64
     pairs = (agents, m) if plan.packets else (1, 1)
-    values, sums = sums_of(plan)
+    values, sums = initial_sums(plan)
     beginnings = {
-        "mem": first_memories(plan, np.zeros(m, int), real), "memory": memories(plan, m, real),
+        "mem": law_memories(plan, np.zeros(m, int), real), "memory": metric_memories(plan, m, real),
         "values": values, "sums": sums,
-        "store": of_pairs(plan, *pairs, real), "reached": np.full(goals, -1.0, real),
+        "store": pair_values(plan, *pairs, real), "reached": np.full(goals, -1.0, real),
     }  # fmt: skip
     columns = sum(map(len, plan.records.values()))
     gusts = (5 if plan.dryden else 3,)
     shaped: dict[str, tuple[tuple[int, ...], Any]] = {
-        "held": ((HELD,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": (gusts, real),
-        "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
-        "shapes": ((shapes[0] if later else 0, shapes[1]), real), "words": ((4, m), np.uint32),
-        "near": ((NEAR,), np.int64), "labels": ((2, m), label), "there": ((2,), np.float64),
-    }  # fmt: skip
+        "held": ((HELD_SIZE,), real),
+        "row": ((columns,), real),
+        "whole": ((len(INTEGER_NAMES),), np.int64),
+        "gust": (gusts, real),
+        "aim": ((4,), real),
+        "counts": ((2,), np.int64),
+        "later": ((later, 8), real),
+        "shapes": ((shapes[0] if later else 0, shapes[1]), real),
+        "words": ((4, m), np.uint32),
+        "near": ((MAX_GATHERED,), np.int64),
+        "labels": ((2, m), label),
+        "there": ((2,), np.float64),
+    }
     shaped |= {name: (array.shape, array.dtype) for name, array in beginnings.items()}
     shaped |= {name: (size, real) for name, size in kept}
     # last, since faults and agents that differ add to them: what lies before lies to their first rows as ever
@@ -72,28 +80,28 @@ def layout_of(
     places, end = [], 0
     for name, (shape, kind) in shaped.items():
         places.append((name, end, shape, np.dtype(kind)))
-        end += -(-math.prod(shape) * np.dtype(kind).itemsize // LINE) * LINE
-    layout = Layout(tuple(places), np.zeros(end, np.uint8))
-    buffer, arrays = layout.filled()
+        end += -(-math.prod(shape) * np.dtype(kind).itemsize // CACHE_LINE) * CACHE_LINE
+    layout = BufferLayout(tuple(places), np.zeros(end, np.uint8))
+    buffer, arrays = layout.new_buffer()
     for name, array in beginnings.items():
         arrays[name][...] = array
-    return Layout(layout.places, buffer.copy())
+    return BufferLayout(layout.places, buffer.copy())
 
 
-def lanes(agents: int) -> int:
+def lane_count(agents: int) -> int:
     """Agents of a row, filled up to whole vectors."""
     return -(-agents // LANES) * LANES
 
 
 def aligned_zeros(shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
     """Zeros that begin on a cache line."""
-    found: NDArray[Any] = aligned(np.zeros, math.prod(shape) * np.dtype(kind).itemsize).view(kind).reshape(shape)
+    found: NDArray[Any] = align(np.zeros, math.prod(shape) * np.dtype(kind).itemsize).view(kind).reshape(shape)
     return found
 
 
-def aligned(make: Callable[..., NDArray[Any]], size: int) -> NDArray[Any]:
+def align(make: Callable[..., NDArray[Any]], size: int) -> NDArray[Any]:
     """So many bytes, as `make` makes them, from a cache line on."""
-    room = make(size + LINE, np.uint8)
-    first = -room.__array_interface__["data"][0] % LINE
+    room = make(size + CACHE_LINE, np.uint8)
+    first = -room.__array_interface__["data"][0] % CACHE_LINE
     found: NDArray[Any] = room[first : first + size]
     return found

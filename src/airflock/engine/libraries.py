@@ -7,8 +7,8 @@ from typing import Any
 from numba.core.codegen import Codegen, JITCodeLibrary
 from numba.core.runtime import rtsys  # type: ignore[attr-defined]  # Numba has no types, here and below
 
-from airflock.engine.compile_shortcuts import KNOWN
-from airflock.engine.layout import LINE
+from airflock.engine.compile_shortcuts import IS_TESTED_VERSION
+from airflock.engine.layout import CACHE_LINE
 
 # what Numba calls the body of a loop over threads, what unpacks its arguments, and what hands its parts to threads
 OF_LOOPS = ("__numba_parfor_gufunc", "<numba.np.ufunc.wrappers.", "parallelgufuncwrapper")
@@ -27,7 +27,7 @@ class DriverLibrary(JITCodeLibrary):  # type: ignore[misc]
         """
         for function in module.functions:
             if function.blocks:
-                function.attributes.alignstack = LINE
+                function.attributes.alignstack = CACHE_LINE
         super().add_ir_module(module)
 
     def add_linking_library(self, library: Any) -> None:
@@ -47,7 +47,7 @@ class DriverLibrary(JITCodeLibrary):  # type: ignore[misc]
         super()._optimize_final_module()
 
     def _optimize_functions(self, module: Any) -> None:
-        if not KNOWN:
+        if not IS_TESTED_VERSION:
             super()._optimize_functions(module)
             return
         module.data_layout = self._codegen._data_layout
@@ -72,4 +72,4 @@ def _made(usual: Callable[..., Any], codegen: Any, name: str, **named: Any) -> A
     return InlinedLibrary(codegen, name) if name.startswith(OF_LOOPS) else usual(codegen, name, **named)
 
 
-SPREAD = Codegen, "create_library", _made
+PARALLEL_REPLACEMENT = Codegen, "create_library", _made

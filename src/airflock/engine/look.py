@@ -5,59 +5,62 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from airflock.core import agent as one
-from airflock.core import radio, random, silence
-from airflock.core.agent import Heard
-from airflock.core.agent import State as Motion
-from airflock.core.contract import Model
-from airflock.core.hearing import carried, lasts
-from airflock.core.maths import norm
-from airflock.core.topology import met_of
-from airflock.core.view import View
-from airflock.core.vocabulary import answer
-from airflock.engine.plan import NEVER
-from airflock.engine.state import State
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.surroundings import Place
-from airflock.scenarios.timing import clock
+from airflock.core import (
+    AgentView,
+    HeardNeighbour,
+    Model,
+    State as Motion,
+    agent as one,
+    call_rule,
+    extrapolated_state,
+    met_neighbours,
+    norm,
+    packet_counts,
+    radio,
+    random,
+    silence,
+)
+from airflock.engine.plan import NO_PACKET_TIME
+from airflock.engine.state import DriverState
+from airflock.scenarios import FlightWorld, Scenario, step_counts
 from airflock.world import edges
 
 
-def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, world: int) -> View:
+def agent_view(scenario: Scenario, state: DriverState, agent: int, step: int, seed: int, world: int) -> AgentView:
     """What `agent` perceived at the last decision up to `step`. Exact where the driver has just decided there."""
     plan, model = state.plan, scenario.law_of(agent).model
     every = state.whole("decide_every")
     number = step // every
-    measured, said = [motion(state, prefix) for prefix in ("m", "h")]
-    truth = motion(state, "")
+    measured, said = [agent_states(state, prefix) for prefix in ("m", "h")]
+    truth = agent_states(state, "")
     own = measured[agent]
     heard = tuple(_heard(scenario, state, agent, number, truth, said, seed, world))
     p = _parameters(scenario, state, agent)
     met = _met(scenario, state, own, heard)
-    near = answer(model.reach, "reach", {"p": p}, model.name) if model.reach else math.inf
+    near = call_rule(model.reach, "reach", {"p": p}, model.name) if model.reach else math.inf
     terms, alike = [], []
     for other, meets in zip(heard, met, strict=True):
         if model.neighbour is None:
             break
         beside = other._replace(state=_beside(scenario, own, other.state))
-        given = one.pair_percept(own, beside, agent, scenario.group_numbers[agent])
+        given = one.pair_arguments(own, beside, agent, scenario.group_indices[agent])
         far = not meets or given["r"] > near
         same = given | {"dvx": 0.0, "dvy": 0.0, "dvz": 0.0, "dv": norm(0.0, 0.0, 0.0)}
         same |= {f"n{name}": given[name] for name in ("hx", "hy", "hz")}
-        found = [answer(model.neighbour, "neighbour", case | {"p": p}, model.name) for case in (given, same)]
+        found = [call_rule(model.neighbour, "neighbour", case | {"p": p}, model.name) for case in (given, same)]
         none = type(found[0])(*(0.0 for _ in found[0]))
         terms.append(none if far else found[0])
         alike.append(none if far else found[1])
     memory = _memory(state, model, agent)
     command = tuple(float(state.rows([f"c{axis}"])[0, agent]) for axis in plan.axes)
-    return View(
+    return AgentView(
         agent, number * every * scenario.flight.dt, truth[agent], own, heard, met, tuple(terms), tuple(alike),
         _record(state, model.Sums, "sum", agent), _record(state, model.Walls, "wall", agent), memory, command,
         _record(state, plan.body.Memory, "body", agent),
     )  # fmt: skip
 
 
-def _memory(state: State, model: Model, agent: int) -> Any:
+def _memory(state: DriverState, model: Model, agent: int) -> Any:
     """What a law remembers of an agent."""
     if model.Memory is None:
         return None
@@ -65,26 +68,26 @@ def _memory(state: State, model: Model, agent: int) -> Any:
     return model.Memory(*(float(x) for x in state.arrays["mem"][:fields, _slot(state, agent)]))
 
 
-def _met(scenario: Scenario, state: State, own: Motion, heard: tuple[Heard, ...]) -> tuple[bool, ...]:
+def _met(scenario: Scenario, state: DriverState, own: Motion, heard: tuple[HeardNeighbour, ...]) -> tuple[bool, ...]:
     """Of each that is heard whether the agent meets it."""
     if state.plan.topology is None:
         return (True,) * len(heard)
-    place = Place(scenario)
+    place = FlightWorld(scenario)
     if len(state.arrays["later"]):
         place.shapes[:] = state.arrays["shapes"].astype(float).tolist()
     beside = [other._replace(state=_beside(scenario, own, other.state)) for other in heard]
-    found = {other.who for other in met_of(state.plan.topology, scenario.topology, own, beside, place)}
+    found = {other.who for other in met_neighbours(state.plan.topology, scenario.topology, own, beside, place)}
     return tuple(other.who in found for other in heard)
 
 
-def _parameters(scenario: Scenario, state: State, agent: int) -> Any:
+def _parameters(scenario: Scenario, state: DriverState, agent: int) -> Any:
     """Numbers of the law, with the agent's own where they differ among agents."""
     law, own = scenario.law_of(agent), zip(state.plan.columns, state.tables.own[:, agent].tolist(), strict=True)
     numbers = {name: value for (letter, name), value in own if letter == "p" and (letter, name) in law.varied}
     return replace(law.parameters, **numbers)
 
 
-def motion(state: State, prefix: str) -> list[Motion]:
+def agent_states(state: DriverState, prefix: str) -> list[Motion]:
     """States of all agents from the rows with a prefix, or the true ones where the plan keeps no such rows."""
     axes, had = state.plan.axes, state.driver.ROWS
     names = [f"{prefix}{name}" for name in state.plan.motion]
@@ -96,20 +99,20 @@ def motion(state: State, prefix: str) -> list[Motion]:
 
 def _heard(
     scenario: Scenario,
-    state: State,
+    state: DriverState,
     i: int,
     number: int,
     truth: list[Motion],
     said: list[Motion],
     seed: int,
     world: int,
-) -> Iterator[Heard]:
+) -> Iterator[HeardNeighbour]:
     """Everybody in range whose packet agent i has and still believes: as the driver drew it, from the same counters."""
     k, plan, n = scenario.radio, state.plan, state.agents
-    fades = plan.topology is not None and plan.topology.asks("fade")
+    fades = plan.topology is not None and plan.topology.asks_for("fade")
     clocks, sent_clocks = _clocks(state, "clock"), _clocks(state, "sent_clock" if plan.late else "clock")
-    reach, groups = _reach(state, i), scenario.group_numbers
-    late = clock(scenario)["delay"] * scenario.flight.dt
+    reach, groups = _reach(state, i), scenario.group_indices
+    late = step_counts(scenario)["delay"] * scenario.flight.dt
     now = number * state.whole("decide_every") * scenario.flight.dt
     for j in range(n):
         if not state.present[j]:
@@ -119,25 +122,29 @@ def _heard(
         if j == i or distance > min(k.range, 1e8):
             continue
         pair = min(i, j) * n + max(i, j)
-        fade = random.normal_pair(*random.words(seed, random.FADE, world, number, pair)[:2])[0] if fades else 0.0
+        fade = random.normal_pair(*random.random_words(seed, random.FADE, world, number, pair)[:2])[0] if fades else 0.0
         if plan.packets:
             packet = state.arrays["store"][:, _slot(state, i), _slot(state, j)].tolist()
             axes, stamp = len(plan.axes), packet[2 * len(plan.axes)]
             age, flat = now + clocks[i] - stamp, [0.0] * (3 - axes)
-            counts = lasts(plan.radio, k, age) if plan.radio.keeps else silence.counts(age, scenario.silent_by())
-            if stamp <= NEVER / 10.0 or not counts:
+            counts = (
+                packet_counts(plan.radio, k, age)
+                if plan.radio.keeps_packets
+                else silence.counts(age, scenario.resolved_silence())
+            )
+            if stamp <= NO_PACKET_TIME / 10.0 or not counts:
                 continue
             sent = Motion(*packet[:axes], *flat, *packet[axes : 2 * axes], *flat)
-            yield Heard(j, carried(plan.radio, k, sent, age), age, fade, groups[j])
+            yield HeardNeighbour(j, extrapolated_state(plan.radio, k, sent, age), age, fade, groups[j])
         elif distance * distance > reach[j]:
             continue
         elif not plan.lossy or random.pair_uniform(seed, random.PACKET, world, number, i, j, n) >= radio.lost(
             distance, k
         ):
-            yield Heard(j, said[j], late + clocks[i] - sent_clocks[j], fade, groups[j])
+            yield HeardNeighbour(j, said[j], late + clocks[i] - sent_clocks[j], fade, groups[j])
 
 
-def _reach(state: State, i: int) -> list[float]:
+def _reach(state: DriverState, i: int) -> list[float]:
     """Square of how far agent i hears each other one, m², where faults leave less than the radio's range."""
     if not state.plan.suffers("radio"):
         return [math.inf] * state.agents
@@ -145,7 +152,7 @@ def _reach(state: State, i: int) -> list[float]:
     return [min(found, float(into[i])) for found in out.tolist()]
 
 
-def _clocks(state: State, row: str) -> list[float]:
+def _clocks(state: DriverState, row: str) -> list[float]:
     """How far the clock of each agent is ahead, or was when it sent what is heard now, s."""
     return [float(ahead) for ahead in state.rows([row])[0]] if state.plan.suffers("clock") else [0.0] * state.agents
 
@@ -162,7 +169,7 @@ def _beside(scenario: Scenario, own: Motion, other: Motion) -> Motion:
     return other._replace(x=x, y=y, z=z)
 
 
-def _record(state: State, record: Any, prefix: str, agent: int) -> Any:
+def _record(state: DriverState, record: Any, prefix: str, agent: int) -> Any:
     """Sums or Walls of one agent as the law was given them; a field that nobody reads is 0. None without such."""
     if record is None:
         return None
@@ -172,5 +179,5 @@ def _record(state: State, record: Any, prefix: str, agent: int) -> Any:
     return record(*values)
 
 
-def _slot(state: State, agent: int) -> int:
+def _slot(state: DriverState, agent: int) -> int:
     return agent if state.slots is None else int(state.slots[agent])

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine import interpreted
-from airflock.engine.drivers import calling
-from airflock.engine.passes.build import columns
+from airflock.engine.drivers import function_compile_messages
+from airflock.engine.passes.build import sampled_columns
 from airflock.engine.passes.driver import replay
 from airflock.engine.plan import Plan
 from airflock.engine.planning import plan_of
-from airflock.engine.state import State
+from airflock.engine.state import DriverState
 from airflock.engine.store import load_driver
-from airflock.engine.tables import Tables, tables
-from airflock.scenarios.scenario import Scenario
+from airflock.engine.tables import WorldTables, world_tables
+from airflock.scenarios import Scenario
 
 READ = ("q", "w")  # letters of the numbers of order parameters, and of the arena
 
@@ -46,30 +46,30 @@ def measure_frames(
     """
     plan = plan_of(scenario, precision=precision)
     steps = {"sample_every": every[0], "collide_every": every[1]}
-    numbers = tables(scenario, plan, 0).changed(agents=frames.shape[2], **steps)
-    values, series = measured(plan, numbers, frames, period, device, present)
-    names = (name for name, _, _ in columns(plan.metrics))
+    numbers = world_tables(scenario, plan, 0).changed(agents=frames.shape[2], **steps)
+    values, series = score_tables(plan, numbers, frames, period, device, present)
+    names = (name for name, _, _ in sampled_columns(plan.metrics))
     return values, dict(zip(names, series.T, strict=True))
 
 
-def measured(
+def score_tables(
     plan: Plan,
-    tables: Tables,
+    tables: WorldTables,
     frames: NDArray[Any],
     period: float = 0.0,
     device: str = "cpu",
     present: NDArray[np.bool_] | None = None,
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
     """The same from the numbers of a world; the values of every instant as (time, value)."""
-    plan, tables = shared(plan, tables)
+    plan, tables = shared_plan(plan, tables)
     driver = interpreted.replay_driver(plan) if device == "python" else replay_driver(plan)
     real = tables.row.dtype
-    state = State(plan, tables, driver)
+    state = DriverState(plan, tables, driver)
     own = state.arrays
     series = np.full((frames.shape[0], len(own["values"])), np.nan)
 
     def measure(first: int, part: NDArray[Any]) -> None:
-        with calling(driver.measure_frames, plan.model.name):
+        with function_compile_messages(driver.measure_frames, plan.model.name):
             driver.measure_frames(
                 first, tables.row, own["whole"], tables.edges, tables.spans, state.scene, own["work"], own["memory"],
                 own["labels"], own["values"], own["sums"], np.ascontiguousarray(part, real), series, real.type(period),
@@ -86,7 +86,7 @@ def measured(
         there = np.flatnonzero(present[first])
         if len(there) >= min(2, frames.shape[2]):
             lanes = slice(0, len(there))
-            state.set_whole("agents", len(there))
+            state.set_integer("agents", len(there))
             own["memory"][:, lanes] = remembered[:, there]
             # who was away has come no way that anybody saw
             own["work"][looked, lanes] = np.where(known, before, frames[first, : len(looked)])[:, there]
@@ -96,7 +96,7 @@ def measured(
     return state.values(), series
 
 
-def shared(plan: Plan, tables: Tables) -> tuple[Plan, Tables]:
+def shared_plan(plan: Plan, tables: WorldTables) -> tuple[Plan, WorldTables]:
     """The same with what order parameters read first among the numbers: then one driver measures flights of all laws.
 
     Of a law it would tell only how many numbers stand before those of the arena.

@@ -14,7 +14,7 @@ FEW = 100_000  # objects of a program, fewer than Numba brings: with the text of
 
 
 @contextmanager
-def never_collected() -> Iterator[None]:
+def frozen_imports() -> Iterator[None]:
     """Around imports: what they bring stays for good where there was little before, and nobody looks for garbage.
 
     What is garbage already goes first. To be entered by one thread at a time.

@@ -3,14 +3,14 @@
 from html import escape
 from typing import TYPE_CHECKING
 
-from airflock.parts.metrics.registry import reports
-from airflock.scenarios.portrait import number, table
+from airflock.parts.metrics import reported_values
+from airflock.scenarios import format_number, html_table
 
 if TYPE_CHECKING:
     from airflock.engine.flight import Flight
 
 
-def html(flight: "Flight") -> str:
+def flight_html(flight: "Flight") -> str:
     """Its sentence, and a table of order parameters since the last change, with units and meanings."""
     done = [event.kind for event in flight.events]
     told = [f"{done.count(kind)} × {kind}" for kind in dict.fromkeys(done)]
@@ -20,7 +20,7 @@ def html(flight: "Flight") -> str:
     head = f"<p><b>{escape(repr(flight).strip('<>'))}</b>{beside}</p>"
     if not flight.step:
         return f"{head}<p>nothing is flown yet</p>"
-    known = reports(flight.scenario.measures)
+    known = reported_values(flight.scenario.measures)
     scores = {name: value for name, value in flight.scores().items() if isinstance(value, (int, float))}
-    rows = [(name, number(value), *known.get(name, ("", ""))) for name, value in scores.items()]
-    return head + table(("order parameter", "value", "unit", "meaning"), rows)
+    rows = [(name, format_number(value), *known.get(name, ("", ""))) for name, value in scores.items()]
+    return head + html_table(("order parameter", "value", "unit", "meaning"), rows)

@@ -6,23 +6,20 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Any
 
-from airflock.core.fault import Fault
-from airflock.core.radio import forward
-from airflock.core.vectors import vectors_of
-from airflock.engine.facts import Facts
-from airflock.world import edges
-from airflock.world.excursion import beyond_nothing
+from airflock.core import Fault, forward, vector_sizes
+from airflock.engine.facts import PlanProperties
+from airflock.world import beyond_nothing, edges
 
-WHOLE = (
+INTEGER_NAMES = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
     "seed_high", "corners", "obstacles", "faces_0", "faces_1", "born",
 )  # fmt: skip
 
-NEVER = -1e9  # s; time stamp of a packet that has not come
+NO_PACKET_TIME = -1e9  # s; time stamp of a packet that has not come
 GONE = -1.0  # s; when what is not under way is due
 
 
-class Plan(Facts):
+class Plan(PlanProperties):
     """The facts of a flight, and what follows from them.
 
     It is made by `engine.plan_of` alone; whoever needs the same flight built otherwise asks for `built`.
@@ -48,7 +45,7 @@ class Plan(Facts):
     @property
     def record(self) -> bool:
         """Whether every sample is kept."""
-        return self.build.record
+        return self.build.keep_frames
 
     @property
     def given_start(self) -> bool:
@@ -94,7 +91,7 @@ class Plan(Facts):
         """Rows of what differs among agents, as (letter, name): numbers, which laws share by name, law and group."""
         found = [*self.varied, *(each for own in self.laws for each in own.varied)]
         found += [("", "law")] if self.laws else []
-        return tuple(dict.fromkeys([*found, *([("", "group")] if self.grouped else [])]))
+        return tuple(dict.fromkeys([*found, *([("", "group")] if self.uses_groups else [])]))
 
     def suffers(self, *rules: str) -> tuple[Fault, ...]:
         """Kinds of fault that have one of these rules."""
@@ -113,12 +110,12 @@ class Plan(Facts):
     @property
     def believes(self) -> bool:
         """Whether what agents measure of themselves is not the truth: it has rows of its own."""
-        return self.noisy or bool(self.suffers("sense"))
+        return self.has_sensor_error or bool(self.suffers("sense"))
 
     @property
     def late(self) -> bool:
         """Whether what is heard comes from the ring of past states."""
-        return self.noisy or self.delayed
+        return self.has_sensor_error or self.delayed
 
     @property
     def sent_faults(self) -> tuple[tuple[int, str, str], ...]:
@@ -149,12 +146,12 @@ class Plan(Facts):
     @property
     def perturbed(self) -> bool:
         """Whether distances as perceived are not the true ones, which decide who is in range."""
-        return self.told or self.believes or self.radio.keeps or bool(self.suffers("radio"))
+        return self.told or self.believes or self.radio.keeps_packets or bool(self.suffers("radio"))
 
     @property
     def packets(self) -> bool:
         """Whether agents keep the last packet of each other one."""
-        return self.radio.keeps or self.silent
+        return self.radio.keeps_packets or self.stops_for_lost
 
     @property
     def missed(self) -> Callable[..., Any] | None:
@@ -173,12 +170,12 @@ class Plan(Facts):
 
     def rolls(self, names: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
         """Of these random numbers, in their places, those that the radio's own rules ask for."""
-        return tuple((c, name) for c, name in enumerate(names) if self.radio.asks(name))
+        return tuple((c, name) for c, name in enumerate(names) if self.radio.asks_for(name))
 
     @property
     def shades(self) -> bool:
         """Whether the radio is asked with whether something stands between two agents, and something can."""
-        return self.radio.asks("clear") and (self.obstacles or self.scene)
+        return self.radio.asks_for("clear") and (self.obstacles or self.scene)
 
     @property
     def waiting(self) -> int:
@@ -197,9 +194,9 @@ class Plan(Facts):
         Position, velocity and time stamp of the newest packet; where packets come late, the same of the one under way
         and when it is due (GONE: none is under way); the radio's Packet.
         """
-        packet = (*(0.0,) * (2 * self.dimensions), NEVER)
+        packet = (*(0.0,) * (2 * self.dimensions), NO_PACKET_TIME)
         under_way = (*packet, GONE) if self.radio.late is not None else ()
-        return (*packet, *under_way, *self.radio.beginnings) if self.packets else packet
+        return (*packet, *under_way, *self.radio.initial_packet) if self.packets else packet
 
     @property
     def hides(self) -> bool:
@@ -223,7 +220,7 @@ class Plan(Facts):
 
     def meeting(self, name: str) -> bool:
         """Whether the rule of the topology asks for something by this name."""
-        return self.topology is not None and self.topology.asks(name)
+        return self.topology is not None and self.topology.asks_for(name)
 
     def varies(self, letter: str) -> bool:
         """Whether a number of this record differs among agents."""
@@ -251,28 +248,28 @@ class Plan(Facts):
     @property
     def vectors(self) -> dict[str, dict[str, int]]:
         """Of each record of numbers its vectors, with how many components each has."""
-        return {letter: vectors_of(names) for letter, names in self.numbers}
+        return {letter: vector_sizes(names) for letter, names in self.numbers}
 
     @property
     def senses(self) -> bool:
         """Whether the sensor makes of the true state the one that is believed; else its errors are added."""
-        return self.noisy and self.sensor.measure is not None
+        return self.has_sensor_error and self.sensor.measure is not None
 
     @property
     def beginnings(self) -> dict[str, float]:
         """Rows of what bodies and sensors remember, by name, and what they hold before an agent has flown."""
-        kept = {"body": self.body.beginnings, "sense": self.sensor.beginnings if self.senses else ()}
+        kept = {"body": self.body.initial_memory, "sense": self.sensor.initial_memory if self.senses else ()}
         return {f"{row}{c}": value for row, values in kept.items() for c, value in enumerate(values)}
 
     @property
     def periodic(self) -> bool:
         """Whether offsets are taken to the nearest image."""
-        return self.edge is edges.wrap
+        return self.edge_rule is edges.wrap
 
     @property
     def flows(self) -> bool:
         """Whether agents come nearer by their velocities alone, all in the same step; not where faces throw back."""
-        return not self.sequential and (self.edge is None or self.periodic)
+        return not self.sequential and (self.edge_rule is None or self.periodic)
 
     @property
     def integration(self) -> str:

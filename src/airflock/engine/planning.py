@@ -4,20 +4,13 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
-from airflock.core.contract import Metric, Model
-from airflock.core.parameters import choices
-from airflock.core.radio import FEW
-from airflock.core.vocabulary import asks
-from airflock.engine.facts import Build, OwnLaw
+from airflock.core import FEW_PACKETS, Metric, Model, argument_names, choices
+from airflock.engine.facts import BuildOptions, GroupLaw
 from airflock.engine.plan import Plan
-from airflock.engine.text.probe import probe, probe_body, probe_fault, probe_radio, probe_sensor, probe_topology
-from airflock.scenarios.cells import by_cells, has_room, measured_by_cells, takes_all_cores
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.timing import clock
-from airflock.support.hardware import sound_precision
-from airflock.world import arena
-from airflock.world.place import obstacle_rule, raised
-from airflock.world.surfaces import EDGES, arena_ray, arena_surfaces
+from airflock.engine.text.probe import probe_body, probe_fault, probe_model, probe_radio, probe_sensor, probe_topology
+from airflock.scenarios import Scenario, box_fits_cells, metrics_use_cells, step_counts, uses_all_cores, uses_cells
+from airflock.support import check_precision
+from airflock.world import EDGE_RULES, arena, arena_ray, arena_surfaces, is_off_centre, obstacle_rule
 
 
 def plan_of(
@@ -38,12 +31,12 @@ def plan_of(
     given_start : the start is handed over with each flight
     absence     : agents may be absent; where a fault takes agents out, or empty batteries do, they may in any case
     """
-    sound_precision(precision)
+    check_precision(precision)
     key = "plan", precision, record, metrics, grid, near, given_start, absence
-    if key not in scenario.prepared:
+    if key not in scenario.engine_cache:
         build = _build(scenario, precision, record, grid, near, given_start, absence)
-        scenario.prepared[key] = _planned(scenario, metrics, build)
-    found: Plan = scenario.prepared[key]
+        scenario.engine_cache[key] = _planned(scenario, metrics, build)
+    found: Plan = scenario.engine_cache[key]
     return found
 
 
@@ -55,20 +48,20 @@ def _build(
     near: bool | None,
     given_start: bool,
     absence: bool,
-) -> Build:
+) -> BuildOptions:
     """How the driver of a scenario is built."""
-    cells = (takes_all_cores(scenario) if grid is None else grid) and has_room(scenario) and by_cells(scenario)
-    return Build(
+    cells = (uses_all_cores(scenario) if grid is None else grid) and box_fits_cells(scenario) and uses_cells(scenario)
+    return BuildOptions(
         bits=precision,
-        record=record,
+        keep_frames=record,
         given_start=given_start,
         grid=cells,
-        near=cells and (measured_by_cells(scenario) if near is None else near),
-        absence=absence or scenario.lands or any(kind.leaves is not None for kind in scenario.fault_kinds),
+        near=cells and (metrics_use_cells(scenario) if near is None else near),
+        absence=absence or scenario.can_land or any(kind.leaves is not None for kind in scenario.fault_kinds),
     )
 
 
-def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None, build: Build) -> Plan:
+def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None, build: BuildOptions) -> Plan:
     """The plan itself."""
     _probe_rules(scenario)
     laws, kinds = scenario.laws, scenario.fault_kinds
@@ -84,11 +77,11 @@ def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None, build: Buil
         sequential=scenario.flight.update == "sequential",
         stop=scenario.metrics.stop == "collision",
         wing_choices=_wing_choices(scenario, metrics),
-        aero_choices=_chosen(scenario.aero) if scenario.descends else (),
+        aero_choices=_chosen(scenario.aero) if scenario.is_aerodynamic else (),
         faults=kinds,
         varied=scenario.varied,
-        laws=tuple(OwnLaw(law.model, constants_of(*law[:2], law.varied), law.varied) for law in laws[1:]),
-        grouped=bool(scenario.groups) and any(law.asks_for_groups for law in laws),
+        laws=tuple(GroupLaw(law.model, constants_of(*law[:2], law.varied), law.varied) for law in laws[1:]),
+        uses_groups=bool(scenario.groups) and any(law.uses_groups for law in laws),
         **_sensing(scenario),
         **_hearing(scenario),
         **_surroundings(scenario),
@@ -102,7 +95,7 @@ def _probe_rules(scenario: Scenario) -> None:
     for kind in scenario.fault_kinds:
         probe_fault(kind)
     probe_body(scenario.vehicle, _chosen(scenario.body))
-    if scenario.errs:
+    if scenario.has_sensor_error:
         probe_sensor(scenario.sensor)
     probe_radio(scenario.transceiver)
     if scenario.own_topology is not None:
@@ -119,10 +112,10 @@ def _surroundings(scenario: Scenario) -> dict[str, Any]:
     kind, wind = scenario.goals.kind, scenario.wind
     return {
         "start": scenario.start.kind,
-        "scene": scenario.scenic,
-        "meshed": scenario.scene.kind == "mesh",
+        "scene": scenario.has_scene,
+        "has_mesh": scenario.scene.kind == "mesh",
         "goals": kind in ("points", "scene"),
-        "herd": kind in ("points", "scene") and scenario.goals.role == "herd",
+        "is_shepherd": kind in ("points", "scene") and scenario.goals.role == "herd",
         "own": kind == "own",
         "windy": wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
         "dryden": wind.kind == "dryden",
@@ -136,33 +129,33 @@ def _hearing(scenario: Scenario) -> dict[str, Any]:
         # the kind of radios that share a record is none of the choices that rules can read
         "radio_choices": tuple(pair for pair in _chosen(scenario.radio) if pair[0] != "kind"),
         "few": _few_packets(scenario),
-        "delayed": clock(scenario)["delay"] > 0,
+        "delayed": step_counts(scenario)["delay"] > 0,
         "lossy": scenario.radio.loss > 0.0,
-        "silent": scenario.silence.rule == "stop",
-        "topology": scenario.meets if any(law.model.neighbour is not None for law in scenario.laws) else None,
+        "stops_for_lost": scenario.silence.rule == "stop",
+        "topology": scenario.topology_rule if any(law.model.neighbour is not None for law in scenario.laws) else None,
         "fading": scenario.own_topology is not None or scenario.topology.fading > 0.0,
     }
 
 
 def _sensing(scenario: Scenario) -> dict[str, Any]:
     """What a plan says of a sensor: nothing of one that tells the truth, so that all such flights share a driver."""
-    if not scenario.errs:
-        return {"noisy": False}
-    return {"noisy": True, "sensor": scenario.sensor, "sensor_choices": _chosen(scenario.sensors)}
+    if not scenario.has_sensor_error:
+        return {"has_sensor_error": False}
+    return {"has_sensor_error": True, "sensor": scenario.sensor, "sensor_choices": _chosen(scenario.sensors)}
 
 
 def _few_packets(scenario: Scenario) -> bool:
     """Whether each rate of the radio sends at most FEW packets between two decisions; True where it has none."""
     rates = [getattr(scenario.radio, name) for name in scenario.transceiver.rates]
-    period = clock(scenario)["decide_every"] * scenario.flight.dt
-    return max(rates, default=0.0) * period <= FEW - 0.1  # rounding may make it one packet more
+    period = step_counts(scenario)["decide_every"] * scenario.flight.dt
+    return max(rates, default=0.0) * period <= FEW_PACKETS - 0.1  # rounding may make it one packet more
 
 
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
     """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
     found = scenario.order_parameters if metrics is None else metrics
     used = scenario.model.flock is not None or any(
-        "wing" in asks(metric.survey, "survey") for metric in found if metric.survey
+        "wing" in argument_names(metric.survey, "survey") for metric in found if metric.survey
     )
     return _chosen(scenario.wing) if used else ()
 
@@ -170,7 +163,7 @@ def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tup
 @lru_cache
 def _probed(model: Model, chosen: tuple[tuple[str, str], ...]) -> None:
     """Probe a model once per set of choices; its numbers decide nothing about the rules' text."""
-    probe(model, model.Parameters(**dict(chosen)))
+    probe_model(model, model.Parameters(**dict(chosen)))
 
 
 def constants_of(
@@ -203,11 +196,11 @@ def make_plan(
         surfaces=surfaces,
         excursion=beyond,
         ray=arena_ray(world),
-        edge=EDGES[world.edges],
+        edge_rule=EDGE_RULES[world.edges],
         dimensions=int(world.dimensions),
         obstacles=bool(world.obstacles),
         obstacle=obstacle_rule(world),
-        polygon=world.arena == "polygon" and world.edges != "periodic",
-        raised=raised(world),
+        polygonal=world.arena == "polygon" and world.edges != "periodic",
+        off_centre_height=is_off_centre(world),
         **options,
     )

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.fault_columns import kept_rows
-from airflock.engine.initial_rows import first_memories, memories, of_pairs
-from airflock.world.scenes.tree import AWAY
+from airflock.engine.fault_columns import fault_memory_rows
+from airflock.engine.initial_rows import law_memories, metric_memories, pair_values
+from airflock.world import FAR_AWAY
 
 if TYPE_CHECKING:
-    from airflock.engine.state import State
+    from airflock.engine.state import DriverState
 
 
-def leave(state: "State", agents: list[int]) -> None:
+def remove_agents(state: "DriverState", agents: list[int]) -> None:
     """Let agents be absent from now on; those who are so already stay so."""
     slots, here = _slots(state), state.here
     gone = sorted(slots[agent] for agent in agents if slots[agent] < here)
@@ -29,7 +29,7 @@ def leave(state: "State", agents: list[int]) -> None:
     _set(state, len(kept))
 
 
-def join(state: "State", agent: int, position: list[float], velocity: list[float]) -> None:
+def add_agent(state: "DriverState", agent: int, position: list[float], velocity: list[float]) -> None:
     """Let an absent agent be there from now on, as agents are at the start: known to all, with sound sensors."""
     here, order = state.here, state.order.tolist()
     lane = order.index(agent)
@@ -42,24 +42,24 @@ def join(state: "State", agent: int, position: list[float], velocity: list[float
         for prefix in ("", "m", "h", "before_", "from_"):
             if prefix + name in rows:
                 work[rows[prefix + name], before] = value
-    for name, (_, true) in kept_rows(state.plan).items():
+    for name, (_, true) in fault_memory_rows(state.plan).items():
         if name in rows:
             work[rows[name], before] = motion[true]
     state.arrays["past"][:, :, before] = 0.0  # by no fault
     state.arrays["past"][:, : len(motion), before] = list(motion.values())
-    state.look_at_pairs()
+    state.reset_pair_distances()
 
 
-def _slots(state: "State") -> list[int]:
+def _slots(state: "DriverState") -> list[int]:
     slots = state.slots
     assert slots is not None  # a plan with absence has them
     found: list[int] = slots.tolist()
     return found
 
 
-def _set(state: "State", here: int) -> None:
+def _set(state: "DriverState", here: int) -> None:
     """So many are there; the lanes of the others are blank, and far away."""
-    state.set_whole("agents", here)
+    state.set_integer("agents", here)
     plan, work, rows = state.plan, state.arrays["work"], state.driver.ROWS
     lanes = slice(here, state.agents)
     order = work[rows["order"], lanes].copy()
@@ -70,21 +70,21 @@ def _set(state: "State", here: int) -> None:
             work[rows[name], lanes] = begin
     state.arrays["past"][:, :, lanes] = 0.0
     for c, axis in enumerate(plan.axes):
-        work[rows[axis], lanes] = AWAY
-        state.arrays["past"][:, c, lanes] = AWAY
+        work[rows[axis], lanes] = FAR_AWAY
+        state.arrays["past"][:, c, lanes] = FAR_AWAY
     if plan.packets:
         store, count = state.arrays["store"], state.agents - here
-        store[:, lanes] = of_pairs(plan, count, store.shape[2], work.dtype)
-        store[:, :, lanes] = of_pairs(plan, store.shape[1], count, work.dtype)
+        store[:, lanes] = pair_values(plan, count, store.shape[2], work.dtype)
+        store[:, :, lanes] = pair_values(plan, store.shape[1], count, work.dtype)
     count, real = state.agents - here, work.dtype
-    state.arrays["memory"][:, lanes] = memories(plan, count, real)
+    state.arrays["memory"][:, lanes] = metric_memories(plan, count, real)
     for name in state.solved:  # what rules of the whole flock go on from is found anew
         state.arrays[name][...] = 0.0
-    state.fill_own()
-    state.arrays["mem"][:, lanes] = first_memories(plan, state.laws[lanes], real)
+    state.fill_varied()
+    state.arrays["mem"][:, lanes] = law_memories(plan, state.laws[lanes], real)
 
 
-def _put(state: "State", places: list[int]) -> None:
+def _put(state: "DriverState", places: list[int]) -> None:
     """Put into lane k what lies in lane places[k]."""
     at: NDArray[np.int64] = np.array(places)
     arrays: dict[str, Any] = state.arrays

@@ -171,6 +171,6 @@ def normal_pair(a, b):
 """
 
 
-def primitives(bits: int) -> str:
+def random_primitives(bits: int) -> str:
     """Text of all primitives for float32 or float64, after those of `vectors`."""
-    return vectors.TEXT + WIDE + (LOG32 + TURN32 if bits == 32 else LOG64 + TURN64) + NORMAL
+    return vectors.EXTREME_TEXT + WIDE + (LOG32 + TURN32 if bits == 32 else LOG64 + TURN64) + NORMAL

@@ -5,22 +5,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.view import View
-from airflock.engine.course import Course
-from airflock.engine.look import view
-from airflock.engine.plan import NEVER
+from airflock.core import AgentView
+from airflock.engine.course import FlightState
+from airflock.engine.look import agent_view
+from airflock.engine.plan import NO_PACKET_TIME
 from airflock.engine.snapshots import Window
-from airflock.engine.state import State
-from airflock.scenarios.events import Event, agent_number, agent_numbers
-from airflock.scenarios.onsets import told
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import FlightError
+from airflock.engine.state import DriverState
+from airflock.scenarios import Event, Scenario, begun_faults, check_agent, check_agents
+from airflock.support import FlightError
 
 
-class Readings:
+class FlightObservations:
     """A flight on its course, to be read."""
 
-    _course: Course
+    _course: FlightState
 
     @property
     def scenario(self) -> Scenario:
@@ -85,7 +83,7 @@ class Readings:
     @property
     def over(self) -> bool:
         """Whether the flight has reached its duration, or has ended at a collision."""
-        return self._course.step >= self._course.steps or self._state.ended
+        return self._course.step >= self._course.steps or self._state.has_ended
 
     @property
     def state(self) -> NDArray[Any]:
@@ -104,10 +102,10 @@ class Readings:
     def sent(self) -> NDArray[Any]:
         """Over two lossy links: when the newest packet of each pair was sent, s (receiver, sender); nan: none."""
         stamps = self._state.arrays["store"][2 * self._state.plan.dimensions, :, : self.agents].astype(float)
-        return np.where(stamps > NEVER / 10.0, stamps, np.nan)
+        return np.where(stamps > NO_PACKET_TIME / 10.0, stamps, np.nan)
 
     @property
-    def _state(self) -> State:
+    def _state(self) -> DriverState:
         """Of the driver in force."""
         return self._course.state
 
@@ -146,7 +144,7 @@ class Readings:
     @property
     def faults(self) -> list[dict[str, Any]]:
         """Faults that have begun: kind, agent, and when they begin and end (s; None: never)."""
-        return told(self._state.tables.due, self.step, self.scenario.flight.dt)
+        return begun_faults(self._state.tables.due, self.step, self.scenario.flight.dt)
 
     def scores(self) -> dict[str, Any]:
         """Order parameters and fitness of the window since the last change, up to now.
@@ -160,7 +158,7 @@ class Readings:
         """
         return self.scenario.judged(self._state.values())
 
-    def look(self, agent: int) -> View:
+    def look(self, agent: int) -> AgentView:
         """What an agent perceives, and the parts of its command.
 
         Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
@@ -176,25 +174,25 @@ class Readings:
         >>> view.agent, len(view.heard) == len(view.met)
         (3, True)
         """
-        self._course.take_over()
+        self._course.apply_pending_change()
         self._course.begin()
         number = self._there(agent)
-        if not self.decides or self._course.sensed or self._state.plan.sequential:
-            return view(self.scenario, self._state, number, self.step, self.seed, self.world)
+        if not self.decides or self._course.has_sensed or self._state.plan.sequential:
+            return agent_view(self.scenario, self._state, number, self.step, self.seed, self.world)
         kept = self._state.buffer.copy()
         self._state.advance(self.step, self.step + 1, 2)
-        found = view(self.scenario, self._state, number, self.step, self.seed, self.world)
+        found = agent_view(self.scenario, self._state, number, self.step, self.seed, self.world)
         self._state.buffer[:] = kept
         return found
 
     def _there(self, agent: Any) -> int:
         """Number of an agent that is there. Raises FlightError in one line."""
-        number = agent_number(agent, self.agents)
+        number = check_agent(agent, self.agents)
         return self._those(number)[0]
 
     def _those(self, agents: Any) -> list[int]:
         """Numbers of one agent or several that are there. Raises FlightError in one line."""
-        numbers, there = agent_numbers(agents, self.agents), self.present
+        numbers, there = check_agents(agents, self.agents), self.present
         for number in numbers:
             if not there[number]:
                 raise FlightError(f"agent = {number}: it is absent at t = {self.time:g} s")

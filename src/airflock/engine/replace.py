@@ -9,7 +9,7 @@ class ReplacementError(Exception):
     """Generated text does not hold what a replacement was written for: the engine contradicts itself."""
 
 
-def must_replace(text: Text, old: str, new: str, count: int = -1) -> Text:
+def checked_replace(text: Text, old: str, new: str, count: int = -1) -> Text:
     """Text, or lines, with `new` in place of `old`, which must occur. Whoever expects it only sometimes says when.
 
     count : so many occurrences at most, from the first on; all by default

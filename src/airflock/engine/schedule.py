@@ -7,13 +7,13 @@ every so-manieth. `stages.flight` is the same as a function; kernels and cells t
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from airflock.engine.passes.slots import sorted_by_cells
+from airflock.engine.passes.slots import sorts_by_cells
 from airflock.engine.plan import Plan
-from airflock.engine.text.rewrite import law_mark
+from airflock.engine.text.rewrite import law_suffix
 
 
 @dataclass(frozen=True)
-class Event:
+class StepEvent:
     """What is done together in a step.
 
     stages : in their order
@@ -24,18 +24,18 @@ class Event:
     every: str = ""
 
 
-ORDER: Mapping[str, Event] = {
-    "send": Event(("snapshot",), "decide_every"),  # ahead of the decision by the delay
-    "world": Event(("aim_", "glide_", "appear_")),
-    "decide": Event(
+ORDER: Mapping[str, StepEvent] = {
+    "send": StepEvent(("snapshot",), "decide_every"),  # ahead of the decision by the delay
+    "world": StepEvent(("aim_", "glide_", "appear_")),
+    "decide": StepEvent(
         ("perceive", "tune", "neighbours", "rearrange", "boundaries", "flock", "decide", "stop", "overrule"),
         "decide_every",
     ),
-    "watch": Event(("measure_collision",), "collide_every"),
-    "sample": Event(("measure_sample",), "sample_every"),
-    "move": Event(("move",)),
+    "watch": StepEvent(("measure_collision",), "collide_every"),
+    "sample": StepEvent(("measure_sample",), "sample_every"),
+    "move": StepEvent(("move",)),
 }
-BY_LAW = ("neighbours", "boundaries", "decide")  # which ask a law: one of each for every law of the flock
+STAGES_PER_LAW = ("neighbours", "boundaries", "decide")  # which ask a law: one of each for every law of the flock
 AT_ONCE = ("perceive", "tune", "rearrange", "flock")  # for all agents: not where one after another decides and moves
 NEEDED: Mapping[str, Callable[[Plan], bool]] = {
     "snapshot": lambda plan: plan.late,
@@ -44,17 +44,17 @@ NEEDED: Mapping[str, Callable[[Plan], bool]] = {
     "appear_": lambda plan: plan.scene,
     "tune": lambda plan: bool(plan.suffers("radio", "clock")),
     "neighbours": lambda plan: plan.model.neighbour is not None,
-    "rearrange": sorted_by_cells,
+    "rearrange": sorts_by_cells,
     "boundaries": lambda plan: plan.model.boundary is not None,
     "flock": lambda plan: plan.model.flock is not None,
-    "stop": lambda plan: plan.silent,
+    "stop": lambda plan: plan.stops_for_lost,
     "overrule": lambda plan: bool(plan.suffers("overrule")),
     "measure_collision": lambda plan: any(metric.clock == "collision" for metric in plan.metrics),
     "measure_sample": lambda plan: any(metric.clock == "sample" for metric in plan.metrics),
 }
 
 
-def order(plan: Plan) -> dict[str, tuple[str, ...]]:
+def stages_of_events(plan: Plan) -> dict[str, tuple[str, ...]]:
     """Stages of each event that a plan has, in the order of a step."""
     return {
         name: tuple(each for stage in event.stages for each in _of_laws(stage, plan)) for name, event in ORDER.items()
@@ -63,11 +63,11 @@ def order(plan: Plan) -> dict[str, tuple[str, ...]]:
 
 def _of_laws(stage: str, plan: Plan) -> list[str]:
     """Names of a stage in a plan that has it; of one that asks a law, for each law that has such a rule."""
-    plans = plan.every if stage in BY_LAW else (plan,)
-    return [f"{stage}{law_mark(own.law)}" for own in plans if stage not in NEEDED or NEEDED[stage](own)]
+    plans = plan.every if stage in STAGES_PER_LAW else (plan,)
+    return [f"{stage}{law_suffix(own.law)}" for own in plans if stage not in NEEDED or NEEDED[stage](own)]
 
 
-def in_turn(plan: Plan) -> tuple[str, ...]:
+def sequential_stages(plan: Plan) -> tuple[str, ...]:
     """What each agent in turn does in a sequential step."""
-    events = order(plan)
+    events = stages_of_events(plan)
     return tuple(stage for stage in (*events["decide"], *events["move"]) if stage not in AT_ONCE)

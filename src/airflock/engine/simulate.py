@@ -11,14 +11,9 @@ from airflock.engine import cpu, devices, failure, requirements
 from airflock.engine.drivers import flight_driver, flight_text, is_loaded
 from airflock.engine.plan import Plan
 from airflock.engine.planning import plan_of
-from airflock.engine.state import State
-from airflock.scenarios.cells import takes_all_cores
-from airflock.scenarios.places import start_fault, start_in_box
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.seeds import sound_seed
-from airflock.scenarios.timing import clock
-from airflock.support.errors import FlightError
-from airflock.support.threads import in_threads
+from airflock.engine.state import DriverState
+from airflock.scenarios import Scenario, check_seed, start_error, step_counts, uses_all_cores, wrap_start
+from airflock.support import FlightError, run_in_threads
 
 
 def driver_text(scenario: Scenario, *, precision: int = 32) -> str:
@@ -26,7 +21,7 @@ def driver_text(scenario: Scenario, *, precision: int = 32) -> str:
     return flight_text(plan_of(scenario, precision=precision))
 
 
-def fly(
+def fly_world(
     scenario: Scenario,
     seed: int = 0,
     *,
@@ -34,64 +29,64 @@ def fly(
     record: bool = False,
     start: Any = None,
     device: str = "cpu",
-    say: Callable[[str], None] | None = None,
-) -> cpu.Flown:
+    notify: Callable[[str], None] | None = None,
+) -> cpu.DriverResult:
     """Fly one world. Raises FlightError where agents find no room or a state stops being finite.
 
     device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
     """
-    seed = sound_seed(seed)
-    scenario = scenario.in_flight(seed)
+    seed = check_seed(seed)
+    scenario = scenario.with_drawn_scene(seed)
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
         plan = plan.built(given_start=True)
-        start = sound_start(scenario, plan, start)
-    chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
+        start = check_start(scenario, plan, start)
+    chosen = device if device == "cpu" else _choice(device, [scenario], [plan], notify)
     if chosen != "cuda":
-        requirements.check(scenario, plan)
+        requirements.check_resources(scenario, plan)
     flown = devices.fly_one(scenario, plan, seed, chosen, start)
-    return checked(scenario, seed, flown, chosen, precision, start)
+    return check_result(scenario, seed, flown, chosen, precision, start)
 
 
-def picked(
+def pick_device(
     scenarios: Sequence[Scenario],
     device: str = "auto",
     *,
     precision: int = 32,
     record: bool = False,
-    say: Callable[[str], None] | None = None,
+    notify: Callable[[str], None] | None = None,
 ) -> str:
     """Device on which these flights run: the one that is named if it can fly them, else what `auto` picks."""
     if device == "cpu":
         return device
     plans = [plan_of(scenario, precision=precision, record=record) for scenario in scenarios]
-    return _choice(device, scenarios, plans, say)
+    return _choice(device, scenarios, plans, notify)
 
 
 def _choice(
     device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan], say: Callable[[str], None] | None
 ) -> str:
-    choice = devices.choose(device, scenarios, plans)
+    choice = devices.choose_device(device, scenarios, plans)
     if say is not None and choice.note:
         say(choice.note)
     return choice.device
 
 
-def checked(
-    scenario: Scenario, seed: int, flown: cpu.Flown, device: str = "cpu", precision: int = 32, start: Any = None
-) -> cpu.Flown:
+def check_result(
+    scenario: Scenario, seed: int, result: cpu.DriverResult, device: str = "cpu", precision: int = 32, start: Any = None
+) -> cpu.DriverResult:
     """A flight that went well; raises FlightError for any other."""
-    if flown.status < 0:
-        raise FlightError(failure.no_place(scenario, seed, -flown.status - 1))
-    bad = _first_bad(flown)
+    if result.status < 0:
+        raise FlightError(failure.no_place_message(scenario, seed, -result.status - 1))
+    bad = _first_bad(result)
     if bad is not None:
         raise FlightError(
-            failure.not_finite(scenario, seed, bad, _first_bad_step(scenario, seed, precision, start, device))
+            failure.not_finite_message(scenario, seed, bad, _first_bad_step(scenario, seed, precision, start, device))
         )
-    return flown
+    return result
 
 
-def _first_bad(flown: cpu.Flown) -> int | None:
+def _first_bad(flown: cpu.DriverResult) -> int | None:
     """First agent whose state is not finite."""
     import numpy as np
 
@@ -101,9 +96,9 @@ def _first_bad(flown: cpu.Flown) -> int | None:
 
 def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, device: str) -> int:
     """First step after which a state is not finite: flights are deterministic, so another one finds it by halves."""
-    last = clock(scenario)["steps"]
+    last = step_counts(scenario)["steps"]
     if device != "cuda":
-        return failure.first_bad_step(opened(scenario, seed, precision, False, start, device=device), 0, last)
+        return failure.first_bad_step(open_state(scenario, seed, precision, False, start, device=device), 0, last)
     plan = plan_of(scenario, precision=precision).built(given_start=start is not None)
 
     def bad(steps: int) -> bool:
@@ -113,7 +108,7 @@ def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, d
     return bisect_left(range(1, last), True, key=bad) + 1
 
 
-def opened(
+def open_state(
     scenario: Scenario,
     seed: int,
     precision: int = 32,
@@ -124,31 +119,32 @@ def opened(
     given_start: bool = False,
     absence: bool = False,
     device: str = "cpu",
-) -> State:
+) -> DriverState:
     """State of a flight before its first step.
 
-    start       : as in `fly`; given_start : whether agents have been given their places already, so that none are drawn
+    start       : as in `fly_world`; given_start : whether agents have been given their places already, so that none are
+                  drawn
     absence     : as in `plan_of`
     device      : cpu, or python, in double precision and with all pairs
     Raises FlightError where `start` cannot be flown.
     """
     given_start = given_start or start is not None
-    plan = to_fly(scenario, precision, record, given_start=given_start, absence=absence, device=device)
-    given = None if start is None else sound_start(scenario, plan, start)
-    return State.of(plan, scenario, seed, world, given, device)
+    plan = flight_plan(scenario, precision, record, given_start=given_start, absence=absence, device=device)
+    given = None if start is None else check_start(scenario, plan, start)
+    return DriverState.of(plan, scenario, seed, world, given, device)
 
 
-def to_fly(
+def flight_plan(
     scenario: Scenario, precision: int, record: bool, *, given_start: bool, absence: bool, device: str
 ) -> Plan:  # fmt: skip
-    """The plan that `opened` flies by, before any text is made. Raises FlightError where memory cannot hold it."""
+    """The plan that `open_state` flies by, before any text is made. Raises FlightError where memory cannot hold it."""
     plan = plan_of(scenario, precision=precision, record=record, absence=absence)
     plan = plan.built(grid=False, bits=64) if device == "python" else plan
-    requirements.check(scenario, plan)
+    requirements.check_resources(scenario, plan)
     return plan.built(given_start=given_start)
 
 
-def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
+def check_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
     """Positions and velocities to start from, as a driver reads them: (component, agent), m and m/s; in a periodic box.
 
     Raises FlightError, one line, where their shape, their kind or their values are wrong.
@@ -168,21 +164,21 @@ def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
     if len(bad):
         row, agent = bad[0]
         raise FlightError(f"{said}{names[row]} of agent {agent} is {given[row, agent]}, not a finite number")
-    outside = start_fault(scenario, given)
+    outside = start_error(scenario, given)
     if outside:
         raise FlightError(f"{scenario.name}: {outside}")
-    return start_in_box(scenario, given)
+    return wrap_start(scenario, given)
 
 
 def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> dict[str, float]:
     """Order parameters and fitness of one flight, from running sums: no trajectory is kept."""
-    return scenario.judged(fly(scenario, seed, precision=precision).values)
+    return scenario.judged(fly_world(scenario, seed, precision=precision).values)
 
 
 def compile_for(scenario: Scenario, *, precision: int = 32) -> None:
     """Compile what flies a scenario, if that has not been done; scenarios that differ by numbers share it."""
     if not is_loaded(flight_driver(plan_of(scenario, precision=precision))):
-        opened(scenario, 0, precision).compile()
+        open_state(scenario, 0, precision).compile()
 
 
 def score_flights(
@@ -191,31 +187,31 @@ def score_flights(
     *,
     threads: int | None = None,
     precision: int = 32,
-    done: Callable[[], None] | None = None,
+    on_done: Callable[[], None] | None = None,
     device: str = "cpu",
-    say: Callable[[str], None] | None = None,
+    notify: Callable[[str], None] | None = None,
 ) -> list[dict[str, float]]:
     """Order parameters of many flights, flight i with seeds[i]; side by side on all cores, or together on a GPU.
 
-    device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
+    device : cpu, cuda, python (no compiler, double precision), or auto, which tells `notify` what it picked
     """
-    seeds = [sound_seed(seed) for seed in seeds]
+    seeds = [check_seed(seed) for seed in seeds]
     if device != "cpu":
         plans = [plan_of(scenario, precision=precision) for scenario in scenarios]
-        device = _choice(device, scenarios, plans, say)
+        device = _choice(device, scenarios, plans, notify)
         if device == "cuda":
-            flown = devices.fly_on_gpu(scenarios, plans, seeds, None, done)
+            flown = devices.fly_on_gpu(scenarios, plans, seeds, None, on_done)
             together = zip(scenarios, seeds, flown, strict=True)
-            return [s.judged(checked(s, seed, f, device, precision).values) for s, seed, f in together]
+            return [s.judged(check_result(s, seed, f, device, precision).values) for s, seed, f in together]
     if device == "python":
         precision, threads = 64, 1
     else:
         for scenario in {plan_of(scenario, precision=precision): scenario for scenario in scenarios}.values():
             compile_for(scenario, precision=precision)  # once, before threads ask for it
-        if any(takes_all_cores(scenario) for scenario in scenarios):
+        if any(uses_all_cores(scenario) for scenario in scenarios):
             threads = 1  # each flight takes all cores by itself
 
     def job(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
-        return lambda: scenario.judged(fly(scenario, seed, precision=precision, device=device).values)
+        return lambda: scenario.judged(fly_world(scenario, seed, precision=precision, device=device).values)
 
-    return list(in_threads([job(*pair) for pair in zip(scenarios, seeds, strict=True)], threads, done))
+    return list(run_in_threads([job(*pair) for pair in zip(scenarios, seeds, strict=True)], threads, on_done))

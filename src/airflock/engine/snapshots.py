@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.state import State
-from airflock.scenarios.events import Event
-from airflock.scenarios.onsets import Onset
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import FlightError
+from airflock.engine.state import DriverState
+from airflock.scenarios import Event, FaultOnset, Scenario
+from airflock.support import FlightError
 
 
 @dataclass(frozen=True)
@@ -34,16 +32,16 @@ class Snapshot:
     version: str
     origin: tuple[Scenario, int, int, Any]
     scenario: Scenario
-    state: State
+    state: DriverState
     bytes: NDArray[np.uint8]
     step: int
-    sensed: bool
+    has_sensed: bool
     begin: int
     events: tuple[Event, ...]
     windows: tuple[Window, ...]
     frames: tuple[NDArray[Any], ...]
-    sampled: tuple[NDArray[Any], ...]
-    due: tuple[Onset, ...]
+    sampled_values: tuple[NDArray[Any], ...]
+    due: tuple[FaultOnset, ...]
 
     def __repr__(self) -> str:
         """Of which flight it is, and when."""
@@ -52,11 +50,11 @@ class Snapshot:
 
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled. Raises FlightError where another process could not import a law."""
-        sendable(self.origin[0], self.scenario)
+        check_sendable(self.origin[0], self.scenario)
         return vars(self)
 
 
-def sendable(*scenarios: Scenario) -> None:
+def check_sendable(*scenarios: Scenario) -> None:
     """Raise FlightError where a scenario has code of its own, which another process could not import."""
     for scenario in scenarios:
         try:

@@ -6,26 +6,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.drivers import device_of, driver_of, flying
-from airflock.engine.fault_columns import still_has, strike
-from airflock.engine.flight_memory import FlightMemory
+from airflock.engine.drivers import compile_messages, device_of, driver_of
+from airflock.engine.fault_columns import begin_fault, still_has_fault
+from airflock.engine.flight_memory import DriverMemory
 from airflock.engine.plan import Plan
-from airflock.engine.presence import leave
+from airflock.engine.presence import remove_agents
 from airflock.engine.stages.approach import BEGUN
-from airflock.engine.tables import Tables, tables
-from airflock.engine.totals import combined, goals_reached
-from airflock.scenarios.onsets import Onset
-from airflock.scenarios.scenario import Scenario
+from airflock.engine.tables import WorldTables, world_tables
+from airflock.engine.totals import combine_sums, goal_times
+from airflock.scenarios import FaultOnset, Scenario
 
 
-class State(FlightMemory):
+class DriverState(DriverMemory):
     """A flight as its driver flies it, step by step."""
 
-    def compile(self) -> "State":
+    def compile(self) -> "DriverState":
         """Have the driver compiled; nothing is flown, and agents get no places. Returns the state."""
         marks = self.arrays["held"]
         begun, marks[BEGUN] = marks[BEGUN], 1.0
-        with flying(self.driver, self.plan.model.name):
+        with compile_messages(self.driver, self.plan.model.name):
             self.advance(0, 0)
         marks[BEGUN] = begun
         return self
@@ -33,17 +32,17 @@ class State(FlightMemory):
     @classmethod
     def of(
         cls, plan: Plan, scenario: Scenario, seed: int = 0, world: int = 0, start: Any = None, device: str = "cpu"
-    ) -> "State":
+    ) -> "DriverState":
         """State before the first step of a scenario by its plan.
 
         start  : positions and velocities, (component, agent) in m and m/s, where the plan asks for them
         device : cpu, or python, uncompiled
         """
-        return cls(plan, tables(scenario, plan, seed, world), driver_of(plan, device), start)
+        return cls(plan, world_tables(scenario, plan, seed, world), driver_of(plan, device), start)
 
-    def twin(self) -> "State":
+    def copy(self) -> "DriverState":
         """The same state in memory of its own."""
-        made = State(self.plan, self.tables, self.driver, self.start)
+        made = DriverState(self.plan, self.tables, self.driver, self.start)
         made.buffer[:] = self.buffer
         return made
 
@@ -51,7 +50,7 @@ class State(FlightMemory):
         """Pickled without its driver, which another process makes, or has, of the same plan."""
         return _again, (self.plan, self.tables, device_of(self.driver), self.start, self.buffer)
 
-    def expect(self, due: tuple[Onset, ...]) -> None:
+    def set_onsets(self, due: tuple[FaultOnset, ...]) -> None:
         """Have these faults to come, instead of those before."""
         self.tables = replace(self.tables, due=due)
 
@@ -83,13 +82,13 @@ class State(FlightMemory):
             return  # said when the step is flown
         for onset in self.tables.due:
             if onset.step == step and onset.leaves:
-                leave(self, [onset.agent] if still_has(self, onset) else [])
+                remove_agents(self, [onset.agent] if still_has_fault(self, onset) else [])
             elif onset.step == step:
-                strike(self, onset)
+                begin_fault(self, onset)
 
     def _watched(self, first: int, last: int, half: int, frames: NDArray[Any] | None) -> int:
         """Fly some steps; who has come to the ground with an empty battery is put away before the next one."""
-        landing, every = self.tables.landing, self.whole("sample_every")
+        landing, every = self.tables.ground_contact, self.whole("sample_every")
         if landing is None or first == last:
             return self._fly(first, last, half, frames)
         if not self.begun and (unplaced := self._fly(first, first, 0, None)) < 0:
@@ -98,7 +97,7 @@ class State(FlightMemory):
         while step < last:
             if step > first or not half & 1:  # else that was done before this step was sensed
                 landing.land(self)
-            stop = min(last, step + landing.safe_steps(self))
+            stop = min(last, step + landing.steps_without_landing(self))
             rest = None if frames is None else frames[-(-step // every) - skipped :]
             done = self._fly(step, stop, half, rest)
             if done != stop:
@@ -117,7 +116,7 @@ class State(FlightMemory):
         if kept is not None:
             self.arrays["sums"][:] = kept
         if self.plan.absence and not half & 2:
-            instants = max(done - first, 0) + int(self.ended)  # that of a collision, too, at which the flight ends
+            instants = max(done - first, 0) + int(self.has_ended)  # that of a collision, too, at which the flight ends
             there = self.arrays["there"]
             there[0] += self.here * instants
             there[1] += self.agents * instants
@@ -125,15 +124,15 @@ class State(FlightMemory):
 
     def values(self) -> dict[str, Any]:
         """Order parameters over the time that the sums hold, and when each goal was reached."""
-        found = combined(self.plan, self.arrays["sums"]) | goals_reached(self.plan, self.arrays["reached"])
+        found = combine_sums(self.plan, self.arrays["sums"]) | goal_times(self.plan, self.arrays["reached"])
         if self.plan.absence:
             there, of = self.arrays["there"].tolist()
             found["present"] = there / of if of else 1.0
         return found
 
 
-def _again(plan: Plan, tables: Tables, device: str, start: NDArray[Any], buffer: NDArray[np.uint8]) -> State:
+def _again(plan: Plan, tables: WorldTables, device: str, start: NDArray[Any], buffer: NDArray[np.uint8]) -> DriverState:
     """A state out of a pickle."""
-    made = State(plan, tables, driver_of(plan, device), start)
+    made = DriverState(plan, tables, driver_of(plan, device), start)
     made.buffer[:] = buffer
     return made

@@ -13,10 +13,8 @@ from pathlib import Path
 from threading import Lock
 from types import ModuleType
 
-from airflock.engine.never_collected import never_collected
-from airflock.support import atomic
-from airflock.support.cache import DRIVERS, cache_folder, shrink, spare
-from airflock.support.machine import toolchain
+from airflock.engine.never_collected import frozen_imports
+from airflock.support import DRIVERS, atomic, cache_folder, private_folder, shrink, toolchain_versions
 
 SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
 
@@ -26,16 +24,16 @@ _loading = Lock()
 
 
 @cache
-def compiled_by() -> str:
+def compiler_fingerprint() -> str:
     """What makes machine code of a text here: versions, processor, and our own passes."""
     passes = hashlib.sha256(b"".join((Path(__file__).parent / name).read_bytes() for name in PASSES))
-    return f"{toolchain()}|{passes.hexdigest()}"
+    return f"{toolchain_versions()}|{passes.hexdigest()}"
 
 
 def load_driver(text: str, label: str) -> ModuleType:
     """Import a driver from its text; compiled code of an earlier process is reused."""
     _import_compiler()
-    digest = hashlib.sha256(f"{compiled_by()}\n{text}".encode()).hexdigest()[:20]
+    digest = hashlib.sha256(f"{compiler_fingerprint()}\n{text}".encode()).hexdigest()[:20]
     name = f"airflock_driver_{label}_{digest}"
     with _loading:  # a thread must not get a module that another one is still executing
         return sys.modules[name] if name in sys.modules else _import(name, digest, text, label)
@@ -45,23 +43,23 @@ def _import_compiler() -> None:
     """Import what drivers import, if nobody has imported Numba yet."""
     with _loading:
         if "numba" not in sys.modules:
-            with never_collected():
+            with frozen_imports():
                 from airflock.engine import checksums, compiler  # noqa: F401
 
 
 def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
-    from airflock.engine.checksums import seal
+    from airflock.engine.checksums import seal_functions
 
     try:
         path = _written(cache_folder() / DRIVERS / digest, label, text)
     except OSError:  # filled up since it was looked at
-        path = _written(spare() / DRIVERS / digest, label, text)
+        path = _written(private_folder() / DRIVERS / digest, label, text)
     module = ModuleType(name)
     module.__file__ = str(path)
     module.TEXT = text  # type: ignore[attr-defined]
     sys.modules[name] = module
     exec(compile(text, path, "exec"), vars(module))  # our own text, and not what the file may hold by now
-    seal(module, digest)
+    seal_functions(module, digest)
     return module
 
 
@@ -73,7 +71,7 @@ def _written(folder: Path, label: str, text: str) -> Path:
         folder.unlink(missing_ok=True)
         folder.mkdir(mode=0o700, exist_ok=True)
     if not path.is_file() or path.read_bytes() != text.encode():
-        atomic.write(path, text)  # written beside and renamed: another process may be doing the same
+        atomic.write_file(path, text)  # written beside and renamed: another process may be doing the same
     os.utime(folder)
     if new and int(folder.name[:2], 16) < 256 * SWEPT:
         shrink(folder.parent.parent)

@@ -6,25 +6,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.landing import Landing, landing_of
-from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.landing import GroundContact, ground_contact
+from airflock.engine.plan import INTEGER_NAMES, Plan
 from airflock.parts.bodies import dryden, wind
-from airflock.scenarios.onsets import Onset, onsets
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.sections import ORDER, Clock, Geometry
-from airflock.scenarios.timing import clock
-from airflock.world.arena import heights_of
-from airflock.world.place import edge_rows, half_sizes
-from airflock.world.scenes.tree import scene as make_scene
-from airflock.world.scenes.tree import unbuilt
-from airflock.world.surfaces import faces
+from airflock.scenarios import ORDER, FaultOnset, Geometry, Scenario, StepTimes, draw_onsets, step_counts
+from airflock.world import edge_rows, face_rows, half_sizes, heights_of, make_scene as make_scene, without_appearing
 
 EMPTY = make_scene([])
-SEEDED = [WHOLE.index(name) for name in ("world", "seed_low", "seed_high")]
+SEEDED = [INTEGER_NAMES.index(name) for name in ("world", "seed_low", "seed_high")]
 
 
 @dataclass(frozen=True)
-class Tables:
+class WorldTables:
     """Numbers of one world.
 
     row   : (columns,) all records of numbers in the plan's order, SI
@@ -52,20 +45,20 @@ class Tables:
     later: NDArray[Any]
     goals: NDArray[Any]
     own: NDArray[Any]
-    due: tuple[Onset, ...] = ()
-    landing: Landing | None = None
+    due: tuple[FaultOnset, ...] = ()
+    ground_contact: GroundContact | None = None
 
-    def changed(self, **whole: int) -> "Tables":
-        """The same world with other integers, by their names in `plan.WHOLE`."""
-        return replace(self, whole=np.array([(self.integers | whole)[name] for name in WHOLE], np.int64))
+    def changed(self, **whole: int) -> "WorldTables":
+        """The same world with other integers, by their names in `plan.INTEGER_NAMES`."""
+        return replace(self, whole=np.array([(self.integers | whole)[name] for name in INTEGER_NAMES], np.int64))
 
     @property
     def integers(self) -> dict[str, int]:
         """Integers of this world by name."""
-        return dict(zip(WHOLE, self.whole.tolist(), strict=True))
+        return dict(zip(INTEGER_NAMES, self.whole.tolist(), strict=True))
 
 
-def extents(scenario: Scenario) -> tuple[float, float, float]:
+def start_extents(scenario: Scenario) -> tuple[float, float, float]:
     """Half sizes of the box about the origin from which starts are drawn, m."""
     world = scenario.world
     x, y, z = half_sizes(scenario.world)
@@ -77,21 +70,21 @@ def extents(scenario: Scenario) -> tuple[float, float, float]:
     return x, y, max(map(abs, heights_of(world))) if scenario.dimensions == 3 else 0.0
 
 
-def read_by_drivers(scenario: Scenario, period: float) -> dict[str, Any]:
+def driver_records(scenario: Scenario, period: float) -> dict[str, Any]:
     """Record behind each letter of a driver's row; period: time between two decisions, s."""
-    a, records = scenario.wind, scenario.records | {"metrics": scenario.measured_by()}
+    a, records = scenario.wind, scenario.records | {"metrics": scenario.resolved_metrics()}
     derived = {
-        "w": geometry(scenario), "c": Clock(scenario.flight.dt, period), "air": dryden.numbers_of(a),
-        "a": wind.Steady(a.east, a.north, a.up, a.gust, a.gust_time), "silence": scenario.silent_by(),
+        "w": driver_geometry(scenario), "c": StepTimes(scenario.flight.dt, period), "air": dryden.numbers_of(a),
+        "a": wind.Steady(a.east, a.north, a.up, a.gust, a.gust_time), "silence": scenario.resolved_silence(),
     }  # fmt: skip
     found = {each.letter: derived.get(each.letter, records[each.key]) for each in ORDER if each.letter}
     return found | {f"p{k}": law.parameters for k, law in enumerate(scenario.laws) if k}
 
 
-def geometry(scenario: Scenario) -> Geometry:
+def driver_geometry(scenario: Scenario) -> Geometry:
     """What drivers read of world, start and goals."""
     begin, goals = scenario.start, scenario.goals
-    half, extent = half_sizes(scenario.world), extents(scenario)
+    half, extent = half_sizes(scenario.world), start_extents(scenario)
     return Geometry(
         **dict(zip(("half_x", "half_y", "half_z"), half, strict=True)),
         **dict(zip(("extent_x", "extent_y", "extent_z"), extent, strict=True)),
@@ -110,33 +103,33 @@ def geometry(scenario: Scenario) -> Geometry:
     )
 
 
-def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
+def world_tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> WorldTables:
     """Numbers of one world for a plan's driver."""
-    scenario = scenario.in_flight(seed)
+    scenario = scenario.with_drawn_scene(seed)
     key = "tables", plan
-    if key not in scenario.prepared:
-        scenario.prepared[key] = _common(scenario, plan)
-    common: Tables = scenario.prepared[key]
+    if key not in scenario.engine_cache:
+        scenario.engine_cache[key] = _common(scenario, plan)
+    common: WorldTables = scenario.engine_cache[key]
     whole = common.whole.copy()
     whole[SEEDED] = world, seed & 0xFFFFFFFF, (seed >> 32) & 0xFFFFFFFF
     return replace(
         common,
         whole=whole,
-        own=row_values(scenario, plan, seed).astype(common.row.dtype) if plan.columns else common.own,
-        due=onsets(scenario, seed, world) if plan.faults else (),
-        landing=landing_of(scenario, seed, common.row.dtype.type),
+        own=agent_values(scenario, plan, seed).astype(common.row.dtype) if plan.columns else common.own,
+        due=draw_onsets(scenario, seed, world) if plan.faults else (),
+        ground_contact=ground_contact(scenario, seed, common.row.dtype.type),
     )
 
 
-def _common(scenario: Scenario, plan: Plan) -> Tables:
+def _common(scenario: Scenario, plan: Plan) -> WorldTables:
     """Numbers that the flights of a scenario have in common; of the seed there is nothing in them."""
     real = np.float32 if plan.bits == 32 else np.float64
-    dt, times = scenario.flight.dt, clock(scenario)
-    surfaces, families = faces(scenario.world)
+    dt, times = scenario.flight.dt, step_counts(scenario)
+    surfaces, families = face_rows(scenario.world)
     edges, corners, spans = edge_rows(scenario.world)
     scene = scenario.stands() if plan.scene else EMPTY
-    shapes, later = unbuilt(scene)
-    values = read_by_drivers(scenario, dt * times["decide_every"])
+    shapes, later = without_appearing(scene)
+    values = driver_records(scenario, dt * times["decide_every"])
     # an optional number that is None becomes 0
     numbers = [getattr(values[letter], name) or 0.0 for letter, names in plan.numbers for name in names]
     counts = families + [0] * (2 - len(families))
@@ -151,9 +144,9 @@ def _common(scenario: Scenario, plan: Plan) -> Tables:
         "faces_0": counts[0],
         "faces_1": counts[1],
     }
-    return Tables(
+    return WorldTables(
         row=np.array(numbers, real),
-        whole=np.array([whole[name] for name in WHOLE], np.int64),
+        whole=np.array([whole[name] for name in INTEGER_NAMES], np.int64),
         faces=np.array(surfaces, real).reshape(-1, 4),
         edges=np.array(edges, real).reshape(-1, 4),
         spans=np.array(spans, np.int64).reshape(-1, 2),
@@ -166,10 +159,10 @@ def _common(scenario: Scenario, plan: Plan) -> Tables:
     )
 
 
-def row_values(scenario: Scenario, plan: Plan, seed: int) -> Any:
+def agent_values(scenario: Scenario, plan: Plan, seed: int) -> Any:
     """What differs among agents, (number, agent): numbers with the tolerances of manufacture, law, group."""
     made = np.zeros((len(plan.columns), scenario.agents))
-    known = {"law": scenario.law_numbers, "group": scenario.group_numbers}
+    known = {"law": scenario.law_indices, "group": scenario.group_indices}
     for c, (letter, name) in enumerate(plan.columns):
-        made[c] = scenario.own_numbers(letter, name, seed) if letter else known[name]
+        made[c] = scenario.agent_values(letter, name, seed) if letter else known[name]
     return made

@@ -15,7 +15,7 @@ CHOSEN = NAME, "OMP_WAIT_POLICY"
 
 
 @contextmanager
-def waiting_briefly() -> Iterator[None]:
+def short_spin() -> Iterator[None]:
     """Around what loads the library of threads, which reads its environment once; what a user has chosen stands."""
     if any(name in os.environ for name in CHOSEN):
         yield

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.passes.build import columns
+from airflock.engine.passes.build import sampled_columns
 from airflock.engine.plan import Plan
-from airflock.engine.stages.words import START, ZERO
+from airflock.engine.stages.words import REDUCTION_START, ZERO
 
 
-def sums_of(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def initial_sums(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Values of an instant and sums over time at their start; the sums end with the counts of both clocks."""
-    found = [float(START.get(how, ZERO)) for _, how, _ in columns(plan.metrics)]
+    found = [float(REDUCTION_START.get(how, ZERO)) for _, how, _ in sampled_columns(plan.metrics)]
     return np.zeros(len(found)), np.array([*found, 0.0, 0.0])
 
 
-def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
+def combine_sums(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
     """Named order parameters from the sums over time, which end with the counts of both clocks; more may follow."""
     found = _columns(plan)
     totals: list[float] = sums.tolist()  # numbers of Python's are divided in a fifth of the time
@@ -37,10 +37,10 @@ def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
 
 @lru_cache(maxsize=64)
 def _columns(plan: Plan) -> list[tuple[str, str, str]]:
-    return columns(plan.metrics)
+    return sampled_columns(plan.metrics)
 
 
-def goals_reached(plan: Plan, reached: NDArray[Any]) -> dict[str, Any]:
+def goal_times(plan: Plan, reached: NDArray[Any]) -> dict[str, Any]:
     """When each goal was reached, s (nan: never), and how many were."""
     if not plan.goals:
         return {}

@@ -13,7 +13,7 @@ are Numba's of two numbers, and `as_bits` and `as_number` its views of the bits 
 kind of number as functions that Python could call.
 """
 
-TEXT = """
+EXTREME_TEXT = """
 def _extreme(instruction, comparison):
     @intrinsic
     def extreme(typing_context, a, b):
@@ -88,7 +88,7 @@ def apart(typing_context):
 """
 
 # Only in drivers that sort agents into cells: a short loop that copies the few agents of a cell costs more than they.
-BLOCKS = """
+BLOCK_TEXT = """
 @intrinsic
 def copy_block(typing_context, to, row, at, source, first, shift):
     def emit(context, builder, signature, arguments):

@@ -9,29 +9,24 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
-from airflock.drones.onboard.card import Card
+from airflock.drones import FlightCard
 from airflock.fleets import compare, realtime
-from airflock.fleets.faults import Fault, read_faults
-from airflock.fleets.starting import write_for_watching
-from airflock.fleets.teller import WATCHED
-from airflock.parts.metrics.registry import reports
-from airflock.recordings.score_table import described
-from airflock.recordings.scores import measure
-from airflock.scenarios.change import variant
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.seeds import sound_seeds
-from airflock.support.errors import ScenarioError, gathering
-from airflock.support.spelling import meant
-from airflock.support.untrusted import own_path
+from airflock.fleets.faults import InjectedFault, read_injected_faults
+from airflock.fleets.starting import write_card_and_key
+from airflock.fleets.teller import DEFAULT_WATCH_ADDRESS
+from airflock.parts.metrics import reported_values
+from airflock.recordings import measure_recording, with_units
+from airflock.scenarios import Scenario, check_seeds, scenario_variant
+from airflock.support import ScenarioError, collect_errors, expand_path, suggest
 
-VEHICLES = ("px4", "ardupilot")
-BODIES = ("multirotor", "quadrotor")
-LOCKSTEP = realtime.MODES[0]
-CALL = 14540  # port where the first vehicle contacts a client
+VEHICLE_KINDS = ("px4", "ardupilot")
+VEHICLE_BODIES = ("multirotor", "quadrotor")
+LOCKSTEP_MODE = realtime.FLEET_MODES[0]
+FIRST_CLIENT_PORT = 14540  # port where the first vehicle contacts a client
 
 
 @dataclass
-class Fleets:
+class FleetRuns:
     """What a fleet flew, seed after seed.
 
     scenario   : what was flown; vehicle: the autopilot that the vehicles imitated
@@ -48,31 +43,31 @@ class Fleets:
     simulated: list[dict[str, Any]] = field(default_factory=list)
     runs: list[dict[str, Any]] = field(default_factory=list)
     recordings: list[xr.Dataset] = field(default_factory=list)
-    departure: compare.Departure | None = None
+    divergence: compare.Divergence | None = None
 
     @property
     def table(self) -> pd.DataFrame:
         """Order parameters, one row per flight by its seed; `attrs` say units and meanings as those of `score` do."""
         index = pd.Index([run["seed"] for run in self.runs], name="seed")
-        return described(pd.DataFrame(self.measured, index=index), dict(reports(self.scenario.measures)))
+        return with_units(pd.DataFrame(self.measured, index=index), dict(reported_values(self.scenario.measures)))
 
     @property
-    def comparison(self) -> list[compare.Line]:
+    def comparison(self) -> list[compare.MetricComparison]:
         """Of each order parameter the means of both, z and p after Holm's correction; none of fewer than two seeds."""
-        return compare.table(self.simulated, self.measured) if len(self.simulated) > 1 else []
+        return compare.compare_scores(self.simulated, self.measured) if len(self.simulated) > 1 else []
 
-    def add(self, flown: Any, *, beside: bool, follows: bool) -> None:
+    def add(self, flown: Any, *, with_simulator: bool, starts_alike: bool) -> None:
         """Measure a flight, and fly the simulator beside it where asked.
 
         follows : whether both start alike, on one clock
         """
-        if beside:
-            simulated, measured = compare.both(flown.scenario, flown)
+        if with_simulator:
+            simulated, measured = compare.simulated_and_flown_scores(flown.scenario, flown)
             self.simulated.append(simulated)
-            if follows and self.departure is None:
-                self.departure = compare.departure(flown)
+            if starts_alike and self.divergence is None:
+                self.divergence = compare.divergence(flown)
         else:
-            measured = measure(compare.recording(flown))[0]
+            measured = measure_recording(compare.fleet_recording(flown))[0]
         self.measured.append(measured)
         phases = [phase.name for phase in flown.phases()]
         run = {"seed": flown.seed, "sha256": flown.digest(), "phases": phases, "notes": flown.log, **measured}
@@ -88,8 +83,8 @@ def fleet(
     trust: bool = False,
     vehicle: str = "px4",
     body: str | None = None,
-    mode: str = LOCKSTEP,
-    join: int = CALL,
+    mode: str = LOCKSTEP_MODE,
+    join: int = FIRST_CLIENT_PORT,
     faults: str | os.PathLike[str] | None = None,
     beside: bool = False,
     silence: bool | None = None,
@@ -97,7 +92,7 @@ def fleet(
     card: str | os.PathLike[str] | None = None,
     done: Callable[[], None] | None = None,
     say: Callable[[str], None] | None = None,
-) -> Fleets:
+) -> FleetRuns:
     """Fly a fleet in software: one node and one MAVLink vehicle per drone, in lock-step or on the real clock.
 
     Parameters
@@ -140,7 +135,7 @@ def fleet(
     -------
     Fleets
         `table`, one row per flight; `runs`, what is told of each; `recordings` (time, space, keypoint, individual);
-        beside the simulator `comparison` and `departure`.
+        beside the simulator `comparison` and `divergence`.
 
     Raises
     ------
@@ -155,47 +150,56 @@ def fleet(
     >>> found.table.index.tolist(), dict(found.recordings[0].position.sizes)["individual"]
     ([0, 1], 3)
     """
-    numbers = sound_seeds(seeds)
+    numbers = check_seeds(seeds)
     mistakes = [
-        f"{name} = {word!r} is none of {', '.join(known)}{meant(word, known, lead='; ')}"
+        f"{name} = {word!r} is none of {', '.join(known)}{suggest(word, known, lead='; ')}"
         for name, word, known in (
-            ("vehicle", vehicle, VEHICLES),
-            ("body", body, BODIES),
-            ("mode", mode, realtime.MODES),
+            ("vehicle", vehicle, VEHICLE_KINDS),
+            ("body", body, VEHICLE_BODIES),
+            ("mode", mode, realtime.FLEET_MODES),
         )
         if word is not None and word not in known
     ]
-    if card is not None and mode == LOCKSTEP:
+    if card is not None and mode == LOCKSTEP_MODE:
         mistakes.append("card: in lock-step it flies too fast to watch; give mode = 'tasks' or 'processes'")
     known: Scenario | None = None
-    injected: tuple[Fault, ...] = ()
-    with gathering(mistakes):
-        keys = {**(settings or {}), **({"body.kind": body} if body in BODIES else {})}
-        found = variant(scenario, keys, trust=trust)
-        known = compare.sampled(found, found.sensors.period or found.flight.dt)
+    injected: tuple[InjectedFault, ...] = ()
+    with collect_errors(mistakes):
+        keys = {**(settings or {}), **({"body.kind": body} if body in VEHICLE_BODIES else {})}
+        found = scenario_variant(scenario, keys, trust=trust)
+        known = compare.with_metric_period(found, found.sensors.period or found.flight.dt)
         if faults is not None:
-            injected = read_faults(own_path(faults), tuple(range(1, known.agents + 1)))
-        mistakes += realtime.refused(injected) if mode != LOCKSTEP else []
+            injected = read_injected_faults(expand_path(faults), tuple(range(1, known.agents + 1)))
+        mistakes += realtime.lockstep_only_errors(injected) if mode != LOCKSTEP_MODE else []
     if card is not None and known is not None and known.varied and len(numbers) > 1:
         mistakes.append(f"card = {card}: with tolerances each seed has its own card; give one seed")
     if mistakes or known is None:
         raise ScenarioError(mistakes)
     stops = True if silence is None and not beside else silence
-    flights = Fleets(known, vehicle)
+    flights = FleetRuns(known, vehicle)
     how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "silent": stops, "ground": ground, "join": join}
     if card is not None:
-        how["card_file"] = own_path(card)
-    for flown in in_turn(known, numbers, faults=injected, done=done, say=say, **how):
-        flights.add(flown, beside=beside, follows=not ground and mode == LOCKSTEP)
-        flights.recordings.append(compare.recording(flown))
+        how["card_file"] = expand_path(card)
+    for flown in fly_seeds(known, numbers, faults=injected, on_done=done, notify=say, **how):
+        flights.add(flown, with_simulator=beside, starts_alike=not ground and mode == LOCKSTEP_MODE)
+        flights.recordings.append(compare.fleet_recording(flown))
     return flights
 
 
-def in_turn(
-    scenario: Scenario, seeds: Sequence[int], *, vehicle: str, mode: str, silent: bool | None, ground: bool, join: int,
-    faults: Sequence[Fault] = (), card_file: Path | None = None, done: Callable[[], None] | None = None,
-    say: Callable[[str], None] | None = None,
-) -> Iterator[Any]:  # fmt: skip
+def fly_seeds(
+    scenario: Scenario,
+    seeds: Sequence[int],
+    *,
+    vehicle: str,
+    mode: str,
+    stop_for_lost: bool | None,
+    from_ground: bool,
+    join: int,
+    faults: Sequence[InjectedFault] = (),
+    card_file: Path | None = None,
+    on_done: Callable[[], None] | None = None,
+    notify: Callable[[str], None] | None = None,
+) -> Iterator[Any]:
     """Fly a scenario that fleets can fly, one seed after another; what each flew.
 
     silent    : whether the rule of silence stops a drone; None: where the scenario says so
@@ -203,26 +207,30 @@ def in_turn(
     card_file : where the card is written before the first flight, so that `airflock watch` can show it; say: told so
     """
     private, public = b"", b""
-    if ground:
-        from airflock.drones.mavlink.orders import new_keys
+    if from_ground:
+        from airflock.drones import new_operator_keys
 
-        private, public = new_keys()
-    live = mode != LOCKSTEP
+        private, public = new_operator_keys()
+    live = mode != LOCKSTEP_MODE
 
-    def card_of(seed: int) -> Card:
-        return compare.software_card(scenario, vehicle=vehicle, operator=public, silent=silent, live=live, seed=seed)
+    def card_of(seed: int) -> FlightCard:
+        return compare.software_card(
+            scenario, vehicle=vehicle, operator=public, stop_for_lost=stop_for_lost, realtime=live, seed=seed
+        )
 
     card = card_of(seeds[0])
     if card_file is not None:
-        write_for_watching(card_file, card)
-        if say is not None:
-            say(f"wrote {card_file} and its key; airflock watch {card_file} shows the fleet")
+        write_card_and_key(card_file, card)
+        if notify is not None:
+            notify(f"wrote {card_file} and its key; airflock watch {card_file} shows the fleet")
     for seed in seeds:
         card = card_of(seed) if scenario.varied else card
-        common: dict[str, Any] = {"faults": faults, "operator": private, "done": done}
+        common: dict[str, Any] = {"faults": faults, "operator": private, "on_done": on_done}
         if live:
-            start = None if ground else compare.first_states(scenario, seed)
-            calls, watcher = (realtime.JOIN[0], join), WATCHED if card_file else None
-            yield realtime.fly(scenario, card, seed, mode, start=start, join=calls, watcher=watcher, **common)
+            start = None if from_ground else compare.simulated_start(scenario, seed)
+            calls, watcher = (realtime.DEFAULT_CLIENT[0], join), DEFAULT_WATCH_ADDRESS if card_file else None
+            yield realtime.fly_in_realtime(
+                scenario, card, seed, mode, start=start, first_client=calls, watcher=watcher, **common
+            )
         else:
-            yield compare.fly(scenario, card, seed, ground=ground, **common)
+            yield compare.fly_in_lockstep(scenario, card, seed, from_ground=from_ground, **common)

@@ -3,11 +3,11 @@
 from dataclasses import replace
 from typing import Any
 
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import ScenarioError
+from airflock.scenarios import Scenario
+from airflock.support import ScenarioError
 
 
-def records_of(scenario: Scenario, count: int, seed: int | None) -> list[tuple[Any, Any]]:
+def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tuple[Any, Any]]:
     """Numbers of law and body of each of the first `count` agents.
 
     seed : with tolerances of manufacture as this seed draws them; None: without, for real drones have their own
@@ -23,7 +23,7 @@ def records_of(scenario: Scenario, count: int, seed: int | None) -> list[tuple[A
     groups = tuple(replace(group, spread={}) for group in scenario.groups) if seed is None else scenario.groups
     told = replace(scenario, groups=groups)
     varied = dict.fromkeys([*told.varied, *(each for law in told.laws for each in law.varied)])
-    columns = {(of, name): told.own_numbers(of, name, seed or 0) for of, name in varied}
+    columns = {(of, name): told.agent_values(of, name, seed or 0) for of, name in varied}
 
     def own(agent: int) -> tuple[Any, Any]:
         law = told.law_of(agent)
@@ -34,8 +34,8 @@ def records_of(scenario: Scenario, count: int, seed: int | None) -> list[tuple[A
     return [own(agent) for agent in range(count)]
 
 
-def sensors_of(scenario: Scenario, count: int, seed: int) -> list[Any]:
+def agent_sensors(scenario: Scenario, count: int, seed: int) -> list[Any]:
     """Numbers of the sensor of each of the first `count` agents, with tolerances as a seed draws them."""
-    columns = {name: scenario.own_numbers("s", name, seed) for of, name in scenario.varied if of == "s"}
+    columns = {name: scenario.agent_values("s", name, seed) for of, name in scenario.varied if of == "s"}
     own = [{name: column[agent] for name, column in columns.items()} for agent in range(count)]
     return [replace(scenario.sensors, **numbers) for numbers in own]

@@ -3,20 +3,23 @@
 Sources: PX4 user guide, Parameter Reference; ArduPilot Copter, pages Flight Modes and GCS Failsafe.
 """
 
-from airflock.drones.mavlink.autopilots import px4_mode
+from airflock.drones import px4_mode
 
-OURS, LAND, RTL, HOLD, TAKEOFF, PILOT = "OURS", "LAND", "RTL", "HOLD", "TAKEOFF", "PILOT"
-MODES = {
-    "px4": {OURS: px4_mode(6), LAND: px4_mode(4, 6), RTL: px4_mode(4, 5), HOLD: px4_mode(4, 3),
-            TAKEOFF: px4_mode(4, 2), PILOT: px4_mode(3)},
-    "ardupilot": {OURS: 4, LAND: 9, RTL: 6, HOLD: 17, PILOT: 5},
+GUIDED, LAND_MODE, RETURN_MODE, HOLD_MODE, TAKEOFF_MODE, PILOT_MODE = "OURS", "LAND", "RTL", "HOLD", "TAKEOFF", "PILOT"
+MODE_NUMBERS = {
+    "px4": {GUIDED: px4_mode(6), LAND_MODE: px4_mode(4, 6), RETURN_MODE: px4_mode(4, 5), HOLD_MODE: px4_mode(4, 3),
+            TAKEOFF_MODE: px4_mode(4, 2), PILOT_MODE: px4_mode(3)},
+    "ardupilot": {GUIDED: 4, LAND_MODE: 9, RETURN_MODE: 6, HOLD_MODE: 17, PILOT_MODE: 5},
 }  # fmt: skip
-PARAMETERS: dict[str, dict[str, float | int]] = {
+DEFAULT_PARAMETERS: dict[str, dict[str, float | int]] = {
     "px4": {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 4, "GF_ACTION": 3, "MIS_TAKEOFF_ALT": 10.0, "MAV_SYS_ID": 1},
     "ardupilot": {
         "GUID_TIMEOUT": 1.0, "FENCE_ENABLE": 1, "FENCE_ACTION": 1, "FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 5.0,
         "SYSID_MYGCS": 255, "SYSID_THISMAV": 1,
     },
 }  # fmt: skip
-ON_LOSS = {3: RTL, 4: LAND, 5: HOLD}  # COM_OBL_RC_ACT of PX4
-ON_SILENCE = {5: LAND, 7: HOLD}  # FS_GCS_ENABLE of ArduPilot; all others return, by the way they came or straight
+LOST_SETPOINT_MODES = {3: RETURN_MODE, 4: LAND_MODE, 5: HOLD_MODE}  # COM_OBL_RC_ACT of PX4
+LOST_STATION_MODES = {
+    5: LAND_MODE,
+    7: HOLD_MODE,
+}  # FS_GCS_ENABLE of ArduPilot; all others return, by the way they came or straight

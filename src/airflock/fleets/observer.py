@@ -7,23 +7,29 @@ in software the ether tells, too, who hears whom and which faults hold; real rad
 from collections import deque
 from typing import NamedTuple
 
-from airflock.core.radio import forward
-from airflock.drones.mavlink import orders, status, witness
-from airflock.drones.mavlink.orders import order_of
-from airflock.drones.mavlink.signing import Receiver
-from airflock.drones.onboard.card import Card
-from airflock.drones.onboard.mission import Phase
-from airflock.drones.onboard.peers import FRESH, Peer, Peers
-from airflock.fleets.teller import NUMBERS
-from airflock.support.errors import LinkError
+from airflock.core import forward
+from airflock.drones import (
+    HEARD_WITHIN,
+    FlightCard,
+    MissionPhase,
+    PacketReceiver,
+    Peer,
+    Peers,
+    orders,
+    parse_order,
+    status,
+    witness,
+)
+from airflock.fleets.teller import FAULT_NUMBERS
+from airflock.support import LinkError
 
-NOBODY = 0  # system id of who only listens
-KEPT = 200  # notes
-TOLD = 2.0  # s; what the ether has not told for longer does not hold
-KINDS = {number: kind for kind, number in NUMBERS.items()}
+LISTENER_ID = 0  # system id of who only listens
+MAX_NOTES = 200  # notes
+REPORT_LIFETIME = 2.0  # s; what the ether has not told for longer does not hold
+KIND_OF_NUMBER = {number: kind for kind, number in FAULT_NUMBERS.items()}
 
 
-class Note(NamedTuple):
+class ObserverNote(NamedTuple):
     """Something that happened: time of the own clock, s; system id, 0 for the fleet; what."""
 
     time: float
@@ -31,7 +37,7 @@ class Note(NamedTuple):
     text: str
 
 
-class Observer:
+class FleetObserver:
     """Listens to the fleet of a card.
 
     card, key : of the mission; now, utc : the own clock (s) and Unix time (µs), which run alike from then on
@@ -39,78 +45,81 @@ class Observer:
     Attributes: peers, the newest believed status of each member; notes, what happened; refused, datagrams by reason.
     """
 
-    def __init__(self, card: Card, key: bytes, *, now: float, utc: int):
+    def __init__(self, card: FlightCard, key: bytes, *, now: float, utc: int):
         self.card, self.begun = card, now
-        self._zero = utc - round(now * 1e6)
-        senders = {status.MESSAGE: card.members, orders.MESSAGE: (orders.OPERATOR, witness.WITNESS)}
+        self._clock_zero = utc - round(now * 1e6)
+        senders = {
+            status.STATUS_MESSAGE: card.members,
+            orders.TUNNEL_MESSAGE: (orders.OPERATOR_SYSTEM, witness.CHANNEL_SYSTEM),
+        }
         spread = card.safety.clock_spread + card.delay
-        self._receive = Receiver(key, NOBODY, senders, started=utc, spread=spread)
-        self._peers = Peers(card, NOBODY)
-        self.notes: deque[Note] = deque(maxlen=KEPT)
-        self._heard: dict[int, tuple[float, frozenset[int]]] = {}
+        self._receive = PacketReceiver(key, LISTENER_ID, senders, started=utc, max_clock_difference=spread)
+        self._peers = Peers(card, LISTENER_ID)
+        self.notes: deque[ObserverNote] = deque(maxlen=MAX_NOTES)
+        self._heard_reports: dict[int, tuple[float, frozenset[int]]] = {}
         self._faults: dict[str, tuple[float, frozenset[int]]] = {}
         self._silent: set[int] = set()
-        self._given = 0  # when the last order was given, µs of Unix time
+        self._last_order_time = 0  # when the last order was given, µs of Unix time
 
     # ------------------------------------------------------------------------------------------------------ in
 
     def take(self, datagram: bytes, now: float) -> None:
         """Take a datagram that came by any radio."""
-        got = self._receive(datagram, self._zero + round(now * 1e6))
+        got = self._receive(datagram, self._clock_zero + round(now * 1e6))
         if got is None:
             return
-        if got.message == status.MESSAGE:
-            told = status.status_of(got.values, self.card.site)
+        if got.message == status.STATUS_MESSAGE:
+            told = status.parse_status(got.values, self.card.site)
             if told is not None:
                 self._state(got.system, told, now)
-        elif got.system == witness.WITNESS:
-            self._witnessed(witness.told_of(got.values), now)
+        elif got.system == witness.CHANNEL_SYSTEM:
+            self._take_report(witness.parse_report(got.values), now)
         else:
             self._order(got.values, now)
 
-    def _state(self, who: int, told: status.Status, now: float) -> None:
-        peer = self.peers[who]
+    def _state(self, member: int, drone_status: status.DroneStatus, now: float) -> None:
+        peer = self.peers[member]
         new, was = peer.status is None, peer.phase
-        if not self._peers.take(who, told, (told.time - self._zero) * 1e-6, now):
+        if not self._peers.take(member, drone_status, (drone_status.time - self._clock_zero) * 1e-6, now):
             return
         if new:
-            self._note(now, who, f"heard, {peer.phase.name}")
+            self._note(now, member, f"heard, {peer.phase.name}")
         elif was != peer.phase:
-            self._note(now, who, f"{was.name} → {peer.phase.name}")
+            self._note(now, member, f"{was.name} → {peer.phase.name}")
 
-    def _witnessed(self, told: witness.Told | None, now: float) -> None:
-        if told is None:
+    def _take_report(self, report: witness.ChannelReport | None, now: float) -> None:
+        if report is None:
             return
-        if told.what == witness.HEARS and told.subject in self.peers:
-            self._heard[told.subject] = now, told.systems & self.peers.keys()
-        elif told.what in KINDS:
-            kind = KINDS[told.what]
+        if report.kind == witness.HEARS_REPORT and report.subject in self.peers:
+            self._heard_reports[report.subject] = now, report.systems & self.peers.keys()
+        elif report.kind in KIND_OF_NUMBER:
+            kind = KIND_OF_NUMBER[report.kind]
             if kind not in self._faults:
-                self._note(now, 0, f"fault {kind}: {self.named(told.systems)}")
-            self._faults[kind] = now, told.systems
+                self._note(now, 0, f"fault {kind}: {self.named(report.systems)}")
+            self._faults[kind] = now, report.systems
 
     def _order(self, values: dict[str, object], now: float) -> None:
         try:
-            order = order_of(values, self.card.operator) if self.card.operator else None
+            order = parse_order(values, self.card.operator) if self.card.operator else None
         except LinkError:  # without the library no order can be checked, and none is shown
             return
-        if order is not None and order.mission == self.card.mission and order.given > self._given:
-            self._given = order.given
-            self._note(now, order.target, f"the operator orders {order.do.name.lower().replace('_', ' ')}")
+        if order is not None and order.mission == self.card.mission and order.given_at > self._last_order_time:
+            self._last_order_time = order.given_at
+            self._note(now, order.target, f"the operator orders {order.kind.name.lower().replace('_', ' ')}")
 
     def look(self, now: float) -> None:
         """Note who fell silent or came back, and which faults are over; to be called a few times a second."""
         for who, peer in self.peers.items():
-            silent = peer.status is not None and now - peer.heard_at > FRESH
+            silent = peer.status is not None and now - peer.heard_at > HEARD_WITHIN
             if silent != (who in self._silent):
                 self._silent ^= {who}
                 self._note(now, who, "silent" if silent else "heard again")
-        for kind in [kind for kind, (at, _) in self._faults.items() if now - at > TOLD]:
+        for kind in [kind for kind, (at, _) in self._faults.items() if now - at > REPORT_LIFETIME]:
             del self._faults[kind]
             self._note(now, 0, f"fault {kind} is over")
 
     def _note(self, now: float, member: int, text: str) -> None:
-        self.notes.append(Note(now, member, text))
+        self.notes.append(ObserverNote(now, member, text))
 
     # ----------------------------------------------------------------------------------------------------- out
 
@@ -125,26 +134,31 @@ class Observer:
         return {reason: n for reason, n in (self._receive.refused | self._peers.refused).items() if n}
 
     @property
-    def accepted(self) -> int:
+    def accepted_count(self) -> int:
         """Datagrams that were accepted."""
-        return self._receive.accepted
+        return self._receive.accepted_count
 
     def heard(self, now: float) -> list[int]:
         """Members that are heard now."""
-        return [who for who, peer in self.peers.items() if now - peer.heard_at <= FRESH]
+        return [who for who, peer in self.peers.items() if now - peer.heard_at <= HEARD_WITHIN]
 
     def place(self, member: int, now: float) -> tuple[float, float, float] | None:
         """Where a member is now, m from the site: as it told, carried on by its velocity while it is heard."""
         peer = self.peers[member]
         if peer.state is None:
             return None
-        s, ahead = peer.state, min(max(now - peer.at, 0.0), FRESH)
+        s, ahead = peer.state, min(max(now - peer.at, 0.0), HEARD_WITHIN)
         x, y, z = forward(*s, ahead)
         return x, y, z
 
     def links(self, now: float) -> dict[tuple[int, int], bool]:
         """Pairs of members between whom packets arrive, and whether they do so both ways; nothing of real radios."""
-        ways = {(who, other) for who, (at, others) in self._heard.items() if now - at <= TOLD for other in others}
+        ways = {
+            (who, other)
+            for who, (at, others) in self._heard_reports.items()
+            if now - at <= REPORT_LIFETIME
+            for other in others
+        }
         return {(a, b): (b, a) in ways for a, b in ways if a < b or (b, a) not in ways}
 
     @property
@@ -154,7 +168,7 @@ class Observer:
 
     def flying(self, now: float) -> list[int]:
         """Members that are heard now and fly."""
-        return [who for who in self.heard(now) if self.peers[who].flies]
+        return [who for who in self.heard(now) if self.peers[who].is_flying]
 
     def named(self, systems: frozenset[int]) -> str:
         """System ids in words."""
@@ -164,6 +178,12 @@ class Observer:
         return f"drone{'s' * (len(known) > 1)} {', '.join(map(str, known))}"
 
 
-def on_ground(phase: Phase) -> bool:
+def is_on_ground(phase: MissionPhase) -> bool:
     """Whether a drone in this phase has not started, or has landed."""
-    return phase in (Phase.BOOT, Phase.READY, Phase.CLEARED, Phase.ARMING, Phase.DONE)
+    return phase in (
+        MissionPhase.BOOT,
+        MissionPhase.READY,
+        MissionPhase.CLEARED,
+        MissionPhase.ARMING,
+        MissionPhase.DONE,
+    )

@@ -7,29 +7,25 @@ from typing import Any
 
 from shapely.geometry import Polygon
 
-from airflock.core.parameters import Parameters
-from airflock.core.radio import forward
-from airflock.core.silence import complete
-from airflock.drones.onboard.card import VERSION
-from airflock.drones.onboard.safety import Safety
-from airflock.fleets.individuals import records_of
-from airflock.parts.bodies.motion import Parameters as Multirotor
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import CardError
-from airflock.world import arena
-from airflock.world.place import inward
+from airflock.core import Parameters, forward, with_defaults
+from airflock.drones import CARD_VERSION, SafetyLimits
+from airflock.fleets.individuals import agent_records
+from airflock.parts.bodies import Parameters as Multirotor
+from airflock.scenarios import Scenario
+from airflock.support import CardError
+from airflock.world import arena, inward_plane
 
-HEIGHT = 20.0  # m; our choice: above trees and people, below most limits
-MARGIN = 30.0  # m; our choice: a flock turns some metres beyond the law's soft walls
-SPARE = 10.0  # m between the highest layer and the fence
-CIRCLE = 16  # sides of the polygon around a circular arena
+DEFAULT_HEIGHT = 20.0  # m; our choice: above trees and people, below most limits
+DEFAULT_FENCE_MARGIN = 30.0  # m; our choice: a flock turns some metres beyond the law's soft walls
+FENCE_HEADROOM = 10.0  # m between the highest layer and the fence
+CIRCLE_SIDES = 16  # sides of the polygon around a circular arena
 
 
-def card_document(
+def make_card_document(
     scenario: Scenario, *, site: tuple[float, float, float], members: Sequence[int], mission: int, expires: int,
-    operator: bytes = b"", autopilot: str = "px4", height: float | None = None, margin: float = MARGIN,
+    operator: bytes = b"", autopilot: str = "px4", height: float | None = None, margin: float = DEFAULT_FENCE_MARGIN,
     as_simulated: bool = False, seed: int | None = None, safety: Mapping[str, Any] | None = None,
-    silent: bool | None = None,
+    stop_for_lost: bool | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Document of a flight card, without its hash.
 
@@ -45,17 +41,19 @@ def card_document(
     Raises CardError where the scenario has no walls, or where neighbours are seen instead of heard, or where its law
     or its topology is not in the package.
     """
-    _refuse_unflyable(scenario)
-    limits = replace(limits_of(scenario), **(safety or {}))
+    _check_flyable(scenario)
+    limits = replace(default_safety(scenario), **(safety or {}))
     low, high = arena.heights_of(scenario.world) if scenario.dimensions == 3 else (0.0, 0.0)
-    height = max(HEIGHT, limits.base - low) if height is None else height
+    height = max(DEFAULT_HEIGHT, limits.base - low) if height is None else height
     top = limits.base + limits.layer * (len(members) - 1)
     stands = scenario.stands()
-    held = not scenario.transceiver.keeps
-    silent = not as_simulated or scenario.silence.rule == "stop" if silent is None else silent
-    silence = complete(scenario.silence, _speed(scenario), scenario.radio.delay, "stop" if silent else "fly_on")
+    held = not scenario.transceiver.keeps_packets
+    stop_for_lost = not as_simulated or scenario.silence.rule == "stop" if stop_for_lost is None else stop_for_lost
+    silence = with_defaults(
+        scenario.silence, _preferred_speed(scenario), scenario.radio.delay, "stop" if stop_for_lost else "fly_on"
+    )
     return {
-        "airflock_card": VERSION,
+        "airflock_card": CARD_VERSION,
         "name": scenario.name,
         "mission": mission,
         "expires": expires,
@@ -63,11 +61,11 @@ def card_document(
         "members": list(members),
         "operator": operator.hex(),
         "autopilot": autopilot,
-        "law": {"kind": scenario.model.name, **plain(scenario.parameters)},
-        "body": {"kind": scenario.vehicle.name, **plain(scenario.body)},
-        "own": _own(scenario, records_of(scenario, len(members), seed)),
-        **_groups(scenario, len(members)),
-        "world": plain(scenario.world),
+        "law": {"kind": scenario.model.name, **to_json_table(scenario.parameters)},
+        "body": {"kind": scenario.vehicle.name, **to_json_table(scenario.body)},
+        "own": _member_differences(scenario, agent_records(scenario, len(members), seed)),
+        **_group_numbers(scenario, len(members)),
+        "world": to_json_table(scenario.world),
         "shapes": {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()},
         "radio": {
             "delay": scenario.radio.delay,
@@ -75,13 +73,13 @@ def card_document(
             "forget": 5.0,
             **({"once": held, "any_stamp": True} if as_simulated else {}),
         },
-        "silence": plain(silence),
-        **({"topology": plain(scenario.topology)} if scenario.meets is not None else {}),
-        "safety": plain(limits),
+        "silence": to_json_table(silence),
+        **({"topology": to_json_table(scenario.topology)} if scenario.topology_rule is not None else {}),
+        "safety": to_json_table(limits),
         "fence": {
-            "corners": outline(scenario.world, margin),
+            "corners": fence_corners(scenario.world, margin),
             "low": min(2.0, 0.5 * limits.base),
-            "high": max(height + high, top) + SPARE,
+            "high": max(height + high, top) + FENCE_HEADROOM,
         },
         "height": height,
         "period": scenario.sensors.period or scenario.flight.dt,
@@ -89,7 +87,7 @@ def card_document(
     }
 
 
-def left_off(scenario: Scenario) -> list[str]:
+def omission_notes(scenario: Scenario) -> list[str]:
     """What of a scenario no card holds, in a line for each: real drones bring their own."""
     kinds = ", ".join(dict.fromkeys(entry.fault.name for entry in scenario.faults))
     spread = ", ".join(dict.fromkeys(key for group in scenario.groups for _, key in group.spread))
@@ -97,7 +95,7 @@ def left_off(scenario: Scenario) -> list[str]:
     return [f"the card leaves off the scenario's {what}: {names}" for what, names in said.items() if names]
 
 
-def beside_the_scenario(scenario: Scenario, safety: Safety, members: int) -> list[str]:
+def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> list[str]:
     """What of a card the scenario did not fly, in a line for each: its scores and certificates do not speak of it."""
     told = []
     if members != scenario.agents:
@@ -105,7 +103,7 @@ def beside_the_scenario(scenario: Scenario, safety: Safety, members: int) -> lis
             f"the card is for {members} drones, the scenario flies {scenario.agents}: scores and certificates of it do "
             f"not speak of {members}"
         )
-    likely = limits_of(scenario)
+    likely = default_safety(scenario)
     if safety.response < likely.response:
         told.append(
             f"response = {safety.response:g} s is shorter than what the scenario gives a card, {likely.response:g} s: "
@@ -120,7 +118,7 @@ def beside_the_scenario(scenario: Scenario, safety: Safety, members: int) -> lis
     return told
 
 
-def _refuse_unflyable(scenario: Scenario) -> None:
+def _check_flyable(scenario: Scenario) -> None:
     """Raise a CardError where a scenario has what no card can hold."""
     fault = ""
     others = [
@@ -141,14 +139,14 @@ def _refuse_unflyable(scenario: Scenario) -> None:
         raise CardError([f"{scenario.name}: {fault}"])
 
 
-def _own(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:
+def _member_differences(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:
     """Of each member the numbers of law and body in which it differs from the flock; none where all are alike."""
-    base = {"law": plain(scenario.parameters), "body": plain(scenario.body)}
+    base = {"law": to_json_table(scenario.parameters), "body": to_json_table(scenario.body)}
     if not scenario.varied and len(scenario.laws) == 1:
         return []
     rows = [
         {
-            part: {k: v for k, v in plain(record).items() if v != base[part].get(k)}
+            part: {k: v for k, v in to_json_table(record).items() if v != base[part].get(k)}
             for part, record in zip(base, own, strict=True)
         }
         for own in records
@@ -156,44 +154,44 @@ def _own(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[st
     for agent, ((p, _), row) in enumerate(zip(records, rows, strict=True)):
         law = scenario.law_of(agent).model
         if law.name != scenario.model.name:
-            row["law"] = {"kind": law.name, **plain(p)}
+            row["law"] = {"kind": law.name, **to_json_table(p)}
     return rows
 
 
-def _groups(scenario: Scenario, count: int) -> dict[str, list[int]]:
+def _group_numbers(scenario: Scenario, count: int) -> dict[str, list[int]]:
     """Of each member the number of its group, where a law asks for it."""
-    asked = scenario.groups and any(law.asks_for_groups for law in scenario.laws)
-    return {"groups": list(scenario.group_numbers[:count])} if asked else {}
+    asked = scenario.groups and any(law.uses_groups for law in scenario.laws)
+    return {"groups": list(scenario.group_indices[:count])} if asked else {}
 
 
-def limits_of(scenario: Scenario) -> Safety:
+def default_safety(scenario: Scenario) -> SafetyLimits:
     """Limits that follow from a scenario: half as fast again as its law prefers, as agile as its body."""
     body = scenario.body if isinstance(scenario.body, Multirotor) else Multirotor()
-    return Safety(
-        speed_max=min(1.5 * _speed(scenario), 60.0),
+    return SafetyLimits(
+        speed_max=min(1.5 * _preferred_speed(scenario), 60.0),
         accel=min(body.a_max, 50.0),
         response=body.tau,
         mission_time=min(max(scenario.flight.duration, 1.0), 36000.0),
     )
 
 
-def _speed(scenario: Scenario) -> float:
+def _preferred_speed(scenario: Scenario) -> float:
     preferred = scenario.model.preferred_speed
     return float(preferred(scenario.parameters)) if preferred else 4.0
 
 
-def outline(world: arena.Parameters, margin: float) -> list[list[float]]:
+def fence_corners(world: arena.Parameters, margin: float) -> list[list[float]]:
     """Corners of a fence around an arena, margin (m) outside its walls."""
     if world.arena == "circle":
-        reach = (world.radius + margin) / math.cos(math.pi / CIRCLE)
-        angles = [2.0 * math.pi * k / CIRCLE for k in range(CIRCLE)]
+        reach = (world.radius + margin) / math.cos(math.pi / CIRCLE_SIDES)
+        angles = [2.0 * math.pi * k / CIRCLE_SIDES for k in range(CIRCLE_SIDES)]
         return [[reach * math.cos(a), reach * math.sin(a)] for a in angles]
     if world.arena == "polygon":
         wider = Polygon(world.corners).buffer(margin, join_style="mitre")
         return [[x, y] for x, y in wider.exterior.coords[:-1]]
     h = 0.5 * world.side
     ring = [(-h, -h), (h, -h), (h, h), (-h, h)]
-    sides = [inward(a, b) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
+    sides = [inward_plane(a, b) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
     corners = []
     for one, two in zip([sides[-1], *sides[:-1]], sides, strict=True):  # each corner moves with its two sides
         a, b, _, d = one
@@ -204,7 +202,7 @@ def outline(world: arena.Parameters, margin: float) -> list[list[float]]:
     return corners
 
 
-def plain(record: Parameters) -> dict[str, Any]:
+def to_json_table(record: Parameters) -> dict[str, Any]:
     """A record as a table for JSON; numbers that were left to the scenario are left out."""
     return {key: _listed(value) for key, value in asdict(record).items() if value is not None}
 

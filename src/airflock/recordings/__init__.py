@@ -1,1 +1,5 @@
 """Trajectories as labelled datasets, simulated or flown, and their scores."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -12,32 +12,31 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock.parts.faults.registry import KINDS
-from airflock.recordings.layout import EAST_NORTH_UP, FRAME, check_dataset
-from airflock.scenarios.laws import MODELS
-from airflock.support.errors import RecordingError, bounded
-from airflock.support.untrusted import from_outside, json_object
+from airflock.parts.faults import KINDS
+from airflock.recordings.layout import EAST_NORTH_UP, FRAME_ATTRIBUTE, check_dataset
+from airflock.scenarios import MODELS
+from airflock.support import RecordingError, as_error, parse_json_object, shortened
 
-FORMAT = 2
-FORMAT_KEY, CHECKSUM, LAW = "airflock_format", "airflock_checksum", "airflock_law"
-EVENTS, FAULTS = "airflock_events", "airflock_faults"
+RECORDING_FORMAT = 2
+FORMAT_ATTRIBUTE, CHECKSUM_ATTRIBUTE, LAW_ATTRIBUTE = "airflock_format", "airflock_checksum", "airflock_law"
+EVENTS, FAULTS_ATTRIBUTE = "airflock_events", "airflock_faults"
 
 
 def check_format(recording: xr.Dataset, where: str = "recording") -> None:
     """Raise RecordingError for what is no dataset, and for a format that only a newer Airflock knows."""
     check_dataset(recording, where)
-    found = whole_number(recording, FORMAT_KEY, 1, where)
-    if not 1 <= found <= FORMAT:
-        raise RecordingError(f"{where}: is of format {found}; this Airflock reads formats 1 to {FORMAT}")
+    found = read_integer(recording, FORMAT_ATTRIBUTE, 1, where)
+    if not 1 <= found <= RECORDING_FORMAT:
+        raise RecordingError(f"{where}: is of format {found}; this Airflock reads formats 1 to {RECORDING_FORMAT}")
 
 
-def whole_number(recording: xr.Dataset, name: str, usual: int | None = None, where: str = "recording") -> int:
+def read_integer(recording: xr.Dataset, name: str, default: int | None = None, where: str = "recording") -> int:
     """A whole number of the attributes; `usual` where it is missing. Raises RecordingError for anything else."""
-    value: Any = recording.attrs.get(name, usual)
+    value: Any = recording.attrs.get(name, default)
     if isinstance(value, (float, np.floating)) and np.isfinite(value) and value == int(value):
         value = int(value)
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not -(2**64) < int(value) < 2**64:
-        told = "is missing" if value is None else f"= {bounded(repr(value), 60)} is not a whole number"
+        told = "is missing" if value is None else f"= {shortened(repr(value), 60)} is not a whole number"
         raise RecordingError(f"{where}: attribute {name} {told}")
     return int(value)
 
@@ -50,21 +49,21 @@ def scenario_document(recording: xr.Dataset) -> dict[str, Any] | None:
     return found
 
 
-def name_of(recording: xr.Dataset) -> str:
+def recording_name(recording: xr.Dataset) -> str:
     """What to call a recording: its scenario's name, or that of the file that its tracks came from."""
     files = str(recording.attrs.get("source_file") or "").split(", ")
     first = files[0].rpartition("/")[2].rpartition(".")[0] or files[0]
     more = f" and {len(files) - 1} more" if len(files) > 1 else ""
-    return str(recording.attrs.get("airflock_name") or f"{bounded(first, 60) or 'recording'}{more}")
+    return str(recording.attrs.get("airflock_name") or f"{shortened(first, 60) or 'recording'}{more}")
 
 
-def axes_of(recording: xr.Dataset) -> tuple[str, str, str]:
+def axis_names(recording: xr.Dataset) -> tuple[str, str, str]:
     """What to call the axes: east, north, up of flights and of tracks on the ground; else x, y, z, as of a tank."""
-    known = recording.attrs.get("airflock_scenario") or recording.attrs.get(FRAME) == EAST_NORTH_UP
+    known = recording.attrs.get("airflock_scenario") or recording.attrs.get(FRAME_ATTRIBUTE) == EAST_NORTH_UP
     return ("east", "north", "up") if known else ("x", "y", "z")
 
 
-def measured_by(recording: xr.Dataset) -> dict[str, Any]:
+def metrics_settings(recording: xr.Dataset) -> dict[str, Any]:
     """What a flight was measured by: the section [metrics] with all its values."""
     return _object(recording, "airflock_metrics") or {}
 
@@ -73,11 +72,11 @@ def _object(recording: xr.Dataset, name: str) -> dict[str, Any] | None:
     text = recording.attrs.get(name)
     if text is None or (isinstance(text, str) and not text):
         return None
-    with from_outside(f"recording: attribute {name} is damaged", RecordingError):
-        return json_object(text)
+    with as_error(f"recording: attribute {name} is damaged", RecordingError):
+        return parse_json_object(text)
 
 
-def events(recording: xr.Dataset) -> list[Any]:
+def recorded_events(recording: xr.Dataset) -> list[Any]:
     """What was done to the flight on its way, as `simulate(..., events=...)` takes it."""
     found = (_object(recording, EVENTS) or {}).get("events", [])
     if not isinstance(found, list):
@@ -85,54 +84,54 @@ def events(recording: xr.Dataset) -> list[Any]:
     return found
 
 
-def faults(recording: xr.Dataset) -> list[dict[str, Any]]:
+def recorded_faults(recording: xr.Dataset) -> list[dict[str, Any]]:
     """Faults that befell agents in flight: kind, agent, and when they began and ended (s; None: they did not end)."""
-    found = (_object(recording, FAULTS) or {}).get("faults", [])
+    found = (_object(recording, FAULTS_ATTRIBUTE) or {}).get("faults", [])
     sound = isinstance(found, list) and all(
         isinstance(entry, Mapping) and {"kind", "agent", "begin", "end"} <= set(entry) and _instant(entry["begin"])
         for entry in found
     )
     if not sound:
-        raise RecordingError(f"recording: attribute {FAULTS} is damaged: it holds no list of faults")
+        raise RecordingError(f"recording: attribute {FAULTS_ATTRIBUTE} is damaged: it holds no list of faults")
     return [dict(entry) for entry in found]
 
 
-def told_faults(found: list[dict[str, Any]], most: int = 6) -> str:
+def faults_line(faults: list[dict[str, Any]], max_faults: int = 6) -> str:
     """Faults in one line for a person: what, who and when."""
-    lines = [f"{each['kind']} of agent {each['agent']} at {each['begin']:g} s" for each in found[:most]]
-    more = f", and {len(found) - most} more" if len(found) > most else ""
-    return f"{len(found)} fault{'s' if len(found) > 1 else ''}: {', '.join(lines)}{more}"
+    lines = [f"{each['kind']} of agent {each['agent']} at {each['begin']:g} s" for each in faults[:max_faults]]
+    more = f", and {len(faults) - max_faults} more" if len(faults) > max_faults else ""
+    return f"{len(faults)} fault{'s' if len(faults) > 1 else ''}: {', '.join(lines)}{more}"
 
 
 def _instant(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 <= value < 1e9
 
 
-def flown_with_own_law(recording: xr.Dataset) -> bool:
+def uses_user_law(recording: xr.Dataset) -> bool:
     """Whether the law, that of a group, or a kind of fault was the user's own, which is not in the recording."""
     document = scenario_document(recording)
     if document is None:
         return False
-    laws = [str(law.get("kind")) for law in tables_of(document, "model")] or [""]
-    faults = [str(fault.get("kind")) for fault in tables_of(document, "faults")]
+    laws = [str(law.get("kind")) for law in tables_under_key(document, "model")] or [""]
+    faults = [str(fault.get("kind")) for fault in tables_under_key(document, "faults")]
     own = any(kind not in MODELS for kind in laws) or any(kind not in KINDS for kind in faults)
-    return LAW in recording.attrs or own or bool(own_laws_of_groups(document))
+    return LAW_ATTRIBUTE in recording.attrs or own or bool(user_group_laws(document))
 
 
-def own_laws_of_groups(document: Mapping[str, Any]) -> list[str]:
+def user_group_laws(document: Mapping[str, Any]) -> list[str]:
     """Names of laws of groups that were the user's own."""
-    laws = [law for group in tables_of(document, "groups") for law in tables_of(group, "model")]
+    laws = [law for group in tables_under_key(document, "groups") for law in tables_under_key(group, "model")]
     return [kind for kind in (str(law["kind"]) for law in laws if "kind" in law) if kind not in MODELS]
 
 
-def tables_of(document: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
+def tables_under_key(document: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
     """Tables under a key of a scenario that nobody has checked yet: one, those of a list, or none."""
     found = document.get(key)
     entries = found if isinstance(found, list) else [found]
     return [entry for entry in entries if isinstance(entry, Mapping)]
 
 
-def checksum(recording: xr.Dataset) -> str:
+def recording_checksum(recording: xr.Dataset) -> str:
     """Hash of all arrays and attributes but itself, the same before saving and after loading."""
     found = hashlib.sha256()
     for name in sorted(map(str, recording.variables)):
@@ -142,7 +141,7 @@ def checksum(recording: xr.Dataset) -> str:
         found.update(f"{name} {recording[name].dims} {plain.shape}\n".encode())
         found.update(content)
     for name in sorted(recording.attrs):
-        if name != CHECKSUM:
+        if name != CHECKSUM_ATTRIBUTE:
             found.update(f"{name} {_plain(recording.attrs[name])!r}\n".encode())
     return found.hexdigest()
 

@@ -11,19 +11,11 @@ import xarray as xr
 
 from airflock.recordings import attributes
 from airflock.recordings.flights import provenance, simulate
-from airflock.recordings.isolated import Opening
-from airflock.recordings.layout import check
-from airflock.recordings.own_kinds import refuse_without_files, with_files
-from airflock.scenarios.families import Given
-from airflock.scenarios.laws import given_law
-from airflock.scenarios.making import make
-from airflock.scenarios.own_code import law_hash
-from airflock.scenarios.scenario import Scenario
-from airflock.support import atomic
-from airflock.support.errors import RecordingError
-from airflock.support.machine import processor
-from airflock.support.suffixes import RECORDINGS, suffix_fault
-from airflock.support.untrusted import from_outside, path_of
+from airflock.recordings.isolated import ReaderProcess
+from airflock.recordings.layout import check_recording
+from airflock.recordings.own_kinds import require_user_files, with_user_files
+from airflock.scenarios import CallerParts, Scenario, build_scenario, law_from_caller, law_hash
+from airflock.support import RECORDINGS, RecordingError, as_error, atomic, processor_name, suffix_error, to_path
 
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
@@ -57,26 +49,26 @@ def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     >>> airflock.save(airflock.simulate(short), "flight.nc").name
     'flight.nc'
     """
-    target = path_of(path)
-    check(recording, str(target))
-    wrong = suffix_fault(target, RECORDINGS)
+    target = to_path(path)
+    check_recording(recording, str(target))
+    wrong = suffix_error(target, RECORDINGS)
     if wrong:
         raise RecordingError(wrong)
     if target.is_dir():
         raise RecordingError(f"{target}: is a folder; give a file name ending in .nc")
     if "airflock_scenario" in recording.attrs:  # a log of someone else's is no recording of ours
-        recording = recording.assign_attrs({attributes.FORMAT_KEY: attributes.FORMAT})
-        recording = recording.assign_attrs({attributes.CHECKSUM: attributes.checksum(recording)})
+        recording = recording.assign_attrs({attributes.FORMAT_ATTRIBUTE: attributes.RECORDING_FORMAT})
+        recording = recording.assign_attrs({attributes.CHECKSUM_ATTRIBUTE: attributes.recording_checksum(recording)})
     try:
         packed = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
         content = recording.to_netcdf(None, engine="h5netcdf", encoding=packed)
-        atomic.write(target, content)
+        atomic.write_file(target, content)
     except OSError as fault:
         raise RecordingError(f"{target}: cannot be written: {fault.strerror or fault}; nothing was saved") from fault
     return target
 
 
-def load_recording(path: str | os.PathLike[str] | Opening) -> xr.Dataset:
+def load_recording(path: str | os.PathLike[str] | ReaderProcess) -> xr.Dataset:
     """Read a recording, in a process of its own.
 
     Parameters
@@ -107,19 +99,19 @@ def load_recording(path: str | os.PathLike[str] | Opening) -> xr.Dataset:
     Traceback (most recent call last):
     airflock.support.errors.RecordingError: nowhere.nc: no such file
     """
-    opening = path if isinstance(path, Opening) else Opening(path)
+    opening = path if isinstance(path, ReaderProcess) else ReaderProcess(path)
     recording: xr.Dataset = opening.answer()
     where = str(opening.path)
-    with from_outside(where, RecordingError):
-        check(recording, where)
+    with as_error(where, RecordingError):
+        check_recording(recording, where)
         attributes.check_format(recording, where)
-        noted = recording.attrs.get(attributes.CHECKSUM)
-        if noted is not None and noted != attributes.checksum(recording):
+        noted = recording.attrs.get(attributes.CHECKSUM_ATTRIBUTE)
+        if noted is not None and noted != attributes.recording_checksum(recording):
             warnings.warn(f"{where}: was changed since Airflock wrote it", stacklevel=2)
     return recording
 
 
-def fly_again(
+def replay_recording(
     recording: xr.Dataset, law: Any = None, settings: Mapping[str, Any] | None = None, *, trust: bool = False
 ) -> tuple[bool, list[str]]:
     """Fly a simulated recording again from its attributes.
@@ -130,22 +122,22 @@ def fly_again(
     Returns whether all positions have the same bits, and what differs between then and now that could explain it.
     """
     document = attributes.scenario_document(recording)
-    if document is None or not attributes.whole_number(recording, "random_start", 1):
+    if document is None or not attributes.read_integer(recording, "random_start", 1):
         raise RecordingError("recording: was not flown from a scenario and a seed, so it cannot be flown again")
-    own = given_law(law) if law is not None else None
+    own = law_from_caller(law) if law is not None else None
     _refuse_missing_laws(recording, document, own)
-    refuse_without_files(document, settings or {})
-    document, _ = with_files(document, settings or {})
+    require_user_files(document, settings or {})
+    document, _ = with_user_files(document, settings or {})
     name = str(recording.attrs.get("airflock_name", "recording"))
-    scenario = make(document, name, given=Given(law=own), trust=trust)
-    seed = attributes.whole_number(recording, "airflock_seed")
-    precision = attributes.whole_number(recording, "airflock_precision", 32)
+    scenario = build_scenario(document, name, caller_parts=CallerParts(law=own), trust=trust)
+    seed = attributes.read_integer(recording, "airflock_seed")
+    precision = attributes.read_integer(recording, "airflock_precision", 32)
     again = simulate(
         scenario,
         seed,
         precision=precision,
         device=str(recording.attrs.get("airflock_device", "cpu")),
-        events=attributes.events(recording),
+        events=attributes.recorded_events(recording),
     )
     same = again["position"].shape == recording["position"].shape and bool(
         np.array_equal(again["position"].values, recording["position"].values, equal_nan=True)
@@ -155,13 +147,13 @@ def fly_again(
 
 def _refuse_missing_laws(recording: xr.Dataset, document: Mapping[str, Any], own: Any) -> None:
     """Raise a RecordingError for a law of the user's own that the recording names, and nobody gives."""
-    if own is None and attributes.flown_with_own_law(recording):
+    if own is None and attributes.uses_user_law(recording):
         name = document.get("model", {}).get("kind")
         raise RecordingError(
             f"recording: was flown with a law of its own, {name!r}, which is not in the file; give it with "
             "--law FILE.py (in Python: law=...)"
         )
-    for name in attributes.own_laws_of_groups(document):
+    for name in attributes.user_group_laws(document):
         raise RecordingError(
             f"recording: a group was flown with a law of its own, {name!r}, which is not in the file; it can be "
             "scored and drawn, but not flown again"
@@ -176,11 +168,11 @@ def _differences(recording: xr.Dataset, scenario: Scenario, now: Mapping[str, An
         "airflock_toolchain": "compiler",
         "airflock_processor": "processor",
     }
-    then, now = recording.attrs, {**now, "airflock_processor": processor()}
+    then, now = recording.attrs, {**now, "airflock_processor": processor_name()}
     found = [
         f"{text}: {then.get(key)} then, {now[key]} now" for key, text in words.items() if then.get(key) != now[key]
     ]
-    noted, flown = then.get(attributes.LAW), law_hash(scenario.model)
+    noted, flown = then.get(attributes.LAW_ATTRIBUTE), law_hash(scenario.model)
     if noted is not None and noted != flown:
         found.insert(0, f"law: {noted} then, {flown} now")
     return found

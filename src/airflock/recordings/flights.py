@@ -12,20 +12,12 @@ import numpy as np
 import xarray as xr
 
 from airflock import __version__
-from airflock.engine import Flight, driver_text, fly, picked
-from airflock.recordings.attributes import FAULTS
-from airflock.recordings.layout import dataset
-from airflock.recordings.perception import finish_keeping, sound
-from airflock.scenarios.events import Event
-from airflock.scenarios.files import loaded
-from airflock.scenarios.groups import names_of
-from airflock.scenarios.laws import MODELS
-from airflock.scenarios.own_code import law_hash
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.seeds import sound_seed
-from airflock.scenarios.timing import clock
-from airflock.support.errors import FlightError
-from airflock.support.machine import processor, toolchain
+from airflock.engine import Flight, driver_text, fly_world, pick_device
+from airflock.recordings.attributes import FAULTS_ATTRIBUTE
+from airflock.recordings.layout import make_dataset
+from airflock.recordings.perception import check_keep, finish_keeping
+from airflock.scenarios import MODELS, Event, Scenario, check_seed, group_names, law_hash, load_if_named, step_counts
+from airflock.support import FlightError, processor_name, toolchain_versions
 
 
 def simulate(
@@ -85,10 +77,10 @@ def simulate(
     >>> dict(recording.position.sizes)
     {'time': 6, 'space': 2, 'keypoint': 1, 'individual': 4}
     """
-    seed = sound_seed(seed)
-    scenario = loaded(scenario).in_flight(seed)
-    sound(keep, events, scenario)
-    device = picked([scenario], device, precision=precision, record=True, say=say)
+    seed = check_seed(seed)
+    scenario = load_if_named(scenario).with_drawn_scene(seed)
+    check_keep(keep, events, scenario)
+    device = pick_device([scenario], device, precision=precision, record=True, notify=say)
     if device in Flight.DEVICES:
         flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events, device=device)
         perceived = finish_keeping(flight, keep) if keep else {}
@@ -98,17 +90,17 @@ def simulate(
         raise FlightError(
             f"{'events' if events else 'keep'}: a flight on device = {device} takes none; choose device = cpu or python"
         )
-    flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
+    flown = fly_world(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
-    times = np.arange(len(flown.frames)) * clock(scenario)["sample_every"] * scenario.flight.dt
+    times = np.arange(len(flown.frames)) * step_counts(scenario)["sample_every"] * scenario.flight.dt
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None), "airflock_device": device}
-    return dataset(
+    return make_dataset(
         flown.frames,
         scenario.dimensions,
         times,
         attributes,
         scenario.model.command,
-        names_of(scenario.groups, scenario.agents),
+        group_names(scenario.groups, scenario.agents),
     )
 
 
@@ -145,12 +137,14 @@ def recording_of(flight: Flight) -> xr.Dataset:
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}
     attributes |= {"airflock_device": flight.device} if flight.device != "cpu" else {}
     if flight.events:
-        attributes["airflock_events"] = json.dumps({"events": [plain(event.plain()) for event in flight.events]})
+        attributes["airflock_events"] = json.dumps(
+            {"events": [to_plain_values(event.plain()) for event in flight.events]}
+        )
     if flight.faults:
-        attributes[FAULTS] = json.dumps({"faults": plain(flight.faults)})
-    return dataset(
+        attributes[FAULTS_ATTRIBUTE] = json.dumps({"faults": to_plain_values(flight.faults)})
+    return make_dataset(
         flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command,
-        names_of(scenario.groups, scenario.agents),
+        group_names(scenario.groups, scenario.agents),
     )  # fmt: skip
 
 
@@ -159,22 +153,22 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
     text = driver_text(scenario, precision=precision)
     own = scenario.document.get("model", {}).get("kind") not in MODELS
     return {
-        "airflock_scenario": json.dumps(flown_document(scenario)),
+        "airflock_scenario": json.dumps(bare_document(scenario)),
         "airflock_name": scenario.name,
-        "airflock_metrics": json.dumps(asdict(scenario.measured_by())),
+        "airflock_metrics": json.dumps(asdict(scenario.resolved_metrics())),
         "airflock_seed": seed,
         "airflock_precision": precision,
         "airflock_version": __version__,
         "airflock_sources": hashlib.sha256(text.encode()).hexdigest(),
-        "airflock_toolchain": toolchain(),
-        "airflock_processor": processor(),
+        "airflock_toolchain": toolchain_versions(),
+        "airflock_processor": processor_name(),
         **({"airflock_law": law_hash(scenario.model)} if own else {}),
     }
 
 
-def flown_document(scenario: Scenario) -> dict[str, Any]:
+def bare_document(scenario: Scenario) -> dict[str, Any]:
     """The scenario as plain values, of which code of the user's own is its bare name: no file, and no place of one."""
-    document: dict[str, Any] = plain(scenario.document)
+    document: dict[str, Any] = to_plain_values(scenario.document)
     for section in ("model", "body", "sensors", "metrics"):
         table = document.get(section, {})
         kind = table.get("kind") if isinstance(table, dict) else None
@@ -187,10 +181,10 @@ def flown_document(scenario: Scenario) -> dict[str, Any]:
     return document
 
 
-def plain(value: Any) -> Any:
+def to_plain_values(value: Any) -> Any:
     """A nested dict of plain Python values, for JSON."""
     if isinstance(value, dict) or hasattr(value, "items"):
-        return {str(key): plain(entry) for key, entry in value.items()}
+        return {str(key): to_plain_values(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
+        return [to_plain_values(entry) for entry in value]
     return value

@@ -6,22 +6,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock.core.contract import Model
-from airflock.core.parameters import Parameters, declarations, number_names
-from airflock.core.radio import Packets
-from airflock.core.vocabulary import Own, asks
+from airflock.core import Model, Own, PacketParameters, Parameters, argument_names, declarations, number_names
 from airflock.parts.aero import descent
-from airflock.parts.metrics.registry import POWER, SETS
-from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
-from airflock.recordings.layout import frames_of
-from airflock.recordings.own_kinds import missing_kinds, with_files
-from airflock.scenarios.document import keyed
-from airflock.scenarios.families import Given
-from airflock.scenarios.making import make
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.sections import SECTIONS
-from airflock.support.errors import RecordingError
-from airflock.support.untrusted import from_outside
+from airflock.parts.metrics import POWER_SETTINGS, SETS
+from airflock.recordings.attributes import check_format, metrics_settings, scenario_document, uses_user_law
+from airflock.recordings.layout import recording_frames
+from airflock.recordings.own_kinds import missing_user_parts, with_user_files
+from airflock.scenarios import SECTIONS, CallerParts, Scenario, build_scenario, settings_dict
+from airflock.support import RecordingError, as_error
 
 
 class _Nothing(Parameters):
@@ -37,19 +29,21 @@ def _on(own: Own) -> tuple[float, float, float]:
 UNKNOWN = Model(name="unknown", Parameters=_Nothing, command="velocity", decide=_on)
 
 
-def aero_settings(recording: xr.Dataset, changed: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def power_settings(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Settings that measure the power of a recording's geometry; `changed` goes before them.
 
     A law that solves for the wings of the flock flies in a frame that moves with the air; elsewhere forward is the
     flock's mean heading.
     """
-    law = scenario_of(recording).model
-    on_wings = law.flock is not None and law.flock is not descent.flock and "wing" in asks(law.flock, "flock")
+    law = scenario_of_recording(recording).model
+    on_wings = law.flock is not None and law.flock is not descent.flock and "wing" in argument_names(law.flock, "flock")
     frame = {} if on_wings else {"wing.frame": "ground"}
-    return {**POWER, **frame, **(changed or {})}
+    return {**POWER_SETTINGS, **frame, **(settings or {})}
 
 
-def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> Scenario:
+def scenario_of_recording(
+    recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False
+) -> Scenario:
     """Scenario that a recording was flown with, or for a flight log one that only says how to score it.
 
     A law, a body or a metric set of the user's own is not in the file: the law is unknown then, and the others are the
@@ -58,11 +52,11 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
     """
     check_format(recording)
     document = scenario_document(recording)
-    settings = keyed(settings, str(recording.attrs.get("airflock_name", "recording")))
+    settings = settings_dict(settings, str(recording.attrs.get("airflock_name", "recording")))
     if document is not None:
-        with from_outside(str(recording.attrs.get("airflock_name", "recording")), RecordingError):
+        with as_error(str(recording.attrs.get("airflock_name", "recording")), RecordingError):
             return _flown(document, settings, recording, trust)
-    frames, period, _ = frames_of(recording)
+    frames, period, _ = recording_frames(recording)
     dims = frames.shape[1] // 2
     speed = float(np.nanmean(np.linalg.norm(frames[:, dims:], axis=1)))
     document = {
@@ -73,14 +67,14 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
         "metrics": {"v_flock": max(speed, 0.01), "r_cluster": 80.0, "r_comm": 80.0, "period": period},
         "world": {"dimensions": str(dims), "arena": "none"},
     }
-    return make(document, "recording", settings, given=Given(law=UNKNOWN), trust=trust)
+    return build_scenario(document, "recording", settings, caller_parts=CallerParts(law=UNKNOWN), trust=trust)
 
 
 def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dataset, trust: bool) -> Scenario:
     """Scenario of a simulated recording, with stand-ins for what the file does not hold and nobody gave."""
     name = str(recording.attrs.get("airflock_name", "recording"))
-    missing = missing_kinds(document, given)
-    document, settings = with_files(document, given)
+    missing = missing_user_parts(document, given)
+    document, settings = with_user_files(document, given)
     if "metrics" in missing:
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
     if "body" in missing:
@@ -88,13 +82,13 @@ def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dat
     if "sensors" in missing:
         document = {**document, "sensors": {k: v for k, v in document["sensors"].items() if k == "period"}}
     if "radio" in missing:
-        common = {key: value for key, value in document["radio"].items() if key in number_names(Packets)}
+        common = {key: value for key, value in document["radio"].items() if key in number_names(PacketParameters)}
         document = {**document, "radio": common}
     if "topology" in missing:
         document = {key: value for key, value in document.items() if key != "topology"}
-    if not flown_with_own_law(recording):
-        return make(document, name, settings, trust=trust)
-    measured = measured_by(recording)
+    if not uses_user_law(recording):
+        return build_scenario(document, name, settings, trust=trust)
+    measured = metrics_settings(recording)
     kept = measured if str(measured.get("kind", "")) in ("", *SETS) else _usual_metrics(measured)
     kept = document["metrics"] if str(given.get("metrics.kind")).endswith(".py") and "metrics" in document else kept
     stand_in = {**document, "model": {}, "body": {}, "metrics": {k: v for k, v in kept.items() if v is not None}}
@@ -105,7 +99,7 @@ def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dat
             for group in document["groups"]
         ]
     others = {key: value for key, value in settings.items() if not key.startswith("model.")}
-    return make(stand_in, name, others, given=Given(law=UNKNOWN), trust=trust)
+    return build_scenario(stand_in, name, others, caller_parts=CallerParts(law=UNKNOWN), trust=trust)
 
 
 def _usual_metrics(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,12 +10,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.recordings import images
-from airflock.recordings.flown_scenario import scenario_of
-from airflock.recordings.layout import frames_of
-from airflock.recordings.scores import measure
-from airflock.support.errors import RecordingError
+from airflock.recordings.flown_scenario import scenario_of_recording
+from airflock.recordings.layout import recording_frames
+from airflock.recordings.scores import measure_recording
+from airflock.support import RecordingError
 
-BETWEEN = {
+PAIR_METRICS = {
     "r_centres": ("m", "mean distance between the centres of two groups; nan in a periodic world"),
     "r_between": ("m", "smallest distance between agents of the two groups"),
     "phi_between": ("", "velocity correlation between agents of the two groups"),
@@ -28,24 +28,23 @@ def group_scores(
 ) -> pd.DataFrame:
     """Order parameters as a table: a row for all agents, one for each group, and one for each two groups.
 
-    A group is measured as if the others were not there. What is between two groups, `BETWEEN`, stands in rows named
-    "one to other"; an instant counts where both have somebody there. Of a group that is never there all but `present`
-    is nan.
-    Raises RecordingError where the recording's scenario has no groups.
+    A group is measured as if the others were not there. What is between two groups, `PAIR_METRICS`, stands in rows
+    named "one to other"; an instant counts where both have somebody there. Of a group that is never there all but
+    `present` is nan. Raises RecordingError where the recording's scenario has no groups.
     """
-    scenario = scenario_of(recording, settings, trust=trust)
+    scenario = scenario_of_recording(recording, settings, trust=trust)
     groups = [group for group in scenario.groups if group.agents]
     if not groups:
         raise RecordingError("recording: its scenario has no [[groups]]")
-    rows: dict[str, dict[str, Any]] = {"all": measure(recording, settings, trust=trust)[0]}
-    frames, _, present = frames_of(recording)
+    rows: dict[str, dict[str, Any]] = {"all": measure_recording(recording, settings, trust=trust)[0]}
+    frames, _, present = recording_frames(recording)
     for group in groups:
         members = list(group.agents)
         rows[group.name] = {"present": 0.0}
         if present[:, members].any():
-            rows[group.name] = measure(recording.isel(individual=members), settings, trust=trust)[0]
+            rows[group.name] = measure_recording(recording.isel(individual=members), settings, trust=trust)[0]
     dims, world = frames.shape[1] // 2, scenario.world
-    box = images.sides(world, dims)
+    box = images.box_sides(world, dims)
     for one, other in combinations(groups, 2):
         pair = (list(one.agents), list(other.agents))
         rows[f"{one.name} to {other.name}"] = _between(frames, present, pair, dims, box)
@@ -69,12 +68,12 @@ def _between(
         if not len(part):
             continue
         (xa, xb), (ha, hb) = ([array[part][:, :, who] for who in pair] for array in (x, heading))
-        gap = images.nearest(xb[:, :, None, :] - xa[:, :, :, None], box, axis=1)
+        gap = images.nearest_image(xb[:, :, None, :] - xa[:, :, :, None], box, axis=1)
         nearest = min(nearest, float(np.nanmin(np.linalg.norm(gap, axis=1))))
         apart += np.linalg.norm(np.nanmean(xb, axis=2) - np.nanmean(xa, axis=2), axis=1).tolist()
         cosines += np.nanmean((hb[:, :, None, :] * ha[:, :, :, None]).sum(axis=1), axis=(1, 2)).tolist()
     if not apart:
-        return dict.fromkeys(BETWEEN, np.nan)
+        return dict.fromkeys(PAIR_METRICS, np.nan)
     return {
         "r_centres": float(np.mean(apart)) if box is None else np.nan,
         "r_between": nearest,

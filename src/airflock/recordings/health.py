@@ -8,12 +8,16 @@ from typing import Any
 
 from airflock import __version__
 from airflock.engine import score_flight, score_flights
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.support import gpu as gpu
-from airflock.support.cache import cache_folder, cache_trouble, drivers, usual_folder
-from airflock.support.machine import processor
-from airflock.support.threads import cores
+from airflock.scenarios import Scenario, load
+from airflock.support import (
+    available_cores,
+    cache_folder,
+    cache_folder_error,
+    default_cache_folder,
+    gpu as gpu,
+    list_drivers,
+    processor_name,
+)
 
 PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "typer", "matplotlib", "cma")
 EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  # of extras: cuda, scenes, evolve, ...
@@ -39,11 +43,15 @@ def doctor() -> dict[str, Any]:
     >>> airflock.doctor()["self_check"]
     'passed'
     """
-    found: dict[str, Any] = {"airflock": __version__, "python": platform.python_version(), "processor": processor()}
-    found |= {"cores": cores(), "cache": str(cache_folder())}
-    trouble = cache_trouble(usual_folder())
+    found: dict[str, Any] = {
+        "airflock": __version__,
+        "python": platform.python_version(),
+        "processor": processor_name(),
+    }
+    found |= {"cores": available_cores(), "cache": str(cache_folder())}
+    trouble = cache_folder_error(default_cache_folder())
     found |= {"cache_note": f"for this process only: {trouble}"} if trouble else {}
-    kept = drivers(cache_folder())
+    kept = list_drivers(cache_folder())
     found |= {"cache_drivers": len(kept), "cache_mb": round(sum(size for _, size, _ in kept) / 1e6, 1)}
     found["cache_free_gb"] = round(shutil.disk_usage(cache_folder()).free / 1e9, 1)
     for name in (*PACKAGES, *EXTRAS):
@@ -65,11 +73,11 @@ def doctor() -> dict[str, Any]:
 
 def _gpu(scenario: Scenario, known: dict[str, float]) -> dict[str, Any]:
     """What GPUs there are, or why none can be used; and the same flight on the first of them."""
-    fault = gpu.trouble()
+    fault = gpu.unavailable_reason()
     if fault is not None:
         return {"gpu": fault}
     found: dict[str, Any] = {}
-    for number, device in enumerate(gpu.describe()):
+    for number, device in enumerate(gpu.describe_gpus()):
         text = "{name}, compute capability {compute_capability}, {multiprocessors} multiprocessors, {free_gb} of "
         found[f"gpu_{number}" if number else "gpu"] = (text + "{memory_gb} GB free").format(**device)
     for name in ("first", "second"):

@@ -5,19 +5,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.world import arena
-from airflock.world.place import half_sizes
+from airflock.world import arena, half_sizes
 
 Array = NDArray[Any]
 
 
-def sides(world: arena.Parameters, dimensions: int) -> Array | None:
+def box_sides(world: arena.Parameters, dimensions: int) -> Array | None:
     """Sides of a periodic world, (axis,) m; None of any other."""
     return 2.0 * np.array(half_sizes(world)[:dimensions]) if world.edges == "periodic" else None
 
 
-def nearest(offset: Array, box: Array | None, axis: int = 0) -> Array:
-    """Offsets (m) to the nearest images; `axis` is that of coordinates, `box` what `sides` returns."""
+def nearest_image(offset: Array, box: Array | None, axis: int = 0) -> Array:
+    """Offsets (m) to the nearest images; `axis` is that of coordinates, `box` what `box_sides` returns."""
     if box is None:
         return offset
     side = box.reshape([-1 if a == axis else 1 for a in range(offset.ndim)])

@@ -1,8 +1,8 @@
 """Open a file in a process of its own, with limits of time and memory, and get plain arrays back.
 
 HDF5 is a large library in C. A damaged file of 34 kB keeps it busy for ever, and no thread and no Ctrl-C ends it;
-others crash it. Readers of ArduPilot's logs loop without end in some files. `Opening` is the side of the caller. It
-starts the process at once, so that the process works while the caller still imports.
+others crash it. Readers of ArduPilot's logs loop without end in some files. `ReaderProcess` is the side of the caller.
+It starts the process at once, so that the process works while the caller still imports.
 
 The process gets one line of JSON, its request. It answers with lines of JSON: any number of {"share": of the file that
 has been read}, then {"error": text} or a header of attributes and variables, and after that the bytes of the variables.
@@ -21,9 +21,8 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
-from airflock.recordings.packed import refuse_packed, refuse_pickle
-from airflock.support.errors import RecordingError
-from airflock.support.untrusted import from_outside, is_file, path_of
+from airflock.recordings.packed import refuse_archive, refuse_pickle_file
+from airflock.support import RecordingError, as_error, is_file, to_path
 
 LEAST_TIME = 15.0  # s of a processor that a file of any size may take
 WAIT = 4.0  # time by the clock over that of a processor, for machines that are busy with other things
@@ -35,19 +34,19 @@ ENDED_LATE = tuple(-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if 
 START = """import json, sys
 request = json.loads(sys.stdin.readline())
 sys.path[:] = request["paths"]
-from airflock.recordings.isolated import main
-main(request)"""
+from airflock.recordings.isolated import run_reader
+run_reader(request)"""
 
-Share = Callable[[float], None]
+OnShare = Callable[[float], None]
 # attributes of a file, and its variables by name: dimensions if they have names, attributes, values
 Contents = tuple[dict[str, Any], dict[str, tuple[list[str] | None, dict[str, Any], Any]]]
 
 
-def netcdf(path: str, room: int, _: Share) -> Contents:
+def read_netcdf_arrays(path: str, max_bytes: int, _: OnShare) -> Contents:
     """Read a netCDF file; raise ValueError for what reaches outside the file or is too large."""
     import h5netcdf
 
-    _refuse_outside(path, room)
+    _refuse_outside(path, max_bytes)
     with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
         return _to_json(file.attrs), {
             name: (list(variable.dimensions), _to_json(variable.attrs), variable[...])
@@ -55,21 +54,21 @@ def netcdf(path: str, room: int, _: Share) -> Contents:
         }
 
 
-def hdf5(path: str, room: int, _: Share) -> Contents:
-    """Read the arrays at the root of any HDF5 file; raise ValueError as `netcdf` does."""
+def read_hdf5_arrays(path: str, max_bytes: int, _: OnShare) -> Contents:
+    """Read the arrays at the root of any HDF5 file; raise ValueError as `read_netcdf_arrays` does."""
     import h5py
 
-    _refuse_outside(path, room)
+    _refuse_outside(path, max_bytes)
     with h5py.File(path, "r") as file:
         arrays = {name: file[name] for name in file if isinstance(file[name], h5py.Dataset)}
         return _to_json(file.attrs), {name: (None, {}, array[()]) for name, array in arrays.items()}
 
 
-class Opening:
+class ReaderProcess:
     """A file that another process is opening. `answer` waits for it; `close` ends the process in any case."""
 
     def __init__(
-        self, path: str | os.PathLike[str], read: Callable[[str, int, Share], Contents] = netcdf,
+        self, path: str | os.PathLike[str], read: Callable[[str, int, OnShare], Contents] = read_netcdf_arrays,
         kind: str = RECORDING, *, pace: float = 5e6, limit: float | None = None,
     ):  # fmt: skip
         """Start the process.
@@ -80,16 +79,16 @@ class Opening:
 
         Raises RecordingError where there is no such file or no process can be started.
         """
-        self.path, self.kind, self.decoded = path_of(path), kind, read is netcdf
+        self.path, self.kind, self.decoded = to_path(path), kind, read is read_netcdf_arrays
         if not is_file(self.path):
             raise RecordingError(f"{self.path}: no such file")
         if kind == RECORDING and self.path.suffix.lower() in FOREIGN:
             raise RecordingError(
                 f"{self.path}: holds tracks, not a recording: airflock import {self.path.name} --save FILE.nc"
             )
-        with from_outside(self.path, RecordingError):
-            refuse_packed(self.path)
-            refuse_pickle(self.path)
+        with as_error(self.path, RecordingError):
+            refuse_archive(self.path)
+            refuse_pickle_file(self.path)
         self.limit = LEAST_TIME + self.path.stat().st_size / pace if limit is None else limit
         posix = hasattr(os, "sysconf")  # Windows does not tell its memory: 8 GB there
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if posix else 8 << 30
@@ -115,7 +114,7 @@ class Opening:
         with suppress(BrokenPipeError), self.process.stdin as pipe:  # if the process has ended, `answer` says so
             pipe.write(json.dumps(request).encode() + b"\n")
 
-    def __enter__(self) -> "Opening":
+    def __enter__(self) -> "ReaderProcess":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -128,7 +127,7 @@ class Opening:
         self.process.wait()
         self.stdout.close()
 
-    def answer(self, done: Share | None = None) -> Any:
+    def answer(self, on_progress: OnShare | None = None) -> Any:
         """Return the file as an xarray Dataset, a netCDF file decoded; `done` is called with the share that was read.
 
         Raises RecordingError where it is of another kind, or takes too long.
@@ -136,11 +135,11 @@ class Opening:
         import numpy as np
         import xarray as xr
 
-        with self, from_outside(self.path, RecordingError):
+        with self, as_error(self.path, RecordingError):
             header: dict[str, Any] = {"share": 0.0}
             while "share" in header:
-                if done is not None:
-                    done(min(0.99, header["share"]))
+                if on_progress is not None:
+                    on_progress(min(0.99, header["share"]))
                 line = self.stdout.readline()
                 if not line.endswith(b"\n"):
                     raise self._ended()
@@ -165,7 +164,7 @@ class Opening:
         return RecordingError(f"{self.path}: is damaged: the process that opened it ended with {how}")
 
 
-def main(request: Mapping[str, Any]) -> None:
+def run_reader(request: Mapping[str, Any]) -> None:
     """Read a file in this process, and write the answer to standard output."""
     _limit(request["room"], request["seconds"])
     with os.fdopen(os.dup(1), "wb") as out:

@@ -12,17 +12,20 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.core.contract.declared import COMMANDS
-from airflock.recordings.differences import velocities
-from airflock.support.errors import RecordingError
+from airflock.core import COMMANDS
+from airflock.recordings.differences import differentiated_velocity
+from airflock.support import RecordingError
 
 DIMENSIONS = ("time", "space", "keypoint", "individual")
 SHORTEST = 1e-6  # s between frames: the shortest motion step there is
-FRAME, EAST_NORTH_UP = "airflock_frame", "east-north-up"  # of tracks whose axes are known to be those of the ground
-UNITS = {"position": "m", "velocity": "m/s"}
+FRAME_ATTRIBUTE, EAST_NORTH_UP = (
+    "airflock_frame",
+    "east-north-up",
+)  # of tracks whose axes are known to be those of the ground
+VARIABLE_UNITS = {"position": "m", "velocity": "m/s"}
 
 
-def dataset(
+def make_dataset(
     frames: NDArray[Any],
     dimensions: int,
     times: float | NDArray[Any],
@@ -51,7 +54,7 @@ def dataset(
     if groups:
         coordinates["group"] = ("individual", np.array(groups, str))
     names = ("position", "velocity", "command")
-    units = {**UNITS, "command": COMMANDS.get(command, "1")}
+    units = {**VARIABLE_UNITS, "command": COMMANDS.get(command, "1")}
     variables: dict[str, Any] = {
         name: (DIMENSIONS, frames[:, c * dimensions : (c + 1) * dimensions, None, :], {"units": units[name]})
         for c, name in enumerate(names)
@@ -62,55 +65,57 @@ def dataset(
     return xr.Dataset(variables, coordinates, {**fixed, **attributes})
 
 
-def check_dataset(found: Any, where: str = "recording") -> None:
+def check_dataset(value: Any, where: str = "recording") -> None:
     """Raise a RecordingError for what is no dataset at all: a table, an array, the name of a file."""
-    if isinstance(found, (str, os.PathLike)):
-        raise RecordingError(f"{where}: {os.fspath(found)} is a name; open it with airflock.load_recording")
-    if isinstance(found, xr.DataArray):
-        raise RecordingError(f"{where}: is the DataArray {found.name}, one variable; give the whole Dataset")
-    if not isinstance(found, xr.Dataset):
-        kind = type(found).__name__
+    if isinstance(value, (str, os.PathLike)):
+        raise RecordingError(f"{where}: {os.fspath(value)} is a name; open it with airflock.load_recording")
+    if isinstance(value, xr.DataArray):
+        raise RecordingError(f"{where}: is the DataArray {value.name}, one variable; give the whole Dataset")
+    if not isinstance(value, xr.Dataset):
+        kind = type(value).__name__
         raise RecordingError(f"{where}: {kind} is no xarray Dataset; airflock.load_tracks makes one of tracks")
 
 
-def check(found: xr.Dataset, where: str = "recording") -> None:
+def check_recording(recording: xr.Dataset, where: str = "recording") -> None:
     """Raise a RecordingError that lists everything a dataset lacks to be a recording."""
-    check_dataset(found, where)
+    check_dataset(recording, where)
     faults = []
-    if "position" not in found:
+    if "position" not in recording:
         faults.append("no variable position")
     else:
-        missing = [name for name in DIMENSIONS if name not in found["position"].dims]
+        missing = [name for name in DIMENSIONS if name not in recording["position"].dims]
         if missing:
             faults.append(f"position lacks the dimension{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
     if not faults:
-        sizes = found["position"].sizes
+        sizes = recording["position"].sizes
         if sizes["time"] < 1 or sizes["individual"] < 1:
             faults.append(f"position is empty ({sizes['time']} times, {sizes['individual']} individuals)")
         if sizes["space"] not in (2, 3):
             faults.append(f"space has {sizes['space']} components, not 2 or 3")
-        times = found["time"].values if "time" in found.coords else np.zeros(0, "U")
+        times = recording["time"].values if "time" in recording.coords else np.zeros(0, "U")
         if times.ndim != 1 or times.dtype.kind not in "fiu" or not (np.diff(times.astype(float)) > 0).all():
             faults.append("time is not an increasing coordinate, s")
         for name in ("position", "velocity"):
-            if name in found and found[name].dtype.kind not in "fiu":
-                faults.append(f"{name} is of kind {found[name].dtype}, not numbers")
-            if name in found and {d: found[name].sizes.get(d) for d in DIMENSIONS} != {d: sizes[d] for d in DIMENSIONS}:
+            if name in recording and recording[name].dtype.kind not in "fiu":
+                faults.append(f"{name} is of kind {recording[name].dtype}, not numbers")
+            if name in recording and {d: recording[name].sizes.get(d) for d in DIMENSIONS} != {
+                d: sizes[d] for d in DIMENSIONS
+            }:
                 faults.append(f"{name} has not the dimensions {', '.join(DIMENSIONS)} of position")
     if faults:
         raise RecordingError("\n".join(f"{where}: {fault}" for fault in faults))
 
 
-def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any], float, NDArray[np.bool_]]:
+def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any], float, NDArray[np.bool_]]:
     """Frames (time, component, agent) of position and velocity, the time between frames (s), and who is there.
 
     An agent of which a number is missing (nan) at an instant is not there then: (time, agent). Velocity is
     differentiated from position, within stretches in which the agent is there, where it is not recorded.
     """
-    check(found, where)
+    check_recording(recording, where)
     order = ("time", "space", "keypoint", "individual")
-    position = found["position"].transpose(*order).isel(keypoint=0).values
-    times = found["time"].values.astype(float)
+    position = recording["position"].transpose(*order).isel(keypoint=0).values
+    times = recording["time"].values.astype(float)
     steps = np.diff(times)
     period = float(np.median(steps)) if steps.size else 1.0
     if not SHORTEST <= period < np.inf:
@@ -119,17 +124,17 @@ def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any]
         raise RecordingError(
             f"{where}: frames are {steps.min():g} to {steps.max():g} s apart; resample to a constant rate"
         )
-    if "velocity" in found:
-        velocity = found["velocity"].transpose(*order).isel(keypoint=0).values
+    if "velocity" in recording:
+        velocity = recording["velocity"].transpose(*order).isel(keypoint=0).values
     elif len(times) > 1:
-        velocity = velocities(position, times)
+        velocity = differentiated_velocity(position, times)
     else:
         raise RecordingError(f"{where}: one frame without velocity has no speed to score")
     frames = np.concatenate([position, velocity], axis=1)
     endless = np.argwhere(np.isinf(frames))
     if len(endless):
         time, component, agent = endless[0]
-        what, name = "position" if component < position.shape[1] else "velocity", found["individual"].values[agent]
+        what, name = "position" if component < position.shape[1] else "velocity", recording["individual"].values[agent]
         raise RecordingError(f"{where}: the {what} of {name} at t = {times[time]:g} s is infinite")
     present = ~np.isnan(frames).any(axis=1)
     if not present.any():

@@ -8,8 +8,7 @@ nobody said out of what, nor a rotation where nobody said about which point: the
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from airflock.support.errors import RecordingError
-from airflock.support.numeric import is_number
+from airflock.support import RecordingError, is_number
 
 FITNESS = "r_cluster", "r_coll", "r_comm", "v_flock"
 # Order parameter: keys of `metrics` that it depends on.
@@ -34,7 +33,7 @@ FITNESSES = {"vasarhelyi": FITNESS, "kidger": ("r_coll", "r_flock"), "dimock": (
 IN_BODIES = {"r_coll": 0.5, "r_body": 0.5, "r_b": 0.5, "r_safe": 1.0, "r_cluster": 5.0, "r_comm": 5.0}
 
 
-def in_bodies(length: float) -> dict[str, float]:
+def body_length_settings(length: float) -> dict[str, float]:
     """Settings that measure in lengths of a body.
 
     Two bodies touch where their centres are half a length apart, and belong together up to five lengths: our choice,
@@ -62,7 +61,9 @@ def in_bodies(length: float) -> dict[str, float]:
     return {f"metrics.{key}": share * length for key, share in IN_BODIES.items()}
 
 
-def unsaid(names: Iterable[str], kind: str, settings: Mapping[str, Any], *, arena: bool) -> dict[str, tuple[str, ...]]:
+def undefined_metrics(
+    names: Iterable[str], kind: str, settings: Mapping[str, Any], *, arena: bool
+) -> dict[str, tuple[str, ...]]:
     """Order parameters of a metric set that depend on keys which settings do not give, and these keys.
 
     arena : whether settings give one, without which nobody is ever outside
@@ -73,11 +74,11 @@ def unsaid(names: Iterable[str], kind: str, settings: Mapping[str, Any], *, aren
     return {name: keys for name, keys in missing.items() if keys} | outside
 
 
-def told(found: Mapping[str, tuple[str, ...]]) -> str:
+def missing_lengths_note(undefined: Mapping[str, tuple[str, ...]]) -> str:
     """One line that names what is not told and what to give."""
-    keys = sorted({key for needed in found.values() for key in needed})
+    keys = sorted({key for needed in undefined.values() for key in needed})
     lengths = " or ".join(filter(None, (
         "--body-length 0.04" if set(keys) & IN_BODIES.keys() else "",
         " ".join(f"--set {key if '.' in key else f'metrics.{key}'}=..." for key in keys),
     )))  # fmt: skip
-    return f"not shown, as tracks do not say what is near, fast or the centre: {', '.join(found)}; give {lengths}"
+    return f"not shown, as tracks do not say what is near, fast or the centre: {', '.join(undefined)}; give {lengths}"

@@ -3,37 +3,37 @@
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.scenarios.families import FAMILIES
-from airflock.support.errors import RecordingError
+from airflock.scenarios import PART_KINDS
+from airflock.support import RecordingError
 
 
-def own_kinds(document: Mapping[str, Any]) -> dict[str, str]:
+def user_parts(document: Mapping[str, Any]) -> dict[str, str]:
     """Section → name of what the user's own was there, of the scenario that a recording was flown with."""
     found = {}
-    for family in FAMILIES:
+    for family in PART_KINDS:
         table = document.get(family.section)
         kind = str(table.get("kind") or "") if isinstance(table, Mapping) else ""
-        if kind and kind not in family.known:
+        if kind and kind not in family.shipped:
             found[family.section] = kind
     return found
 
 
-def missing_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, str]:
+def missing_user_parts(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, str]:
     """Those of them for which settings give no file."""
-    return {s: kind for s, kind in own_kinds(document).items() if not str(settings.get(f"{s}.kind")).endswith(".py")}
+    return {s: kind for s, kind in user_parts(document).items() if not str(settings.get(f"{s}.kind")).endswith(".py")}
 
 
-def with_files(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+def with_user_files(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """The document with the files that settings give for such kinds, whose numbers stay; and all other settings."""
     found, rest = dict(document), dict(settings)
-    for section in own_kinds(document).keys() - missing_kinds(document, settings).keys():
+    for section in user_parts(document).keys() - missing_user_parts(document, settings).keys():
         found[section] = {**found[section], "kind": rest.pop(f"{section}.kind")}
     return found, rest
 
 
-def refuse_without_files(document: Mapping[str, Any], settings: Mapping[str, Any]) -> None:
+def require_user_files(document: Mapping[str, Any], settings: Mapping[str, Any]) -> None:
     """Raise RecordingError, one line with the remedy, where a recording cannot be flown again by what is at hand."""
-    missing = missing_kinds(document, settings)
+    missing = missing_user_parts(document, settings)
     if missing:
         what = " and ".join(f"{section}.kind = {kind!r}" for section, kind in missing.items())
         options = " ".join(f"--set {section}.kind={kind}.py" for section, kind in missing.items())
@@ -43,6 +43,6 @@ def refuse_without_files(document: Mapping[str, Any], settings: Mapping[str, Any
             f"{'its file' if len(missing) == 1 else 'their files'} with {options} --trust "
             f"(in Python: settings={{{given}}}, trust=True)"
         )
-    other = [key for key in settings if key not in {f"{section}.kind" for section in own_kinds(document)}]
+    other = [key for key in settings if key not in {f"{section}.kind" for section in user_parts(document)}]
     if other:
         raise RecordingError(f"recording: {other[0]}: it can only be flown again as it was, so no key can change")

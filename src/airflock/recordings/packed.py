@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from airflock.support.errors import RecordingError
+from airflock.support import RecordingError
 
 ARCHIVES = (".zip", ".gz", ".7z", ".tar", ".rar", ".xz", ".bz2")
 STARTS = {b"PK\x03\x04": "a zip archive; unpack it first: unzip", b"\x1f\x8b": "compressed; unpack it first: gunzip"}
 PICKLES = (".pkl", ".pickle")
 
 
-def refuse_packed(path: Path) -> None:
+def refuse_archive(path: Path) -> None:
     """Raise a RecordingError for an archive; one of NumPy's (.npz) is none."""
     with path.open("rb") as file:
         start = file.read(4)
@@ -20,7 +20,7 @@ def refuse_packed(path: Path) -> None:
         raise RecordingError(f"{path}: is an archive; unpack it first")
 
 
-def refuse_pickle(path: Path) -> None:
+def refuse_pickle_file(path: Path) -> None:
     """Raise a RecordingError for a file that is called a pickle."""
     if path.suffix.lower() in PICKLES:
         raise RecordingError(

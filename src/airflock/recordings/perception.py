@@ -13,18 +13,17 @@ from numpy.typing import NDArray
 
 from airflock.core import radio, random
 from airflock.engine import Flight
-from airflock.recordings.layout import DIMENSIONS, UNITS
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.timing import clock
-from airflock.support.errors import FlightError
-from airflock.world.place import half_sizes
+from airflock.recordings.layout import DIMENSIONS, VARIABLE_UNITS
+from airflock.scenarios import Scenario, step_counts
+from airflock.support import FlightError
+from airflock.world import half_sizes
 
 Array = NDArray[Any]
 KINDS = ("measured", "heard")
 FARTHEST = 1e8  # m; the limit of any range in a driver
 
 
-def sound(keep: Sequence[str], events: Sequence[Any], scenario: Scenario) -> None:
+def check_keep(keep: Sequence[str], events: Sequence[Any], scenario: Scenario) -> None:
     """Refuse what cannot be kept, one line each."""
     if isinstance(keep, str) or not isinstance(keep, Iterable):
         raise FlightError(f"keep = {keep!r} is not a list; give some of {', '.join(KINDS)}, such as keep=('measured',)")
@@ -44,7 +43,7 @@ def finish_keeping(flight: Flight, keep: Sequence[str]) -> dict[str, xr.Variable
     age : (time, receiver, sender), s since what was last heard had been sent; nan: never heard
     """
     scenario, n = flight.scenario, flight.agents
-    times, dt = clock(scenario), scenario.flight.dt
+    times, dt = step_counts(scenario), scenario.flight.dt
     every, sample = times["decide_every"], times["sample_every"]
     late = times["delay"] * dt
     stamps = np.full((n, n), np.nan)
@@ -83,7 +82,7 @@ def _variables(measured: list[Array], ages: list[Array], dimensions: int) -> dic
         table = np.array(measured)[:, :, None, :]
         for c, name in enumerate(("position", "velocity")):
             part = table[:, c * dimensions : (c + 1) * dimensions]
-            found[f"measured_{name}"] = xr.Variable(DIMENSIONS, part, {"units": UNITS[name]})
+            found[f"measured_{name}"] = xr.Variable(DIMENSIONS, part, {"units": VARIABLE_UNITS[name]})
     if ages:
         found["age"] = xr.Variable(("time", "receiver", "sender"), np.array(ages, np.float32), {"units": "s"})
     return found
@@ -103,7 +102,7 @@ def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
 def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float) -> Array:
     """When what each agent knows of each other one was sent, s, after a decision; nan: never heard."""
     k, n = flight.scenario.radio, flight.agents
-    if flight.scenario.transceiver.keeps:
+    if flight.scenario.transceiver.keeps_packets:
         return np.where(np.eye(n, dtype=bool), np.nan, flight.sent)
     place = flight.state[: flight.scenario.dimensions].astype(float)
     offset = place[:, None, :] - place[:, :, None]  # from receiver (first) to sender

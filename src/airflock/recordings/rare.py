@@ -6,7 +6,7 @@ from typing import Any
 CONFIDENCE = 0.95
 
 
-def upper_bound(events: int, flights: int, confidence: float = CONFIDENCE) -> float:
+def upper_probability_bound(events: int, flights: int, confidence: float = CONFIDENCE) -> float:
     """Largest probability of an event per flight that so few events allow (Clopper and Pearson 1934, one-sided).
 
     events : flights in which it happened, out of `flights`. Returns 0 to 1; for no event 1 - (1 - confidence)^(1/n).
@@ -16,20 +16,20 @@ def upper_bound(events: int, flights: int, confidence: float = CONFIDENCE) -> fl
     return 1.0 if events >= flights else float(betaincinv(events + 1, flights - events, confidence))
 
 
-def remarks(rows: Sequence[Mapping[str, Any]], seeds: Sequence[int]) -> list[str]:
+def rare_event_notes(scores: Sequence[Mapping[str, Any]], seeds: Sequence[int]) -> list[str]:
     """Sentences under a table of several flights: how often there were collisions at most, and the worst seed."""
-    if len(rows) < 2:
+    if len(scores) < 2:
         return []
     said = []
-    if all("n_coll" in row for row in rows):
-        hit = sum(row["n_coll"] > 0.0 for row in rows)
-        bound = upper_bound(hit, len(rows))
+    if all("n_coll" in row for row in scores):
+        hit = sum(row["n_coll"] > 0.0 for row in scores)
+        bound = upper_probability_bound(hit, len(scores))
         said.append(
-            f"collisions in {hit} of {len(rows)} flights: with {100.0 * CONFIDENCE:g} % confidence, at most "
+            f"collisions in {hit} of {len(scores)} flights: with {100.0 * CONFIDENCE:g} % confidence, at most "
             f"{100.0 * bound:.2g} % of such flights have a collision"
         )
-    if all("fitness" in row for row in rows):
-        worst, row = min(zip(seeds, rows, strict=True), key=lambda pair: pair[1]["fitness"])
+    if all("fitness" in row for row in scores):
+        worst, row = min(zip(seeds, scores, strict=True), key=lambda pair: pair[1]["fitness"])
         said.append(
             f"worst flight: seed {worst}, fitness {row['fitness']:.4g}; draw it with airflock plot ... --seed {worst}"
         )

@@ -8,9 +8,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.recordings import images
-from airflock.recordings.flown_scenario import scenario_of
-from airflock.recordings.layout import frames_of
-from airflock.support.errors import RecordingError
+from airflock.recordings.flown_scenario import scenario_of_recording
+from airflock.recordings.layout import recording_frames
+from airflock.support import RecordingError
 
 BINS = 24
 LEVELS = {"q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95}
@@ -21,7 +21,7 @@ HOW = (
 )
 
 
-def reception(heard: xr.Dataset | pd.DataFrame, bins: int = BINS) -> pd.DataFrame:
+def packet_age(heard: xr.Dataset | pd.DataFrame, bins: int = BINS) -> pd.DataFrame:
     """Age of what is known of another agent by the distance to it, over all pairs and instants.
 
     heard : a recording with `age` (time, receiver, sender), s; or a table of packets, one row for each decision and
@@ -54,17 +54,17 @@ def _of_recording(recording: xr.Dataset) -> tuple[NDArray[Any], NDArray[Any]]:
     """Distance (m) and age (s) of every pair at every instant at which both are there."""
     if "age" not in recording:
         raise RecordingError(f"recording: does not hold the age of received data; {HOW}")
-    frames, _, present = frames_of(recording)
+    frames, _, present = recording_frames(recording)
     axes, agents = frames.shape[1] // 2, frames.shape[2]
     age = recording["age"].transpose("time", "receiver", "sender").values.astype(float)
     if age.shape != (len(frames), agents, agents):
         raise RecordingError(f"recording: age has the sizes {age.shape}, not {(len(frames), agents, agents)}")
-    world = scenario_of(recording).world if recording.attrs.get("airflock_scenario") else None
-    box = images.sides(world, axes) if world is not None else None
+    world = scenario_of_recording(recording).world if recording.attrs.get("airflock_scenario") else None
+    box = images.box_sides(world, axes) if world is not None else None
     off = ~np.eye(agents, dtype=bool)
     distances, ages = [], []
     for place, old, there in zip(frames[:, :axes], age, present, strict=True):
-        gap = images.nearest(place[:, None, :] - place[:, :, None], box)
+        gap = images.nearest_image(place[:, None, :] - place[:, :, None], box)
         both = off & there[:, None] & there[None, :]
         distances.append(np.sqrt((gap**2).sum(axis=0))[both])
         ages.append(old[both])

@@ -32,10 +32,10 @@ class ScoreTable(pd.DataFrame):  # type: ignore[misc]  # pandas has no types her
         return head + end + rest
 
 
-def described(table: pd.DataFrame, known: dict[str, tuple[str, str]]) -> ScoreTable:
+def with_units(table: pd.DataFrame, descriptions: dict[str, tuple[str, str]]) -> ScoreTable:
     """A table with the units and meanings of those of its columns that are known: name → unit, meaning."""
     made = ScoreTable(table)
     made.attrs |= table.attrs
     for place, about in (("units", 0), ("meanings", 1)):
-        made.attrs[place] = {name: known[name][about] for name in table.columns if name in known}
+        made.attrs[place] = {name: descriptions[name][about] for name in table.columns if name in descriptions}
     return made

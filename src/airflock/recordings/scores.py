@@ -9,25 +9,21 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.core.maths import FAR
+from airflock.core import FAR
 from airflock.engine import measure_frames, plan_of
-from airflock.parts.metrics import nearest
-from airflock.parts.metrics.registry import reports
+from airflock.parts.metrics import nearest, reported_values
 from airflock.recordings.attributes import scenario_document
-from airflock.recordings.flown_scenario import aero_settings, scenario_of
-from airflock.recordings.layout import frames_of
-from airflock.recordings.lengths import in_bodies, unsaid
-from airflock.recordings.score_table import described
-from airflock.runs.executors.scores import scores
-from airflock.scenarios.change import variant
-from airflock.scenarios.document import keyed
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.seeds import sound_seeds
-from airflock.support.errors import RecordingError
+from airflock.recordings.flown_scenario import power_settings, scenario_of_recording
+from airflock.recordings.layout import recording_frames
+from airflock.recordings.lengths import body_length_settings, undefined_metrics
+from airflock.recordings.score_table import with_units
+from airflock.runs import score_scenarios
+from airflock.scenarios import Scenario, check_seeds, scenario_variant, settings_dict
+from airflock.support import RecordingError
 
 
 def score(
-    what: Scenario | str | os.PathLike[str] | xr.Dataset,
+    scenario_or_recording: Scenario | str | os.PathLike[str] | xr.Dataset,
     seeds: int | Iterable[int] = 1,
     *,
     settings: Mapping[str, Any] | None = None,
@@ -46,7 +42,7 @@ def score(
 
     Parameters
     ----------
-    what : Scenario, str, path or xarray.Dataset
+    scenario_or_recording : Scenario, str, path or xarray.Dataset
         A scenario, or the name of a preset or scenario file, which is flown; or a recording (time, space,
         keypoint, individual), which is measured.
     seeds : int or iterable of int
@@ -100,15 +96,23 @@ def score(
     >>> table.index.tolist(), table.attrs["units"]["phi_vel"]
     ([0, 1, 2], 'm/s')
     """
-    if isinstance(what, xr.Dataset):
-        return _of_recording(what, settings, aero=aero, groups=groups, body_length=body_length, trust=trust)
+    if isinstance(scenario_or_recording, xr.Dataset):
+        return _of_recording(
+            scenario_or_recording, settings, aero=aero, groups=groups, body_length=body_length, trust=trust
+        )
     asked = {"aero": aero, "groups": groups, "body_length": body_length is not None}
     if any(asked.values()):
         names = ", ".join(name for name, given in asked.items() if given)
         raise RecordingError(f"{names}: needs a recording, such as one from airflock.simulate(scenario)")
-    scenario, numbers = variant(what, settings, trust=trust), sound_seeds(seeds)
-    options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
-    rows = scores([scenario] * len(numbers), numbers, scheduler=scheduler, **options)
+    scenario, numbers = scenario_variant(scenario_or_recording, settings, trust=trust), check_seeds(seeds)
+    options: dict[str, Any] = {
+        "threads": threads,
+        "precision": precision,
+        "on_done": done,
+        "device": device,
+        "notify": say,
+    }
+    rows = score_scenarios([scenario] * len(numbers), numbers, scheduler=scheduler, **options)
     return _about(pd.DataFrame(rows, index=pd.Index(numbers, name="seed")), scenario)
 
 
@@ -122,23 +126,23 @@ def _of_recording(
     trust: bool,
 ) -> pd.DataFrame:
     """The table of a recording."""
-    settings = keyed(given, "recording")
-    settings = in_bodies(body_length) | settings if body_length is not None else settings
-    settings = aero_settings(recording, settings) if aero else settings
-    scenario = scenario_of(recording, settings, trust=trust)
+    settings = settings_dict(given, "recording")
+    settings = body_length_settings(body_length) | settings if body_length is not None else settings
+    settings = power_settings(recording, settings) if aero else settings
+    scenario = scenario_of_recording(recording, settings, trust=trust)
     if groups:
-        from airflock.recordings.groups import BETWEEN, group_scores
+        from airflock.recordings.groups import PAIR_METRICS, group_scores
 
         table = _about(group_scores(recording, settings, trust=trust), scenario)
         for place, about in (("units", 0), ("meanings", 1)):
-            table.attrs[place] |= {name: told[about] for name, told in BETWEEN.items()}
+            table.attrs[place] |= {name: told[about] for name, told in PAIR_METRICS.items()}
         return table
-    table = _about(pd.DataFrame([measure(recording, settings, trust=trust)[0]]), scenario)
-    table.attrs["not_told"] = not_told(recording, scenario, settings)
+    table = _about(pd.DataFrame([measure_recording(recording, settings, trust=trust)[0]]), scenario)
+    table.attrs["not_told"] = undefined_metrics_of(recording, scenario, settings)
     return table
 
 
-def not_told(
+def undefined_metrics_of(
     recording: xr.Dataset, scenario: Scenario, settings: Mapping[str, Any] | None = None
 ) -> dict[str, tuple[str, ...]]:
     """Order parameters that a recording without a scenario does not have for want of a length, with the keys missing.
@@ -148,18 +152,18 @@ def not_told(
     if scenario_document(recording) is not None:
         return {}
     sampled = (name for metric in scenario.measures.metrics for name in metric.Sample._fields)
-    names = (*reports(scenario.measures), *sampled)
-    return unsaid(names, scenario.measures.name, settings or {}, arena=scenario.world.arena != "none")
+    names = (*reported_values(scenario.measures), *sampled)
+    return undefined_metrics(names, scenario.measures.name, settings or {}, arena=scenario.world.arena != "none")
 
 
-def between_frames(recording: xr.Dataset, scenario: Scenario) -> str:
+def between_frames_note(recording: xr.Dataset, scenario: Scenario) -> str:
     """What a simulated recording cannot tell as its flight did, which looked between its frames; empty if nothing.
 
     scenario : `scenario_of` the recording
     """
     if scenario_document(recording) is None or recording.attrs.get("airflock_device") == "fleet":
         return ""
-    q, (_, period, _) = scenario.measured_by(), frames_of(recording)
+    q, (_, period, _) = scenario.resolved_metrics(), recording_frames(recording)
     names = [name for each in scenario.measures.of(q) if each.clock == "collision" for name in each.reports]
     looked = q.collision_period or period
     if not names or looked > 0.99 * period:
@@ -173,7 +177,7 @@ def between_frames(recording: xr.Dataset, scenario: Scenario) -> str:
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """A table with units and meanings of its columns among its attributes."""
     of_courses = {name: about for each in scenario.measures.metrics for name, about in each.courses.items()}
-    return described(table, of_courses | dict(reports(scenario.measures)))
+    return with_units(table, of_courses | dict(reported_values(scenario.measures)))
 
 
 def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> pd.DataFrame:
@@ -208,15 +212,17 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, 
     >>> airflock.over_time(airflock.simulate(short))["phi_vel"].shape
     (6,)
     """
-    return _about(measure(recording, settings, trust=trust)[1], scenario_of(recording, settings, trust=trust))
+    return _about(
+        measure_recording(recording, settings, trust=trust)[1], scenario_of_recording(recording, settings, trust=trust)
+    )
 
 
-def courses(scenario: Scenario) -> list[str]:
+def time_series_names(scenario: Scenario) -> list[str]:
     """Names of the order parameters that have a value at every instant of a flight: the columns of `over_time`."""
     return [name for metric in plan_of(scenario.alike()).metrics for name in metric.Sample._fields]
 
 
-def measure(
+def measure_recording(
     recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False
 ) -> tuple[dict[str, Any], pd.DataFrame]:
     """Order parameters of a recording, and their course over time.
@@ -224,12 +230,13 @@ def measure(
     Frames are taken every metrics.period, or each one if they are farther apart; collisions every
     metrics.collision_period. Where a number is missing (nan) the individual is not there: an instant counts with those
     who are, means over time are means over instants at which at least two are, and the value `present` tells the share
-    of individuals and instants that is there. What tracks do not have for want of a length (`not_told`) is left out.
+    of individuals and instants that is there. What tracks do not have for want of a length (`undefined_metrics_of`) is
+    left out.
     """
-    frames, period, present = frames_of(recording)
-    scenario = scenario_of(recording, settings, trust=trust)
+    frames, period, present = recording_frames(recording)
+    scenario = scenario_of_recording(recording, settings, trust=trust)
     precision = 64 if frames.dtype == np.float64 else 32
-    q = scenario.measured_by()
+    q = scenario.resolved_metrics()
     every = max(1, round(q.period / period)), max(1, round((q.collision_period or period) / period))
     values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
     times = pd.Index(recording["time"].values.astype(float), name="time")
@@ -239,6 +246,6 @@ def measure(
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
     scores |= {} if present.all() else {"present": float(present.mean())}
-    untold = not_told(recording, scenario, settings)
+    untold = undefined_metrics_of(recording, scenario, settings)
     kept = {name: value for name, value in scores.items() if name not in untold}
     return kept, course[[name for name in course if name not in untold]]

@@ -7,21 +7,17 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.parts.metrics.registry import numbers_of, reports
-from airflock.recordings.score_table import described
-from airflock.runs.executors.scores import scores
-from airflock.scenarios import short_keys
-from airflock.scenarios.change import variant
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.seeds import sound_seeds
-from airflock.support.errors import ScenarioError, gathering
-from airflock.support.spelling import meant
+from airflock.parts.metrics import reported_values, scalar_names
+from airflock.recordings.score_table import with_units
+from airflock.runs import score_scenarios
+from airflock.scenarios import Scenario, check_seeds, scenario_variant, short_keys
+from airflock.support import ScenarioError, collect_errors, suggest
 
 ORDER = "polarisation"  # shown where nothing judges flights: the first that a set reports may be a constant speed
 
 
 def sweep(
-    what: Scenario | str | os.PathLike[str],
+    scenario: Scenario | str | os.PathLike[str],
     over: Mapping[str, Sequence[Any]],
     seeds: int | Iterable[int] = 5,
     *,
@@ -39,7 +35,7 @@ def sweep(
 
     Parameters
     ----------
-    what : Scenario, str or path
+    scenario : Scenario, str or path
         A scenario, or the name of a preset or scenario file.
     over : mapping
         Keys and the values that each takes; several keys make a grid.
@@ -85,14 +81,14 @@ def sweep(
     >>> table.attrs["units"]["phi_vel"], table.attrs["meanings"]["phi_vel"]
     ('m/s', 'mean speed')
     """
-    points = grid(over)
-    scenarios = scenarios_at(what, points, settings, law, trust=trust)
-    numbers = sound_seeds(seeds)
-    options = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
-    return flown(points, scenarios, numbers, scheduler=scheduler, **options)
+    points = grid_points(over)
+    scenarios = scenarios_at(scenario, points, settings, law, trust=trust)
+    numbers = check_seeds(seeds)
+    options = {"threads": threads, "precision": precision, "on_done": done, "device": device, "notify": say}
+    return fly_points(points, scenarios, numbers, scheduler=scheduler, **options)
 
 
-def grid(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
+def grid_points(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     """All combinations of the values of several keys; raises a ScenarioError that names keys without a list of them."""
     if not isinstance(over, Mapping):
         raise ScenarioError([f"over = {over!r}: give keys with lists of values, such as {{'radio.delay': [0.0, 1.0]}}"])
@@ -103,7 +99,7 @@ def grid(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
 
 
 def scenarios_at(
-    what: Scenario | str | os.PathLike[str],
+    scenario: Scenario | str | os.PathLike[str],
     points: Sequence[Mapping[str, Any]],
     settings: Mapping[str, Any] | None,
     law: Any = None,
@@ -114,9 +110,9 @@ def scenarios_at(
     faults: list[str] = []
     found = []
     for point in points:
-        with gathering(faults):
+        with collect_errors(faults):
             changed = {**(settings or {}), **point}
-            found.append(variant(what, changed, law, trust=trust))
+            found.append(scenario_variant(scenario, changed, law, trust=trust))
     faults += _columns_given_twice(points, found)
     if faults:
         raise ScenarioError(faults)
@@ -127,33 +123,33 @@ def _columns_given_twice(points: Sequence[Mapping[str, Any]], scenarios: Sequenc
     """Keys by their last word that the table has as another column: the seed of a flight, or an order parameter."""
     faults: list[str] = []
     for key in points[0] if points and scenarios else ():
-        if key == "seed" or any(key in reports(found.measures) for found in scenarios):
-            whole = " or ".join(short_keys.places(scenarios[0].records).get(key, ()))
+        if key == "seed" or any(key in reported_values(found.measures) for found in scenarios):
+            whole = " or ".join(short_keys.keys_by_last_word(scenarios[0].records).get(key, ()))
             faults.append(f"{scenarios[0].name}: {key}: is a column of the table already; write {whole}")
     return faults
 
 
-def flown(
+def fly_points(
     points: Sequence[Mapping[str, Any]], scenarios: Sequence[Scenario], seeds: Sequence[int], **options: Any
 ) -> pd.DataFrame:
     """Tidy table of the flights of all seeds at all points; options as of `sweep`."""
     jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in seeds]
     flights = [found for _, found, _ in jobs]
-    rows = scores(flights, [seed for _, _, seed in jobs], **options)
+    rows = score_scenarios(flights, [seed for _, _, seed in jobs], **options)
     table = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
-    known = {name: told for found in scenarios for name, told in reports(found.measures).items()}
-    return described(table, known)
+    known = {name: told for found in scenarios for name, told in reported_values(found.measures).items()}
+    return with_units(table, known)
 
 
-def shown(asked: str | None, scenarios: Sequence[Scenario]) -> str:
+def metric_to_show(metric: str | None, scenarios: Sequence[Scenario]) -> str:
     """The order parameter to show: the one asked for, or what the flights are usually judged by; all must report it."""
-    each = [numbers_of(found.measures, found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
+    each = [scalar_names(found.measures, found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
     known = [name for name in (each[0] if each else ()) if all(name in names for names in each)]
-    if asked is None:
+    if metric is None:
         judged = (*(found.measures.best for found in scenarios), ORDER)
         usual = [name for name in judged if name in known]
         return str((usual + known + [""])[0])
-    if each and asked not in known:
-        hint = meant(asked, known, f"known: {', '.join(known)}")
-        raise ScenarioError([f"--show {asked}: unknown order parameter; {hint}"])
-    return asked
+    if each and metric not in known:
+        hint = suggest(metric, known, f"known: {', '.join(known)}")
+        raise ScenarioError([f"--show {metric}: unknown order parameter; {hint}"])
+    return metric

@@ -8,13 +8,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from airflock import __version__
-from airflock.scenarios.scenario import Scenario
-from airflock.support import atomic
-from airflock.support.errors import StudyError
-from airflock.support.machine import processor
-from airflock.support.untrusted import from_outside, read_toml
+from airflock.scenarios import Scenario
+from airflock.support import StudyError, as_error, atomic, processor_name, read_toml
 
-STUDY = "study.toml"
+STUDY_FILE = "study.toml"
 PACKAGES = ("numpy", "numba", "cma", "pymoo")
 
 
@@ -22,21 +19,21 @@ class Interrupted(StudyError):
     """Ctrl-C: everything that had landed is stored."""
 
 
-class Documented(Protocol):
+class HasDocument(Protocol):
     """What is done in a folder and can be continued there: a study, or a campaign of certify."""
 
     def document(self) -> dict[str, Any]:
         """Everything that decides its result, as plain values."""
 
 
-def open_folder(folder: Path, study: Documented, *, resume: bool, kind: str = "study") -> None:
+def open_folder(folder: Path, study: HasDocument, *, resume: bool, kind: str = "study") -> None:
     """Make a study's folder, or check that it holds this very study; likewise for another kind, such as a campaign.
 
     Raises StudyError where the folder holds another study, or this one and `resume` was not asked for.
     """
     found = folder / f"{kind}.toml"
     if found.is_file():
-        same_or_refuse(folder, read(found), plain(study.document()), kind)
+        same_or_refuse(folder, read_toml_file(found), to_toml_values(study.document()), kind)
         if not resume:
             raise StudyError(f"{folder}: already holds this {kind}; continue it with --resume, or give another --out")
         return
@@ -47,7 +44,7 @@ def open_folder(folder: Path, study: Documented, *, resume: bool, kind: str = "s
         raise StudyError(f"{folder}: is not empty and holds no {found.name}; give a new folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write(found, study.document(), f"A {kind} of Airflock. Written once, when it began.")
+        write_toml_file(found, study.document(), f"A {kind} of Airflock. Written once, when it began.")
     except OSError as fault:
         raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
 
@@ -59,13 +56,13 @@ def remove_unfinished(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def read(path: Path) -> dict[str, Any]:
+def read_toml_file(path: Path) -> dict[str, Any]:
     """A TOML file as a dict."""
-    with from_outside(path, StudyError):
+    with as_error(path, StudyError):
         return read_toml(path)
 
 
-def write(path: Path, document: Mapping[str, Any], comment: str = "") -> None:
+def write_toml_file(path: Path, document: Mapping[str, Any], comment: str = "") -> None:
     """Write a nested dict as TOML, complete or not at all."""
     import tomlkit
 
@@ -73,8 +70,8 @@ def write(path: Path, document: Mapping[str, Any], comment: str = "") -> None:
     if comment:
         made.add(tomlkit.comment(comment))
         made.add(tomlkit.nl())
-    _fill(made, plain(document))
-    atomic.write(path, tomlkit.dumps(made))
+    _fill(made, to_toml_values(document))
+    atomic.write_file(path, tomlkit.dumps(made))
 
 
 def _fill(table: Any, values: Mapping[str, Any]) -> None:
@@ -100,16 +97,16 @@ def _fill(table: Any, values: Mapping[str, Any]) -> None:
             table.add(key, value)
 
 
-def plain(value: Any) -> Any:
+def to_toml_values(value: Any) -> Any:
     """Values as TOML knows them: lists instead of tuples, no None."""
     if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items() if entry is not None}
-    return [plain(entry) for entry in value] if isinstance(value, (list, tuple)) else value
+        return {str(key): to_toml_values(entry) for key, entry in value.items() if entry is not None}
+    return [to_toml_values(entry) for entry in value] if isinstance(value, (list, tuple)) else value
 
 
-def versions() -> dict[str, str]:
+def program_versions() -> dict[str, str]:
     """Versions that the last bits of a study depend on, and the processor."""
-    found = {"python": platform.python_version(), "cpu": processor(), "airflock": __version__}
+    found = {"python": platform.python_version(), "cpu": processor_name(), "airflock": __version__}
     for name in PACKAGES:
         try:
             found[name] = version(name)

@@ -12,16 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.parameters import Quantity, declarations
-from airflock.scenarios.faulty import Entry
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.sections import ORDER
+from airflock.core import Quantity, declarations
+from airflock.scenarios import ORDER, FaultEntry, Scenario
 
 DECADES = 3.0  # a declared range at least this many decades wide is searched on a logarithmic scale
 
 
 @dataclass(frozen=True)
-class Axis:
+class SearchAxis:
     """One parameter that varies.
 
     key       : for instance model.p_rep
@@ -66,7 +64,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Tie:
+class TiedParameter:
     """A parameter that follows another: factor times its value plus offset."""
 
     of: str
@@ -75,12 +73,12 @@ class Tie:
 
 
 @dataclass(frozen=True)
-class Space:
+class SearchSpace:
     """Varied, fixed and tied parameters of a study."""
 
-    axes: tuple[Axis, ...]
+    axes: tuple[SearchAxis, ...]
     fixed: Mapping[str, float] = field(default_factory=dict)
-    tied: Mapping[str, Tie] = field(default_factory=dict)
+    tied: Mapping[str, TiedParameter] = field(default_factory=dict)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -123,7 +121,7 @@ def _nest(table: dict[str, Any], key: str, entry: Mapping[str, Any]) -> None:
     (table.setdefault(section, {}) if section else table)[name] = dict(entry)
 
 
-def _order(axes: Sequence[Axis]) -> list[int]:
+def _order(axes: Sequence[SearchAxis]) -> list[int]:
     """Indices of axes, each after the one that it lies above."""
     index = {axis.key: i for i, axis in enumerate(axes)}
     done: list[int] = []
@@ -157,30 +155,30 @@ def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scen
     return replace(scenario, **{fields[s]: replace(records[s], **values) for s, values in changed.items()})
 
 
-def _befallen(entry: Entry, values: Mapping[str, float]) -> Entry:
+def _befallen(entry: FaultEntry, values: Mapping[str, float]) -> FaultEntry:
     """An entry of faults with other numbers; that of agents is whole."""
     number = round(values["number"]) if "number" in values else entry.number
     return replace(entry, per_hour=values.get("per_hour", entry.per_hour), number=number)
 
 
-def declared(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:
+def declared_numbers(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:
     """Key → declaration and present value of every number of a scenario; of drag descent and silence where they fly."""
     return {
         f"{section}.{name}".lstrip("."): (how, getattr(record, name))
         for section, record in scenario.records.items()
-        if (section != "aero" or scenario.descends) and (section != "silence" or scenario.silence.rule == "stop")
+        if (section != "aero" or scenario.is_aerodynamic) and (section != "silence" or scenario.silence.rule == "stop")
         for name, how, _ in declarations(record)
         if isinstance(how, Quantity)
     }
 
 
-def full_space(scenario: Scenario) -> Space:
+def full_space(scenario: Scenario) -> SearchSpace:
     """All numbers of the model between their declared bounds, but for those that set the speed that is asked for."""
     axes = []
-    for key, (how, value) in declared(scenario).items():
+    for key, (how, value) in declared_numbers(scenario).items():
         if key.startswith("model.") and value is not None and not _sets_speed(scenario, key, how, value):
-            axes.append(Axis(key, how.unit, how.low, how.high, usual_scale(how.low, how.high), how.whole))
-    return Space(tuple(axes))
+            axes.append(SearchAxis(key, how.unit, how.low, how.high, default_scale(how.low, how.high), how.whole))
+    return SearchSpace(tuple(axes))
 
 
 def _sets_speed(scenario: Scenario, key: str, how: Quantity, value: float) -> bool:
@@ -192,6 +190,6 @@ def _sets_speed(scenario: Scenario, key: str, how: Quantity, value: float) -> bo
     return float(speed(with_parameters(scenario, {key: other}).parameters)) != float(speed(scenario.parameters))
 
 
-def usual_scale(low: float, high: float) -> str:
+def default_scale(low: float, high: float) -> str:
     """Logarithmic where a range is positive and DECADES wide, else linear."""
     return "log" if low > 0.0 and high >= low * 10.0**DECADES else "linear"

@@ -16,10 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock.runs.executors import Landed
-from airflock.support import locks
-from airflock.support.errors import StudyError
-from airflock.support.untrusted import FormatError, from_outside, json_object, json_value
+from airflock.runs.executors import FlightResult
+from airflock.support import FormatError, StudyError, as_error, locks, parse_json, parse_json_object
 
 FILE, LOCK = "evaluations.sqlite", "writer.lock"
 SCHEMA = """
@@ -40,7 +38,7 @@ CREATE TABLE IF NOT EXISTS flight (
 WALL = ("duration", "worker", "session")  # columns that tell of the machine and not of the study
 
 
-class Batch(NamedTuple):
+class CandidateBatch(NamedTuple):
     """Which candidates: of the search's generations, or of what comes after it."""
 
     stage: str
@@ -48,18 +46,18 @@ class Batch(NamedTuple):
     generation: int
 
 
-class Store:
+class FlightStore:
     """The evaluations of one study folder. Use as a context; `write=False` only looks."""
 
     def __init__(self, folder: Path, *, write: bool = True):
         """Open or create; raises StudyError where another process is writing, or where the file is no store."""
-        self.path, self.lock, self.session = folder / FILE, -1, 0
+        self.path, self.lock_handle, self.session = folder / FILE, -1, 0
         if not write and not self.path.is_file():
             raise StudyError(f"{folder}: holds no study ({FILE} is missing)")
         if write:
-            self.lock = _lock(folder)
+            self.lock_handle = _lock(folder)
         try:
-            with plain_faults(self.path):
+            with as_study_error(self.path):
                 uri = f"{self.path.absolute().as_uri()}?mode={'rwc' if write else 'ro'}"
                 self.connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=10.0)
                 if write:
@@ -73,7 +71,7 @@ class Store:
             self._unlock()
             raise
 
-    def __enter__(self) -> "Store":
+    def __enter__(self) -> "FlightStore":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -85,29 +83,31 @@ class Store:
         self._unlock()
 
     def _unlock(self) -> None:
-        if self.lock >= 0:
-            os.close(self.lock)
-            self.lock = -1
+        if self.lock_handle >= 0:
+            os.close(self.lock_handle)
+            self.lock_handle = -1
 
     def begin(self, versions: Mapping[str, str]) -> None:
         """Note that a process begins to write: when, where, with which versions."""
         row = (time.strftime("%Y-%m-%dT%H:%M:%S%z"), platform.node(), json.dumps(dict(versions)))
-        with plain_faults(self.path):
+        with as_study_error(self.path):
             cursor = self.connection.execute("INSERT INTO session (began, host, versions) VALUES (?, ?, ?)", row)
             self.session = int(cursor.lastrowid or 0)
 
-    def asked(self, batch: Batch) -> list[list[float]]:
+    def asked(self, batch: CandidateBatch) -> list[list[float]]:
         """Points of a batch's candidates that the store already holds, in their order."""
         found = self.rows(
             "SELECT point FROM candidate WHERE stage=? AND run=? AND generation=? ORDER BY candidate", batch
         )
-        with from_outside(f"{self.path}: a point of {' '.join(map(str, batch))}", StudyError):
+        with as_error(f"{self.path}: a point of {' '.join(map(str, batch))}", StudyError):
             points = [_point(point) for (point,) in found]
             if len({len(point) for point in points}) > 1:
                 raise FormatError("has another number of parameters than the others")
         return points
 
-    def ask(self, batch: Batch, points: Sequence[Sequence[float]], parameters: Sequence[Mapping[str, float]]) -> None:
+    def ask(
+        self, batch: CandidateBatch, points: Sequence[Sequence[float]], parameters: Sequence[Mapping[str, float]]
+    ) -> None:
         """Store candidates, all of a batch at once; a candidate that is there already stays."""
         rows = [
             (*batch, i, _encode([float(x) for x in point]), _encode(dict(values)))
@@ -119,50 +119,50 @@ class Store:
             rows,
         )
 
-    def land(self, batch: Batch, landed: Landed) -> None:
+    def land(self, batch: CandidateBatch, result: FlightResult) -> None:
         """Store one flight, at once; one that is there already stays, so that nothing counts twice."""
-        f = landed.flight
-        scores = None if landed.values is None else _text(landed.values)
+        f = result.flight
+        scores = None if result.values is None else _text(result.values)
         row = (
             *batch,
-            f.candidate,
+            f.candidate_index,
             f.repeat,
             f.seed,
             scores,
-            landed.reason,
-            landed.duration,
-            landed.worker,
+            result.reason,
+            result.duration,
+            result.worker,
             self.session,
         )
-        with plain_faults(self.path):
+        with as_study_error(self.path):
             self.connection.execute("INSERT OR IGNORE INTO flight VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
 
-    def flown(self, batch: Batch) -> dict[tuple[int, int], Mapping[str, Any] | None]:
+    def flown(self, batch: CandidateBatch) -> dict[tuple[int, int], Mapping[str, Any] | None]:
         """(candidate, repeat) → order parameters of the flights that the store holds, None of those that failed."""
         found = self.rows(
             "SELECT candidate, repeat, scores FROM flight WHERE stage=? AND run=? AND generation=?", batch
         )
-        with from_outside(f"{self.path}: scores of {' '.join(map(str, batch))}", StudyError):
-            return {(c, r): None if scores is None else values_of(scores) for c, r, scores in found}
+        with as_error(f"{self.path}: scores of {' '.join(map(str, batch))}", StudyError):
+            return {(c, r): None if scores is None else parse_values(scores) for c, r, scores in found}
 
-    def tell(self, batch: Batch, fitness: Sequence[Sequence[float | None]]) -> None:
+    def tell(self, batch: CandidateBatch, fitness: Sequence[Sequence[float | None]]) -> None:
         """Store the fitness of all candidates of a batch, one number for each objective."""
         rows = [(json.dumps(list(values)), *batch, i) for i, values in enumerate(fitness)]
         self._many("UPDATE candidate SET fitness=? WHERE stage=? AND run=? AND generation=? AND candidate=?", rows)
 
     def count(self, stage: str = "search") -> int:
         """Flights of a stage."""
-        with plain_faults(self.path):
+        with as_study_error(self.path):
             return int(self.connection.execute("SELECT count(*) FROM flight WHERE stage=?", (stage,)).fetchone()[0])
 
     def rows(self, sql: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
         """All rows of a query."""
-        with plain_faults(self.path):
+        with as_study_error(self.path):
             return self.connection.execute(sql, tuple(values)).fetchall()
 
     def _many(self, sql: str, rows: Sequence[Sequence[Any]]) -> None:
         """Many rows in one transaction."""
-        with plain_faults(self.path):
+        with as_study_error(self.path):
             self.connection.execute("BEGIN IMMEDIATE")
             try:
                 self.connection.executemany(sql, rows)
@@ -189,7 +189,7 @@ def _lock(folder: Path) -> int:
 
 
 @contextmanager
-def plain_faults(path: Path) -> Iterator[None]:
+def as_study_error(path: Path) -> Iterator[None]:
     """SQLite's complaints as one line that names the file."""
     try:
         yield
@@ -220,13 +220,13 @@ def _finite(value: Any) -> Any:
     return float(value) if math.isfinite(value) else None
 
 
-def values_of(text: Any) -> dict[str, Any]:
+def parse_values(text: Any) -> dict[str, Any]:
     """Values by name of a row's JSON, nan for null; raises FormatError where a row was tampered with."""
-    return {key: math.nan if value is None else value for key, value in json_object(text).items()}
+    return {key: math.nan if value is None else value for key, value in parse_json_object(text).items()}
 
 
 def _point(text: Any) -> list[float]:
-    found = json_value(text)
+    found = parse_json(text)
     if not isinstance(found, list) or not all(isinstance(x, (int, float)) and math.isfinite(x) for x in found):
         raise FormatError("is not a list of finite numbers")
     return [float(x) for x in found]

@@ -1,18 +1,17 @@
 """Notes on scenarios that are valid but hardly meant; nothing here stops a flight."""
 
-from airflock.core.parameters import Quantity, declarations
-from airflock.parts.metrics.registry import METRICS
+from airflock.core import Quantity, declarations
+from airflock.parts.metrics import METRICS
 from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.scenario import Scenario
-from airflock.world.place import edge_rows
-from airflock.world.polygon import obstacle
+from airflock.world import edge_rows, obstacle
 
 APART = 100.0  # factor between the lengths of a law and of its arena above which one of them is hardly meant
 ON_EDGE = 1e-3  # m inside an arena up to which a point counts as on its edge: `obstacle` rounds by 1e-6 there
 SEES_WALLS = {"ray", "cast"}
 
 
-def advice(scenario: Scenario) -> list[str]:
+def dubious_setting_notes(scenario: Scenario) -> list[str]:
     """What a person should know before flying a scenario."""
     asked = (_speed_alone, _no_walls, _lengths, _all_met, _unsent, _too_late, _about_an_edge)
     return [note for note in (ask(scenario) for ask in asked) if note]

@@ -6,11 +6,11 @@ And whether order parameters look at pairs by cells.
 import math
 from dataclasses import replace
 
-from airflock.core.rules.reading import fields_read
-from airflock.scenarios.group_laws import Law
+from airflock.core import fields_read
+from airflock.scenarios.group_laws import FlownLaw
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.timing import clock
-from airflock.world.place import half_sizes
+from airflock.scenarios.timing import step_counts
+from airflock.world import half_sizes
 
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
 
@@ -20,29 +20,29 @@ GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flight
 NEAR_FROM, NEAR_FROM_IN_A_BOX = 6000, 2000
 
 
-def takes_all_cores(scenario: Scenario) -> bool:
+def uses_all_cores(scenario: Scenario) -> bool:
     """Whether one flight of a scenario uses all cores by itself, so that several side by side gain nothing.
 
     Its neighbours are found by cells: many agents, laws of finite reach, perception as things are.
     """
-    perfect = not scenario.errs and clock(scenario)["delay"] == 0 and scenario.radio.loss == 0.0
+    perfect = not scenario.has_sensor_error and step_counts(scenario)["delay"] == 0 and scenario.radio.loss == 0.0
     return (
         scenario.agents >= GRID_FROM
         and perfect
-        and by_cells(scenario)
-        and not scenario.transceiver.keeps
+        and uses_cells(scenario)
+        and not scenario.transceiver.keeps_packets
         and scenario.silence.rule == "fly_on"
         and scenario.flight.update == "synchronous"
         and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
-        and has_room(scenario)
+        and box_fits_cells(scenario)
     )
 
 
-def group_notes(scenario: Scenario) -> list[str]:
+def cell_notes(scenario: Scenario) -> list[str]:
     """A note where only the laws of groups keep a large flock from being flown by cells."""
-    if not scenario.groups or takes_all_cores(scenario) or not takes_all_cores(replace(scenario, groups=())):
+    if not scenario.groups or uses_all_cores(scenario) or not uses_all_cores(replace(scenario, groups=())):
         return []
-    if not by_cells(scenario):
+    if not uses_cells(scenario):
         endless = next(law.model.name for law in scenario.laws if not _within_reach(law))
         why = f"{endless} sees without limit (it has no reach)"
     else:
@@ -54,21 +54,21 @@ def group_notes(scenario: Scenario) -> list[str]:
     ]
 
 
-def by_cells(scenario: Scenario) -> bool:
+def uses_cells(scenario: Scenario) -> bool:
     """Whether cells as wide as a law's reach hold all who decide whom an agent of it meets."""
     if not any(law.model.neighbour for law in scenario.laws) or not all(map(_within_reach, scenario.laws)):
         return False
-    kind = scenario.meets
+    kind = scenario.topology_rule
     walls = scenario.scene.kind != "none" or bool(scenario.world.obstacles)
-    return kind is None or (kind.near and not (walls and kind.asks("hidden")))
+    return kind is None or (kind.near and not (walls and kind.asks_for("hidden")))
 
 
-def _within_reach(law: Law) -> bool:
+def _within_reach(law: FlownLaw) -> bool:
     """Whether a law looks at nobody beyond a reach that it tells."""
     return law.model.neighbour is None or law.model.reach is not None
 
 
-def has_room(scenario: Scenario) -> bool:
+def box_fits_cells(scenario: Scenario) -> bool:
     """Whether a periodic box is two reaches wide, so that a neighbour is in reach at one image only."""
     if scenario.world.edges != "periodic":
         return True
@@ -76,7 +76,7 @@ def has_room(scenario: Scenario) -> bool:
     return min(halves) >= max(_widest_reach(scenario, law) for law in scenario.laws)
 
 
-def _widest_reach(scenario: Scenario, law: Law) -> float:
+def _widest_reach(scenario: Scenario, law: FlownLaw) -> float:
     """The widest reach of those who fly by a law, m; without end where it is a matter of chance."""
     if law.model.reach is None or law.model.neighbour is None:
         return 0.0
@@ -91,7 +91,7 @@ def _widest_reach(scenario: Scenario, law: Law) -> float:
     return max(found)
 
 
-def measured_by_cells(scenario: Scenario) -> bool:
+def metrics_use_cells(scenario: Scenario) -> bool:
     """Whether order parameters look at pairs by cells, too, where neighbours are found so."""
     periodic = scenario.world.edges == "periodic"
     return bool(scenario.agents >= (NEAR_FROM_IN_A_BOX if periodic else NEAR_FROM))

@@ -4,10 +4,10 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from airflock.scenarios.cells import takes_all_cores
+from airflock.scenarios.cells import uses_all_cores
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.timing import clock
-from airflock.support.errors import FlightError
+from airflock.scenarios.timing import step_counts
+from airflock.support import FlightError
 
 TIMES = (("days", 86400.0), ("h", 3600.0), ("min", 60.0))
 LONGEST = 30 * 86400.0  # s of a processor that one flight may take; nobody waits longer for one
@@ -18,16 +18,16 @@ SIGHT = 2e-6  # for one look of one agent among a hundred buildings
 WING = 2e-6  # for what one wing does to another, while all are solved for
 
 
-def check_time(scenario: Scenario) -> None:
+def check_run_time(scenario: Scenario) -> None:
     """Refuse a flight that nobody can wait for; raises FlightError with the number of agents or the time that fits."""
     flight, n = scenario.flight, float(scenario.agents)
     if flight.duration / flight.dt * n * (2.0 * n * PAIR + STEP + SIGHT + n * WING) <= LONGEST:
         return  # whatever its rates and its law are
-    took = seconds_of(scenario)
+    took = estimated_seconds(scenario)
     if took <= LONGEST:
         return
     days = LONGEST / 86400.0
-    fit = most_below(scenario.agents, lambda agents: seconds_of(_of(scenario, agents)) <= LONGEST)
+    fit = largest_fitting(scenario.agents, lambda agents: estimated_seconds(_of(scenario, agents)) <= LONGEST)
     told = f"{scenario.name}: a flight takes about {took / 86400.0:.3g} days of a processor, more than {days:g}"
     fits = [f"about {fit} agents fit"] if fit else []
     fits.append(f"{'or ' if fits else ''}a duration of about {flight.duration * LONGEST / took:.3g} s")
@@ -39,25 +39,25 @@ def _of(scenario: Scenario, agents: float) -> Scenario:
     return replace(scenario, flight=replace(scenario.flight, agents=float(agents)))
 
 
-def seconds_of(scenario: Scenario) -> float:
+def estimated_seconds(scenario: Scenario) -> float:
     """Seconds of one core that a flight takes, about, without its compilation; at all cores, cells take a share."""
-    times, n, model = clock(scenario), float(scenario.agents), scenario.model
+    times, n, model = step_counts(scenario), float(scenario.agents), scenario.model
     decisions = times["steps"] / times["decide_every"]
-    pairs = min(n, 60.0) if takes_all_cores(scenario) else n
+    pairs = min(n, 60.0) if uses_all_cores(scenario) else n
     seconds = (decisions + times["steps"] / times["sample_every"]) * n * pairs * PAIR + times["steps"] * n * STEP
     seconds += decisions * n * SIGHT if model.sight is not None else 0.0
     return seconds + (decisions * n * n * WING if model.flock is not None else 0.0)
 
 
-def total_seconds(scenarios: Sequence[Scenario]) -> float:
+def estimated_total_seconds(scenarios: Sequence[Scenario]) -> float:
     """Seconds of one core that flights take, about; the same scenario may stand there very often."""
     kinds = {id(scenario): scenario for scenario in scenarios}
-    return sum(count * seconds_of(kinds[kind]) for kind, count in Counter(map(id, scenarios)).items())
+    return sum(count * estimated_seconds(kinds[kind]) for kind, count in Counter(map(id, scenarios)).items())
 
 
-def time_note(scenarios: Sequence[Scenario], threads: int) -> str:
+def run_time_note(scenarios: Sequence[Scenario], threads: int) -> str:
     """How long these flights take side by side, about, where that is more than a minute; empty if it is not."""
-    seconds = total_seconds(scenarios) / max(1, min(threads, len(scenarios)))
+    seconds = estimated_total_seconds(scenarios) / max(1, min(threads, len(scenarios)))
     if seconds < 60.0:
         return ""
     unit, size = next((unit, size) for unit, size in TIMES if seconds >= size)
@@ -65,10 +65,10 @@ def time_note(scenarios: Sequence[Scenario], threads: int) -> str:
     return f"{count} will take about {seconds / size:.2g} {unit}"
 
 
-def most_below(high: int, fits: Callable[[int], bool]) -> int:
+def largest_fitting(limit: int, fits: Callable[[int], bool]) -> int:
     """The largest number up to `high` that fits, 0 if not even one does."""
     low = 0
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if fits(middle) else (low, middle)
+    while limit - low > 1:
+        middle = (low + limit) // 2
+        low, limit = (middle, limit) if fits(middle) else (low, middle)
     return low

@@ -3,15 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.core.parameters import declarations
-from airflock.core.vectors import expanded, overruled
-from airflock.scenarios.families import FAMILIES
+from airflock.core import declarations, expand_vectors, without_replaced
+from airflock.scenarios.families import PART_KINDS
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.sections import SECTIONS
-from airflock.support.errors import ScenarioError
-from airflock.support.spelling import meant
+from airflock.support import ScenarioError, suggest
 
-TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
+TOP_LEVEL_KEYS = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
 
 
 def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
@@ -20,7 +18,7 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
     With its law goes what a paper published of it.
     """
     notes: list[str] = []
-    for family in FAMILIES:
+    for family in PART_KINDS:
         section = family.section
         given, key = document.get(section, {}), f"{section}.kind"
         if key not in settings or not isinstance(given, Mapping):
@@ -38,7 +36,7 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
     return document, tuple(notes)
 
 
-def keyed(settings: Any, where: str) -> dict[str, Any]:
+def settings_dict(settings: Any, where: str) -> dict[str, Any]:
     """Settings as a dict of keys and plain values; none for None. Raises ScenarioError for anything else."""
     if settings is None:
         return {}
@@ -56,7 +54,7 @@ def _plain(value: Any) -> Any:
     return type(value)(map(_plain, value)) if type(value) in (list, tuple) else value
 
 
-def merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+def with_settings(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """A copy of a document with keys like "model.p_rep" set, and the keys that nobody knows."""
     made: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in document.items()}
     faults: list[str] = []
@@ -65,21 +63,21 @@ def merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[di
         if name and not isinstance(made.setdefault(section, {}), dict):
             faults.append(f"{key}: unknown key")
         elif name:
-            made[section] = {**overruled(made[section], {name: value}), name: value}
+            made[section] = {**without_replaced(made[section], {name: value}), name: value}
         else:
             made[section] = value
-    return made, faults + [_unknown(key, value) for key, value in made.items() if key not in TOP]
+    return made, faults + [_unknown(key, value) for key, value in made.items() if key not in TOP_LEVEL_KEYS]
 
 
 def _unknown(key: str, value: object) -> str:
     """A line about a key that no scenario has; of a section, such as `flight`, in which a key of the top stands."""
-    above = next((name for name in value if name in TOP), None) if isinstance(value, Mapping) else None
+    above = next((name for name in value if name in TOP_LEVEL_KEYS), None) if isinstance(value, Mapping) else None
     if above is not None:
         return f"{key}.{above}: unknown key; did you mean {above}?"
-    return f"{key}: unknown key; {meant(key, TOP, 'known: ' + ', '.join(TOP))}"
+    return f"{key}: unknown key; {suggest(key, TOP_LEVEL_KEYS, 'known: ' + ', '.join(TOP_LEVEL_KEYS))}"
 
 
-def understood(document: dict[str, Any], section: str, record: type) -> dict[str, Any]:
+def without_unknown_numbers(document: dict[str, Any], section: str, record: type) -> dict[str, Any]:
     """A document without the numbers of a section whose kind cannot be had; its stand-in judges those that it knows."""
     known = {name for name, _, _ in declarations(record)} | {"kind"}
     given = document.get(section, {})
@@ -88,12 +86,12 @@ def understood(document: dict[str, Any], section: str, record: type) -> dict[str
     return {**document, section: {key: value for key, value in given.items() if key in known}}
 
 
-def components(document: dict[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str]]:
+def with_vector_components(document: dict[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str]]:
     """A document in which each vector is its components, and what is wrong with those that are given whole."""
     faults: list[str] = []
     for section, record in records.items():
         if isinstance(given := document.get(section), Mapping) and getattr(record, "VECTORS", None):
-            document[section], more = expanded(section, given, record)
+            document[section], more = expand_vectors(section, given, record)
             faults += more
     return document, faults
 

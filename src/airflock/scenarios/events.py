@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from airflock.support.errors import FlightError
+from airflock.support import FlightError
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,12 @@ class Event:
 KINDS = ("change", "command", "push", "place", "fault", "remove", "add", "branch")
 
 
-def events_of(given: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
+def to_events(items: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
     """Events from events or their plain dicts, in the order of their steps. Raises FlightError for one that is none."""
-    if not isinstance(given, Iterable):
-        raise FlightError(f"events = {given!r}: give a list of events, such as those of a flight")
+    if not isinstance(items, Iterable):
+        raise FlightError(f"events = {items!r}: give a list of events, such as those of a flight")
     events = []
-    for number, entry in enumerate(given):
+    for number, entry in enumerate(items):
         try:
             event = entry if isinstance(entry, Event) else Event(int(entry["step"]), str(entry["kind"]), entry["data"])
         except (KeyError, TypeError, ValueError) as fault:
@@ -48,51 +48,55 @@ def events_of(given: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
     return sorted(events, key=lambda event: event.step)
 
 
-def vectors(what: str, given: Any, count: int, dimensions: int, unit: str) -> list[Any]:
+def to_vectors(name: str, value: Any, count: int, dimensions: int, unit: str) -> list[Any]:
     """One finite vector for all of `count` agents, or a list of one for each, as plain floats. Raises FlightError."""
-    rows = given.tolist() if hasattr(given, "tolist") else given
+    rows = value.tolist() if hasattr(value, "tolist") else value
     each = isinstance(rows, (list, tuple)) and any(hasattr(row, "__len__") for row in rows)
     if not each:
-        return vector(what, rows, dimensions, unit)
+        return to_vector(name, rows, dimensions, unit)
     if len(rows) != count:
-        raise FlightError(f"{what}: {len(rows)} rows for {count} agents; give one for all, or (agent, axis)")
-    return [vector(f"{what}[{number}]", row, dimensions, unit) for number, row in enumerate(rows)]
+        raise FlightError(f"{name}: {len(rows)} rows for {count} agents; give one for all, or (agent, axis)")
+    return [to_vector(f"{name}[{number}]", row, dimensions, unit) for number, row in enumerate(rows)]
 
 
-def vector(what: str, given: Any, dimensions: int, unit: str) -> list[float]:
+def to_vector(name: str, value: Any, dimensions: int, unit: str) -> list[float]:
     """A finite vector of plain floats. Raises FlightError in one line."""
     try:
-        found = [float(c) for c in given]
+        found = [float(c) for c in value]
     except (TypeError, ValueError):
         found = []
     if len(found) != dimensions or not all(math.isfinite(c) for c in found):
         axes = ("east", "north", "up")[:dimensions]
-        raise FlightError(f"{what} = {given!r} is not [{', '.join(axes)}] in {unit or '1'}, each finite")
+        raise FlightError(f"{name} = {value!r} is not [{', '.join(axes)}] in {unit or '1'}, each finite")
     return found
 
 
-def agent_number(given: Any, agents: int) -> int:
+def check_agent(agent: Any, agents: int) -> int:
     """Number of an agent of the flock. Raises FlightError in one line."""
-    if isinstance(given, bool) or not hasattr(given, "__index__") or not 0 <= _index(given) < agents:
-        raise FlightError(f"agent = {given!r}: this flight has the agents 0 to {agents - 1}")
-    return _index(given)
+    if isinstance(agent, bool) or not hasattr(agent, "__index__") or not 0 <= _index(agent) < agents:
+        raise FlightError(f"agent = {agent!r}: this flight has the agents 0 to {agents - 1}")
+    return _index(agent)
 
 
-def are_several(given: Any) -> bool:
+def are_several(agents: Any) -> bool:
     """Whether agents are given as a list, an array or a range, and not one by itself."""
     return (
-        isinstance(given, Iterable) and not isinstance(given, (str, bytes, Mapping)) and getattr(given, "ndim", 1) > 0
+        isinstance(agents, Iterable)
+        and not isinstance(agents, (str, bytes, Mapping))
+        and getattr(agents, "ndim", 1) > 0
     )
 
 
-def agent_numbers(given: Any, agents: int) -> list[int]:
+def check_agents(number_or_list: Any, agents: int) -> list[int]:
     """Numbers of one agent or of several different ones. Raises FlightError in one line."""
-    found = [agent_number(number, agents) for number in (given if are_several(given) else [given])]
+    found = [
+        check_agent(number, agents) for number in (number_or_list if are_several(number_or_list) else [number_or_list])
+    ]
     if not found:
-        raise FlightError(f"agent = {given!r}: names no agent")
+        raise FlightError(f"agent = {number_or_list!r}: names no agent")
     twice = [number for place, number in enumerate(found) if number in found[:place]]
     if twice:
-        raise FlightError(f"agent = {given!r}: {twice[0]} is named twice")
+        raise FlightError(f"agent = {number_or_list!r}: {twice[0]} is named twice")
     return found
 
 

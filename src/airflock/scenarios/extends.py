@@ -4,22 +4,21 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from airflock.core.parameters import number_names
-from airflock.core.radio import Packets
-from airflock.core.vectors import overruled
+from airflock.core import PacketParameters, number_names, without_replaced
 from airflock.scenarios.schema import value_of
-from airflock.support.errors import ScenarioError
-from airflock.support.untrusted import is_file, own_path
+from airflock.support import ScenarioError, expand_path, is_file
 
 OF_ITS_OWN = ("published", "title")  # what a paper published of a file and what the file is called: not of another
 LONGEST = 10  # files in a chain of extends
 # sections in which another kind means other keys
 KINDS = ("model", "body", "sensors", "radio", "scene", "goals", "start")
-SHARED = {"sensors": ("period",), "radio": number_names(Packets)}  # but for these, which every kind has
-Read = Callable[[str, Path | None], tuple[dict[str, Any], Path]]
+SHARED = {"sensors": ("period",), "radio": number_names(PacketParameters)}  # but for these, which every kind has
+ReadDocument = Callable[[str, Path | None], tuple[dict[str, Any], Path]]
 
 
-def extended(document: Mapping[str, Any], where: str, folder: Path | None, read: Read) -> tuple[dict[str, Any], str]:
+def extend_document(
+    document: Mapping[str, Any], where: str, folder: Path | None, read: ReadDocument
+) -> tuple[dict[str, Any], str]:
     """A document with everything of the file that it extends, and which file that was ("" for none).
 
     Keys of the document go before those of the file. Where it names another kind of model, body, sensor, radio, scene,
@@ -34,7 +33,7 @@ def extended(document: Mapping[str, Any], where: str, folder: Path | None, read:
 
 
 def _extended(
-    document: Mapping[str, Any], where: str, folder: Path | None, read: Read, chain: tuple[str, ...]
+    document: Mapping[str, Any], where: str, folder: Path | None, read: ReadDocument, chain: tuple[str, ...]
 ) -> tuple[dict[str, Any], str]:
     own = dict(document)
     name = own.pop("extends", None)
@@ -63,7 +62,7 @@ def _section(key: str, base: Any, own: Any) -> Any:
     if key == "topology":  # ours share their numbers; a file has its own
         other = kinds[0] != kinds[1] and any(isinstance(kind, str) and kind.endswith(".py") for kind in kinds)
     kept = {name: base[name] for name in SHARED.get(key, ()) if name in base} if other else base
-    return {**overruled(kept, own), **own}
+    return {**without_replaced(kept, own), **own}
 
 
 def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -73,7 +72,7 @@ def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     for section, key in (*kinds, ("scene", "file")):
         table = result.get(section)
         name = value_of(table.get(key)) if isinstance(table, Mapping) else None
-        if isinstance(name, str) and name and not own_path(name).is_absolute() and is_file(folder / name):
+        if isinstance(name, str) and name and not expand_path(name).is_absolute() and is_file(folder / name):
             result[section] = {**table, key: str((folder / name).absolute())}  # type: ignore[dict-item]
     faults, groups = result.get("faults"), result.get("groups")
     if isinstance(faults, list):

@@ -4,15 +4,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airflock.core.parameters import Declaration, declarations
+from airflock.core import Declaration, declarations
 from airflock.scenarios.schema import value_of
-from airflock.support.spelling import as_name, meant
+from airflock.support import suggest, to_identifier
 
 FIRST = "faults."
 FORM = "write faults.KIND.KEY or faults.NUMBER.KEY, for instance faults.motor.share"
 
 
-def with_faults(
+def with_fault_keys(
     document: Mapping[str, Any], settings: Mapping[str, Any]
 ) -> tuple[Mapping[str, Any], dict[str, Any], list[str]]:
     """A document with the keys of its faults set, the other settings, and what is wrong with these keys."""
@@ -42,13 +42,13 @@ def is_fault_key(key: str) -> bool:
     return key.startswith(FIRST)
 
 
-def fault_of(tables: Sequence[Mapping[str, Any]], key: str) -> tuple[int | None, str]:
+def entry_of_key(tables: Sequence[Mapping[str, Any]], key: str) -> tuple[int | None, str]:
     """Number of the entry that a key means, None where there is none, and the name of what it sets."""
     entry, _, name = key.removeprefix(FIRST).rpartition(".")
     return _entry(entry, name, tables)[0], name
 
 
-def declared_of_faults(entries: Sequence[Any]) -> Iterator[tuple[str, str, Declaration, Any]]:
+def fault_declarations(entries: Sequence[Any]) -> Iterator[tuple[str, str, Declaration, Any]]:
     """Key, kind, declaration and value of the numbers of each fault.
 
     Keys are those by number: a kind may come again while a flock flies.
@@ -60,12 +60,12 @@ def declared_of_faults(entries: Sequence[Any]) -> Iterator[tuple[str, str, Decla
 
 def has_fault(scenario: Any, key: str) -> bool:
     """Whether a scenario has the fault that a key names."""
-    return fault_of(_kinds(scenario), key)[0] is not None
+    return entry_of_key(_kinds(scenario), key)[0] is not None
 
 
-def value_in_fault(scenario: Any, key: str) -> Any:
+def fault_key_value(scenario: Any, key: str) -> Any:
     """Value of a key of a fault; None where there is no such fault, or nothing is said of when it begins and ends."""
-    number, name = fault_of(_kinds(scenario), key)
+    number, name = entry_of_key(_kinds(scenario), key)
     if number is None:
         return None
     written = scenario.document["faults"][number].get(name)
@@ -91,9 +91,9 @@ def _entry(entry: str, name: str, tables: Sequence[Mapping[str, Any]]) -> tuple[
     if numbers:
         several = ", ".join(f"{FIRST}{number}.{name}" for number in numbers[:3])
         return None, f"{len(numbers)} faults are of this kind; write one of {several}"
-    return None, f"the scenario has no fault {entry!r}; {meant(entry, kinds, 'known: ' + ', '.join(kinds))}"
+    return None, f"the scenario has no fault {entry!r}; {suggest(entry, kinds, 'known: ' + ', '.join(kinds))}"
 
 
 def _name(kind: Any) -> str:
     """What a kind is called in a key: that of a file by the file's name."""
-    return as_name(Path(kind).stem) if isinstance(kind, str) and kind.endswith(".py") else str(kind)
+    return to_identifier(Path(kind).stem) if isinstance(kind, str) and kind.endswith(".py") else str(kind)

@@ -6,22 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from airflock.core.fault import KEYS, Fault, fault
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
-from airflock.parts.faults.registry import KINDS
+from airflock.core import ENTRY_KEYS, Fault, Parameters as Record, fault, quantity
+from airflock.parts.faults import KINDS
 from airflock.scenarios import schema, units
-from airflock.scenarios.groups import Group, members
-from airflock.scenarios.own_code import made_of
-from airflock.support.errors import AirflockError
-from airflock.support.spelling import meant
+from airflock.scenarios.groups import Group, read_members
+from airflock.scenarios.own_code import build_from_file
+from airflock.support import AirflockError, suggest
 
 PERCEPTION = {"sense", "tell", "radio", "clock"}  # rules that disturb what agents know of each other
 MOST = 255  # entries of a file: each draws by a number of its own
 
 
 @dataclass(frozen=True, kw_only=True)
-class Timing(Record):
+class FaultTiming(Record):
     """When a fault begins and ends, and how many it hits; beside the numbers of its kind."""
 
     at: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it begins")
@@ -40,7 +37,7 @@ class Timing(Record):
 
 
 @dataclass(frozen=True)
-class Entry:
+class FaultEntry:
     """One entry of [[faults]].
 
     fault    : its kind; numbers : the kind's parameters
@@ -59,30 +56,30 @@ class Entry:
     until: float = math.inf
     lasts: float = math.inf
 
-    def occurs(self, duration: float) -> bool:
+    def can_occur(self, duration: float) -> bool:
         """Whether it may occur in a flight of this duration, s."""
         begin = 0.0 if self.at is None else self.at
         due = self.per_hour > 0.0 if self.at is None else self.at < duration
         return due and self.lasts > 0.0 and self.until > begin and bool(self.agents)
 
 
-def entries(
-    given: Any, agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None = None, *,
-    own: Mapping[str, Fault] | None = None, trust: bool = False,
-) -> tuple[tuple[Entry, ...], list[str], list[str]]:  # fmt: skip
+def read_fault_entries(
+    tables: Any, agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None = None, *,
+    user_kinds: Mapping[str, Fault] | None = None, trust: bool = False,
+) -> tuple[tuple[FaultEntry, ...], list[str], list[str]]:  # fmt: skip
     """Entries of [[faults]], notes of converted units, and everything that is wrong with them, one line each.
 
     own : kinds that the caller gives, by name
     """
-    if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(e, Mapping) for e in given):
+    if not isinstance(tables, Sequence) or isinstance(tables, str) or not all(isinstance(e, Mapping) for e in tables):
         return (), [], ["faults is not a list of tables; write [[faults]]"]
-    if len(given) > MOST:
-        return (), [], [f"faults: {len(given)} entries are more than {MOST}"]
-    found: list[Entry] = []
+    if len(tables) > MOST:
+        return (), [], [f"faults: {len(tables)} entries are more than {MOST}"]
+    found: list[FaultEntry] = []
     notes: list[str] = []
     faults: list[str] = []
-    kinds = {**KINDS, **(own or {})}
-    for number, table in enumerate(given):
+    kinds = {**KINDS, **(user_kinds or {})}
+    for number, table in enumerate(tables):
         entry, told, wrong = _entry(f"faults[{number}]", table, agents, groups, sequential, folder, kinds, trust)
         notes += told
         faults += wrong
@@ -97,16 +94,16 @@ def entries(
 def _entry(
     where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None,
     kinds: Mapping[str, Fault], trust: bool,
-) -> tuple[Entry | None, list[str], list[str]]:  # fmt: skip
+) -> tuple[FaultEntry | None, list[str], list[str]]:  # fmt: skip
     kind, faults = _kind(where, table.get("kind"), folder, kinds, trust)
     names = ("kind", "agents", "group")
-    timing = {key: value for key, value in table.items() if key in KEYS and key not in names}
-    when, notes, wrong = _record(where, timing, Timing)
+    timing = {key: value for key, value in table.items() if key in ENTRY_KEYS and key not in names}
+    when, notes, wrong = _record(where, timing, FaultTiming)
     faults += wrong
     numbers = None
     if kind is not None:  # else nobody can judge its numbers
-        rest = {key: value for key, value in table.items() if key not in KEYS}
-        numbers, told, wrong = _record(where, rest, kind.Parameters, KEYS)
+        rest = {key: value for key, value in table.items() if key not in ENTRY_KEYS}
+        numbers, told, wrong = _record(where, rest, kind.Parameters, ENTRY_KEYS)
         notes, faults = notes + told, faults + wrong
     who, wrong = _who(where, table, agents, groups)
     faults += wrong
@@ -123,7 +120,7 @@ def _entry(
         return None, notes, faults
     faults += _end_faults(where, when, kind, numbers)
     count = 1 if when.number is None and when.per_hour is not None else when.number
-    entry = Entry(
+    entry = FaultEntry(
         kind, numbers, who, None if count is None else int(count), when.at, when.per_hour or 0.0,
         math.inf if when.until is None else when.until, math.inf if when.lasts is None else when.lasts,
     )  # fmt: skip
@@ -134,8 +131,8 @@ def _record(
     where: str, table: Mapping[str, Any], record: type, beside: Sequence[str] = ()
 ) -> tuple[Any, list[str], list[str]]:
     """A record made from keys of an entry, in SI units, or None; notes; what is wrong."""
-    document, notes, faults = units.converted({where: table}, {where: record})
-    made, wrong = schema.check(where, document[where], record, beside)
+    document, notes, faults = units.convert_units({where: table}, {where: record})
+    made, wrong = schema.read_section(where, document[where], record, beside)
     return (None if faults else made), notes, faults + wrong
 
 
@@ -147,10 +144,10 @@ def _kind(
         return kinds[name], []
     if isinstance(name, str) and name.endswith(".py"):
         try:
-            return made_of(fault, f"{where}.kind", name, folder, trust=trust), []
+            return build_from_file(fault, f"{where}.kind", name, folder, trust=trust), []
         except AirflockError as wrong:
             return None, str(wrong).splitlines()
-    hint = meant(name, kinds, f"known: {', '.join(kinds)}, or a file that ends in .py")
+    hint = suggest(name, kinds, f"known: {', '.join(kinds)}, or a file that ends in .py")
     return None, [f"{where}.kind = {name!r}: unknown kind of fault; {hint}"]
 
 
@@ -161,7 +158,7 @@ def _who(
     if "agents" in table and "group" in table:
         return None, [f"{where} names agents and a group; give one of them"]
     if "agents" in table:
-        return members(f"{where}.agents", table["agents"], agents)
+        return read_members(f"{where}.agents", table["agents"], agents)
     if "group" not in table:
         return tuple(range(agents)), []
     named = {group.name: group.agents for group in groups}
@@ -171,7 +168,7 @@ def _who(
     return None, [f"{where}.group = {table['group']!r}: unknown group; {known}"]
 
 
-def _when_faults(where: str, when: Timing, may: int) -> list[str]:
+def _when_faults(where: str, when: FaultTiming, may: int) -> list[str]:
     """What is wrong with times that are sound alone; may : how many agents may be hit."""
     faults = []
     if (when.at is None) == (when.per_hour is None):
@@ -185,11 +182,11 @@ def _when_faults(where: str, when: Timing, may: int) -> list[str]:
     return faults
 
 
-def _end_faults(where: str, when: Timing, kind: Fault, numbers: Any) -> list[str]:
+def _end_faults(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> list[str]:
     """Why a fault cannot end."""
     faults = []
     ends = when.lasts is not None or (when.at is not None and when.until is not None)
-    if ends and kind.gone_after(numbers) <= 0.0:
+    if ends and kind.time_to_absence(numbers) <= 0.0:
         faults.append(
             f"{where}: {kind.name} does not end, as an agent that drops out stays out; leave out until and lasts"
         )

@@ -8,18 +8,16 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from airflock.core.fault import Fault, fault
+from airflock.core import Fault, fault
 from airflock.scenarios import formats
-from airflock.scenarios.document import keyed
-from airflock.scenarios.extends import extended
-from airflock.scenarios.families import FAMILIES, Family, Given
-from airflock.scenarios.ground import with_ground
-from airflock.scenarios.laws import given_law
-from airflock.scenarios.making import make
+from airflock.scenarios.document import settings_dict
+from airflock.scenarios.extends import extend_document
+from airflock.scenarios.families import PART_KINDS, CallerParts, PartKind
+from airflock.scenarios.ground import with_field
+from airflock.scenarios.laws import law_from_caller
+from airflock.scenarios.making import build_scenario
 from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import ScenarioError
-from airflock.support.spelling import meant
-from airflock.support.untrusted import FormatError, from_outside, is_file, own_path, read_toml
+from airflock.support import FormatError, ScenarioError, as_error, expand_path, is_file, read_toml, suggest
 
 IMPORTED = "not a scenario; airflock import makes a recording of it (in Python: airflock.load_tracks)"
 NO_SCENARIO = {  # files that stand beside scenarios, by their ending: what they are, and what takes them
@@ -127,46 +125,55 @@ def load(
     airflock.support.errors.ScenarioError: vasarhelyi_2018/4ms: radio.delay = 60 s lies outside [0, 30] s
     """
     text = str(name)
-    where = text if text in presets() else str(own_path(text))
-    with from_outside(where):
+    where = text if text in presets() else str(expand_path(text))
+    with as_error(where):
         document, folder = _read(where, None)
-        document, base = extended(document, where, folder, _read)
-        document, given = _with_given(document, zip(FAMILIES, (metrics, body, sensor, radio, topology), strict=True))
-        flown = None if law is None else given_law(law)
-        of_groups = {own.name: own for own in map(given_law, _several(laws))}
-        given = replace(given, law=flown, kinds=_kinds(faults), laws=of_groups)
+        document, base = extend_document(document, where, folder, _read)
+        document, given = _with_given(document, zip(PART_KINDS, (metrics, body, sensor, radio, topology), strict=True))
+        flown = None if law is None else law_from_caller(law)
+        of_groups = {own.name: own for own in map(law_from_caller, _several(laws))}
+        given = replace(given, law=flown, fault_kinds=_kinds(faults), laws=of_groups)
         notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
-        document, settings, told, wrong = with_ground(document, keyed(settings, where), folder)
+        document, settings, told, wrong = with_field(document, settings_dict(settings, where), folder)
         if flown is not None:
-            kind = str(own_path(law).absolute()) if str(law).endswith(".py") else flown.name
+            kind = str(expand_path(law).absolute()) if str(law).endswith(".py") else flown.name
             document = {**document, "model": {"kind": kind}, "published": {}}
-        return make(
-            document, where, settings, folder=folder, given=given, notes=notes + told, known_faults=wrong, trust=trust
+        return build_scenario(
+            document,
+            where,
+            settings,
+            folder=folder,
+            caller_parts=given,
+            notes=notes + told,
+            known_errors=wrong,
+            trust=trust,
         )
 
 
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     """Document of a preset or of a file, looked for in a folder, in today's format, and the folder that it lies in."""
     known = presets()
-    path = known.get(name) or (own_path(name) if folder is None else folder / own_path(name))
+    path = known.get(name) or (expand_path(name) if folder is None else folder / expand_path(name))
     if not is_file(path):
         # the name of a file is meant as a preset only where the two are much alike
         word, alike = (name, 0.4) if path.suffix != ".toml" else (name.removesuffix(".toml"), 0.7)
-        hint = meant(word, known, "; airflock presets lists the presets", lead="; ", cutoff=alike)
+        hint = suggest(word, known, "; airflock presets lists the presets", lead="; ", cutoff=alike)
         raise ScenarioError([f"{name}: no such file or preset{hint}"])
     if path.suffix.lower() in NO_SCENARIO:
         raise ScenarioError([f"{name}: is {NO_SCENARIO[path.suffix.lower()]}"])
-    with from_outside(name):
+    with as_error(name):
         try:
             document = read_toml(path)
         except FormatError as fault:
             raise ScenarioError([f"{name}: is not a scenario file (TOML): {fault}"]) from fault
     if tells_of_study(document) and not {"model", "extends"} & set(document):
         raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
-    return {**formats.current(document, name), formats.KEY: formats.FORMAT}, path.parent
+    return {**formats.to_current_format(document, name), formats.KEY: formats.FORMAT}, path.parent
 
 
-def _with_given(document: Mapping[str, Any], given: Iterable[tuple[Family[Any], Any]]) -> tuple[dict[str, Any], Given]:
+def _with_given(
+    document: Mapping[str, Any], given: Iterable[tuple[PartKind[Any], Any]]
+) -> tuple[dict[str, Any], CallerParts]:
     """A document that names what the caller gives, and the rules of it that are not found by their names alone.
 
     Giving them is consent to run them. Raises ScenarioError.
@@ -178,8 +185,8 @@ def _with_given(document: Mapping[str, Any], given: Iterable[tuple[Family[Any], 
         if what is None:
             continue
         table, kind = document.get(family.section, {}), str(what)
-        if not (isinstance(what, str) and what in family.known):
-            found, more = family.given(what)
+        if not (isinstance(what, str) and what in family.shipped):
+            found, more = family.from_caller(what)
             faults += more
             if found is None:
                 continue
@@ -187,7 +194,7 @@ def _with_given(document: Mapping[str, Any], given: Iterable[tuple[Family[Any], 
         document[family.section] = {**family.kept(table, kind), "kind": kind}
     if faults:
         raise ScenarioError(faults)
-    return document, Given(**rules)
+    return document, CallerParts(**rules)
 
 
 def _kinds(given: Any) -> dict[str, Fault]:
@@ -201,14 +208,14 @@ def _several(given: Any) -> list[Any]:
     return [] if given is None else list(given) if isinstance(given, (list, tuple)) else [given]
 
 
-def loaded(what: Any) -> Scenario:
+def load_if_named(scenario: Any) -> Scenario:
     """A scenario, or the one that a name stands for."""
-    if isinstance(what, Scenario):
-        return what
-    if isinstance(what, (str, os.PathLike)):
-        return load(what)
-    kind = type(what).__name__
-    tracks = "; airflock.load_tracks makes a recording of tracks" if hasattr(what, "shape") else ""
+    if isinstance(scenario, Scenario):
+        return scenario
+    if isinstance(scenario, (str, os.PathLike)):
+        return load(scenario)
+    kind = type(scenario).__name__
+    tracks = "; airflock.load_tracks makes a recording of tracks" if hasattr(scenario, "shape") else ""
     raise ScenarioError([f"{kind} is not a scenario; give a Scenario, a preset's name or a scenario file{tracks}"])
 
 

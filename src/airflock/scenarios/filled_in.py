@@ -2,10 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from airflock.core.contract import Model
-from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import complete
-from airflock.parts.metrics.parameters import Parameters as MetricParameters
+from airflock.core import Model, SilenceParameters, with_defaults
+from airflock.parts.metrics import Parameters as MetricParameters
 from airflock.scenarios.geometry import largest_extension
 from airflock.world import arena, start
 
@@ -13,7 +11,7 @@ if TYPE_CHECKING:
     from airflock.scenarios.scenario import Scenario
 
 
-def metrics(scenario: "Scenario") -> MetricParameters:
+def default_metrics(scenario: "Scenario") -> MetricParameters:
     """The numbers of its order parameters."""
     given = {name: getattr(scenario.metrics, name) for name in scenario.metrics.__dataclass_fields__}
     p, model = scenario.parameters, scenario.model
@@ -35,16 +33,16 @@ def metrics(scenario: "Scenario") -> MetricParameters:
     return type(scenario.metrics)(**given)
 
 
-def silence(scenario: "Scenario") -> Silence:
+def default_silence(scenario: "Scenario") -> SilenceParameters:
     """The rule of silence."""
-    return complete(scenario.silence, scenario.model.speed(scenario.parameters), scenario.radio.delay)
+    return with_defaults(scenario.silence, scenario.model.speed(scenario.parameters), scenario.radio.delay)
 
 
-def separation(model: Model, parameters: Any, begin: start.Parameters, world: arena.Parameters) -> float:
+def default_separation(model: Model, parameters: Any, start_record: start.Parameters, world: arena.Parameters) -> float:
     """Default of start.separation, m: 2 s of flight at the preferred speed, at least 3 m (authors' program).
 
     In a ball, a box or a periodic world agents may start anywhere: 0.
     """
-    if begin.kind != "arena" or world.edges == "periodic":
+    if start_record.kind != "arena" or world.edges == "periodic":
         return 0.0
     return max(3.0, 2.0 * model.speed(parameters))

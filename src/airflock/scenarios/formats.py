@@ -7,14 +7,14 @@ older file mean something else raises the number and adds a step to MIGRATIONS; 
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from airflock.support.errors import ScenarioError
+from airflock.support import ScenarioError
 
 KEY = "format"
 FORMAT = 1  # of scenarios and studies
 MIGRATIONS: tuple[Callable[[Mapping[str, Any]], Mapping[str, Any]], ...] = ()  # step i reads format i + 1 as i + 2
 
 
-def current(document: Mapping[str, Any], where: str) -> Mapping[str, Any]:
+def to_current_format(document: Mapping[str, Any], where: str) -> Mapping[str, Any]:
     """A document of any format known here as one of today's, without its key `format`."""
     found = document.get(KEY, 1)
     if isinstance(found, bool) or not isinstance(found, int) or found < 1:

@@ -9,8 +9,7 @@ from shapely.geometry import MultiPoint, Point, Polygon, box
 from shapely.validation import explain_validity
 
 from airflock.scenarios.wings import FORMATIONS
-from airflock.world import arena, start
-from airflock.world.place import half_sizes
+from airflock.world import arena, half_sizes, start
 
 MOST_JITTER = 5.8  # standard deviations; no normal number of `core.random` is larger
 ROUNDED = 2e-3  # m; by how much an obstacle at an edge may reach outside: corners of files are told to the millimetre
@@ -27,7 +26,7 @@ def ground_plan(world: arena.Parameters) -> Any:
     return Polygon(world.corners) if world.arena == "polygon" and len(world.corners) > 2 else None
 
 
-def polygon_fault(corners: Any) -> str:
+def polygon_error(corners: Any) -> str:
     """Why a list of corners is no simple polygon; empty if it is one."""
     if len(corners) < 3:
         return f"has {len(corners)} corners; a polygon needs at least 3"
@@ -77,21 +76,24 @@ def diameter(points: Sequence[tuple[float, float]]) -> float:
     return largest
 
 
-def formation_faults(world: arena.Parameters, begin: start.Parameters, agents: int) -> list[str]:
+def formation_errors(world: arena.Parameters, start_record: start.Parameters, agents: int) -> list[str]:
     """Why a formation does not fit into the arena. Of straight lines in a convex arena the ends decide."""
     plan = ground_plan(world)
     if plan is None:
         return []
-    margin = 0.0 if world.edges == "open" else MOST_JITTER * begin.jitter  # a face would move an agent outside
+    margin = 0.0 if world.edges == "open" else MOST_JITTER * start_record.jitter  # a face would move an agent outside
     ends = (0, max(agents - 2, 0), agents - 1)
     for agent in dict.fromkeys(range(agents) if world.arena == "polygon" else ends):
-        x, y, z = FORMATIONS[begin.kind](agent, begin.spacing_x, begin.spacing_y, begin.spacing_z)
+        x, y, z = FORMATIONS[start_record.kind](
+            agent, start_record.spacing_x, start_record.spacing_y, start_record.spacing_z
+        )
         low, top = arena.heights_of(world)
         high = not low + margin <= z <= top - margin and world.dimensions == "3"
         if high or not plan.covers(Point(x, y).buffer(margin) if margin else Point(x, y)):
             spot = f"[{x:g}, {y:g}" + (f", {z:g}]" if world.dimensions == "3" else "]")
             return [
-                f"start.kind = {begin.kind!r}: agent {agent} of {agents} would start at {spot} m, outside the arena"
+                f"start.kind = {start_record.kind!r}: agent {agent} of {agents} would start at {spot} m, "
+                "outside the arena"
                 + (f" or within {margin:g} m of jitter of its faces" if margin else "")
                 + "; enlarge it, or lower start.spacing_x, start.spacing_y and start.spacing_z"
             ]
@@ -108,21 +110,22 @@ def _edge_faults(world: arena.Parameters) -> list[str]:
     return found
 
 
-def start_faults(world: arena.Parameters, begin: start.Parameters, agents: int) -> list[str]:
+def start_region_errors(world: arena.Parameters, start_record: start.Parameters, agents: int) -> list[str]:
     """Why a start region does not fit into the arena."""
     found = []
-    if begin.kind in FORMATIONS:
-        found += formation_faults(world, begin, agents)
-    elif begin.kind != "arena" and world.arena != "none":
-        reach = begin.radius if begin.kind == "ball" else 0.5 * begin.side
+    if start_record.kind in FORMATIONS:
+        found += formation_errors(world, start_record, agents)
+    elif start_record.kind != "arena" and world.arena != "none":
+        reach = start_record.radius if start_record.kind == "ball" else 0.5 * start_record.side
         z = min(-arena.heights_of(world)[0], arena.heights_of(world)[1]) if world.dimensions == "3" else math.inf
         plan = ground_plan(world)
         round_ = Point(0.0, 0.0).buffer(reach * 0.999, quad_segs=64)
-        region = round_ if begin.kind == "ball" else box(-reach, -reach, reach, reach)
+        region = round_ if start_record.kind == "ball" else box(-reach, -reach, reach, reach)
         if plan is not None and (not plan.covers(region) or reach > z):
-            name = "radius" if begin.kind == "ball" else "side"
+            name = "radius" if start_record.kind == "ball" else "side"
             found.append(
-                f"start.{name} = {getattr(begin, name):g} m: the arena is smaller than the {begin.kind} in which "
+                f"start.{name} = {getattr(start_record, name):g} m: "
+                f"the arena is smaller than the {start_record.kind} in which "
                 f"agents start; enlarge world.side or world.height, or lower start.{name}"
             )
     return found
@@ -145,7 +148,7 @@ def _size(world: arena.Parameters, begin: start.Parameters) -> str:
     return {"ball": "start.radius", "box": "start.side"}.get(begin.kind, of_arena)
 
 
-def height_faults(world: arena.Parameters) -> list[str]:
+def height_errors(world: arena.Parameters) -> list[str]:
     """What is wrong with floor, ceiling and the heights of obstacles."""
     found = []
     given = [key for key in ("floor", "ceiling") if getattr(world, key) is not None]
@@ -167,32 +170,34 @@ def height_faults(world: arena.Parameters) -> list[str]:
     return found
 
 
-def faults(
-    world: arena.Parameters, agents: int, separation: float, begin: start.Parameters, *, started: bool = False
+def world_errors(
+    world: arena.Parameters, agents: int, separation: float, start_record: start.Parameters, *, started: bool = False
 ) -> list[str]:
     """Everything that is wrong with a world, and with starting in it unless the flight has started; one line each."""
-    found = height_faults(world)
+    found = height_errors(world)
     if world.arena == "polygon":
-        fault = polygon_fault(world.corners)
+        fault = polygon_error(world.corners)
         if fault:
             found.append(f"world.corners {fault}")
     if world.arena != "square" and world.walls == "nearest_per_axis":
         found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'; set world.walls = 'every_edge'")
     plan = None if found else ground_plan(world)
-    region, height = (None, 1.0) if found else _region(world, begin)
+    region, height = (None, 1.0) if found else _region(world, start_record)
     if not found:
-        found += _edge_faults(world) if started else start_faults(world, begin, agents) + _edge_faults(world)
+        found += (
+            _edge_faults(world) if started else start_region_errors(world, start_record, agents) + _edge_faults(world)
+        )
     solid: list[Polygon] = []
     within = None if plan is None or not world.obstacles else plan.buffer(ROUNDED, join_style="mitre")
     for number, corners in enumerate(world.obstacles):
-        fault = polygon_fault(corners)
+        fault = polygon_error(corners)
         if fault:
             found.append(f"world.obstacles[{number}] {fault}")
             continue
         shape = Polygon(corners)
         if within is not None and not within.covers(shape):
             found.append(f"world.obstacles[{number}] reaches outside the arena")
-        solid.append(shape.buffer(begin.wall_clearance))
+        solid.append(shape.buffer(start_record.wall_clearance))
     if started:
         return found
     free = math.inf if region is None else region.difference(union_all(solid)).area
@@ -203,11 +208,11 @@ def faults(
     if not found and need > (JAMMED if world.dimensions == "2" else 0.35):
         found.append(
             f"agents = {agents} do not fit at start.separation = {separation:g} m"
-            + (f" and start.wall_clearance = {begin.wall_clearance:g} m" if begin.wall_clearance else "")
+            + (f" and start.wall_clearance = {start_record.wall_clearance:g} m" if start_record.wall_clearance else "")
             + (f": they would cover {need:.0%} of" if free * height > 0.0 else ": no place is left in")
-            + f" the region they start in; enlarge {_size(world, begin)}, or lower agents or "
-            + ("start.separation or start.wall_clearance" if begin.wall_clearance else "start.separation")
+            + f" the region they start in; enlarge {_size(world, start_record)}, or lower agents or "
+            + ("start.separation or start.wall_clearance" if start_record.wall_clearance else "start.separation")
         )
-    if not found and world.arena == "none" and agents > 1 and begin.kind == "arena":
+    if not found and world.arena == "none" and agents > 1 and start_record.kind == "arena":
         found.append("world.arena = 'none' has no region to start in; give an arena, or start.kind = 'ball'")
     return found

@@ -9,17 +9,15 @@ from typing import Any
 
 from airflock.scenarios import schema, units
 from airflock.scenarios.schema import value_of
-from airflock.support.errors import ScenarioError
-from airflock.support.untrusted import is_file, own_path
-from airflock.world import arena
-from airflock.world.scenes.outlines import ground_of
+from airflock.support import ScenarioError, expand_path, is_file
+from airflock.world import arena, load_field
 
 FROM_FILE = ("world.file", "world.simplify")
 GIVEN = ("corners", "obstacles", "heights")  # what the file says, and the scenario cannot say as well
 INSTEAD = {"arena": "square", "side": 1e6}  # of a file that cannot be read, so that all else is judged in wide room
 
 
-def with_ground(
+def with_field(
     document: Mapping[str, Any], settings: Mapping[str, Any], folder: Path | None
 ) -> tuple[dict[str, Any], Mapping[str, Any], tuple[str, ...], tuple[str, ...]]:
     """Document and settings in which a field's file has become its keys, notes, and what is wrong with it.
@@ -37,7 +35,7 @@ def with_ground(
     shape = value_of(settings.get("world.arena", "polygon"))
     if shape != "polygon":
         faults.append(f"world.arena = {shape!r}: is given, and world.file as well; take one of them out")
-    path = own_path(name) if is_file(name) or folder is None else folder / own_path(name)
+    path = expand_path(name) if is_file(name) or folder is None else folder / expand_path(name)
     faults += [] if is_file(path) else [f"world.file = {name!r}: no such file"]
     simplify, more = _metres(world)
     faults += more
@@ -46,7 +44,7 @@ def with_ground(
     if not faults:
         try:
             space = str(value_of(world.get("dimensions", "2"))) == "3"
-            found = ground_of(path, simplify=simplify, space=space)
+            found = load_field(path, simplify=simplify, space=space)
         except ScenarioError as fault:
             faults += str(fault).splitlines()
         else:
@@ -59,12 +57,12 @@ def with_ground(
 def _metres(world: Mapping[str, Any]) -> tuple[float, list[str]]:
     """How far outlines may move, m, and what is wrong with it."""
     given = {"world": {key: value for key, value in world.items() if key == "simplify"}}
-    told, _, faults = units.converted(given, {"world": arena.Parameters})
-    made, more = schema.check("world", told["world"], arena.Parameters)
+    told, _, faults = units.convert_units(given, {"world": arena.Parameters})
+    made, more = schema.read_section("world", told["world"], arena.Parameters)
     return (made.simplify if made is not None else 0.0), faults + more
 
 
-def file_faults(world: Any) -> list[str]:
+def field_file_errors(world: Any) -> list[str]:
     """Why a record of an arena that still names a file cannot be flown."""
     if world is None or not world.file:
         return []

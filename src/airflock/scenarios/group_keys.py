@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from typing import Any
 
-from airflock.core.parameters import Declaration, declarations
+from airflock.core import Declaration, declarations
 from airflock.scenarios.groups import LETTERS
-from airflock.support.spelling import meant
+from airflock.support import suggest
 
 FIRST, SPREAD = "groups.", "spread"
 FORM = "write groups.NAME.SECTION.KEY, for instance groups.heavy.body.tau"
@@ -20,7 +20,7 @@ def is_group_key(key: str) -> bool:
     return key.startswith(FIRST)
 
 
-def parts_of(key: str) -> tuple[str, str, str]:
+def split_key(key: str) -> tuple[str, str, str]:
     """Group, section and name that a key consists of, the name with `.spread`; empty words where it has too few."""
     rest = key.removeprefix(FIRST).rsplit(".", 3)
     if len(rest) == 4 and rest[1] in LETTERS and rest[3] == SPREAD:
@@ -28,7 +28,7 @@ def parts_of(key: str) -> tuple[str, str, str]:
     return (".".join(rest[:-2]), rest[-2], rest[-1]) if len(rest) > 2 else ("", "", "")
 
 
-def with_groups(
+def with_group_keys(
     document: Mapping[str, Any], settings: Mapping[str, Any]
 ) -> tuple[Mapping[str, Any], dict[str, Any], list[str]]:
     """A document with the keys of its groups set, the other settings, and what is wrong with these keys."""
@@ -46,7 +46,7 @@ def with_groups(
     names = [table.get("name", f"group_{number}") for number, table in enumerate(tables)]
     faults = []
     for key, value in wanted.items():
-        group, section, name = parts_of(key)
+        group, section, name = split_key(key)
         if section not in LETTERS and _of_the_file(key, names):
             faults.append(
                 f"{key}: a setting changes only {', '.join(LETTERS)} of a group; write it in the file's [[groups]]"
@@ -55,14 +55,17 @@ def with_groups(
             hint = _advice(key, document, dict(zip(map(str, names), tables, strict=True)))
             faults.append(f"{key}: unknown key; {hint}")
         elif group not in names:
-            hint = meant(group, [str(known) for known in names], f"known: {', '.join(map(str, names))}")
+            hint = suggest(group, [str(known) for known in names], f"known: {', '.join(map(str, names))}")
             faults.append(f"{key}: unknown group {group!r}; {hint}")
         else:
             table = tables[names.index(group)]
             own, (name, _, spread) = table.get(section, {}), name.partition(".")
             if isinstance(own, Mapping):
                 before = own.get(name)
-                table[section] = {**own, name: _spread_anew(before, value) if spread else kept(before, value)}
+                table[section] = {
+                    **own,
+                    name: _spread_anew(before, value) if spread else with_old_spread(before, value),
+                }
     return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, faults
 
 
@@ -92,7 +95,7 @@ def _advice(key: str, document: Mapping[str, Any], tables: Mapping[str, Mapping[
     return f"did you mean {FIRST}{group}.{places[near]}.{near}?"
 
 
-def kept(before: Any, value: Any) -> Any:
+def with_old_spread(before: Any, value: Any) -> Any:
     """A value with the spread that the number had before, which keeps its unit."""
     if not isinstance(before, Mapping) or "spread" not in before or isinstance(value, Mapping):
         return value
@@ -110,7 +113,7 @@ def _spread_anew(before: Any, spread: Any) -> dict[str, Any]:
     return {"value": value, "spread": spread}
 
 
-def declared_of_groups(scenario: Any) -> Iterator[tuple[str, Declaration, Any]]:
+def group_declarations(scenario: Any) -> Iterator[tuple[str, Declaration, Any]]:
     """Key, declaration and value of what groups have of their own: numbers, and all of a law that only they have."""
     for group in scenario.groups:
         for section, letter in LETTERS.items():
@@ -122,9 +125,9 @@ def declared_of_groups(scenario: Any) -> Iterator[tuple[str, Declaration, Any]]:
                     yield f"{FIRST}{group.name}.{section}.{name}", declared, value
 
 
-def value_in_group(scenario: Any, key: str) -> Any:
+def group_key_value(scenario: Any, key: str) -> Any:
     """Value of a key of a group; that of the flock where the group has none of its own."""
-    group, section, name = parts_of(key)
+    group, section, name = split_key(key)
     found = next(each for each in scenario.groups if each.name == group)
     record = found.law[1] if found.law and section == "model" else scenario.records[section]
     return found.numbers.get((LETTERS[section], name), getattr(record, name))

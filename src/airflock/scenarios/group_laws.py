@@ -5,19 +5,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from airflock.core.contract import Body, Model
-from airflock.core.parameters import Choice, Quantity, choices, declarations
-from airflock.core.sensor import Sensor
-from airflock.core.vocabulary import asks
+from airflock.core import Body, Choice, Model, Quantity, Sensor, argument_names, choices, declarations
 from airflock.scenarios import checks, schema
-from airflock.scenarios.laws import find_model
-from airflock.support.errors import AirflockError
+from airflock.scenarios.laws import find_law
+from airflock.support import AirflockError
 
 if TYPE_CHECKING:
     from airflock.scenarios.groups import Group
 
 
-class Law(NamedTuple):
+class FlownLaw(NamedTuple):
     """A law that agents of a flock fly by.
 
     parameters : its record; numbers that differ among its agents are those of the first group that flies by it
@@ -31,14 +28,14 @@ class Law(NamedTuple):
     varied: tuple[tuple[str, str], ...] = ()
 
     @property
-    def asks_for_groups(self) -> bool:
+    def uses_groups(self) -> bool:
         """Whether its rule for neighbours asks for their groups."""
         rule = self.model.neighbour
-        return rule is not None and bool({"kin", "group"} & set(asks(rule, "neighbour", self.model.name)))
+        return rule is not None and bool({"kin", "group"} & set(argument_names(rule, "neighbour", self.model.name)))
 
 
 @dataclass
-class Laws:
+class GroupLawReader:
     """What a group's section `model` may name.
 
     model, kind, parameters : law of the flock, as its file names it, and its numbers
@@ -78,7 +75,7 @@ class Laws:
             return self.model
         if isinstance(kind, str) and kind in known:
             return known[kind]
-        self._read[kind] = found = find_model(kind, self.folder, told=f"{where}.kind", trust=self.trust)
+        self._read[kind] = found = find_law(kind, self.folder, where=f"{where}.kind", trust=self.trust)
         return found
 
     def _misfits(self, where: str, kind: Any, found: Model) -> list[str]:
@@ -106,7 +103,7 @@ class Laws:
         """Parameters of a group's law with its own choices; its numbers come later."""
         known = {name for name, declared, _ in declarations(found.Parameters) if isinstance(declared, Choice)}
         own = {key: schema.value_of(value) for key, value in table.items() if key in known}
-        made, faults = schema.check(where, own, found.Parameters)
+        made, faults = schema.read_section(where, own, found.Parameters)
         if faults or made is None:
             return None, faults
         base = self.parameters if found == self.model else found.Parameters()
@@ -116,28 +113,28 @@ class Laws:
         return record, []
 
 
-def misfits(
-    groups: Sequence["Group"], parts: Mapping[str, Any], found: Model, vehicle: Body, sensor: Sensor
+def group_errors(
+    groups: Sequence["Group"], parts: Mapping[str, Any], model: Model, body: Body, sensor: Sensor
 ) -> list[str]:
     """What of a scenario its groups cannot fly with their own numbers or law, one line each."""
     faults: list[str] = []
-    of_all = {*checks.body_faults(vehicle, parts, found), *checks.sensor_faults(sensor, parts)}  # told already
+    of_all = {*checks.body_errors(body, parts, model), *checks.sensor_errors(sensor, parts)}  # told already
     for number, group in enumerate(groups):
-        law, base = group.law or (found, parts["parameters"])
+        law, base = group.law or (model, parts["parameters"])
         own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in "pbs"}
         if group.law is None and not any(own.values()):
             continue
         told: dict[str, Any] = {**parts, "parameters": base and replace(base, **own["p"])}
         told["body"] = parts["body"] and replace(parts["body"], **own["b"])
         told["sensors"] = parts["sensors"] and replace(parts["sensors"], **own["s"])
-        more = checks.body_faults(vehicle, told, law) + (checks.sensor_faults(sensor, told) if own["s"] else [])
+        more = checks.body_errors(body, told, law) + (checks.sensor_errors(sensor, told) if own["s"] else [])
         if group.law is not None and parts["silence"] is not None and parts["flight"] is not None:
-            more += checks.silence_faults(parts["silence"].rule, parts["flight"], law)
+            more += checks.silence_errors(parts["silence"].rule, parts["flight"], law)
         faults += [f"groups[{number}]: {fault}" for fault in more if fault not in of_all]
     return faults
 
 
-def laws_of(model: Model, parameters: Any, groups: Sequence["Group"], agents: int) -> tuple[Law, ...]:
+def flown_laws(model: Model, parameters: Any, groups: Sequence["Group"], agents: int) -> tuple[FlownLaw, ...]:
     """Laws of a flock: that of all who have none of their own, then those of groups, one for each text."""
     found: dict[Any, list[Group]] = {}
     for group in groups:
@@ -146,7 +143,7 @@ def laws_of(model: Model, parameters: Any, groups: Sequence["Group"], agents: in
     apart = {agent for members in found.values() for group in members for agent in group.agents}
     rest = tuple(agent for agent in range(agents) if agent not in apart)
     base = [group for group in groups if group.law is None]
-    made = [Law(model, parameters, rest, _varied(base, parameters))]
+    made = [FlownLaw(model, parameters, rest, _varied(base, parameters))]
     for (law, _), members in found.items():
         first = members[0]
         assert first.law is not None
@@ -154,7 +151,7 @@ def laws_of(model: Model, parameters: Any, groups: Sequence["Group"], agents: in
             first.law[1], **{name: value for (letter, name), value in first.numbers.items() if letter == "p"}
         )
         who = tuple(sorted(agent for group in members for agent in group.agents))
-        made.append(Law(law, record, who, _varied(members, record)))
+        made.append(FlownLaw(law, record, who, _varied(members, record)))
     return tuple(made)
 
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass, field, replace
 from inspect import signature
 from typing import Any
 
-from airflock.core import random
-from airflock.core.contract import Model
-from airflock.core.parameters import Choice, Quantity, declarations
+from airflock.core import Choice, Model, Quantity, declarations, random
 from airflock.scenarios import schema, units
-from airflock.scenarios.group_laws import Laws
-from airflock.scenarios.spreads import checked, deviation, or_share, share_of
+from airflock.scenarios.group_laws import GroupLawReader
+from airflock.scenarios.spreads import check_spreads, relative_spread, standard_deviation, with_share_hint
 
 LETTERS = {
     "model": "p",
@@ -45,45 +43,45 @@ class Group:
         return replace(self, numbers=rest[0], spread=rest[1])
 
 
-def members(where: str, given: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:
+def read_members(where: str, value: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:
     """Numbers of agents from a list of them; and what is wrong with it, one line."""
-    whole = isinstance(given, Sequence) and not isinstance(given, str)
-    if not whole or not given or not all(isinstance(k, int) and not isinstance(k, bool) for k in given):
-        return None, [f"{where} = {given!r} is not a list of numbers of agents, 0 to {agents - 1}"]
-    wrong = [k for k in given if not 0 <= k < agents]
+    whole = isinstance(value, Sequence) and not isinstance(value, str)
+    if not whole or not value or not all(isinstance(k, int) and not isinstance(k, bool) for k in value):
+        return None, [f"{where} = {value!r} is not a list of numbers of agents, 0 to {agents - 1}"]
+    wrong = [k for k in value if not 0 <= k < agents]
     if wrong:
         return None, [f"{where}: there is no agent {wrong[0]}; this flock has the agents 0 to {agents - 1}"]
-    return tuple(sorted(set(given))), []
+    return tuple(sorted(set(value))), []
 
 
-def names_of(groups: Sequence[Group], agents: int) -> tuple[str, ...]:
+def group_names(groups: Sequence[Group], agents: int) -> tuple[str, ...]:
     """Name of the group of each agent, "" in none; nothing where there are no groups."""
     named = {agent: group.name for group in groups for agent in group.agents}
     return tuple(named.get(agent, "") for agent in range(agents)) if named else ()
 
 
-def counted(given: Any, agents: int) -> Any:
+def count_of_share(value: Any, agents: int) -> Any:
     """A number of agents out of a share of the flock such as "20 %", at least one; anything else as it is."""
-    share = SHARE.fullmatch(given) if isinstance(given, str) else None
+    share = SHARE.fullmatch(value) if isinstance(value, str) else None
     if share is None or not 0.0 < float(share[1]) <= 100.0:
-        return given
+        return value
     return max(1, round(float(share[1]) / 100.0 * agents))
 
 
-def groups_of(
-    given: Any, agents: int, records: Mapping[str, type], laws: Laws | None = None
+def read_groups(
+    tables: Any, agents: int, records: Mapping[str, type], laws: GroupLawReader | None = None
 ) -> tuple[tuple[Group, ...], list[str], list[str]]:
     """Groups, notes of converted units, and everything that is wrong with them, one line each.
 
     records : "model", "body" and "sensors" → record of their parameters
     laws    : finds the law that a group's section model names
     """
-    if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(g, Mapping) for g in given):
+    if not isinstance(tables, Sequence) or isinstance(tables, str) or not all(isinstance(g, Mapping) for g in tables):
         return (), [], ["groups is not a list of tables; write [[groups]]"]
-    who, faults = _agents(given, agents)
+    who, faults = _agents(tables, agents)
     found: list[Group] = []
     notes: list[str] = []
-    for number, table in enumerate(given):
+    for number, table in enumerate(tables):
         where = f"groups[{number}]"
         faults += [f"{where}.{key}: unknown key; known: {', '.join(KEYS)}" for key in table if key not in KEYS]
         name = table.get("name", f"group_{number}")
@@ -113,7 +111,7 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
     taken: set[int] = set()
     for number, table in enumerate(given):
         if isinstance(table.get("agents"), (list, tuple)):
-            listed, wrong = members(f"groups[{number}].agents", table["agents"], agents)
+            listed, wrong = read_members(f"groups[{number}].agents", table["agents"], agents)
             faults += wrong
             twice = sorted(taken & set(listed or ()))
             if twice:
@@ -123,7 +121,7 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
     left = [agent for agent in range(agents) if agent not in taken]
     rest = []
     for number, table in enumerate(given):
-        count = counted(table.get("agents"), agents)
+        count = count_of_share(table.get("agents"), agents)
         if count is None:
             rest.append(number)
         elif not isinstance(count, (list, tuple)):
@@ -162,7 +160,7 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             faults.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
         elif isinstance(value, Mapping) and "spread" in value:
             unit = {"unit": value["unit"]} if "unit" in value else {}
-            share = share_of(value["spread"], known.get(key))
+            share = relative_spread(value["spread"], known.get(key))
             absolute = {"value": value["spread"], **unit} if unit else value["spread"]
             spreads[key] = absolute if share is None else share
             rest = {name: entry for name, entry in value.items() if name != "spread"}
@@ -171,12 +169,12 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
         else:
             values[key] = value
     apart = f"{where}.spread"
-    converted, told, unfit = units.converted({where: values, apart: spreads}, {where: record, apart: record})
+    converted, told, unfit = units.convert_units({where: values, apart: spreads}, {where: record, apart: record})
     notes = [_as_written(line, where, apart) for line in told]
-    wrong = [f"{_as_written(line, where, apart)}{or_share(line, apart, known)}" for line in unfit]
-    made, more = schema.check(where, converted[where], record)
+    wrong = [f"{_as_written(line, where, apart)}{with_share_hint(line, apart, known)}" for line in unfit]
+    made, more = schema.read_section(where, converted[where], record)
     faults += wrong + more
-    off, more = checked(where, converted[apart], known)
+    off, more = check_spreads(where, converted[apart], known)
     numbers = {key: float(getattr(made, key)) for key in converted[where]} if made is not None and not more else {}
     return numbers, off, notes, faults + more
 
@@ -189,7 +187,7 @@ def _as_written(line: str, where: str, apart: str) -> str:
     return f"{where}.{key}.spread {rest}"
 
 
-def varied(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+def varied_numbers(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """Numbers that differ among agents, as (letter, name), in declared order; base : letter → record of the flock.
 
     Those of laws: `group_laws.Law.varied`.
@@ -205,7 +203,7 @@ def varied(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str,
     return tuple(found)
 
 
-def own_numbers(groups: Sequence[Group], agents: int, letter: str, name: str, record: Any, seed: int) -> list[float]:
+def agent_values(groups: Sequence[Group], agents: int, letter: str, name: str, record: Any, seed: int) -> list[float]:
     """One number of every agent: its group's, and off it by a normal number of its own, within the allowed range.
 
     It is 0 of agents whose law has no such number.
@@ -220,24 +218,24 @@ def own_numbers(groups: Sequence[Group], agents: int, letter: str, name: str, re
             continue
         usual = float(getattr(own_record, name) or 0.0)
         own = group.numbers.get((letter, name), usual)
-        spread = deviation(group.spread.get((letter, name), 0.0), own)
+        spread = standard_deviation(group.spread.get((letter, name), 0.0), own)
         for agent in group.agents:
             value = own
             if spread > 0.0:
                 draw = list(LETTERS.values()).index(letter)
-                w0, w1, _, _ = random.words(seed, random.SPREAD, 0, list(known).index(name), agent, draw)
+                w0, w1, _, _ = random.random_words(seed, random.SPREAD, 0, list(known).index(name), agent, draw)
                 value += spread * random.normal_pair(w0, w1)[0]
             values[agent] = min(max(value, declared.low), declared.high)
     return values
 
 
-def group_faults(groups: Sequence[Group], found: Model | None) -> list[str]:
+def group_number_errors(groups: Sequence[Group], model: Model | None) -> list[str]:
     """Why numbers of groups cannot be flown by a law, one line."""
-    if found is None or found.flock is None or found.workspace is None:
+    if model is None or model.flock is None or model.workspace is None:
         return []
-    if "p" not in {*signature(found.flock).parameters, *signature(found.workspace).parameters}:
+    if "p" not in {*signature(model.flock).parameters, *signature(model.workspace).parameters}:
         return []
     number = next((k for k, group in enumerate(groups) for of, _ in (*group.numbers, *group.spread) if of == "p"), None)
     if number is None or groups[number].law is not None:
         return []
-    return [f"groups[{number}].model: model {found.name} solves for the whole flock, with one set of numbers"]
+    return [f"groups[{number}].model: model {model.name} solves for the whole flock, with one set of numbers"]

@@ -5,21 +5,20 @@ from difflib import get_close_matches
 from functools import cache
 from typing import Any, NamedTuple
 
-from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, number_names, with_unit
-from airflock.core.radio import Packets
-from airflock.parts.bodies.registry import BODIES
-from airflock.parts.faults.registry import KINDS
-from airflock.parts.radios.registry import RADIOS
-from airflock.parts.sensors.registry import SENSORS
-from airflock.scenarios.faulty import Timing
-from airflock.scenarios.laws import MODELS, find_model
+from airflock.core import Choice, PacketParameters, Points, Quantity, Text, declarations, format_with_unit, number_names
+from airflock.parts.bodies import BODIES
+from airflock.parts.faults import KINDS
+from airflock.parts.radios import RADIOS
+from airflock.parts.sensors import SENSORS
+from airflock.scenarios.faulty import FaultTiming
+from airflock.scenarios.laws import MODELS, find_law
 from airflock.scenarios.sections import SECTIONS, Flight
-from airflock.scenarios.whole_keys import WHOLE_KEYS
-from airflock.support.errors import ScenarioError
+from airflock.scenarios.whole_keys import UNDECLARED_KEYS
+from airflock.support import ScenarioError
 
 TOP = "top"  # the keys before the first section
 FAMILIES = {"model": MODELS, "body": BODIES, "sensors": SENSORS, "faults": KINDS}  # sections with records by kind
-OF_ALL = number_names(Packets)  # keys of every radio, which the section [radio] tells
+OF_ALL = number_names(PacketParameters)  # keys of every radio, which the section [radio] tells
 OTHER_RADIOS = {name: radio for name, radio in RADIOS.items() if radio.Parameters is not SECTIONS["radio"]}
 
 
@@ -52,13 +51,13 @@ class Key(NamedTuple):
         """The default, for a person to read; a dash where it comes from the rest of the scenario."""
         if self.default is None or self.default in ((), ""):
             return "–"
-        return with_unit(f"{self.default:g}", self.unit) if self.kind == "number" else str(self.default)
+        return format_with_unit(f"{self.default:g}", self.unit) if self.kind == "number" else str(self.default)
 
     @property
     def allowed(self) -> str:
         """What the key may be, for a person to read."""
         if self.kind == "number":
-            return with_unit(f"{self.low:g} … {self.high:g}", self.unit)
+            return format_with_unit(f"{self.low:g} … {self.high:g}", self.unit)
         return " | ".join(self.options) if self.options else self.kind
 
 
@@ -80,7 +79,7 @@ def sections() -> Mapping[str, Section]:
     """Sections by name: the top, each model, body, sensor and radio, other sections, lists, kinds of fault."""
     result = {TOP: _section("at the top", "", Flight)}
     for name in MODELS:
-        result[name] = _section(f'model.kind = "{name}"', "model", find_model(name).Parameters, name)
+        result[name] = _section(f'model.kind = "{name}"', "model", find_law(name).Parameters, name)
     for family, members in (("body", BODIES), ("sensors", SENSORS)):
         for name, member in members.items():
             result[name] = _section(f'{family}.kind = "{name}"', family, member.Parameters, name)
@@ -92,7 +91,7 @@ def sections() -> Mapping[str, Section]:
         result[name] = found._replace(keys=tuple(key for key in found.keys if _last(key) not in OF_ALL))
     groups = "Agents with their own numbers for the law, the body or the sensor."
     result["groups"] = Section("[[groups]]", groups, tuple(_whole("groups")))
-    shared = _section("[[faults]]", "faults", Timing)
+    shared = _section("[[faults]]", "faults", FaultTiming)
     result["faults"] = shared
     for name, kind in KINDS.items():
         about = kind.doc.strip().split("\n\n")[0].partition(": ")[2] or kind.doc
@@ -166,7 +165,7 @@ def _section(head: str, before: str, record: type, owner: str = "") -> Section:
 def _whole(section: str) -> list[Key]:
     return [
         Key(f"{section}.{name}".lstrip("."), "", key.kind, None, "", None, None, key.options, key.meaning, "")
-        for name, key in WHOLE_KEYS.get(section, {}).items()
+        for name, key in UNDECLARED_KEYS.get(section, {}).items()
     ]
 
 

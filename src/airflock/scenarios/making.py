@@ -22,27 +22,26 @@ from airflock.scenarios import (
     units,
     wings,
 )
-from airflock.scenarios.advice import advice
-from airflock.scenarios.cells import group_notes, measured_by_cells, takes_all_cores
-from airflock.scenarios.document import TOP, components, keyed, merged, with_kinds
-from airflock.scenarios.families import FAMILIES, METRICS, NOTHING, TOPOLOGY, Given
-from airflock.scenarios.gathering import Gathered, gathered
-from airflock.scenarios.ground import file_faults
+from airflock.scenarios.advice import dubious_setting_notes
+from airflock.scenarios.cells import cell_notes, metrics_use_cells, uses_all_cores
+from airflock.scenarios.document import TOP_LEVEL_KEYS, settings_dict, with_kinds, with_settings, with_vector_components
+from airflock.scenarios.families import METRIC_SET_KIND, NO_CALLER_PARTS, PART_KINDS, TOPOLOGY_KIND, CallerParts
+from airflock.scenarios.gathering import ScenarioParts, collect_parts
+from airflock.scenarios.ground import field_file_errors
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
-from airflock.support.errors import ParameterError, ScenarioError
-from airflock.support.untrusted import is_file
+from airflock.support import ParameterError, ScenarioError, is_file
 
 
-def make(
+def build_scenario(
     document: Mapping[str, Any],
     where: str = "scenario",
     settings: Mapping[str, Any] | None = None,
     *,
     folder: Path | None = None,
-    given: Given = NOTHING,
+    caller_parts: CallerParts = NO_CALLER_PARTS,
     notes: tuple[str, ...] = (),
-    known_faults: tuple[str, ...] = (),
+    known_errors: tuple[str, ...] = (),
     trust: bool = False,
     started: bool = False,
 ) -> Scenario:
@@ -53,21 +52,21 @@ def make(
     trust : whether code that the document names may run
     started : whether the flight is in the air, so that nothing is asked about its start
     """
-    settings = keyed(settings, where)
-    document, settings, faults = group_keys.with_groups(formats.current(document, where), settings)
-    document, settings, wrong = fault_keys.with_faults(document, settings)
+    settings = settings_dict(settings, where)
+    document, settings, faults = group_keys.with_group_keys(formats.to_current_format(document, where), settings)
+    document, settings, wrong = fault_keys.with_fault_keys(document, settings)
     faults += wrong
-    short = {key: value for key, value in settings.items() if "." not in key and key not in TOP}
+    short = {key: value for key, value in settings.items() if "." not in key and key not in TOP_LEVEL_KEYS}
     document, left_out = with_kinds(document, settings)
-    whole, unknown = merged(document, {key: value for key, value in settings.items() if key not in short})
-    flown, whole, more = gathered(whole, given, folder, trust=trust)
-    faults = [*known_faults, *unknown, *faults, *more]
+    whole, unknown = with_settings(document, {key: value for key, value in settings.items() if key not in short})
+    flown, whole, more = collect_parts(whole, caller_parts, folder, trust=trust)
+    faults = [*known_errors, *unknown, *faults, *more]
     records = ({"model": flown.law.Parameters} if flown.law else {}) | flown.records
     whole, told, more = _written_out(whole, settings, short, records)
     faults += more
     parts, more = _parts(whole, flown)
     faults += more + _faults_between(parts, flown, started)
-    individuals, told_of, more = _individuals(whole, parts, flown, given, folder, trust)
+    individuals, told_of, more = _individuals(whole, parts, flown, caller_parts, folder, trust)
     published, wrong = _published(whole.get("published", {}))
     faults += more + wrong
     if faults or flown.law is None:
@@ -78,9 +77,17 @@ def make(
         measures=flown.measures, own_topology=flown.own_topology, published=published,
         document=whole, **parts, **individuals,
     )  # fmt: skip
-    if faults := _derived_faults(scenario) or places.place_faults(scenario, started):
+    if faults := _derived_faults(scenario) or places.scene_errors(scenario, started):
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
-    notes = (*notes, *left_out, *told, *told_of, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
+    notes = (
+        *notes,
+        *left_out,
+        *told,
+        *told_of,
+        *_notes(scenario),
+        *dubious_setting_notes(scenario),
+        *places.scene_notes(scenario),
+    )
     return replace(scenario, notes=notes)
 
 
@@ -88,18 +95,18 @@ def _written_out(
     document: dict[str, Any], settings: Mapping[str, Any], short: Mapping[str, Any], records: Mapping[str, type]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
     """A document with keys given by their last word, vectors as components, all in SI units; notes; what is wrong."""
-    named, told, faults = short_keys.whole_keys(short, records, TOP)
+    named, told, faults = short_keys.expand_short_keys(short, records, TOP_LEVEL_KEYS)
     faults += [f"{key} is given twice, once by its last word" for key in named if key in settings]
-    document, more = components(merged(document, named)[0], records)
+    document, more = with_vector_components(with_settings(document, named)[0], records)
     faults += more
-    document, converted, more = units.converted(document, {"": Flight, **records})
+    document, converted, more = units.convert_units(document, {"": Flight, **records})
     return document, [*told, *converted], faults + more
 
 
 def _derived_faults(scenario: Scenario) -> list[str]:
     """Numbers that follow from the scenario and lie outside their ranges: what loads can fly."""
     try:
-        scenario.measured_by()
+        scenario.resolved_metrics()
     except ParameterError as fault:
         told = [f"metrics.{line.partition('.')[2]}" for line in str(fault).splitlines()]
         return [f"{line}; it follows from the other keys unless it is given" for line in told]
@@ -107,9 +114,13 @@ def _derived_faults(scenario: Scenario) -> list[str]:
 
 
 def _individuals(
-    document: Mapping[str, Any], parts: Mapping[str, Any], flown: Gathered, given: Given, folder: Path | None,
+    document: Mapping[str, Any],
+    parts: Mapping[str, Any],
+    flown: ScenarioParts,
+    given: CallerParts,
+    folder: Path | None,
     trust: bool,
-) -> tuple[dict[str, Any], list[str], list[str]]:  # fmt: skip
+) -> tuple[dict[str, Any], list[str], list[str]]:
     """Groups and faults of a scenario, notes, and what is wrong with them."""
     flight, law = parts["flight"], flown.law
     if not {"groups", "faults"} & set(document) or flight is None:
@@ -121,15 +132,15 @@ def _individuals(
     if law is not None and parts.get("parameters") is not None:
         kind, world = document.get("model", {}).get("kind"), parts["world"]
         walls = world is not None and (world.arena == "polygon" or bool(world.obstacles))
-        named = group_laws.Laws(law, kind, parts["parameters"], given.laws, folder, trust, walls)
+        named = group_laws.GroupLawReader(law, kind, parts["parameters"], given.laws, folder, trust, walls)
     count = int(flight.agents)
-    flocks, notes, faults = groups.groups_of(document.get("groups", ()), count, records, named)
-    faults += groups.group_faults(flocks, law)
+    flocks, notes, faults = groups.read_groups(document.get("groups", ()), count, records, named)
+    faults += groups.group_number_errors(flocks, law)
     if law is not None and not faults:
-        faults += group_laws.misfits(flocks, parts, law, flown.vehicle, flown.sensor)
+        faults += group_laws.group_errors(flocks, parts, law, flown.vehicle, flown.sensor)
     sequential = flight.update == "sequential"
-    made, told, more = faulty.entries(
-        document.get("faults", ()), count, flocks, sequential, folder, own=given.kinds, trust=trust
+    made, told, more = faulty.read_fault_entries(
+        document.get("faults", ()), count, flocks, sequential, folder, user_kinds=given.fault_kinds, trust=trust
     )
     return {"groups": flocks, "faults": made}, notes + told, faults + more
 
@@ -141,29 +152,29 @@ def _beside(scene: Any, folder: Path | None) -> Any:
     return replace(scene, file=str(folder / scene.file))
 
 
-def _parts(document: Mapping[str, Any], flown: Gathered) -> tuple[dict[str, Any], list[str]]:
+def _parts(document: Mapping[str, Any], flown: ScenarioParts) -> tuple[dict[str, Any], list[str]]:
     """The records of a scenario by section, None where one is faulty; and all their faults."""
     parts: dict[str, Any] = {}
     faults: list[str] = []
-    kinds = {family.section: family.records for family in FAMILIES if family is not METRICS}
+    kinds = {family.section: family.records for family in PART_KINDS if family is not METRIC_SET_KIND}
     for section, record in flown.records.items():
         given = document.get(section, {})
         if section in kinds and isinstance(given, Mapping) and not hasattr(record, "kind"):
             given = {key: value for key, value in given.items() if key != "kind"}
-        parts[section], more = schema.check(section, given, record, kinds=kinds.get(section))
+        parts[section], more = schema.read_section(section, given, record, kinds=kinds.get(section))
         faults += more
     top: dict[str, Any] = {key: document[key] for key in ("agents", "duration", "dt", "update") if key in document}
-    parts["flight"], more = schema.check("", top, Flight)
+    parts["flight"], more = schema.read_section("", top, Flight)
     faults += more
     table = document.get("model", {})
     if flown.law is not None and isinstance(table, Mapping):
         keys = {key: value for key, value in table.items() if key != "kind"}
-        parts["parameters"], more = schema.check("model", keys, flown.law.Parameters)
+        parts["parameters"], more = schema.read_section("model", keys, flown.law.Parameters)
         faults += more
     return parts, faults
 
 
-def _faults_between(parts: Mapping[str, Any], flown: Gathered, started: bool) -> list[str]:
+def _faults_between(parts: Mapping[str, Any], flown: ScenarioParts, started: bool) -> list[str]:
     """Faults of sections that are sound alone but do not fit each other."""
     faults: list[str] = []
     flight, law, world = parts["flight"], flown.law, parts["world"]
@@ -171,22 +182,22 @@ def _faults_between(parts: Mapping[str, Any], flown: Gathered, started: bool) ->
         faults.append(f"agents = {flight.agents:g} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
     ours = parts["topology"] is not None and flown.own_topology is None
-    meets = TOPOLOGY.known[parts["topology"].kind] if ours else flown.own_topology
-    faults += checks.topology_faults(meets, world, law)
-    faults += file_faults(world)
+    meets = TOPOLOGY_KIND.shipped[parts["topology"].kind] if ours else flown.own_topology
+    faults += checks.topology_errors(meets, world, law)
+    faults += field_file_errors(world)
     if world is not None:
         separation = parts["start"].separation if parts["start"] is not None else 0.0
         if separation is None and law is not None and parts.get("parameters") is not None:
-            separation = filled_in.separation(law, parts["parameters"], begin, world)
+            separation = filled_in.default_separation(law, parts["parameters"], begin, world)
         count = int(flight.agents) if flight is not None else 1
-        faults += geometry.faults(world, count, separation or 0.0, begin, started=started)
+        faults += geometry.world_errors(world, count, separation or 0.0, begin, started=started)
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
-        faults += timing.faults(flight, parts["sensors"].period, parts["metrics"])
-        faults += checks.order_faults(flight, flown.sensor, parts["sensors"], flown.transceiver, parts["radio"])
-        faults += checks.silence_faults(parts["silence"].rule, flight, law) if parts["silence"] is not None else []
-        faults += checks.metric_faults(flown.measures, parts["metrics"], world)
-        faults += wings.faults(parts, law, flown.measures, started)
-    return faults + checks.body_faults(flown.vehicle, parts, law, started) + checks.sensor_faults(flown.sensor, parts)
+        faults += timing.timing_errors(flight, parts["sensors"].period, parts["metrics"])
+        faults += checks.update_order_errors(flight, flown.sensor, parts["sensors"], flown.transceiver, parts["radio"])
+        faults += checks.silence_errors(parts["silence"].rule, flight, law) if parts["silence"] is not None else []
+        faults += checks.metric_errors(flown.measures, parts["metrics"], world)
+        faults += wings.wing_errors(parts, law, flown.measures, started)
+    return faults + checks.body_errors(flown.vehicle, parts, law, started) + checks.sensor_errors(flown.sensor, parts)
 
 
 def _published(table: Any) -> tuple[dict[str, tuple[float, float | None]], list[str]]:
@@ -213,7 +224,7 @@ def _finite(value: Any) -> bool:
 
 def _after(scenario: Scenario) -> str:
     """What becomes of a drone whose motors have stopped."""
-    if scenario.lands:
+    if scenario.can_land:
         return ", and on the ground it is absent"
     if scenario.dimensions == 3:
         return ", and it falls without end, and counts; give a ground: world.arena with world.floor, or scene.ground"
@@ -222,9 +233,9 @@ def _after(scenario: Scenario) -> str:
 
 def _notes(scenario: Scenario) -> list[str]:
     """What cannot be meant, for a person to read; nothing here stops a flight."""
-    cells = takes_all_cores(scenario) and measured_by_cells(scenario)
+    cells = uses_all_cores(scenario) and metrics_use_cells(scenario)
     notes = checks.pair_notes(scenario.flight, scenario.metrics, scenario.order_parameters, cells)
-    notes += timing.notes(scenario) + wings.notes(scenario) + group_notes(scenario)
+    notes += timing.timing_notes(scenario) + wings.wing_notes(scenario) + cell_notes(scenario)
     p = scenario.parameters
     body, duration = scenario.body, scenario.flight.duration
     if getattr(body, "battery", "endless") == "lithium" and getattr(body, "hover_power", 0.0) > 0.0:

@@ -5,14 +5,14 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from airflock.core import random
-from airflock.scenarios.faulty import Entry
+from airflock.scenarios.faulty import FaultEntry
 from airflock.scenarios.scenario import Scenario
 
 ENDLESS = 1e9  # s; how long a fault lasts that does not end
 HOUR = 3600.0  # s
 
 
-class Onset(NamedTuple):
+class FaultOnset(NamedTuple):
     """A fault of one agent that begins, or an agent that drops out.
 
     step  : before which it begins
@@ -33,17 +33,17 @@ class Onset(NamedTuple):
     begin: int = 0
 
 
-def onsets(scenario: Scenario, seed: int, world: int = 0) -> tuple[Onset, ...]:
+def draw_onsets(scenario: Scenario, seed: int, world: int = 0) -> tuple[FaultOnset, ...]:
     """All faults of a flight in the order of their steps."""
-    found: list[Onset] = []
+    found: list[FaultOnset] = []
     for number, entry in enumerate(scenario.faults):
         found += _of_entry(scenario, entry, number, seed, world)
     return _in_order(found)
 
 
-def going_on(
-    before: Sequence[Onset], after: Sequence[Onset], now: int, lasting: Collection[int]
-) -> tuple[Onset, ...]:  # fmt: skip
+def merge_onsets(
+    before: Sequence[FaultOnset], after: Sequence[FaultOnset], now: int, lasting: Collection[int]
+) -> tuple[FaultOnset, ...]:  # fmt: skip
     """Faults of a flight for which others come into force before step `now`, in the order of their steps.
 
     What has begun goes on where its fault is named by these as well, with their numbers, or by an entry that stays;
@@ -58,10 +58,10 @@ def going_on(
     return _in_order([*begun, *gone, *(o for o in after if o.begin >= now)])
 
 
-def _in_order(found: Sequence[Onset]) -> tuple[Onset, ...]:
+def _in_order(found: Sequence[FaultOnset]) -> tuple[FaultOnset, ...]:
     """These in the order of their steps. Nobody leaves by a fault that another of its kind has replaced before."""
-    kept: list[Onset] = []
-    last: dict[tuple[str, int], Onset] = {}
+    kept: list[FaultOnset] = []
+    last: dict[tuple[str, int], FaultOnset] = {}
     for onset in sorted(found, key=lambda onset: onset.step):
         other = last.get((onset.kind, onset.agent), onset)
         if not onset.leaves:
@@ -72,12 +72,12 @@ def _in_order(found: Sequence[Onset]) -> tuple[Onset, ...]:
     return tuple(kept)
 
 
-def _which(onset: Onset) -> tuple[str, int, int, bool]:
+def _which(onset: FaultOnset) -> tuple[str, int, int, bool]:
     """What makes a fault of an agent this one, whatever its numbers: when it began, of whom, and whether one leaves."""
     return onset.kind, onset.agent, onset.begin, onset.leaves
 
 
-def _of_entry(scenario: Scenario, entry: Entry, number: int, seed: int, world: int) -> Iterator[Onset]:
+def _of_entry(scenario: Scenario, entry: FaultEntry, number: int, seed: int, world: int) -> Iterator[FaultOnset]:
     dt, kind = scenario.flight.dt, entry.fault
     numbers = tuple(float(getattr(entry.numbers, name)) for name in kind.fields)
     for occurrence, at in enumerate(_times(scenario, entry, number, seed, world)):
@@ -86,14 +86,14 @@ def _of_entry(scenario: Scenario, entry: Entry, number: int, seed: int, world: i
         if lasts <= 0.0:
             continue
         step = round(at / dt)
-        gone = kind.gone_after(entry.numbers)
+        gone = kind.time_to_absence(entry.numbers)
         for agent in _hit(entry, number, occurrence, seed, world):
-            yield Onset(step, kind.name, agent, lasts, numbers, entry=number, begin=step)
+            yield FaultOnset(step, kind.name, agent, lasts, numbers, entry=number, begin=step)
             if gone < lasts:
-                yield Onset(step + round(gone / dt), kind.name, agent, lasts, numbers, True, number, step)
+                yield FaultOnset(step + round(gone / dt), kind.name, agent, lasts, numbers, True, number, step)
 
 
-def _times(scenario: Scenario, entry: Entry, number: int, seed: int, world: int) -> Iterator[float]:
+def _times(scenario: Scenario, entry: FaultEntry, number: int, seed: int, world: int) -> Iterator[float]:
     """When a fault begins, s: once, or with exponential waiting times."""
     if entry.at is not None:
         if entry.at < scenario.flight.duration:
@@ -101,7 +101,7 @@ def _times(scenario: Scenario, entry: Entry, number: int, seed: int, world: int)
         return
     time, occurrence = 0.0, 0
     while entry.per_hour > 0.0:
-        word = random.words(seed, random.FAULT, world, occurrence, number)[0]
+        word = random.random_words(seed, random.FAULT, world, occurrence, number)[0]
         time -= HOUR / entry.per_hour * math.log(random.uniform(word))
         occurrence += 1
         if time >= min(scenario.flight.duration, entry.until):
@@ -109,16 +109,16 @@ def _times(scenario: Scenario, entry: Entry, number: int, seed: int, world: int)
         yield time
 
 
-def _hit(entry: Entry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
+def _hit(entry: FaultEntry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
     """Whom an occurrence hits: all who may be, or so many of them, drawn without going back."""
     may = entry.agents
     if entry.number is None or entry.number >= len(may):
         return list(may)
-    draw = {agent: random.words(seed, random.FAULT, world, occurrence, agent, 1 + number)[0] for agent in may}
+    draw = {agent: random.random_words(seed, random.FAULT, world, occurrence, agent, 1 + number)[0] for agent in may}
     return sorted(sorted(may, key=lambda agent: (draw[agent], agent))[: entry.number])
 
 
-def told(due: tuple[Onset, ...], step: int, dt: float) -> list[dict[str, Any]]:
+def begun_faults(due: tuple[FaultOnset, ...], step: int, dt: float) -> list[dict[str, Any]]:
     """Faults that have begun before a step, as plain values: kind, agent, when they begin and end (s; None: never)."""
     return [
         {

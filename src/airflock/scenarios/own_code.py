@@ -16,26 +16,32 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TypeVar
 
-from airflock.core.contract import Model
-from airflock.core.parameters import declarations
-from airflock.support.cache import cache_folder
-from airflock.support.errors import ParameterError, RuleError, ScenarioError, bounded
-from airflock.support.spelling import as_name, raised
-from airflock.support.untrusted import is_file, own_path
+from airflock.core import Model, declarations
+from airflock.support import (
+    ParameterError,
+    RuleError,
+    ScenarioError,
+    cache_folder,
+    describe_error,
+    expand_path,
+    is_file,
+    shortened,
+    to_identifier,
+)
 
 T = TypeVar("T")
 
 
-def own_code(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
+def load_user_module(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
     """Module of a Python file that a key names, beside the scenario file or else in the current folder.
 
-    Raises what `own_module` raises.
+    Raises what `import_user_file` raises.
     """
-    beside = own_path(name) if folder is None else folder / own_path(name)
-    return own_module(beside if is_file(beside) else own_path(name), f"{key} = {name!r}", trust=trust)
+    beside = expand_path(name) if folder is None else folder / expand_path(name)
+    return import_user_file(beside if is_file(beside) else expand_path(name), f"{key} = {name!r}", trust=trust)
 
 
-def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:
+def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
     """Module of a Python file that a scenario or study names.
 
     told  : key and value that name it, for faults
@@ -43,21 +49,21 @@ def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:
     Raises ScenarioError without consent or without the file, and RuleError for what its import raises.
     """
     if not is_file(path):
-        raise ScenarioError([f"{told}: no such file"])
+        raise ScenarioError([f"{where}: no such file"])
     if not trust:
         raise ScenarioError(
-            [f"{told}: would run the code in {path.absolute()}; if you trust it, add --trust (in Python: trust=True)"]
+            [f"{where}: would run the code in {path.absolute()}; if you trust it, add --trust (in Python: trust=True)"]
         )
     spec = util.spec_from_file_location(path.stem, path)
     if spec is None or not isinstance(spec.loader, SourceFileLoader):
-        raise ScenarioError([f"{told}: is not a Python file"])
+        raise ScenarioError([f"{where}: is not a Python file"])
     module = util.module_from_spec(spec)
     try:  # the text as it is now: bytecode kept beside it may be of an earlier text, or of a stranger's
         exec(spec.loader.source_to_code(path.read_bytes(), str(path)), vars(module))
     except (Exception, SystemExit, KeyboardInterrupt) as fault:  # the user's own file may fail in any way
         lines = [frame.lineno for frame in traceback.extract_tb(fault.__traceback__) if frame.filename == str(path)]
         place = f"{path}:{lines[-1]}" if lines else str(path)
-        raise RuleError(f"{place}: {bounded(raised(fault))}{_beside(path, fault)}") from fault
+        raise RuleError(f"{place}: {shortened(describe_error(fault))}{_beside(path, fault)}") from fault
     return module
 
 
@@ -69,14 +75,16 @@ def _beside(path: Path, fault: BaseException) -> str:
     return f"; code of your own is one file, also of those who get it from you: write into it what {wanted}.py has"
 
 
-def made_of(make: Callable[[ModuleType, str], T], key: str, name: str, folder: Path | None = None, *, trust: bool) -> T:
+def build_from_file(
+    make: Callable[[ModuleType, str], T], key: str, name: str, folder: Path | None = None, *, trust: bool
+) -> T:
     """What is made of the module and the name of a user's own file; every fault names the file.
 
-    Raises what `own_module` and `make` raise.
+    Raises what `import_user_file` and `make` raise.
     """
-    module = own_code(key, name, folder, trust=trust)
+    module = load_user_module(key, name, folder, trust=trust)
     try:
-        made = make(module, as_name(Path(name).stem))
+        made = make(module, to_identifier(Path(name).stem))
         if isinstance(record := getattr(module, "Parameters", None), type) and declarations(record):
             record()  # its defaults are checked by their own ranges
         return made
@@ -86,9 +94,9 @@ def made_of(make: Callable[[ModuleType, str], T], key: str, name: str, folder: P
         raise type(fault)("\n".join(told)) from fault
 
 
-def raised_there(fault: Exception) -> str:
+def user_error_line(error: Exception) -> str:
     """What code of the user's own raised, in a line with its place; empty if anything else raised it."""
-    last = traceback.extract_tb(fault.__traceback__)[-1]
+    last = traceback.extract_tb(error.__traceback__)[-1]
     path = Path(last.filename).resolve()
     others = (
         Path(__file__).resolve().parents[1],
@@ -98,13 +106,13 @@ def raised_there(fault: Exception) -> str:
     installed = {"site-packages", "dist-packages"} & set(path.parts)
     if installed or not path.is_file() or any(path.is_relative_to(folder) for folder in others):
         return ""
-    return f"{last.filename}:{last.lineno}: {bounded(raised(fault))}"
+    return f"{last.filename}:{last.lineno}: {shortened(describe_error(error))}"
 
 
 def law_hash(law: Model) -> str:
     """Hash of the text of a law's rules and of the functions of its own that they call."""
     texts: dict[str, str] = {}
-    left = [value for value in (*vars(law).values(), *law.deciding) if isinstance(value, FunctionType)]
+    left = [value for value in (*vars(law).values(), *law.decide_rules) if isinstance(value, FunctionType)]
     while left:
         rule = left.pop()
         if rule.__qualname__ in texts:

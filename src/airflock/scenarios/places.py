@@ -8,18 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import SceneError
-from airflock.world import scenery, start
-from airflock.world.edges import wrap
-from airflock.world.place import half_sizes
-from airflock.world.scenes.build import Scene, clearance, in_mesh, scene_of
+from airflock.support import SceneError
+from airflock.world import Scene, clearance, half_sizes, in_mesh, scene_of, scenery, start, wrap
 
 CROWDED = 0.9  # share of a start region inside obstacles that is worth a word; less is redrawn in silence
 DRAWN = 64  # positions at which a start region is looked at
 MOST = 2000  # the same where none is free
 
 
-def place_faults(scenario: Scenario, started: bool = False) -> list[str]:
+def scene_errors(scenario: Scenario, started: bool = False) -> list[str]:
     """What is wrong with a scene, with goals and, unless it has started, with the region of starts; one line each."""
     given = scenario.goals
     if given.kind == "own" and len(given.points) != scenario.agents:
@@ -56,7 +53,7 @@ def place_faults(scenario: Scenario, started: bool = False) -> list[str]:
     return found
 
 
-def place_notes(scenario: Scenario) -> list[str]:
+def scene_notes(scenario: Scenario) -> list[str]:
     """What was adjusted, for a person to read."""
     notes = list(scenario.stands().notes)
     share = _blocked(scenario)
@@ -70,28 +67,28 @@ def place_notes(scenario: Scenario) -> list[str]:
     return notes
 
 
-def start_in_box(scenario: Scenario, given: NDArray[Any]) -> NDArray[Any]:
+def wrap_start(scenario: Scenario, start: NDArray[Any]) -> NDArray[Any]:
     """A given start (component, agent), its places (m) put back into a periodic box: they are the same places there."""
     if scenario.world.edges != "periodic":
-        return given
-    put = given.copy()
+        return start
+    put = start.copy()
     for axis, half in enumerate(half_sizes(scenario.world)[: scenario.dimensions]):
-        for agent in np.flatnonzero(np.abs(given[axis]) > half):
-            put[axis, agent], _ = wrap(float(given[axis, agent]), 0.0, half)
+        for agent in np.flatnonzero(np.abs(start[axis]) > half):
+            put[axis, agent], _ = wrap(float(start[axis, agent]), 0.0, half)
     return put
 
 
-def start_fault(scenario: Scenario, given: NDArray[Any]) -> str:
+def start_error(scenario: Scenario, start: NDArray[Any]) -> str:
     """What is wrong with a given start (component, agent), as a sentence; empty if nothing is."""
-    fault = spot_fault(scenario, given, range(np.shape(given)[1]))
+    fault = position_error(scenario, start, range(np.shape(start)[1]))
     return f"start: {fault}" if fault else ""
 
 
-def spot_fault(scenario: Scenario, given: NDArray[Any], agents: Sequence[int]) -> str:
+def position_error(scenario: Scenario, positions: NDArray[Any], agents: Sequence[int]) -> str:
     """What is wrong with places (component, agent) at which these agents are to be; empty if nothing is."""
     dims = scenario.dimensions
     if scenario.world.edges == "bounce":  # which would move an agent beyond a face onto it, farther than it flies
-        beyond = np.abs(np.asarray(given, float)[:dims]) - np.array(half_sizes(scenario.world)[:dims])[:, None]
+        beyond = np.abs(np.asarray(positions, float)[:dims]) - np.array(half_sizes(scenario.world)[:dims])[:, None]
         if beyond.max() > 0.0:
             agent = agents[int(beyond.max(axis=0).argmax())]
             return (
@@ -99,7 +96,7 @@ def spot_fault(scenario: Scenario, given: NDArray[Any], agents: Sequence[int]) -
                 "move it in or enlarge world.side"
             )
     place = scenario.stands()
-    columns = np.asarray(given, float)[:dims].T if len(place.shapes) else ()
+    columns = np.asarray(positions, float)[:dims].T if len(place.shapes) else ()
     for agent, column in zip(agents, columns, strict=False):
         depth = _depth(place, np.append(column, [0.0] * (3 - dims)))
         if depth > 0.0:

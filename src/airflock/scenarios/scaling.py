@@ -3,7 +3,7 @@
 import math
 import tomllib
 
-from airflock.parts.laws.vasarhelyi_2018 import Parameters
+from airflock.parts.laws import Parameters
 from airflock.scenarios import formats
 from airflock.scenarios.files import presets
 

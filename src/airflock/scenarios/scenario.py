@@ -5,28 +5,32 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
-from airflock.core import random
-from airflock.core.contract import Body, Metric, MetricSet, Model
-from airflock.core.fault import Fault
-from airflock.core.parameters import number_names
-from airflock.core.radio import Packets, Radio
-from airflock.core.sensor import Sensor
-from airflock.core.silence import Parameters as Silence
-from airflock.core.topology import Topology
-from airflock.parts.aero import descent
-from airflock.parts.aero import wing as wings
+from airflock.core import (
+    Body,
+    Fault,
+    Metric,
+    MetricSet,
+    Model,
+    PacketParameters,
+    Radio,
+    Sensor,
+    SilenceParameters,
+    Topology,
+    number_names,
+    random,
+)
+from airflock.parts.aero import descent, wing as wings
 from airflock.parts.bodies import wind
 from airflock.parts.metrics import parameters as metric_parameters
-from airflock.parts.sensors.registry import SENSORS
-from airflock.parts.topologies.registry import TOPOLOGIES
+from airflock.parts.sensors import SENSORS
+from airflock.parts.topologies import TOPOLOGIES
 from airflock.scenarios import filled_in
-from airflock.scenarios.faulty import Entry
-from airflock.scenarios.group_laws import Law, laws_of
-from airflock.scenarios.groups import Group, own_numbers, varied
-from airflock.scenarios.portrait import html, sentence
+from airflock.scenarios.faulty import FaultEntry
+from airflock.scenarios.group_laws import FlownLaw, flown_laws
+from airflock.scenarios.groups import Group, agent_values, varied_numbers
+from airflock.scenarios.portrait import scenario_html, summary
 from airflock.scenarios.sections import ORDER, Flight
-from airflock.world import arena, goals, scenery, start
-from airflock.world.scenes.build import Scene, scene_of, waypoints
+from airflock.world import Scene, arena, goals, scene_of, scenery, start, waypoints
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class Scenario:
     parameters: Any
     body: Any
     sensors: Any
-    radio: Packets
+    radio: PacketParameters
     wind: wind.Parameters
     world: arena.Parameters
     scene: scenery.Parameters
@@ -62,7 +66,7 @@ class Scenario:
     start: start.Parameters
     wing: wings.Parameters
     aero: descent.Parameters
-    silence: Silence
+    silence: SilenceParameters
     metrics: metric_parameters.Parameters
     topology: Any
     flight: Flight
@@ -72,24 +76,24 @@ class Scenario:
     measures: MetricSet
     own_topology: Topology | None = None
     groups: tuple[Group, ...] = ()
-    faults: tuple[Entry, ...] = ()
+    faults: tuple[FaultEntry, ...] = ()
     published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
     document: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        return f"<Scenario {sentence(self)}>"
+        return f"<Scenario {summary(self)}>"
 
     def _repr_html_(self) -> str:
         """Tables of all keys that differ from their defaults, for a notebook."""
-        return html(self)
+        return scenario_html(self)
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields alone: what follows from them is found again wherever it is asked for."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
-    def prepared(self) -> dict[Any, Any]:
+    def engine_cache(self) -> dict[Any, Any]:
         """What an engine has made of this scenario for flights with other seeds, by keys of its own; empty at first."""
         return {}
 
@@ -104,7 +108,7 @@ class Scenario:
         return int(self.world.dimensions)
 
     @cached_property
-    def errs(self) -> bool:
+    def has_sensor_error(self) -> bool:
         """Whether agents measure themselves with errors."""
         own = [{key: v for (letter, key), v in group.numbers.items() if letter == "s"} for group in self.groups]
         spread = any(letter == "s" and sd > 0.0 for group in self.groups for (letter, _), sd in group.spread.items())
@@ -112,13 +116,13 @@ class Scenario:
         return spread or not all(map(self.sensor.is_exact, kinds))
 
     @property
-    def unerring(self) -> "Scenario":
+    def without_sensor_errors(self) -> "Scenario":
         """The same scenario with agents that know their own states as they are."""
         exact, groups = SENSORS["perfect"], tuple(group.without("s") for group in self.groups)
         return replace(self, sensor=exact, sensors=exact.Parameters(period=self.sensors.period), groups=groups)
 
     @property
-    def descends(self) -> bool:
+    def is_aerodynamic(self) -> bool:
         """Whether drag descent is added to the model (the section [aero])."""
         return self.model.flock is descent.flock
 
@@ -132,7 +136,7 @@ class Scenario:
         """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
         records = self.records
         found: dict[str, tuple[str, ...]] = {
-            each.letter: each.derived._fields if each.derived else number_names(records[each.key])
+            each.letter: each.driver_record._fields if each.driver_record else number_names(records[each.key])
             for each in ORDER
             if each.letter
         }
@@ -144,7 +148,7 @@ class Scenario:
         return self.measures.of(self.metrics)
 
     @property
-    def meets(self) -> Topology | None:
+    def topology_rule(self) -> Topology | None:
         """Which of those whom an agent hears it meets; None: all of them."""
         return self.own_topology or TOPOLOGIES[self.topology.kind]
 
@@ -152,20 +156,20 @@ class Scenario:
     def fault_kinds(self) -> tuple[Fault, ...]:
         """Kinds of fault that may occur."""
         duration = self.flight.duration
-        return tuple(dict.fromkeys(entry.fault for entry in self.faults if entry.occurs(duration)))
+        return tuple(dict.fromkeys(entry.fault for entry in self.faults if entry.can_occur(duration)))
 
     @cached_property
     def varied(self) -> tuple[tuple[str, str], ...]:
         """Numbers that differ among agents, as (letter, name); of laws that groups fly by their own: `laws`."""
-        return self.laws[0].varied + varied(self.groups, {"b": self.body, "s": self.sensors})
+        return self.laws[0].varied + varied_numbers(self.groups, {"b": self.body, "s": self.sensors})
 
     @cached_property
-    def laws(self) -> tuple[Law, ...]:
+    def laws(self) -> tuple[FlownLaw, ...]:
         """Laws that fly: that of the flock, and behind it those of groups; one for each text."""
-        return laws_of(self.model, self.parameters, self.groups, self.agents)
+        return flown_laws(self.model, self.parameters, self.groups, self.agents)
 
     @cached_property
-    def law_numbers(self) -> tuple[int, ...]:
+    def law_indices(self) -> tuple[int, ...]:
         """Of each agent which of `laws` it flies by."""
         found = [0] * self.agents
         for number, law in enumerate(self.laws[1:], 1):
@@ -173,12 +177,12 @@ class Scenario:
                 found[agent] = number
         return tuple(found)
 
-    def law_of(self, agent: int) -> Law:
+    def law_of(self, agent: int) -> FlownLaw:
         """The law that an agent flies by."""
-        return self.laws[self.law_numbers[agent]]
+        return self.laws[self.law_indices[agent]]
 
     @cached_property
-    def group_numbers(self) -> tuple[int, ...]:
+    def group_indices(self) -> tuple[int, ...]:
         """Of each agent the number of its group in [[groups]]; -1 where it is in none."""
         found = [-1] * self.agents
         for number, group in enumerate(self.groups):
@@ -186,16 +190,16 @@ class Scenario:
                 found[agent] = number
         return tuple(found)
 
-    def own_numbers(self, letter: str, name: str, seed: int) -> list[float]:
+    def agent_values(self, letter: str, name: str, seed: int) -> list[float]:
         """One number of every agent, with its tolerance as a seed draws it."""
         record = {"p": self.parameters, "b": self.body, "s": self.sensors}[letter]
-        return own_numbers(self.groups, self.agents, letter, name, record, seed)
+        return agent_values(self.groups, self.agents, letter, name, record, seed)
 
     def alike(self) -> "Scenario":
         """The same scenario without groups and faults: what a recording is measured by."""
         return replace(self, groups=(), faults=()) if self.groups or self.faults else self
 
-    def in_flight(self, seed: int) -> "Scenario":
+    def with_drawn_scene(self, seed: int) -> "Scenario":
         """The scenario of one flight: where scene.draw = "flight", with the scene that this flight draws.
 
         Examples
@@ -207,12 +211,12 @@ class Scenario:
         """
         if self.scene.draw == "once":
             return self
-        own = {"seed": random.words(seed, random.SCENE, 0, 0, int(self.scene.seed))[0] >> 1, "draw": "once"}
+        own = {"seed": random.random_words(seed, random.SCENE, 0, 0, int(self.scene.seed))[0] >> 1, "draw": "once"}
         document = {**self.document, "scene": {**self.document.get("scene", {}), **own}}
         return replace(self, scene=replace(self.scene, **own), document=document)
 
     @cached_property
-    def scenic(self) -> bool:
+    def has_scene(self) -> bool:
         """Whether something stands in the world that agents see with rays, feel, or must not touch."""
         return self.scene.draw == "flight" or bool(len(self.stands().shapes))
 
@@ -227,14 +231,14 @@ class Scenario:
         return arena.heights_of(self.world)[0] if walled else None
 
     @property
-    def drains(self) -> bool:
+    def uses_battery(self) -> bool:
         """Whether batteries run empty."""
         return self.vehicle.endures is not None and getattr(self.body, "battery", "") != "endless"
 
     @property
-    def lands(self) -> bool:
+    def can_land(self) -> bool:
         """Whether agents whose batteries are empty may come to the ground: then they are absent."""
-        return self.drains and self.ground is not None
+        return self.uses_battery and self.ground is not None
 
     def stands(self) -> Scene:
         """What stands in the world; for a model that casts, polygons are walls of it too.
@@ -267,25 +271,25 @@ class Scenario:
         """
         return waypoints(self.goals, self.scene, self.dimensions)
 
-    def measured_by(self) -> metric_parameters.Parameters:
+    def resolved_metrics(self) -> metric_parameters.Parameters:
         """Metric parameters with everything that was left to the scenario filled in."""
         return self._measured
 
     @cached_property
     def _measured(self) -> metric_parameters.Parameters:
-        return filled_in.metrics(self)
+        return filled_in.default_metrics(self)
 
     def judged(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Order parameters of a flight with what the metric set makes of them: partial fitnesses and fitness."""
-        return self.measures.judged(values, self.agents, self.flight.duration, self.measured_by())
+        return self.measures.judged(values, self.agents, self.flight.duration, self.resolved_metrics())
 
-    def silent_by(self) -> Silence:
+    def resolved_silence(self) -> SilenceParameters:
         """The rule of silence with everything that was left to the scenario filled in."""
         return self._silent
 
     @cached_property
-    def _silent(self) -> Silence:
-        return filled_in.silence(self)
+    def _silent(self) -> SilenceParameters:
+        return filled_in.default_silence(self)
 
     def separation(self) -> float:
         """Smallest distance of two agents at the start, m.
@@ -297,4 +301,8 @@ class Scenario:
         7.0
         """
         given = self.start.separation
-        return filled_in.separation(self.model, self.parameters, self.start, self.world) if given is None else given
+        return (
+            filled_in.default_separation(self.model, self.parameters, self.start, self.world)
+            if given is None
+            else given
+        )

@@ -9,28 +9,28 @@ from math import inf, isfinite
 from numbers import Real
 from typing import Any
 
-from airflock.core.parameters import (
+from airflock.core import (
     Choice,
     Declaration,
     Quantity,
     Text,
-    choice_fault,
+    choice_error,
     declarations,
-    points_fault,
-    quantity_fault,
-    with_unit,
+    format_with_unit,
+    points_error,
+    quantity_error,
 )
-from airflock.support.spelling import meant
+from airflock.support import suggest
 
 LONG_FORM = {"value", "unit", "source", "note", "interval"}
 
 
-def plain(section: str, given: Mapping[str, Any], record: type) -> tuple[dict[str, Any], list[str]]:
+def plain_values(section: str, table: Mapping[str, Any], record: type) -> tuple[dict[str, Any], list[str]]:
     """Values without their units and sources; faults for units that differ from the declared ones."""
     known = {name: declared for name, declared, _ in declarations(record)}
     units = {name: getattr(declared, "unit", "") for name, declared in known.items()}
     values, faults = {}, []
-    for key, value in given.items():
+    for key, value in table.items():
         if isinstance(value, Mapping):
             name = f"{section}.{key}".lstrip(".")
             unknown = set(value) - LONG_FORM
@@ -57,28 +57,28 @@ def _holds(interval: Any, value: Any) -> bool:
     return sound and numbers[0] <= value <= numbers[-1]
 
 
-def value_of(given: Any) -> Any:
+def value_of(entry: Any) -> Any:
     """A value as it is, or that of a table that also holds its unit or source: { value = ..., source = ... }."""
-    return given["value"] if isinstance(given, Mapping) and "value" in given else given
+    return entry["value"] if isinstance(entry, Mapping) and "value" in entry else entry
 
 
-def check(
-    section: str, given: Mapping[str, Any], record: type, beside: Sequence[str] = (),
+def read_section(
+    section: str, table: Mapping[str, Any], record: type, other_keys: Sequence[str] = (),
     kinds: Mapping[str, type] | None = None,
 ) -> tuple[Any, list[str]]:  # fmt: skip
     """Record made from a section, or None, and all faults in it.
 
     beside : further keys that its table may hold; kinds : records that the section has with another kind
     """
-    if not isinstance(given, Mapping):
-        return None, [f"{section} = {given!r} is not a table of keys"]
-    values, faults = plain(section, given, record)
+    if not isinstance(table, Mapping):
+        return None, [f"{section} = {table!r} is not a table of keys"]
+    values, faults = plain_values(section, table, record)
     known = {name: declared for name, declared, _ in declarations(record)}
     values = {key: _python(value, known.get(key)) for key, value in values.items()}
     for name, declared in known.items():
         if name in values and _is_wrong(values[name], declared):
             faults.append(_line(f"{section}.{name}".lstrip("."), values[name], declared))
-    faults += [_unknown(section, str(key), (*known, *beside), kinds or {}) for key in values if key not in known]
+    faults += [_unknown(section, str(key), (*known, *other_keys), kinds or {}) for key in values if key not in known]
     return (None if faults else record(**values)), faults
 
 
@@ -96,17 +96,17 @@ def _python(value: Any, declared: Declaration | None) -> Any:
 def _is_wrong(value: Any, declared: Declaration) -> bool:
     """Whether a value of Python's own types is not what was declared."""
     if isinstance(declared, Quantity):
-        return bool(quantity_fault(value, declared)) or value in (inf, -inf)
+        return bool(quantity_error(value, declared)) or value in (inf, -inf)
     if isinstance(declared, Choice):
-        return bool(choice_fault(value, declared))
-    return not isinstance(value, str) if isinstance(declared, Text) else bool(points_fault(value, declared))
+        return bool(choice_error(value, declared))
+    return not isinstance(value, str) if isinstance(declared, Text) else bool(points_error(value, declared))
 
 
 def _unknown(section: str, key: str, may: Sequence[str], kinds: Mapping[str, type]) -> str:
-    """The line for a key that a section does not have; `kinds` as of `check`."""
+    """The line for a key that a section does not have; `kinds` as of `read_section`."""
     of = [kind for kind, other in kinds.items() if key in {name for name, _, _ in declarations(other)}]
     prefix = f"{section}." if section else ""
-    hint = meant(key, may, f"known: {', '.join(may)}", prefix=prefix)
+    hint = suggest(key, may, f"known: {', '.join(may)}", prefix=prefix)
     hint = f"it belongs to {section}.kind = {' or '.join(map(repr, of))}" if of else hint
     return f"{prefix}{key}: unknown key; {hint}"
 
@@ -117,10 +117,10 @@ def _line(name: str, value: Any, declared: Declaration) -> str:
         if isinstance(value, float) and isfinite(value) and declared.whole and not value.is_integer():
             return f"{name} = {value:g} is not a whole number; give one in {declared.span}"
         if isinstance(value, Real) and not isinstance(value, bool):
-            return f"{name} = {with_unit(_number(value), declared.unit)} lies outside {declared.span}"
+            return f"{name} = {format_with_unit(_number(value), declared.unit)} lies outside {declared.span}"
         return f"{name} = {value!r} is not a number; give {declared.span}"
     if isinstance(declared, Choice):
-        hint = meant(value, declared.options, lead="; ", cutoff=0.6)
+        hint = suggest(value, declared.options, lead="; ", cutoff=0.6)
         return f"{name} = {value!r} is none of {', '.join(declared.options)}{hint}"
     if isinstance(declared, Text):
         return f"{name} = {value!r} is not text"

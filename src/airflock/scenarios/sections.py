@@ -7,9 +7,7 @@ handed and the columns of the row that a driver reads are all made from `ORDER`,
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from airflock.core import silence
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, choice, quantity, silence
 from airflock.parts.aero import descent, wing
 from airflock.parts.bodies import dryden, motion, wind
 from airflock.parts.metrics import parameters as metrics
@@ -65,7 +63,7 @@ class Geometry(NamedTuple):
     jitter: float
 
 
-class Clock(NamedTuple):
+class StepTimes(NamedTuple):
     """What drivers read of the flight: motion step and time between two decisions, s."""
 
     dt: float
@@ -84,7 +82,7 @@ class Section(NamedTuple):
     key: str
     record: type[Record] | None
     letter: str = ""
-    derived: type[Any] | None = None
+    driver_record: type[Any] | None = None
 
     @property
     def field(self) -> str:
@@ -104,7 +102,7 @@ ORDER = (
     Section("goals", goals.Parameters),
     Section("start", start.Parameters),
     Section("metrics", metrics.Parameters, "q"),
-    Section("", Flight, "c", Clock),
+    Section("", Flight, "c", StepTimes),
     Section("wing", wing.Parameters, "wing"),
     Section("aero", descent.Parameters, "aero"),
     Section("wind", wind.Parameters, "air", dryden.Numbers),

@@ -4,13 +4,13 @@ import operator
 from collections.abc import Iterable
 from typing import Any
 
-from airflock.support.errors import ParameterError
+from airflock.support import ParameterError
 
 LARGEST = 2**64 - 1
 MOST = 10_000_000  # flights at a time
 
 
-def sound_seed(seed: Any) -> int:
+def check_seed(seed: Any) -> int:
     """A seed as a plain integer; any other number would fly as if it were another seed."""
     try:
         found = operator.index(seed)
@@ -21,10 +21,10 @@ def sound_seed(seed: Any) -> int:
     return found
 
 
-def sound_seeds(seeds: int | Iterable[int]) -> list[int]:
+def check_seeds(seeds: int | Iterable[int]) -> list[int]:
     """Seeds of several flights: so many of them from 0 on, or those that are given."""
     if isinstance(seeds, Iterable):
-        found = [sound_seed(seed) for seed in seeds]
+        found = [check_seed(seed) for seed in seeds]
     else:
         try:
             count = operator.index(seeds)

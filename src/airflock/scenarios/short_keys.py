@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Any
 
-from airflock.core.parameters import Quantity, declarations
+from airflock.core import Quantity, declarations
 
 # keys that only files have: what to do instead
 IN_FILES = {
@@ -14,7 +14,7 @@ IN_FILES = {
 }
 
 
-def places(records: Mapping[str, type]) -> dict[str, list[str]]:
+def keys_by_last_word(records: Mapping[str, type]) -> dict[str, list[str]]:
     """Last word → whole keys of all sections that have it.
 
     A key of `metrics` that is taken from the scenario by default (such as metrics.v_flock) gives way to one of the
@@ -32,7 +32,7 @@ def places(records: Mapping[str, type]) -> dict[str, list[str]]:
     return found
 
 
-def whole_keys(
+def expand_short_keys(
     settings: Mapping[str, Any], records: Mapping[str, type], top: tuple[str, ...]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
     """Settings with whole keys, notes of what was found, and faults of keys that are several or none.
@@ -40,7 +40,7 @@ def whole_keys(
     settings : keys that are neither whole ("radio.delay") nor at the top of a file ("agents")
     records  : section → record of its parameters, "model" first
     """
-    known = places(records)
+    known = keys_by_last_word(records)
     result: dict[str, Any] = {}
     notes, faults = [], []
     for key, value in settings.items():

@@ -4,28 +4,28 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.core.parameters import Quantity, with_unit
+from airflock.core import Quantity, format_with_unit
 from airflock.scenarios import units
 
 OF_IT = "a share of the number such as '10 %'"
 
 
-class Share(float):
+class RelativeSpread(float):
     """A standard deviation that is a share of the number itself."""
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Share) and float(self) == float(other)
+        return isinstance(other, RelativeSpread) and float(self) == float(other)
 
     __hash__ = float.__hash__
 
     @classmethod
-    def written(cls, given: Any) -> "Share | None":
+    def parse(cls, entry: Any) -> "RelativeSpread | None":
         """That of a text or table such as "10 %"; None where it says another unit, or none."""
-        match = units.NUMBER.fullmatch(given) if isinstance(given, str) else None
+        match = units.NUMBER_WITH_UNIT.fullmatch(entry) if isinstance(entry, str) else None
         value, unit = (match[1], match[2]) if match else ("", "")
-        if isinstance(given, Mapping):
-            value, unit = given.get("value"), given.get("unit")
-        if isinstance(value, bool) or not isinstance(unit, str) or units.factor(unit, "1") in (None, 1.0):
+        if isinstance(entry, Mapping):
+            value, unit = entry.get("value"), entry.get("unit")
+        if isinstance(value, bool) or not isinstance(unit, str) or units.conversion_factor(unit, "1") in (None, 1.0):
             return None
         try:
             return cls(float(f"{float(value) / 100.0:.12g}"))
@@ -33,43 +33,43 @@ class Share(float):
             return None
 
 
-def deviation(spread: float, value: float) -> float:
+def standard_deviation(spread: float, value: float) -> float:
     """The standard deviation of a number."""
-    return spread * abs(value) if isinstance(spread, Share) else spread
+    return spread * abs(value) if isinstance(spread, RelativeSpread) else spread
 
 
-def share_of(given: Any, declared: Any) -> Share | None:
+def relative_spread(entry: Any, declared: Any) -> RelativeSpread | None:
     """A spread that is a share of the number; of a number that is a share itself "10 %" is 0.1."""
     relative = isinstance(declared, Quantity) and declared.unit not in ("", "1")
-    return Share.written(given) if relative else None
+    return RelativeSpread.parse(entry) if relative else None
 
 
-def or_share(line: str, apart: str, known: Mapping[str, Any]) -> str:
+def with_share_hint(line: str, spread_prefix: str, known: Mapping[str, Any]) -> str:
     """What else may be written, at the end of a line about the unit of a spread."""
-    key = line.removeprefix(f"{apart}.").partition(" ")[0]
-    declared = known.get(key) if line.startswith(f"{apart}.") else None
+    key = line.removeprefix(f"{spread_prefix}.").partition(" ")[0]
+    declared = known.get(key) if line.startswith(f"{spread_prefix}.") else None
     return f", or {OF_IT}" if isinstance(declared, Quantity) and declared.unit not in ("", "1") else ""
 
 
-def checked(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
+def check_spreads(where: str, table: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
     """Standard deviations in declared units."""
     found, faults = {}, []
-    for key, entry in given.items():
+    for key, entry in table.items():
         value = entry.get("value", entry) if isinstance(entry, Mapping) else entry
         declared = known.get(key)
         if not isinstance(declared, Quantity):
             faults.append(f"{where}.{key}: unknown number")
         elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
-            other = or_share(f"{where}.spread.{key}", f"{where}.spread", known)
-            least = with_unit("0", declared.unit)
+            other = with_share_hint(f"{where}.spread.{key}", f"{where}.spread", known)
+            least = format_with_unit("0", declared.unit)
             faults.append(
                 f"{where}.{key}.spread = {_told(value)} is not a standard deviation of {least} or more{other}"
             )
         else:
-            found[key] = value if isinstance(value, Share) else float(value)
+            found[key] = value if isinstance(value, RelativeSpread) else float(value)
     return found, faults
 
 
 def _told(spread: Any) -> str:
     """A spread as it was written."""
-    return f"'{100.0 * spread:g} %'" if isinstance(spread, Share) else repr(spread)
+    return f"'{100.0 * spread:g} %'" if isinstance(spread, RelativeSpread) else repr(spread)

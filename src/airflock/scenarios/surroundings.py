@@ -3,29 +3,21 @@
 import math
 from typing import Any
 
-from airflock.core.agent import State
-from airflock.core.contract import Model
-from airflock.core.maths import FAR
-from airflock.core.vocabulary import answer
+from airflock.core import FAR, Model, State, call_rule
 from airflock.scenarios.scenario import Scenario
-from airflock.world import bvh, goals
-from airflock.world.inside import inside
-from airflock.world.place import Place as Map
-from airflock.world.place import Shapes
-from airflock.world.scenes.tree import unbuilt
-from airflock.world.surfaces import EDGES
+from airflock.world import EDGE_RULES, Shapes, WorldMap as Map, bvh, goals, inside, without_appearing
 
 
-class Place(Map):
+class FlightWorld(Map):
     """The world of a flight: the map that a drone carries, with what happens in it: edges act, shapes appear."""
 
     def __init__(self, scenario: Scenario):
-        stands, self.edge, self.dims = scenario.stands(), EDGES[scenario.world.edges], scenario.dimensions
-        shapes, later = unbuilt(stands)
+        stands, self.edge, self.dims = scenario.stands(), EDGE_RULES[scenario.world.edges], scenario.dimensions
+        shapes, later = without_appearing(stands)
         casts = any(law.model.sight is not None for law in scenario.laws)
         super().__init__(
             scenario.world, Shapes(shapes.tolist(), stands.nodes.tolist(), stands.links.tolist()),
-            look=reach_of_walls(scenario.model, scenario.parameters), casts=casts,
+            look=wall_range(scenario.model, scenario.parameters), casts=casts,
         )  # fmt: skip
         self.later, self.clearance = later.tolist(), scenario.start.clearance
         self.wall_clearance = scenario.start.wall_clearance
@@ -36,7 +28,7 @@ class Place(Map):
         """Rows of all shapes, as they stand now."""
         return self._scene[0]
 
-    def roomy(self, x: float, y: float, z: float) -> bool:
+    def is_free(self, x: float, y: float, z: float) -> bool:
         """Whether an agent may start here: start.wall_clearance off walls, start.clearance off the scene."""
         if self.shapes and bvh.nearest(x, y, z, self.clearance, *self._scene).distance < self.clearance:
             return False
@@ -48,7 +40,7 @@ class Place(Map):
         """1.0 if a sphere of this radius (m) met the scene on its way from a to b."""
         return float(bvh.touches(*a[:3], *b[:3], radius, *self._scene)) if self.shapes else 0.0
 
-    def appear(self, time: float, flock: list[State]) -> None:
+    def update_appearing(self, time: float, flock: list[State]) -> None:
         """Let stand what is due, unless an agent is in its place."""
         for row in self.later:
             if 0.0 <= row[6] <= time:
@@ -67,12 +59,12 @@ class Place(Map):
         return State(*(x for x, _ in moved), *pad, *(v for _, v in moved), *pad)
 
 
-def reach_of_walls(model: Model, p: Any) -> float:
+def wall_range(model: Model, p: Any) -> float:
     """How far (m) a law with these parameters looks for what stands in the world."""
-    return FAR if model.wall_reach is None else float(answer(model.wall_reach, "wall_reach", {"p": p}, model.name))
+    return FAR if model.wall_reach is None else float(call_rule(model.wall_reach, "wall_reach", {"p": p}, model.name))
 
 
-class Course:
+class GoalCourse:
     """Goals: where the goal is, which one it is, and when each was reached (s; nan: never)."""
 
     def __init__(self, scenario: Scenario):

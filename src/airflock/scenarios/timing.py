@@ -6,9 +6,9 @@ from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import Flight
 
 
-def clock(scenario: Scenario) -> dict[str, int]:
+def step_counts(scenario: Scenario) -> dict[str, int]:
     """All times of a scenario in motion steps."""
-    dt, q = scenario.flight.dt, scenario.measured_by()
+    dt, q = scenario.flight.dt, scenario.resolved_metrics()
     decide_every = max(1, round(scenario.sensors.period / dt))
     delay = round(scenario.radio.delay / dt)
     return {
@@ -21,7 +21,7 @@ def clock(scenario: Scenario) -> dict[str, int]:
     }
 
 
-def faults(flight: Flight, period: float, metrics: Any) -> list[str]:
+def timing_errors(flight: Flight, period: float, metrics: Any) -> list[str]:
     """Periods below a step, and more steps than can be counted."""
     dt = flight.dt
     times = {
@@ -37,7 +37,7 @@ def faults(flight: Flight, period: float, metrics: Any) -> list[str]:
     return found
 
 
-def notes(scenario: Scenario) -> list[str]:
+def timing_notes(scenario: Scenario) -> list[str]:
     """What is rounded to steps, for a person to read; nothing here stops a flight."""
     told, dt = [], scenario.flight.dt
     times = {

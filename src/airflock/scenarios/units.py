@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.core.parameters import Declaration, Points, Quantity, declarations, with_unit
+from airflock.core import Declaration, Points, Quantity, declarations, format_with_unit
 
 DEGREE = math.pi / 180.0
 FOOT, MILE, NAUTICAL_MILE = 0.3048, 1609.344, 1852.0
@@ -45,19 +45,21 @@ SPELLINGS = {
     "degrees": "deg", "hz": "Hz", "minutes": "min", "hours": "h", "mps": "m/s", "percent": "%", "μs": "us", "µs": "us",
 }  # fmt: skip
 # a digit can go on only after a blank (1 1/s), so that no unit takes digits from its number
-NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s+(?=\S)|(?![\d.]))(.*?)\s*")
+NUMBER_WITH_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s+(?=\S)|(?![\d.]))(.*?)\s*")
 
 DECIMAL_COMMA = re.compile(r",\d+")
 
 
-def factor(unit: str, declared: str) -> float | None:
+def conversion_factor(unit: str, declared: str) -> float | None:
     """Declared units in one of `unit`, for instance 0.001 for ms where s is declared; None if it is no such unit."""
     name = unit.strip().replace("²", "^2").replace("³", "^3").replace("**", "^").replace("m/s/s", "m/s^2")
     name = SPELLINGS.get(name, name)
     return 1.0 if name == declared else UNITS.get(declared, {}).get(name)
 
 
-def converted(document: Mapping[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str], list[str]]:
+def convert_units(
+    document: Mapping[str, Any], records: Mapping[str, type]
+) -> tuple[dict[str, Any], list[str], list[str]]:
     """A document in declared units, notes of what was converted, and faults of units that cannot be.
 
     document : nested dict of a scenario; records : section → record of its parameters, "" for the keys at the top
@@ -94,7 +96,7 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
     value, unit = (given["value"], given.get("unit", "")) if long else (given, "")
     written = f"{value} {unit}".strip() if long else given
     if isinstance(value, str) and not unit:
-        match = NUMBER.fullmatch(value)
+        match = NUMBER_WITH_UNIT.fullmatch(value)
         if match is None:
             return given, "", ""  # no number at all: told with the allowed range by the check of the section
         if not match[2]:
@@ -106,7 +108,7 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
         if unit and isinstance(unit, str) and unit == declared.unit:
             return ({**given, "value": value, "unit": unit} if long else value), "", ""
         return given, "", ""
-    times = factor(unit, declared.unit)
+    times = conversion_factor(unit, declared.unit)
     if times is None:
         others = _others(declared.unit)
         if declared.unit in ("", "1"):
@@ -115,7 +117,7 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
     scaled = _times(value, times)
     if scaled is None:
         return given, "", ""
-    note = f"{name} = {_short(value)} {unit} is {with_unit(_short(scaled), declared.unit)}"
+    note = f"{name} = {_short(value)} {unit} is {format_with_unit(_short(scaled), declared.unit)}"
     if isinstance(scaled, list):
         note = f"{name} was converted from {unit} to {declared.unit}"
     return ({**given, "value": scaled, "unit": declared.unit} if long else scaled), note, ""

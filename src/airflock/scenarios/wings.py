@@ -3,42 +3,38 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from airflock.core.composition import added
-from airflock.core.composition import faults as misfits
-from airflock.core.contract import Metric, MetricSet, Model, model
-from airflock.core.vocabulary import asks
-from airflock.parts.aero import descent
-from airflock.parts.aero import wing as wings
+from airflock.core import Metric, MetricSet, Model, add_laws, argument_names, composition_errors as misfits, model
+from airflock.parts.aero import descent, wing as wings
 from airflock.world import start
 
-Place = Callable[[int, float, float, float], tuple[float, float, float]]
-FORMATIONS: dict[str, Place] = {"vee": start.in_vee, "echelon": start.in_echelon}  # by the key start.kind
+FormationPlace = Callable[[int, float, float, float], tuple[float, float, float]]
+FORMATIONS: dict[str, FormationPlace] = {"vee": start.in_vee, "echelon": start.in_echelon}  # by the key start.kind
 THIN = 0.1  # of a span: wings farther apart in height do not meet
 
 
 DESCENT = model(descent, "drag_descent")
 
 
-def descending(found: Model) -> Model:
+def with_drag_descent(model: Model) -> Model:
     """A model with drag descent added to what it commands."""
-    return added(found, DESCENT)
+    return add_laws(model, DESCENT)
 
 
-def descent_faults(found: Model) -> list[str]:
+def drag_descent_errors(model: Model) -> list[str]:
     """Why drag descent cannot be added to a model, one line."""
-    if found.flock is not None:
-        return [f"aero: model {found.name} goes down the gradient of the drag by itself; leave the section [aero] out"]
-    return [f"aero: {fault}" for fault in misfits(found, DESCENT)]
+    if model.flock is not None:
+        return [f"aero: model {model.name} goes down the gradient of the drag by itself; leave the section [aero] out"]
+    return [f"aero: {fault}" for fault in misfits(model, DESCENT)]
 
 
-def flies_on_wings(found: Model | None, metrics: tuple[Metric, ...]) -> bool:
+def uses_lifting_line(law: Model | None, metrics: tuple[Metric, ...]) -> bool:
     """Whether a rule of this scenario solves for the wings of the flock."""
-    return (found is not None and found.flock is not None) or any(
-        "wing" in asks(m.survey, "survey") for m in metrics if m.survey
+    return (law is not None and law.flock is not None) or any(
+        "wing" in argument_names(m.survey, "survey") for m in metrics if m.survey
     )
 
 
-def faults(parts: Mapping[str, Any], found: Model | None, measures: MetricSet, started: bool = False) -> list[str]:
+def wing_errors(parts: Mapping[str, Any], law: Model | None, measures: MetricSet, started: bool = False) -> list[str]:
     """Everything that is wrong with the wings of a scenario, one line each; not of its start once it has started."""
     q, wing = parts["metrics"], parts["wing"]
     if q is None or wing is None:
@@ -46,24 +42,24 @@ def faults(parts: Mapping[str, Any], found: Model | None, measures: MetricSet, s
     lines, metrics = [], measures.of(q)
     if q.stop == "collision" and not any("n_coll" in m.Sample._fields for m in metrics):
         lines.append(f"metrics.stop = 'collision' needs collisions, which metrics.kind = {q.kind!r} does not count")
-    if not flies_on_wings(found, metrics):
+    if not uses_lifting_line(law, metrics):
         return lines
     lines += _stalled(wing) if wing.stall == "refused" else []
     lines += [] if started else _overlapping(parts)
-    place = "aero" if found is not None and found.flock is descent.flock else "model"
+    place = "aero" if law is not None and law.flock is descent.flock else "model"
     gradient = getattr(parts["aero"] if place == "aero" else parts.get("parameters"), "gradient", "none")
     if gradient in ("analytic", "frozen") and wing.positions == "grid":
         lines.append(f"{place}.gradient = {gradient!r} is a derivative; it needs wing.positions = 'free', not 'grid'")
     flight = parts["flight"]
-    if found is not None and found.flock is not None and flight is not None and flight.update == "sequential":
-        lines.append(f"update = 'sequential': model {found.name} solves for the whole flock at once")
+    if law is not None and law.flock is not None and flight is not None and flight.update == "sequential":
+        lines.append(f"update = 'sequential': model {law.name} solves for the whole flock at once")
     return lines
 
 
-def notes(scenario: Any) -> list[str]:
+def wing_notes(scenario: Any) -> list[str]:
     """What cannot be meant, but flies."""
     wing = scenario.wing
-    if not flies_on_wings(scenario.model, scenario.order_parameters):
+    if not uses_lifting_line(scenario.model, scenario.order_parameters):
         return []
     lines = _stalled(wing) if wing.stall == "noted" else []
     if wing.core == 0.0 and wing.positions == "free" and scenario.model.flock is not None:

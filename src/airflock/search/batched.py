@@ -3,25 +3,24 @@
 import time
 from collections.abc import Iterator, Sequence
 
-from airflock.runs.executors import Flight, Landed
-from airflock.runs.space import with_parameters
+from airflock.runs import Flight, FlightResult, with_parameters
 from airflock.search.study import Study
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError
 
 
-class Batched:
+class BatchExecutor:
     """One call of the engine for each batch; a flight that goes wrong is found by halves, and the others stand."""
 
     def __init__(self, study: Study, device: str):
         """`device` as `airflock.engine.score_flights` takes it."""
         self.study, self.device = study, device
 
-    def fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
+    def fly(self, tasks: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield all flights of a scenario once they are over."""
-        for place in sorted({flight.place for flight in flights}):
-            yield from self._fly([flight for flight in flights if flight.place == place])
+        for place in sorted({flight.place for flight in tasks}):
+            yield from self._fly([flight for flight in tasks if flight.place == place])
 
-    def _fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
+    def _fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
         from airflock.engine import score_flights
 
         begin = time.perf_counter()
@@ -32,7 +31,7 @@ class Batched:
         except (AirflockError, ArithmeticError) as fault:
             if len(flights) == 1:
                 reason = str(fault).splitlines()[0] if str(fault) else type(fault).__name__
-                yield Landed(flights[0], None, reason, time.perf_counter() - begin, self.device)
+                yield FlightResult(flights[0], None, reason, time.perf_counter() - begin, self.device)
                 return
             half = len(flights) // 2
             yield from self._fly(flights[:half])
@@ -40,7 +39,7 @@ class Batched:
             return
         each = (time.perf_counter() - begin) / len(flights)
         for flight, values in zip(flights, rows, strict=True):
-            yield Landed(flight, values, "", each, self.device)
+            yield FlightResult(flight, values, "", each, self.device)
 
     def close(self) -> None:
         """Nothing was taken."""

@@ -11,21 +11,19 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
-from airflock.core.parameters import Quantity, number_names
-from airflock.runs.space import Axis, Space, declared, full_space, usual_scale
-from airflock.scenarios.files import load
-from airflock.scenarios.geometry import largest_extension
-from airflock.scenarios.scenario import Scenario
+from airflock.core import Quantity, number_names
+from airflock.runs import SearchAxis, SearchSpace, declared_numbers, default_scale, full_space
+from airflock.scenarios import Scenario, largest_extension, load
 from airflock.search.space_table import read_space
-from airflock.support.untrusted import read_toml
+from airflock.support import read_toml
 
 AROUND = 10.0  # factor about a scenario's own value, where no study is shipped
 SCALED = {"m": 1, "m/s": 1}  # units that grow with the speed; times and rates stay
 
 
-def usual_space(scenario: Scenario) -> tuple[Space, list[str]]:
+def default_space(scenario: Scenario) -> tuple[SearchSpace, list[str]]:
     """The numbers of the model that matter, between bounds in which it may fly; and what was done, for a person."""
-    dead = unread(scenario)
+    dead = unread_keys(scenario)
     searched = [axis for axis in full_space(scenario).axes if axis.key not in dead]
     found = _nearest_study(scenario)
     if found is None:
@@ -40,10 +38,10 @@ def usual_space(scenario: Scenario) -> tuple[Space, list[str]]:
         notes = [f"bounds of the study {name}{told}"]
     if dead:
         notes.append(f"not searched, because nothing reads them here: {', '.join(sorted(dead))}")
-    return Space(tuple(_ordered(axes))), notes
+    return SearchSpace(tuple(_ordered(axes))), notes
 
 
-def studied(scenario: Scenario) -> dict[str, tuple[float, float]]:
+def shipped_study_axes(scenario: Scenario) -> dict[str, tuple[float, float]]:
     """Bounds of the shipped study of the same law that is nearest in speed, by key; none where no study is shipped."""
     found = _nearest_study(scenario)
     if found is None:
@@ -54,7 +52,7 @@ def studied(scenario: Scenario) -> dict[str, tuple[float, float]]:
     return {axis.key: (axis.low, axis.high) for axis in scaled}
 
 
-def unread(scenario: Scenario) -> set[str]:
+def unread_keys(scenario: Scenario) -> set[str]:
     """Keys of the model's numbers that no rule reads under the scenario's choices."""
     from airflock.engine import driver_text
 
@@ -69,7 +67,7 @@ def _speed(scenario: Scenario) -> float:
     return float(preferred(scenario.parameters)) if preferred else 0.0
 
 
-def _nearest_study(scenario: Scenario) -> tuple[str, float, dict[str, Axis]] | None:
+def _nearest_study(scenario: Scenario) -> tuple[str, float, dict[str, SearchAxis]] | None:
     """Name, speed (m/s) and axes of the shipped study of the same law, nearest in speed; None if there is none."""
     speed, best = _speed(scenario), None
     for name, model, theirs, axes in _studies():
@@ -84,12 +82,12 @@ def _nearest_study(scenario: Scenario) -> tuple[str, float, dict[str, Axis]] | N
 
 
 @lru_cache(maxsize=1)
-def _studies() -> list[tuple[str, str, float, tuple[Axis, ...]]]:
+def _studies() -> list[tuple[str, str, float, tuple[SearchAxis, ...]]]:
     """Name, law, speed and axes of the shipped studies."""
-    from airflock.search.study import shipped
+    from airflock.search.study import shipped_studies
 
     found = []
-    for name, path in shipped().items():
+    for name, path in shipped_studies().items():
         document = read_toml(path)
         if "scenario" not in document:  # one set for several scenarios: no speed of its own
             continue
@@ -99,26 +97,26 @@ def _studies() -> list[tuple[str, str, float, tuple[Axis, ...]]]:
     return found
 
 
-def _scaled(scenario: Scenario, axis: Axis, own: Axis, ratio: float) -> Axis:
+def _scaled(scenario: Scenario, axis: SearchAxis, own: SearchAxis, ratio: float) -> SearchAxis:
     """An axis of a study at another speed, stretched to hold the scenario's own value; `own` has the declared ends."""
     factor = ratio ** SCALED.get(axis.unit, 0)
     low, high = axis.low * factor, axis.high * factor
     if axis.unit == "m" and (arena := largest_extension(scenario.world)):
         high = min(high, arena)
-    value = float(declared(scenario)[axis.key][1] or 0.0)
+    value = float(declared_numbers(scenario)[axis.key][1] or 0.0)
     low, high = max(own.low, min(low, value)), min(own.high, max(high, value))
     scale = axis.scale if low > 0.0 else "linear"
     return replace(axis, low=low, high=high, scale=scale)
 
 
-def _around(scenario: Scenario, axis: Axis) -> Axis:
+def _around(scenario: Scenario, axis: SearchAxis) -> SearchAxis:
     """An axis about the scenario's own value; from 0 where that is 0."""
-    how, value = declared(scenario)[axis.key]
+    how, value = declared_numbers(scenario)[axis.key]
     own = float(value or 0.0)
     size = abs(own) if own else _typical(scenario, how)
     low, high = (own / AROUND, own * AROUND) if own > 0.0 else (-size, size)
     low, high = max(axis.low, low), min(axis.high, high)
-    return replace(axis, low=low, high=high, scale=usual_scale(low, high))
+    return replace(axis, low=low, high=high, scale=default_scale(low, high))
 
 
 def _typical(scenario: Scenario, how: Quantity) -> float:
@@ -129,7 +127,7 @@ def _typical(scenario: Scenario, how: Quantity) -> float:
     return min(float(sizes.get(how.unit) or 1.0), how.high - how.low)
 
 
-def _ordered(axes: list[Axis]) -> list[Axis]:
+def _ordered(axes: list[SearchAxis]) -> list[SearchAxis]:
     """Axes without an order that no longer holds: above a number that is not searched."""
     keys = {axis.key for axis in axes}
     return [axis if axis.above in keys or not axis.above else replace(axis, above="") for axis in axes]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 INSIDE = 0.01  # a start on a bound lies on the edge of what pycma's smooth transformation reaches
-MIDDLE, SIXTH = 0.5, 1.0 / 6.0  # Methods, "Fitness function", last paragraph
+MIDDLE, START_SIGMA = 0.5, 1.0 / 6.0  # Methods, "Fitness function", last paragraph
 
 
 class CMAES:
@@ -23,7 +23,7 @@ class CMAES:
         dimension: int,
         population: int,
         seed: int,
-        sigma: float = SIXTH,
+        sigma: float = START_SIGMA,
         start: NDArray[np.float64] | None = None,
     ):
         """Start at a point (axis,) of the cube, by default its middle.

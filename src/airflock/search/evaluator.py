@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.runs.executors import Executor, Flight
-from airflock.runs.store import Batch, Store
-from airflock.scenarios.scenario import Scenario
+from airflock.runs import CandidateBatch, Executor, Flight, FlightStore
+from airflock.scenarios import Scenario
 from airflock.search.fitness import Objective
-from airflock.search.racing import still_needed
-from airflock.search.several import of_scenarios
+from airflock.search.racing import remaining_candidates
+from airflock.search.several import combine_scenarios
 from airflock.search.study import Study
-from airflock.search.tables import DURATION
+from airflock.search.tables import DURATION_COLUMN
 
-Flown = dict[tuple[int, int], Mapping[str, Any] | None]  # (candidate, repeat) → order parameters, None: failed
+FlightScores = dict[tuple[int, int], Mapping[str, Any] | None]  # (candidate, repeat) → order parameters, None: failed
 
 
 @dataclass(frozen=True)
@@ -27,17 +26,17 @@ class Evaluator:
     """
 
     study: Study
-    store: Store
+    store: FlightStore
     executor: Executor
     note: Callable[[bool], None] | None = None
 
     def evaluate(
         self,
-        batch: Batch,
+        batch: CandidateBatch,
         points: NDArray[np.float64],
         *,
         seeds: Sequence[Sequence[int]] | None = None,
-        share: float = 1.0,
+        duration_share: float = 1.0,
         racing: bool = False,
     ) -> list[list[float | None]]:
         """Fitness (candidate, objective) of a batch; flies what the store lacks and stores it. None: failed.
@@ -50,9 +49,9 @@ class Evaluator:
         study = self.study
         parameters = [study.space.parameters(point) for point in points]
         numbers = _seeds(study, batch, len(points)) if seeds is None else seeds
-        places = [_shortened(scenario, share) for scenario in study.scenarios]
+        places = [_shortened(scenario, duration_share) for scenario in study.scenarios]
         self.store.ask(batch, points.tolist(), [{**each, **places[0]} for each in parameters])
-        flown: Flown = self.store.flown(batch)
+        flown: FlightScores = self.store.flown(batch)
         if self.note:
             for _ in flown:
                 self.note(False)
@@ -79,18 +78,18 @@ class Evaluator:
         self.store.tell(batch, rows)
         return rows
 
-    def _fly(self, batch: Batch, missing: Sequence[Flight], flown: Flown) -> None:
+    def _fly(self, batch: CandidateBatch, missing: Sequence[Flight], flown: FlightScores) -> None:
         """Fly what is missing; each flight is stored and known as soon as it lands."""
         for landed in self.executor.fly(missing):
             self.store.land(batch, landed)
             if landed.values is not None and all(values is None for values in flown.values()):
                 for objective in self.study.objectives:  # a fault in one shows at the first flight
                     objective.of_flight(landed.values)
-            flown[landed.flight.candidate, landed.flight.repeat] = landed.values
+            flown[landed.flight.candidate_index, landed.flight.repeat] = landed.values
             if self.note:
                 self.note(True)
 
-    def _still_needed(self, flown: Flown, alive: Sequence[int], seen: int, last: int) -> list[int]:
+    def _still_needed(self, flown: FlightScores, alive: Sequence[int], seen: int, last: int) -> list[int]:
         """Candidates that fly on after `seen` of `last` seeds; later flights that are stored already do not count."""
         first, n = self.study.objectives[0], len(self.study.scenarios)
         candidates = 1 + max(i for i, _ in flown)
@@ -102,21 +101,21 @@ class Evaluator:
             ]
             for i in range(candidates)
         ]
-        return still_needed(values, alive, last - seen, first.maximise)
+        return remaining_candidates(values, alive, last - seen, first.maximise)
 
     def _fitness(self, objective: Objective, flights: Sequence[Mapping[str, Any] | None]) -> float | None:
         """Fitness of a candidate from its flights in their order: over the seeds of each scenario, then over these."""
         n = len(self.study.scenarios)
         each = [objective.of_candidate(flights[place::n]) for place in range(n)]
-        return of_scenarios(each, self.study.over_scenarios, objective.maximise)
+        return combine_scenarios(each, self.study.over_scenarios, objective.maximise)
 
 
 def _shortened(scenario: Scenario, share: float) -> dict[str, float]:
     """Parameters of a flight that make it shorter than the scenario's; none for a whole one."""
-    return {} if share == 1.0 else {DURATION: share * scenario.flight.duration}
+    return {} if share == 1.0 else {DURATION_COLUMN: share * scenario.flight.duration}
 
 
-def _seeds(study: Study, batch: Batch, candidates: int) -> list[list[int]]:
+def _seeds(study: Study, batch: CandidateBatch, candidates: int) -> list[list[int]]:
     """Seeds (candidate, repeat) of a generation of the search."""
     k, most = study.seeds(batch.generation), max(study.whole("seeds"), study.whole("late_seeds"))
     before = sum(study.population(run) for run in range(batch.run)) * study.whole("generations")

@@ -6,38 +6,38 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from airflock.runs.store import Batch, Store
+from airflock.runs import CandidateBatch, FlightStore
 from airflock.search import tables
 from airflock.search.evaluator import Evaluator
-from airflock.search.nondominated import front
-from airflock.search.race import race
-from airflock.search.safe import excess_of, safe_first
+from airflock.search.nondominated import pareto_front
+from airflock.search.race import race_candidates
+from airflock.search.safe import batch_excess, rank_by_excess
 from airflock.search.study import Study
-from airflock.support.errors import StudyError
+from airflock.support import StudyError
 
-FINAL, HALF, AGAIN = Batch("final", 0, 0), Batch("final", 0, 1), Batch("again", 0, 0)
-EXCESS = "excess"  # column: how far a candidate is from keeping all limits
+FINAL, HALF, AGAIN = CandidateBatch("final", 0, 0), CandidateBatch("final", 0, 1), CandidateBatch("again", 0, 0)
+EXCESS_COLUMN = "excess"  # column: how far a candidate is from keeping all limits
 
 
-def finalists(
-    evaluator: Evaluator, sound: pd.DataFrame, centres: Sequence[NDArray[np.float64]]
+def select_finalists(
+    evaluator: Evaluator, candidates: pd.DataFrame, centres: Sequence[NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Points (candidate, axis) that fly again: the mean of each run, then the top of the search or its front."""
     study, store = evaluator.study, evaluator.store
     names, top = [objective.name for objective in study.objectives], study.whole("top")
     signs = np.array([-1.0 if objective.maximise else 1.0 for objective in study.objectives])
-    known = sound[sound[names].notna().all(axis=1)].drop_duplicates(list(study.space.keys))
+    known = candidates[candidates[names].notna().all(axis=1)].drop_duplicates(list(study.space.keys))
     losses = known[names].to_numpy() * signs
     if study.limits:
-        losses = safe_first(losses, known[EXCESS].to_numpy())
+        losses = rank_by_excess(losses, known[EXCESS_COLUMN].to_numpy())
         order = np.argsort(losses[:, 0], kind="stable")
         known, losses = known.iloc[order], losses[order]
     if len(names) > 1:
-        best = front(losses)
+        best = pareto_front(losses)
         best = best[np.argsort(losses[best, 0], kind="stable")]
         chosen = best[np.unique(np.linspace(0, len(best) - 1, min(top, len(best))).round().astype(int))]
     elif study.whole("pool") > top > 0:
-        chosen = race(evaluator, _points(store, known), losses[:, 0])
+        chosen = race_candidates(evaluator, _points(store, known), losses[:, 0])
     else:
         chosen = np.arange(min(top, len(known)))
     if not len(chosen) and not centres:
@@ -50,12 +50,12 @@ def fly_finalists(evaluator: Evaluator, points: NDArray[np.float64]) -> tuple[Se
     study = evaluator.study
     fresh = [study.seed(1, j) for j in range(study.whole("final_seeds"))]
     if study.whole("again"):
-        return flown_in_rounds(evaluator, points, fresh)
+        return fly_by_successive_halving(evaluator, points, fresh)
     rows = evaluator.evaluate(FINAL, points, seeds=[fresh] * len(points))
-    return rows, _winner(study, rows, excess_of(study, evaluator.store, FINAL) if study.limits else None)
+    return rows, _winner(study, rows, batch_excess(study, evaluator.store, FINAL) if study.limits else None)
 
 
-def flown_in_rounds(
+def fly_by_successive_halving(
     evaluator: Evaluator, points: NDArray[np.float64], fresh: Sequence[int]
 ) -> tuple[list[list[float | None]], int]:
     """Let all finalists fly a third of the fresh seeds, the better half the others, the best twice as many again.
@@ -88,14 +88,14 @@ def _best(study: Study, values: Sequence[float | None], among: Sequence[int], mo
 
 
 def finalist_table(
-    study: Study, points: NDArray[np.float64], origins: Sequence[str], rows: Sequence[Sequence[float | None]]
+    study: Study, points: NDArray[np.float64], origins: Sequence[str], fitness_rows: Sequence[Sequence[float | None]]
 ) -> pd.DataFrame:
     """Finalists as a table: origin, parameters, fitness on fresh seeds."""
     names = [objective.name for objective in study.objectives]
     return pd.DataFrame(
         [
             {"origin": origin, **study.space.parameters(point), **dict(zip(names, row, strict=True))}
-            for origin, point, row in zip(origins, points, rows, strict=True)
+            for origin, point, row in zip(origins, points, fitness_rows, strict=True)
         ]
     )
 
@@ -119,21 +119,23 @@ def _winner(study: Study, rows: Sequence[Sequence[float | None]], excess: NDArra
     return int(np.argmin(np.where(sound, away.sum(axis=1), np.inf)))
 
 
-def _points(store: Store, table: pd.DataFrame) -> NDArray[np.float64]:
+def _points(store: FlightStore, table: pd.DataFrame) -> NDArray[np.float64]:
     """Points (candidate, axis) of candidates of the search, as they were asked for."""
     pairs = {(int(run), int(g)) for run, g in zip(table["run"], table["generation"], strict=True)}
-    batches = {pair: store.asked(Batch("search", *pair)) for pair in pairs}
+    batches = {pair: store.asked(CandidateBatch("search", *pair)) for pair in pairs}
     places = zip(table["run"], table["generation"], table["candidate"], strict=True)
     return np.array([batches[run, generation][candidate] for run, generation, candidate in places])
 
 
-def excesses(study: Study, store: Store, table: pd.DataFrame) -> NDArray[np.float64]:
+def candidate_excesses(study: Study, store: FlightStore, table: pd.DataFrame) -> NDArray[np.float64]:
     """How far each candidate of the search is from keeping all limits, in the order of the table."""
     found: dict[tuple[int, int], NDArray[np.float64]] = {}
-    durations = table[tables.DURATION] if tables.DURATION in table else pd.Series(np.nan, table.index)
+    durations = table[tables.DURATION_COLUMN] if tables.DURATION_COLUMN in table else pd.Series(np.nan, table.index)
     for run, generation, flown in zip(table["run"], table["generation"], durations, strict=True):
         if (run, generation) not in found:
             share = 1.0 if np.isnan(flown) else float(flown) / study.scenario.flight.duration
-            found[run, generation] = excess_of(study, store, Batch("search", int(run), int(generation)), share)
+            found[run, generation] = batch_excess(
+                study, store, CandidateBatch("search", int(run), int(generation)), share
+            )
     places = zip(table["run"], table["generation"], table["candidate"], strict=True)
     return np.array([found[run, generation][candidate] for run, generation, candidate in places])

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.support.errors import StudyError, bounded
-from airflock.support.spelling import raised
+from airflock.support import StudyError, describe_error, shortened
 
 OVER_SEEDS = ("mean", "worst", "quantile")
-Own = Callable[[Mapping[str, Any]], float]  # a fitness of the user's own, from the order parameters of one flight
+UserFitness = Callable[
+    [Mapping[str, Any]], float
+]  # a fitness of the user's own, from the order parameters of one flight
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Objective:
     maximise: bool = True
     over_seeds: str = "mean"
     quantile: float = 0.1
-    own: Own | None = None
+    own: UserFitness | None = None
     text: str = ""
 
     def of_flight(self, values: Mapping[str, Any]) -> float:
@@ -39,11 +40,11 @@ class Objective:
             known = ", ".join(key for key, value in values.items() if isinstance(value, (int, float)))
             raise StudyError(f"objective {self.name}: unknown order parameter; known: {known}")
         if self.own is not None:
-            value = own_value(self.own, self.name, values)
+            value = user_fitness(self.own, self.name, values)
         elif isinstance(values[self.name], (int, float)):
             value = float(values[self.name])
         else:
-            raise StudyError(f"objective {self.name} = {bounded(repr(values[self.name]), 80)} is not a number")
+            raise StudyError(f"objective {self.name} = {shortened(repr(values[self.name]), 80)} is not a number")
         return value if math.isfinite(value) else math.nan
 
     def of_candidate(self, flights: Sequence[Mapping[str, Any] | None]) -> float | None:
@@ -60,24 +61,26 @@ class Objective:
         return math.fsum(found) / len(found)
 
 
-def own_value(own: Own, name: str, values: Mapping[str, Any]) -> float:
+def user_fitness(function: UserFitness, name: str, values: Mapping[str, Any]) -> float:
     """What a function of the user's own gives for one flight; whatever goes wrong in it is one line with its place."""
     try:
-        return float(own(values))
+        return float(function(values))
     except Exception as fault:  # the user's own function may fail in any way
         last = traceback.extract_tb(fault.__traceback__)[-1]
-        code = getattr(own, "__code__", None)
+        code = getattr(function, "__code__", None)
         place = f"{last.filename}:{last.lineno}"
         if last.filename == __file__ and code is not None:  # it returned, but no number
             place = f"{code.co_filename}:{code.co_firstlineno}"
-        raise StudyError(f"objective {name}: {place}: {raised(fault)}") from fault
+        raise StudyError(f"objective {name}: {place}: {describe_error(fault)}") from fault
 
 
-def losses(rows: Sequence[Sequence[float | None]], objectives: Sequence[Objective]) -> NDArray[np.float64]:
+def candidate_losses(
+    fitness_rows: Sequence[Sequence[float | None]], objectives: Sequence[Objective]
+) -> NDArray[np.float64]:
     """What an optimiser minimises (candidate, objective). A failed candidate is worse than all of its generation."""
     signs = [-1.0 if objective.maximise else 1.0 for objective in objectives]
     table = np.array(
-        [[math.nan if v is None else s * v for s, v in zip(signs, row, strict=True)] for row in rows], float
+        [[math.nan if v is None else s * v for s, v in zip(signs, row, strict=True)] for row in fitness_rows], float
     )
     for column in table.T:
         lost = np.isnan(column)

@@ -12,21 +12,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.support.errors import StudyError
+from airflock.support import StudyError
 
 BITS = 10  # per parameter; 50 bits for five of them
 MUTATION = 0.01
-Bits = NDArray[np.bool_]
+BitArray = NDArray[np.bool_]
 
 
-def decode(bits: Bits, per: int = BITS) -> NDArray[np.float64]:
+def decode(bits: BitArray, bits_per_parameter: int = BITS) -> NDArray[np.float64]:
     """Numbers in [0, 1) from bits (..., parameter * per), the highest bit first: (..., parameter).
 
     The divisor is 1024: the published controller lies on k / 1024 and not on k / 1023.
     """
-    shape = (*bits.shape[:-1], -1, per)
-    weights = 2.0 ** np.arange(per - 1, -1, -1)
-    return np.asarray(np.asarray(bits, float).reshape(shape) @ weights / 2.0**per)
+    shape = (*bits.shape[:-1], -1, bits_per_parameter)
+    weights = 2.0 ** np.arange(bits_per_parameter - 1, -1, -1)
+    return np.asarray(np.asarray(bits, float).reshape(shape) @ weights / 2.0**bits_per_parameter)
 
 
 class BinaryGenetic:
@@ -43,7 +43,7 @@ class BinaryGenetic:
         self.algorithm = _algorithm(bits, population, seed, mutation, crossover)
         self.asked: Any = None
 
-    def ask(self) -> Bits:
+    def ask(self) -> BitArray:
         """Next generation (candidate, bit)."""
         self.asked = self.algorithm.ask()
         return np.array(self.asked.get("X"), bool)
@@ -54,17 +54,17 @@ class BinaryGenetic:
         self.algorithm.tell(infills=self.asked)
 
 
-class Winner(NamedTuple):
+class GeneticResult(NamedTuple):
     """Best chromosome ever, its loss, and the best and the mean loss of each generation."""
 
-    bits: Bits
+    bits: BitArray
     loss: float
     best: list[float]
     mean: list[float]
 
 
-def genetic(
-    losses: Callable[[Bits], NDArray[np.float64]],
+def minimise_over_bits(
+    losses: Callable[[BitArray], NDArray[np.float64]],
     bits: int,
     *,
     population: int = 50,
@@ -72,7 +72,7 @@ def genetic(
     mutation: float = MUTATION,
     crossover: float = 1.0,
     seed: int = 0,
-) -> Winner:
+) -> GeneticResult:
     """Minimise over bits. `losses` takes a whole generation (candidate, bit) and returns (candidate,)."""
     state = BinaryGenetic(bits, population, seed, mutation=mutation, crossover=crossover)
     winner, least, best, mean = np.zeros(bits, bool), np.inf, [], []
@@ -85,7 +85,7 @@ def genetic(
             winner, least = chromosomes[i].copy(), float(found[i])
         best.append(float(found[i]))
         mean.append(float(found.mean()))
-    return Winner(winner, least, best, mean)
+    return GeneticResult(winner, least, best, mean)
 
 
 class GeneticSearch:

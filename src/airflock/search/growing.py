@@ -14,7 +14,7 @@ SHARES = (0.125, 0.25, 0.5, 1.0)  # of the scenario's duration
 LONGEST = 8  # of all generations, at most one in so many has each length but the last
 
 
-class Length:
+class FlightLength:
     """Share of a whole flight that the next generation flies; told of each generation's first objective."""
 
     def __init__(self, generations: int, maximise: bool, *, growing: bool):
@@ -33,7 +33,7 @@ class Length:
         """Whether flights are as long as the scenario says."""
         return len(self.left) == 1
 
-    def generation_over(self, values: Sequence[float | None]) -> None:
+    def end_generation(self, values: Sequence[float | None]) -> None:
         """First objective of all candidates of a generation; None: failed, worse than all others."""
         if self.whole:
             return

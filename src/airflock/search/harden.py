@@ -14,31 +14,35 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from airflock.runs.folder import plain
-from airflock.runs.space import declared
-from airflock.scenarios import formats
-from airflock.scenarios.files import loaded
-from airflock.scenarios.scenario import Scenario
+from airflock.runs import declared_numbers, to_toml_values
+from airflock.scenarios import Scenario, formats, load_if_named
 from airflock.search.held import Constraints
 from airflock.search.objective_table import read_limits
-from airflock.search.steps import RECIPE, ROOM, Measured, Step, recipe, together
-from airflock.search.trial import Trial
-from airflock.support.errors import ScenarioError
+from airflock.search.steps import (
+    TABLE_S4_STEPS,
+    WALL_STEPS,
+    HardeningStep,
+    StepResult,
+    join_scenarios,
+    recipe_parameters,
+)
+from airflock.search.trial import HardeningCandidate
+from airflock.support import ScenarioError
 
 COST = 0.05  # of fitness, at most
-MOST = 22  # rounds of flights, with all whole and half steps, the fresh seeds and measures beside the law
+MAX_ROUNDS = 22  # rounds of flights, with all whole and half steps, the fresh seeds and measures beside the law
 
 
 def harden(
     scenario: Scenario | str | os.PathLike[str] | Sequence[Scenario | str | os.PathLike[str]],
     seeds: Sequence[int] = range(100),
     *,
-    steps: Sequence[Step] = RECIPE,
+    steps: Sequence[HardeningStep] = TABLE_S4_STEPS,
     cost: float = COST,
     limit: str | Sequence[str] = (),
     threads: int | None = None,
     done: Callable[[], None] | None = None,
-) -> list[Measured]:
+) -> list[StepResult]:
     """Make an optimum safer by the steps of Vásárhelyi et al. 2018, Table S4, as far as they keep what held.
 
     Parameters
@@ -83,24 +87,31 @@ def harden(
     ('optimum', 'on fresh seeds')
     """
     single = isinstance(scenario, (Scenario, str, os.PathLike))
-    scenarios = [loaded(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
-    trial = Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, asked_for(scenarios, cost, limit), threads, done)
+    scenarios = [load_if_named(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
+    trial = HardeningCandidate(
+        scenarios,
+        recipe_parameters(scenarios[0], steps)[0],
+        seeds,
+        hardening_request(scenarios, cost, limit),
+        threads,
+        done,
+    )
     found = [trial.first]
-    hit = float((together(trial.optimum)["n_coll"] > 0.0).mean())
+    hit = float((join_scenarios(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()
-    order = [*steps, *(ROOM if touched else ())]
+    order = [*steps, *(WALL_STEPS if touched else ())]
     at_walls = trial.first.contacts > hit or trial.first.parts.get("f_wall", 1.0) < trial.first.parts.get("f_coll", 1.0)
-    if at_walls or trial.short_at_walls():
-        order.sort(key=lambda step: not step.earlier)
+    if at_walls or trial.is_short_at_walls():
+        order.sort(key=lambda step: not step.braking_lead)
     for step in order:
         found += trial.tried(step)
-    for step in ROOM if trial.touches() and not touched else ():
+    for step in WALL_STEPS if trial.touches() and not touched else ():
         found += trial.tried(step)
-    last = trial.on_fresh_seeds()
+    last = trial.verify_on_fresh_seeds()
     return [*found, *trial.beside(), last]
 
 
-def asked_for(scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[str] = ()) -> Constraints:
+def hardening_request(scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[str] = ()) -> Constraints:
     """What must go on to hold. Raises ScenarioError, all faults together."""
     held, faults = read_limits({"limits": limit}, scenarios)
     faults += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
@@ -109,11 +120,11 @@ def asked_for(scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[
     return Constraints(held, cost)
 
 
-def document(scenario: Scenario, step: Measured) -> dict[str, Any]:
+def hardened_document(scenario: Scenario, step: StepResult) -> dict[str, Any]:
     """A scenario file with the parameters of a step, each with its reason."""
-    found: dict[str, Any] = {formats.KEY: formats.FORMAT, **plain(scenario.document)}
+    found: dict[str, Any] = {formats.KEY: formats.FORMAT, **to_toml_values(scenario.document)}
     found.pop("published", None)
-    known = declared(scenario)
+    known = declared_numbers(scenario)
     for key, value in step.parameters.items():
         if value == known[key][1]:
             continue

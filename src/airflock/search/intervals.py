@@ -6,7 +6,7 @@ import numpy as np
 from scipy import stats
 
 
-def interval(values: Sequence[float]) -> tuple[float, float, float, float]:
+def mean_interval(values: Sequence[float]) -> tuple[float, float, float, float]:
     """Mean, SD, and Student's 95 % interval of the mean."""
     x = np.array(values, float)
     mean, sd = float(x.mean()), float(x.std(ddof=1)) if len(x) > 1 else 0.0

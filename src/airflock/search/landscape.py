@@ -4,13 +4,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from airflock.runs.store import Store, values_of
+from airflock.runs import FlightStore, parse_values
 from airflock.search.study import Study
-from airflock.support.errors import StudyError
+from airflock.support import StudyError
 
 EARLY = 3  # generations after which a search that has seen nothing but one value ends
 FEWEST = 40  # candidates of which that can be said
-ZERO = 1e-6  # a product of partial fitnesses below this does not fly
+ZERO_FITNESS = 1e-6  # a product of partial fitnesses below this does not fly
 # partial fitness → what it says if it is zero, and what may be changed
 ADVICE = {
     "f_speed": "the flock is too slow: lower model.v_flock, or take fewer agents, walls and obstacles",
@@ -22,7 +22,7 @@ ADVICE = {
 }
 
 
-def refuse_flat(study: Study, store: Store, generation: int, values: Sequence[float | None]) -> None:
+def refuse_flat(study: Study, store: FlightStore, generation: int, values: Sequence[float | None]) -> None:
     """Raise StudyError once a search has seen one value only; what it is and why, in one line.
 
     generation : number of the generation, of those with whole flights, from 0
@@ -36,28 +36,30 @@ def refuse_flat(study: Study, store: Store, generation: int, values: Sequence[fl
         name = study.objectives[0].name
         raise StudyError(
             f"{study.scenario.name}: nothing to search: {name} = {found[0]:g} for all of {len(found)} candidates"
-            f"{why_zero(flights(store)) if found[0] == 0.0 else ''}"
+            f"{zero_fitness_reason(search_scores(store)) if found[0] == 0.0 else ''}"
         )
 
 
-def dead(study: Study, rows: Sequence[Mapping[str, Any] | None]) -> str:
+def dead_reason(study: Study, scores: Sequence[Mapping[str, Any] | None]) -> str:
     """Why a winner does not fly, if its fitness, a product, is zero in all flights on fresh seeds; else empty."""
-    sound = [row for row in rows if row is not None]
+    sound = [row for row in scores if row is not None]
     if study.objectives[0].name != "fitness" or not sound or not _parts(sound):
         return ""
-    if max(float(row["fitness"]) for row in sound) >= ZERO:
+    if max(float(row["fitness"]) for row in sound) >= ZERO_FITNESS:
         return ""
-    return f"no candidate flies, so there is no best one{why_zero(sound)}"
+    return f"no candidate flies, so there is no best one{zero_fitness_reason(sound)}"
 
 
-def flights(store: Store) -> list[Mapping[str, Any]]:
+def search_scores(store: FlightStore) -> list[Mapping[str, Any]]:
     """Scores of all flights of the search."""
-    return [values_of(scores) for (scores,) in store.rows("SELECT scores FROM flight WHERE stage='search'") if scores]
+    return [
+        parse_values(scores) for (scores,) in store.rows("SELECT scores FROM flight WHERE stage='search'") if scores
+    ]
 
 
-def why_zero(rows: Sequence[Mapping[str, Any]]) -> str:
+def zero_fitness_reason(scores: Sequence[Mapping[str, Any]]) -> str:
     """Which partial fitness is zero most often, in how many flights, and what may be changed; empty if none is."""
-    shares = {name: sum(float(row[name]) < ZERO for row in rows) / len(rows) for name in _parts(rows)}
+    shares = {name: sum(float(row[name]) < ZERO_FITNESS for row in scores) / len(scores) for name in _parts(scores)}
     worst = sorted(((share, name) for name, share in shares.items() if share > 0.5), reverse=True)
     if not worst:
         return ""

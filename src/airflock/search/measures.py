@@ -8,16 +8,15 @@ which a set of numbers cannot bring along: whoever has them sets them in the sce
 from collections.abc import Sequence
 from typing import Any
 
-from airflock.scenarios.change import remade
-from airflock.scenarios.scenario import Scenario
-from airflock.search.steps import Step
-from airflock.support.errors import ScenarioError
+from airflock.scenarios import Scenario, rebuilt
+from airflock.search.steps import HardeningStep
+from airflock.support import ScenarioError
 
 CARRIED = "neighbours carried forward"
 STOPS = "stop near a lost neighbour"
 
 
-def measures(scenarios: Sequence[Scenario]) -> list[tuple[Step, list[Scenario], str]]:
+def measures(scenarios: Sequence[Scenario]) -> list[tuple[HardeningStep, list[Scenario], str]]:
     """Measures that could change a flight in any of the scenarios: step, scenarios with it, and what to set."""
     found = []
     for name, reason, settings in (
@@ -28,11 +27,13 @@ def measures(scenarios: Sequence[Scenario]) -> list[tuple[Step, list[Scenario], 
         if not any(changes):
             continue
         try:
-            flown = [remade(s, change) if change else s for s, change in zip(scenarios, changes, strict=True)]
+            flown = [rebuilt(s, change) if change else s for s, change in zip(scenarios, changes, strict=True)]
         except ScenarioError:  # the law has no such form, or the flock is too large for it
             continue
         first = next(change for change in changes if change)
-        found.append((Step(name, {}, reason), flown, " ".join(f"--set {key}={value}" for key, value in first.items())))
+        found.append(
+            (HardeningStep(name, {}, reason), flown, " ".join(f"--set {key}={value}" for key, value in first.items()))
+        )
     return found
 
 

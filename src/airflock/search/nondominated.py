@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.support.errors import StudyError
+from airflock.support import StudyError
 
 
-class Nondominated:
+class NonDominatedSorting:
     """Ask for points of the unit cube, tell their losses (candidate, objective)."""
 
     def __init__(self, dimension: int, objectives: int, population: int, seed: int):
@@ -30,7 +30,7 @@ class Nondominated:
         """None: a front has no mean."""
 
 
-def front(losses: NDArray[np.float64]) -> NDArray[np.int64]:
+def pareto_front(losses: NDArray[np.float64]) -> NDArray[np.int64]:
     """Indices of the candidates that no other one betters in all objectives; losses (candidate, objective)."""
     order = np.lexsort(losses.T[::-1])
     kept = np.empty(len(losses), np.int64)

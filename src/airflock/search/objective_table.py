@@ -5,13 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airflock.certificates.limit import Limit, read_all
-from airflock.scenarios.own_code import own_module
-from airflock.scenarios.scenario import Scenario
-from airflock.search.fitness import OVER_SEEDS, Objective, Own
-from airflock.support.errors import RuleError, ScenarioError
-from airflock.support.spelling import meant
-from airflock.support.untrusted import is_file, own_path
+from airflock.certificates import EventLimit, parse_limits
+from airflock.scenarios import Scenario, import_user_file
+from airflock.search.fitness import OVER_SEEDS, Objective, UserFitness
+from airflock.support import RuleError, ScenarioError, expand_path, is_file, suggest
 
 KEYS = ("maximise", "minimise", "limits", "over_seeds", "quantile", "own", "source", "note")
 
@@ -28,7 +25,7 @@ def read_objectives(
     faults = []
     for key in table:
         if key not in KEYS:
-            hint = meant(key, KEYS, f"known: {', '.join(KEYS)}", prefix="objective.")
+            hint = suggest(key, KEYS, f"known: {', '.join(KEYS)}", prefix="objective.")
             faults.append(f"objective.{key}: unknown key; {hint}")
     over, quantile = table.get("over_seeds", "mean"), table.get("quantile", 0.1)
     if not isinstance(over, str) or over not in OVER_SEEDS:
@@ -62,18 +59,18 @@ def read_objectives(
     return tuple(found), faults
 
 
-def read_limits(table: Any, scenarios: Sequence[Scenario]) -> tuple[tuple[Limit, ...], list[str]]:
+def read_limits(table: Any, scenarios: Sequence[Scenario]) -> tuple[tuple[EventLimit, ...], list[str]]:
     """Limits that candidates are to keep in all scenarios, from the key `limits` of a table; and all faults in it."""
     texts = table.get("limits", []) if isinstance(table, Mapping) else []
     texts = [texts] if isinstance(texts, str) else texts
     if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
         return (), [f"objective.limits = {texts!r} is neither a limit nor a list of limits, as 'r_min<3 at 0.01/h'"]
-    found: tuple[Limit, ...] = ()
+    found: tuple[EventLimit, ...] = ()
     faults: list[str] = []
     for scenario in scenarios if texts else ():
         try:
-            found = found or read_all(list(texts), scenario)
-            read_all(list(texts), scenario)
+            found = found or parse_limits(list(texts), scenario)
+            parse_limits(list(texts), scenario)
         except ScenarioError as fault:
             faults += [f"objective.limits: {line}" for line in fault.faults]
     faults += [
@@ -84,16 +81,16 @@ def read_limits(table: Any, scenarios: Sequence[Scenario]) -> tuple[tuple[Limit,
     return found, list(dict.fromkeys(faults))
 
 
-def _own(name: Any, folder: Path | None, trust: bool) -> tuple[dict[str, Own], str, list[str]]:
+def _own(name: Any, folder: Path | None, trust: bool) -> tuple[dict[str, UserFitness], str, list[str]]:
     """Functions of a user's own file by name, a hash of its text, and faults."""
     if name is None:
         return {}, "", []
-    path = own_path(str(name)) if folder is None else folder / own_path(str(name))
+    path = expand_path(str(name)) if folder is None else folder / expand_path(str(name))
     if path.suffix != ".py" or not is_file(path):
         return {}, "", [f"objective.own = {name!r}: no such Python file"]
     try:
         text = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
-        module = own_module(path, f"objective.own = {name!r}", trust=trust)
+        module = import_user_file(path, f"objective.own = {name!r}", trust=trust)
     except RuleError as fault:
         return {}, "", [f"objective.own: {fault}"]
     except ScenarioError as fault:

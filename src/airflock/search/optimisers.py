@@ -5,10 +5,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.search.cmaes import CMAES, SIXTH
+from airflock.search.cmaes import CMAES, START_SIGMA
 
 ALGORITHMS = ("cmaes", "ga", "nsga2")
-SEVERAL = "nsga2"  # the one for several objectives
+MULTI_OBJECTIVE = "nsga2"  # the one for several objectives
 
 
 class Optimiser(Protocol):
@@ -24,22 +24,22 @@ class Optimiser(Protocol):
         """Mean of the search's distribution (axis,), if it has one."""
 
 
-def optimiser(
+def make_optimiser(
     algorithm: str,
     dimension: int,
     objectives: int,
     population: int,
     seed: int,
     *,
-    spread: float = SIXTH,
+    spread: float = START_SIGMA,
     start: NDArray[np.float64] | None = None,
 ) -> Optimiser:
     """A fresh optimiser; CMA-ES starts with a standard deviation `spread` at the point `start`, else in the middle."""
     if algorithm == "cmaes":
         return CMAES(dimension, population, seed, spread, start)
     from airflock.search.genetic import GeneticSearch
-    from airflock.search.nondominated import Nondominated
+    from airflock.search.nondominated import NonDominatedSorting
 
     if algorithm == "ga":
         return GeneticSearch(dimension, population, seed)
-    return Nondominated(dimension, objectives, population, seed)
+    return NonDominatedSorting(dimension, objectives, population, seed)

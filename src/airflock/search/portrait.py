@@ -3,15 +3,15 @@
 from html import escape
 from typing import TYPE_CHECKING
 
-from airflock.core.parameters import Quantity, declarations
-from airflock.scenarios.portrait import number, table
+from airflock.core import Quantity, declarations
+from airflock.scenarios import format_number, html_table
 
 if TYPE_CHECKING:
-    from airflock.search.result import Result
+    from airflock.search.result import EvolveResult
     from airflock.search.study import Study
 
 
-def study_sentence(study: "Study") -> str:
+def study_summary(study: "Study") -> str:
     """What is sought, and by how many flights."""
     q, goals = study.search, ", ".join(objective.name for objective in study.objectives)
     return (
@@ -23,28 +23,28 @@ def study_sentence(study: "Study") -> str:
 def study_html(study: "Study") -> str:
     """A table of what varies."""
     rows = [(a.key, f"{a.low:g} … {a.high:g}", a.unit, a.scale) for a in study.space.axes]
-    return f"<p><b>{escape(study_sentence(study))}</b></p>{table(('parameter', 'range', 'unit', 'scale'), rows)}"
+    return f"<p><b>{escape(study_summary(study))}</b></p>{html_table(('parameter', 'range', 'unit', 'scale'), rows)}"
 
 
-def result_sentence(found: "Result") -> str:
+def result_summary(result: "EvolveResult") -> str:
     """How good the winner is, on fresh seeds."""
-    if found.dead:
-        return f"Result {found.folder}: nothing flies: {found.dead}"
-    span = f"{found.fitness:.3g} (95 %: {found.low:.3g} to {found.high:.3g}) on {found.seeds} fresh seeds"
-    return f"Result {found.folder}: {found.scenario.name}, fitness {span}"
+    if result.dead_reason:
+        return f"Result {result.folder}: nothing flies: {result.dead_reason}"
+    span = f"{result.fitness:.3g} (95 %: {result.low:.3g} to {result.high:.3g}) on {result.seeds} fresh seeds"
+    return f"Result {result.folder}: {result.scenario.name}, fitness {span}"
 
 
-def result_html(found: "Result") -> str:
+def result_html(result: "EvolveResult") -> str:
     """A table of the winner's parameters, and of the ranges in which candidates of the search were as good."""
     units = {
         f"{section}.{name}".lstrip("."): declared.unit
-        for section, record in found.scenario.records.items()
+        for section, record in result.scenario.records.items()
         for name, declared, _ in declarations(record)
         if isinstance(declared, Quantity)
     }
     rows = [
-        (key, number(value), units.get(key, ""), " … ".join(map(number, found.ranges.get(key, ()))))
-        for key, value in found.parameters.items()
+        (key, format_number(value), units.get(key, ""), " … ".join(map(format_number, result.ranges.get(key, ()))))
+        for key, value in result.parameters.items()
     ]
     heads = ("parameter", "winner", "unit", "candidates as good")
-    return f"<p><b>{escape(result_sentence(found))}</b></p>{table(heads, rows)}"
+    return f"<p><b>{escape(result_summary(result))}</b></p>{html_table(heads, rows)}"

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from airflock.runs.store import Batch
+from airflock.runs import CandidateBatch
 from airflock.search.evaluator import Evaluator
-from airflock.search.fitness import losses as losses_of
-from airflock.search.safe import excess_of, safe_first
+from airflock.search.fitness import candidate_losses as losses_of
+from airflock.search.safe import batch_excess, rank_by_excess
 
 NEIGHBOURS = 10
-ROUNDS = ((1.0, 4), (0.25, 16))  # share of the pool that flies, and with how many seeds
+RACE_ROUNDS = ((1.0, 4), (0.25, 16))  # share of the pool that flies, and with how many seeds
 UPPER = 0.2  # share of all candidates whose spread tells what near means
 
 
-def smoothed(points: NDArray[np.float64], losses: NDArray[np.float64]) -> NDArray[np.float64]:
+def smoothed_losses(points: NDArray[np.float64], losses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean loss (candidate,) over each candidate's nearest neighbours and itself; points (candidate, axis)."""
     good = points[np.argsort(losses, kind="stable")[: max(2, int(UPPER * len(points)))]]
     scale = np.maximum(good.std(axis=0), 1e-9)
@@ -28,7 +28,9 @@ def smoothed(points: NDArray[np.float64], losses: NDArray[np.float64]) -> NDArra
     return np.asarray(losses[np.asarray(near).reshape(len(points), -1)].mean(axis=1))
 
 
-def race(evaluator: Evaluator, points: NDArray[np.float64], losses: NDArray[np.float64]) -> NDArray[np.int64]:
+def race_candidates(
+    evaluator: Evaluator, points: NDArray[np.float64], losses: NDArray[np.float64]
+) -> NDArray[np.int64]:
     """Indices of the candidates that win, the best first, at most `search.top`.
 
     points : (candidate, axis) of all candidates that did not fail
@@ -36,15 +38,15 @@ def race(evaluator: Evaluator, points: NDArray[np.float64], losses: NDArray[np.f
     """
     study = evaluator.study
     pool, top = study.whole("pool"), study.whole("top")
-    alive = np.argsort(smoothed(points, losses), kind="stable")[:pool]
+    alive = np.argsort(smoothed_losses(points, losses), kind="stable")[:pool]
     number = 0
-    for k, (share, seeds) in enumerate(ROUNDS):
+    for k, (share, seeds) in enumerate(RACE_ROUNDS):
         alive = alive[: max(top, round(share * pool))]
         numbers = [[study.seed(4, number + j) for j in range(seeds)]] * len(alive)
         number += seeds
-        batch = Batch("race", 0, k)
+        batch = CandidateBatch("race", 0, k)
         found = losses_of(evaluator.evaluate(batch, points[alive], seeds=numbers), study.objectives)
         if study.limits:
-            found = safe_first(found, excess_of(study, evaluator.store, batch))
+            found = rank_by_excess(found, batch_excess(study, evaluator.store, batch))
         alive = alive[np.argsort(found[:, 0], kind="stable")]
     return alive[:top]

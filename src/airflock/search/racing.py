@@ -8,10 +8,12 @@ ranks; ours needs no level, as a bound of what is left takes its place.
 
 from collections.abc import Sequence
 
-Values = Sequence[float | None]
+SeedValues = Sequence[float | None]
 
 
-def still_needed(values: Sequence[Values], alive: Sequence[int], left: int, maximise: bool) -> list[int]:
+def remaining_candidates(
+    values: Sequence[SeedValues], remaining: Sequence[int], seeds_left: int, maximise: bool
+) -> list[int]:
     """Which candidates of `alive` fly on.
 
     values : (candidate, seed so far) of all candidates of the generation; None: failed, which ends a candidate
@@ -23,4 +25,8 @@ def still_needed(values: Sequence[Values], alive: Sequence[int], left: int, maxi
     means = [-float("inf") if lost or not row else sum(row) / len(row) for row, lost in zip(told, failed, strict=True)]
     best = max((value for row in told for value in row), default=0.0)
     needed = sorted(means, reverse=True)[(len(means) + 1) // 2 - 1]
-    return [i for i in alive if not failed[i] and (sum(told[i]) + left * best) / (len(told[i]) + left) >= needed]
+    return [
+        i
+        for i in remaining
+        if not failed[i] and (sum(told[i]) + seeds_left * best) / (len(told[i]) + seeds_left) >= needed
+    ]

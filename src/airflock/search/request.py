@@ -7,19 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from airflock.runs.executors.cluster import fly_on_their_cpu
-from airflock.scenarios.change import variant
-from airflock.scenarios.scenario import Scenario
-from airflock.search.fitness import Objective, Own
-from airflock.search.resumed import resumed
-from airflock.search.search_table import fast as fast_keys
-from airflock.search.sensitivity import METHODS
+from airflock.runs import check_worker_device
+from airflock.scenarios import Scenario, scenario_variant
+from airflock.search.fitness import Objective, UserFitness
+from airflock.search.resumed import resume_study
+from airflock.search.search_table import fast_search_keys as fast_keys
+from airflock.search.sensitivity import SENSITIVITY_METHODS
 from airflock.search.study import Study, load_study, make_study
-from airflock.support.errors import StudyError
+from airflock.support import StudyError
 
 
-def asked_for(
-    what: Any,
+def evolve_request(
+    scenario: Any,
     settings: Mapping[str, Any] | None = None,
     search_keys: Mapping[str, Any] | None = None,
     limit: str | Sequence[str] = (),
@@ -28,28 +27,28 @@ def asked_for(
     folder: Path | None = None,
     **others: Any,
 ) -> tuple[Study, str]:
-    """As `study_of`, which takes the others; if a folder is given, what is not asked for is as that holds it.
+    """As `study_from_request`, which takes the others; if a folder is given, what is not asked for is as that holds it.
 
     Also a note of what the folder gave.
     """
 
     def ask(changes: Mapping[str, Any] | None, keys: Mapping[str, Any], limits: Any, *, quick: bool = False) -> Study:
-        return study_of(what, changes, search_keys=keys, limit=limits, fast=quick, **others)
+        return study_from_request(scenario, changes, search_keys=keys, limit=limits, fast=quick, **others)
 
     limits = [limit] if isinstance(limit, str) else list(limit)
     study = ask(settings, search_keys or {}, limits, quick=fast)
-    if folder is None or isinstance(what, Study):
+    if folder is None or isinstance(scenario, Study):
         return study, ""
     keys = fast_keys(search_keys or {}, limits=bool(limits)) if fast else search_keys or {}
-    return resumed(folder, study, settings or {}, keys, limits, ask)
+    return resume_study(folder, study, settings or {}, keys, limits, ask)
 
 
-def study_of(
+def study_from_request(
     what: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario],
     settings: Mapping[str, Any] | None = None,
     space: Mapping[str, Any] | None = None,
     objective: Mapping[str, Any] | None = None,
-    fitness: Own | None = None,
+    fitness: UserFitness | None = None,
     search_keys: Mapping[str, Any] | None = None,
     over_scenarios: str | None = None,
     limit: str | Sequence[str] = (),
@@ -72,7 +71,7 @@ def study_of(
     tables = {key: value for key, value in given.items() if value is not None}
     if isinstance(what, Scenario) or (isinstance(what, Sequence) and not isinstance(what, str)):
         several = [what] if isinstance(what, Scenario) else list(what)
-        scenarios = [variant(each, settings, trust=trust) for each in several]
+        scenarios = [scenario_variant(each, settings, trust=trust) for each in several]
         if not scenarios:
             raise StudyError("evolve is given an empty list of scenarios")
         where = ", ".join(scenario.name for scenario in scenarios)
@@ -93,14 +92,14 @@ def _text_of(code: Any) -> str:
     return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
 
 
-def sound_method(sensitivity: str) -> None:
+def check_sensitivity_method(sensitivity: str) -> None:
     """Refuse a method of finding sensitivities that nobody knows."""
-    if sensitivity and sensitivity not in METHODS:
-        raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
+    if sensitivity and sensitivity not in SENSITIVITY_METHODS:
+        raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(SENSITIVITY_METHODS)}")
 
 
-def sound_device(device: str, scheduler: str | None = None) -> None:
+def check_study_device(device: str, scheduler: str | None = None) -> None:
     """Refuse a device on which no study flies, and another one than their cpu for a scheduler's workers."""
-    fly_on_their_cpu(scheduler, device)
+    check_worker_device(scheduler, device)
     if device not in ("cpu", "cuda", "auto"):
         raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")

@@ -8,18 +8,17 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.runs.folder import plain
-from airflock.scenarios import formats
-from airflock.scenarios.scenario import Scenario
+from airflock.runs import to_toml_values
+from airflock.scenarios import Scenario, formats
 from airflock.search import portrait
 from airflock.search.study import Study
 from airflock.support import atomic
 
-RESULT, BEST = "result.toml", "best.toml"
+RESULT_FILE, BEST_FILE = "result.toml", "best.toml"
 
 
 @dataclass(frozen=True)
-class Result:
+class EvolveResult:
     """What a study found.
 
     parameters : of the winner, by key; scenario : with these parameters
@@ -47,15 +46,15 @@ class Result:
     origin: str
     ranges: dict[str, tuple[float, float]]
     above: int
-    candidates: int
+    candidate_count: int
     failed: int
     finalists: pd.DataFrame
-    dead: str = ""
+    dead_reason: str = ""
     scenarios: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     limits: tuple[Mapping[str, Any], ...] = ()
 
     def __repr__(self) -> str:
-        return f"<{portrait.result_sentence(self)}>"
+        return f"<{portrait.result_summary(self)}>"
 
     def _repr_html_(self) -> str:
         """A table of the winner's parameters, for a notebook."""
@@ -84,12 +83,12 @@ class Result:
                 "largest_in_search": self.largest,
             },
             "origin": self.origin,
-            **({"dead": self.dead} if self.dead else {}),
+            **({"dead": self.dead_reason} if self.dead_reason else {}),
             "parameters": self.parameters,
             **({"limits": [dict(entry) for entry in self.limits]} if self.limits else {}),
             **({"scenarios": [_told(name, *span) for name, span in self.scenarios.items()]} if self.scenarios else {}),
             "working_ranges": {
-                "candidates": self.candidates,
+                "candidates": self.candidate_count,
                 "failed": self.failed,
                 "above_mean": self.above,
                 "range": {key: list(span) for key, span in self.ranges.items()},
@@ -103,30 +102,30 @@ def _told(name: str, mean: float, low: float, high: float) -> dict[str, Any]:
 
 def best_files(study: Study) -> list[str]:
     """Files that hold the winner: best.toml, and best_2.toml and so on for further scenarios."""
-    return [BEST, *(f"best_{place}.toml" for place in range(2, len(study.scenarios) + 1))]
+    return [BEST_FILE, *(f"best_{place}.toml" for place in range(2, len(study.scenarios) + 1))]
 
 
-def further_best(folder: Path) -> list[Path]:
+def further_best_files(folder: Path) -> list[Path]:
     """Files of the winner in the further scenarios of a study's folder, in their order."""
     found = (folder / f"best_{place}.toml" for place in itertools.count(2))
     return list(itertools.takewhile(Path.is_file, found))
 
 
-def scenario_document(
-    study: Study, parameters: dict[str, float], result: Result, folder: Path, place: int = 0
+def best_document(
+    study: Study, parameters: dict[str, float], result: EvolveResult, folder: Path, scenario_index: int = 0
 ) -> dict[str, Any]:
     """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along.
 
     place : which of the study's scenarios
     """
-    scenario = study.scenarios[place]
-    document = {formats.KEY: formats.FORMAT, **plain(scenario.document)}
+    scenario = study.scenarios[scenario_index]
+    document = {formats.KEY: formats.FORMAT, **to_toml_values(scenario.document)}
     document.pop("published", None)
     law = Path(scenario.name).parent / str(document.get("model", {}).get("kind", ""))
     if law.suffix == ".py" and law.is_file():
-        atomic.write(folder / law.name, law.read_bytes())
+        atomic.write_file(folder / law.name, law.read_bytes())
         document["model"]["kind"] = law.name
-    source = f"evolved: {study.search.algorithm}, {result.candidates} evaluations, seed {study.whole('seed')}"
+    source = f"evolved: {study.search.algorithm}, {result.candidate_count} evaluations, seed {study.whole('seed')}"
     units = {axis.key: axis.unit for axis in study.space.axes}
     for key, value in parameters.items():
         section, _, name = key.rpartition(".")

@@ -4,29 +4,29 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airflock.runs.folder import STUDY, plain, read
-from airflock.scenarios.schema import value_of
+from airflock.runs import STUDY_FILE, read_toml_file, to_toml_values
+from airflock.scenarios import value_of
 from airflock.search.study import Study
 
 OWN = ("layout", "airflock")  # of the version that made the folder: nothing that can be asked for
 
 
-def resumed(
+def resume_study(
     folder: Path,
     study: Study,
     settings: Mapping[str, Any],
     search: Mapping[str, Any],
     limit: Sequence[str],
-    ask: Callable[[dict[str, Any], dict[str, Any], list[str]], Study],
+    make_request: Callable[[dict[str, Any], dict[str, Any], list[str]], Study],
 ) -> tuple[Study, str]:
     """The study as its folder holds it, and a note of what was taken from there; what is asked for anew stays so.
 
     study : as it would be without the folder; settings, search, limit : what is asked for now
     ask   : the study for other settings, keys of the search, and limits
     """
-    if not (folder / STUDY).is_file():
+    if not (folder / STUDY_FILE).is_file():
         return study, ""
-    held, now = read(folder / STUDY), plain(study.document())
+    held, now = read_toml_file(folder / STUDY_FILE), to_toml_values(study.document())
     if any(held.get(key) != now[key] for key in OWN):
         return study, ""  # `open_folder` says so
     named = {key.rpartition(".")[2] for key in settings}
@@ -44,7 +44,7 @@ def resumed(
         return study, ""
     told = ", ".join(f"{key} = {value_of(value)}" for key, value in taken.items())
     said = f"goes on with what {folder} holds: {told}"
-    return ask({**settings, **flown}, {**keys, **search}, limits if held_to or limit else []), said
+    return make_request({**settings, **flown}, {**keys, **search}, limits if held_to or limit else []), said
 
 
 def _changed(held: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> list[tuple[str, Any]]:

@@ -6,35 +6,40 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from airflock.runs.executors import Executor, Score
-from airflock.runs.executors.cluster import Cluster, sound_timeout
-from airflock.runs.executors.in_process import InProcess
-from airflock.runs.folder import Interrupted, open_folder, remove_unfinished, versions
-from airflock.runs.space import with_parameters
-from airflock.runs.store import Store
-from airflock.scenarios.scenario import Scenario
-from airflock.search.fitness import Own
-from airflock.search.pictures import draw
-from airflock.search.request import asked_for, sound_device, sound_method
-from airflock.search.result import Result
-from airflock.search.search import Watch, search
-from airflock.search.sensitivity import sensitivity as sensitivities
+from airflock.runs import (
+    DaskCluster,
+    Executor,
+    FlightStore,
+    Interrupted,
+    ScoreFunction,
+    ThreadExecutor,
+    check_timeout,
+    open_folder,
+    program_versions,
+    remove_unfinished,
+    with_parameters,
+)
+from airflock.scenarios import Scenario
+from airflock.search.fitness import UserFitness
+from airflock.search.pictures import draw_study
+from airflock.search.request import check_sensitivity_method, check_study_device, evolve_request
+from airflock.search.result import EvolveResult
+from airflock.search.search import OnSearchProgress, run_search
+from airflock.search.sensitivity import run_sensitivity as sensitivities
 from airflock.search.study import Study
-from airflock.search.winner import conclude
-from airflock.support import atomic
-from airflock.support.asked import Asked
-from airflock.support.untrusted import own_path
+from airflock.search.winner import conclude_study
+from airflock.support import ErrorCollector, atomic, expand_path
 
 
 def evolve(
-    what: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario],
+    scenario: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario],
     out: str | os.PathLike[str],
     *,
     resume: bool = False,
     settings: Mapping[str, Any] | None = None,
     space: Mapping[str, Any] | None = None,
     objective: Mapping[str, Any] | None = None,
-    fitness: Own | None = None,
+    fitness: UserFitness | None = None,
     limit: str | Sequence[str] = (),
     over_scenarios: str | None = None,
     scheduler: str | None = None,
@@ -42,16 +47,16 @@ def evolve(
     device: str = "cpu",
     timeout: float | None = None,
     sensitivity: str = "",
-    watch: Watch | None = None,
+    watch: OnSearchProgress | None = None,
     trust: bool = False,
     fast: bool = False,
     **search_keys: Any,
-) -> Result:
+) -> EvolveResult:
     """Evolve the parameters of a flock, in a folder that survives whatever ends the process.
 
     Parameters
     ----------
-    what : str, path, Scenario or Study, or several scenarios
+    scenario : str, path, Scenario or Study, or several scenarios
         A preset, a scenario or study file, a Scenario, or a Study. Of a list of presets, files and Scenarios one set
         of numbers is searched that flies in all of them.
     out : str or path
@@ -118,94 +123,104 @@ def evolve(
     >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
     True
     """
-    folder = own_path(out)
-    asked = Asked()
+    folder = expand_path(out)
+    asked = ErrorCollector()
     found = asked.read(
-        asked_for, what, settings, search_keys, limit, fast=fast, folder=folder if resume else None, space=space,
-        objective=objective, fitness=fitness, over_scenarios=over_scenarios, trust=trust,
-    )  # fmt: skip
-    asked.read(sound_method, sensitivity)
-    asked.read(sound_timeout, timeout)
-    asked.read(sound_device, device, scheduler)
-    asked.refuse()
-    study = on_device(found[0], device)
+        evolve_request,
+        scenario,
+        settings,
+        search_keys,
+        limit,
+        fast=fast,
+        folder=folder if resume else None,
+        space=space,
+        objective=objective,
+        fitness=fitness,
+        over_scenarios=over_scenarios,
+        trust=trust,
+    )
+    asked.read(check_sensitivity_method, sensitivity)
+    asked.read(check_timeout, timeout)
+    asked.read(check_study_device, device, scheduler)
+    asked.raise_errors()
+    study = resolve_device(found[0], device)
     open_folder(folder, study, resume=resume)
-    executor = executor_for(study, scheduler, threads, timeout)
-    return run(study, folder, executor, watch, sensitivity=sensitivity)
+    executor = study_executor(study, scheduler, threads, timeout)
+    return run_study(study, folder, executor, watch, sensitivity=sensitivity)
 
 
-def score_of(study: Study, place: int = 0) -> Score:
+def study_score(study: Study, scenario_index: int = 0) -> ScoreFunction:
     """Parameters and a seed → order parameters, for one of the study's scenarios."""
     from airflock.engine import score_flight
 
     precision = int(study.search.precision)
 
     def score(parameters: Mapping[str, float], seed: int) -> Mapping[str, Any]:
-        return score_flight(with_parameters(study.scenarios[place], parameters), seed, precision=precision)
+        return score_flight(with_parameters(study.scenarios[scenario_index], parameters), seed, precision=precision)
 
     return score
 
 
-def on_device(study: Study, device: str) -> Study:
+def resolve_device(study: Study, device: str) -> Study:
     """The study for a device: cpu, cuda, or what auto picks for a generation of it. A missing one is one line."""
-    sound_device(device)
+    check_study_device(device)
     if device == "cpu":
         return study
-    from airflock.engine import picked
+    from airflock.engine import pick_device
 
     generation = [study.scenario] * study.population(0) * study.whole("seeds")
-    return replace(study, device=picked(generation, device, precision=int(study.search.precision)))
+    return replace(study, device=pick_device(generation, device, precision=int(study.search.precision)))
 
 
-def executor_for(
+def study_executor(
     study: Study, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
 ) -> Executor:
     """Who flies: this process, or the workers of a dask scheduler."""
     if study.device != "cpu":
-        from airflock.search.batched import Batched
+        from airflock.search.batched import BatchExecutor
 
-        return Batched(study, study.device)
+        return BatchExecutor(study, study.device)
     if scheduler is not None:
-        from airflock.search.task import tasks_of
+        from airflock.search.task import study_tasks
 
-        return Cluster(tasks_of(study), scheduler, timeout=timeout)
+        return DaskCluster(study_tasks(study), scheduler, timeout=timeout)
     from airflock.engine import compile_for
-    from airflock.scenarios.cells import takes_all_cores
-    from airflock.support.threads import cores
+    from airflock.scenarios import uses_all_cores
+    from airflock.support import available_cores
 
     # compiled once, before threads ask for it; a second processor has nothing to do until then
     for scenario in study.scenarios:
         compile_for(scenario, precision=int(study.search.precision))
-    alone = any(takes_all_cores(scenario) for scenario in study.scenarios)
-    scores = [score_of(study, place) for place in range(len(study.scenarios))]
-    return InProcess(scores[0], 1 if alone else threads or cores(), scores[1:])
+    alone = any(uses_all_cores(scenario) for scenario in study.scenarios)
+    scores = [study_score(study, place) for place in range(len(study.scenarios))]
+    return ThreadExecutor(scores[0], 1 if alone else threads or available_cores(), scores[1:])
 
 
-def run(
+def run_study(
     study: Study,
     folder: Path,
     executor: Executor,
-    watch: Watch | None = None,
-    note: Callable[[bool], None] | None = None,
+    on_progress: OnSearchProgress | None = None,
+    notify: Callable[[bool], None] | None = None,
     *,
     sensitivity: str = "",
-) -> Result:
+) -> EvolveResult:
     """Search and conclude in a folder that `open_folder` has accepted; closes the executor."""
     try:
-        with Store(folder) as store:
-            store.begin(versions())
+        with FlightStore(folder) as store:
+            store.begin(program_versions())
             remove_unfinished(folder)
             try:
-                centres = search(study, store, executor, watch)
-                result = conclude(study, store, executor, centres, folder, note)
+                centres = run_search(study, store, executor, on_progress)
+                result = conclude_study(study, store, executor, centres, folder, notify)
                 if sensitivity:
-                    shares = sensitivities(study, store, executor, method=sensitivity, note=note)
-                    atomic.write(folder / "sensitivity.csv", shares.to_csv(index=False))
+                    shares = sensitivities(study, store, executor, method=sensitivity, on_flight=notify)
+                    atomic.write_file(folder / "sensitivity.csv", shares.to_csv(index=False))
             except KeyboardInterrupt as stop:
                 raise Interrupted(
                     f"interrupted: {store.count()} flights of the search are stored in {folder}; continue with --resume"
                 ) from stop
-            draw(study, store, result, folder)
+            draw_study(study, store, result, folder)
             return result
     finally:
         executor.close()

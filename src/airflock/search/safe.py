@@ -12,25 +12,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.certificates.chance import Row, chance, index_of, indices
-from airflock.certificates.limit import Limit
-from airflock.runs.store import Batch, Store
-from airflock.scenarios.scenario import Scenario
+from airflock.certificates import EventLimit, ScoreRow, estimated_probability, reliability_index, reliability_indices
+from airflock.runs import CandidateBatch, FlightStore
+from airflock.scenarios import Scenario
 from airflock.search.study import Study
 
 TIE = 1e-6  # by which fitness orders those who break limits equally
 FARTHEST = 1e6  # standard deviations; where all flights are alike there is none
 
 
-def allowed(limit: Limit, scenario: Scenario, share: float = 1.0) -> float:
+def allowed_probability(limit: EventLimit, scenario: Scenario, duration_share: float = 1.0) -> float:
     """Probability of the event that a limit with a rate allows per flight of a share of the scenario's duration."""
-    found = limit.probability(share * scenario.flight.duration / 3600.0, scenario.agents)
+    found = limit.probability(duration_share * scenario.flight.duration / 3600.0, scenario.agents)
     assert found is not None, "limits without a rate are refused where they are read"
     return found
 
 
-def excess(
-    limits: Sequence[Limit], scenario: Scenario, flights: Sequence[Sequence[Row]], reserve: float, share: float = 1.0
+def limit_excess(
+    limits: Sequence[EventLimit],
+    scenario: Scenario,
+    flights: Sequence[Sequence[ScoreRow]],
+    reserve: float,
+    duration_share: float = 1.0,
 ) -> NDArray[np.float64]:
     """How far candidates are from keeping all limits (candidate,): standard deviations, added up; 0 keeps them.
 
@@ -38,39 +41,43 @@ def excess(
     """
     found = np.zeros(len(flights))
     for limit in limits:
-        short = index_of(allowed(limit, scenario, share) / reserve) - indices(limit, flights)
+        short = reliability_index(allowed_probability(limit, scenario, duration_share) / reserve) - reliability_indices(
+            limit, flights
+        )
         found += np.clip(short, 0.0, FARTHEST)
     return found
 
 
-def excess_of(study: Study, store: Store, batch: Batch, share: float = 1.0) -> NDArray[np.float64]:
+def batch_excess(
+    study: Study, store: FlightStore, batch: CandidateBatch, duration_share: float = 1.0
+) -> NDArray[np.float64]:
     """The excess of each candidate of a batch that has flown (candidate,), added up over the study's scenarios."""
-    flown: dict[int, dict[int, Row]] = {}
+    flown: dict[int, dict[int, ScoreRow]] = {}
     for (candidate, repeat), row in store.flown(batch).items():
         flown.setdefault(candidate, {})[repeat] = row
     n, total = len(study.scenarios), np.zeros(len(flown))
     for place, scenario in enumerate(study.scenarios):
         flights = [[flown[i][r] for r in sorted(flown[i]) if r % n == place] for i in sorted(flown)]
-        total += excess(study.limits, scenario, flights, study.search.reserve, share)
+        total += limit_excess(study.limits, scenario, flights, study.search.reserve, duration_share)
     return total
 
 
-def safe_first(losses: NDArray[np.float64], excess: NDArray[np.float64]) -> NDArray[np.float64]:
+def rank_by_excess(losses: NDArray[np.float64], excess: NDArray[np.float64]) -> NDArray[np.float64]:
     """Losses (candidate, objective) in which each that breaks limits is worse than all that keep them."""
     worst = losses.max(axis=0)
     broken = worst + excess[:, None] + TIE * (losses - worst) / np.maximum(np.ptp(losses, axis=0), TIE)
     return np.where(excess[:, None] > 0.0, broken, losses)
 
 
-def kept(study: Study, flights: Sequence[Row]) -> list[dict[str, Any]]:
+def limit_reports(study: Study, flights: Sequence[ScoreRow]) -> list[dict[str, Any]]:
     """What flights of one candidate say of each limit, one entry a limit and scenario, as plain values."""
     n = len(study.scenarios)
     found = []
     for place, (label, scenario) in enumerate(zip(study.labels, study.scenarios, strict=True)):
         rows = flights[place::n]
         for limit in study.limits:
-            events = sum(row is None or limit.happened(row) for row in rows)
-            likely, most = chance(limit, rows), allowed(limit, scenario)
+            events = sum(row is None or limit.has_happened(row) for row in rows)
+            likely, most = estimated_probability(limit, rows), allowed_probability(limit, scenario)
             found.append(
                 {
                     **({"scenario": label} if n > 1 else {}),
@@ -81,8 +88,8 @@ def kept(study: Study, flights: Sequence[Row]) -> list[dict[str, Any]]:
     return found
 
 
-def told(entry: Mapping[str, Any]) -> str:
-    """One entry of `kept` in words."""
+def limit_report_line(entry: Mapping[str, Any]) -> str:
+    """One entry of `limit_reports` in words."""
     where = f" in {entry['scenario']}" if "scenario" in entry else ""
     verdict = "looks kept" if entry["keeps"] else "looks broken"
     near = ", by how near they came" if entry["estimated"] > entry["events"] / entry["flights"] else ""
@@ -92,11 +99,11 @@ def told(entry: Mapping[str, Any]) -> str:
     )
 
 
-def rarest(limits: Sequence[Limit], scenario: Scenario) -> float:
+def rarest_probability(limits: Sequence[EventLimit], scenario: Scenario) -> float:
     """The smallest probability per flight that a limit allows; 1 without limits."""
-    return min((allowed(limit, scenario) for limit in limits), default=1.0)
+    return min((allowed_probability(limit, scenario) for limit in limits), default=1.0)
 
 
-def flights_that_count(limits: Sequence[Limit], scenario: Scenario) -> int:
+def flights_per_event(limits: Sequence[EventLimit], scenario: Scenario) -> int:
     """Flights among which one event of the rarest limit is to be expected where it is just kept."""
-    return math.ceil(1.0 / rarest(limits, scenario))
+    return math.ceil(1.0 / rarest_probability(limits, scenario))

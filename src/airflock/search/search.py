@@ -10,23 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.runs.executors import Executor
-from airflock.runs.space import declared
-from airflock.runs.store import Batch, Store
+from airflock.runs import CandidateBatch, Executor, FlightStore, declared_numbers
 from airflock.search.evaluator import Evaluator
-from airflock.search.fitness import losses
-from airflock.search.growing import Length
+from airflock.search.fitness import candidate_losses
+from airflock.search.growing import FlightLength
 from airflock.search.landscape import refuse_flat
-from airflock.search.optimisers import optimiser
-from airflock.search.safe import excess_of, safe_first
+from airflock.search.optimisers import make_optimiser
+from airflock.search.safe import batch_excess, rank_by_excess
 from airflock.search.study import Study
-from airflock.support.errors import StudyError
+from airflock.support import StudyError
 
 SAME = 1e-9  # a rebuilt optimiser may differ from the stored points by rounding on another machine, not by more
 
 
 @dataclass(frozen=True)
-class Progress:
+class SearchProgress:
     """How far a search is, after each flight and each generation.
 
     done, total : flights, those of the store included; fresh : flights of this process
@@ -43,15 +41,15 @@ class Progress:
     mean: float | None
 
 
-Watch = Callable[[Progress], None]
+OnSearchProgress = Callable[[SearchProgress], None]
 
 
 @dataclass
-class Tally:
+class ProgressTally:
     """Counts of a search so far, reported to `watch`."""
 
     total: int
-    watch: Watch | None
+    watch: OnSearchProgress | None
     run: int = 0
     generation: int = 0
     done: int = 0
@@ -59,13 +57,15 @@ class Tally:
     best: float | None = None
     mean: float | None = None
 
-    def note(self, new: bool) -> None:
+    def note(self, is_new: bool) -> None:
         """One more flight, flown now or found in the store."""
-        self.done, self.fresh = self.done + 1, self.fresh + new
+        self.done, self.fresh = self.done + 1, self.fresh + is_new
         if self.watch:
-            self.watch(Progress(self.run, self.generation, self.done, self.total, self.fresh, self.best, self.mean))
+            self.watch(
+                SearchProgress(self.run, self.generation, self.done, self.total, self.fresh, self.best, self.mean)
+            )
 
-    def generation_over(self, values: Sequence[float | None], maximise: bool) -> None:
+    def end_generation(self, values: Sequence[float | None], maximise: bool) -> None:
         """First objective of a generation's candidates."""
         found = [value for value in values if value is not None]
         if not found:
@@ -82,61 +82,66 @@ def total_flights(study: Study) -> int:
     return sum(study.population(run) for run in runs) * each * len(study.scenarios)
 
 
-def search(study: Study, store: Store, executor: Executor, watch: Watch | None = None) -> list[NDArray[np.float64]]:
+def run_search(
+    study: Study, store: FlightStore, executor: Executor, on_progress: OnSearchProgress | None = None
+) -> list[NDArray[np.float64]]:
     """Run a study to its end, or to Ctrl-C.
 
     Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if asked for.
     """
-    tally = Tally(total_flights(study), watch)
+    tally = ProgressTally(total_flights(study), on_progress)
     evaluator = Evaluator(study, store, executor, tally.note)
     centres: list[NDArray[np.float64]] = []
     for run in range(study.whole("restarts") + 1):
         means = _run(evaluator, run, tally)
         if means:
-            found = averaged(means, study.whole("averages")) + windowed(means, study.whole("windows"))
+            found = averaged_means(means, study.whole("averages")) + windowed_means(means, study.whole("windows"))
             centres += [means[-1], *found]
     return centres
 
 
-def _run(evaluator: Evaluator, run: int, tally: Tally) -> list[NDArray[np.float64]]:
+def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[np.float64]]:
     """One run of the optimiser; returns its mean (axis,) after each generation of whole flights, if it has one."""
     study, store = evaluator.study, evaluator.store
     first = study.objectives[0]
-    state = optimiser(
+    state = make_optimiser(
         study.search.algorithm, len(study.space.axes), len(study.objectives), study.population(run),
         (study.whole("seed") << 16) + run, spread=study.search.spread, start=_start(study),
     )  # fmt: skip
-    length = Length(study.whole("generations"), first.maximise, growing=study.search.flights == "growing")
+    length = FlightLength(study.whole("generations"), first.maximise, growing=study.search.flights == "growing")
     means: list[NDArray[np.float64]] = []
     seen: list[float | None] = []
     whole = 0
     for generation in range(study.whole("generations")):
         tally.run, tally.generation = run, generation
-        batch = Batch("search", run, generation)
+        batch = CandidateBatch("search", run, generation)
         points = _asked(store, batch, state.ask())
         begun = tally.done
         racing = study.search.racing == "optimistic"
-        rows = evaluator.evaluate(batch, points, share=length.share, racing=racing)
+        rows = evaluator.evaluate(batch, points, duration_share=length.share, racing=racing)
         tally.total -= len(points) * study.seeds(generation) * len(study.scenarios) - (tally.done - begun)
-        values, told = [row[0] for row in rows], losses(rows, study.objectives)
+        values, told = [row[0] for row in rows], candidate_losses(rows, study.objectives)
         sound = values
         if study.limits:
-            broken = excess_of(study, store, batch, length.share)
-            told, sound = safe_first(told, broken), [v for v, much in zip(values, broken, strict=True) if much == 0.0]
+            broken = batch_excess(study, store, batch, length.share)
+            told, sound = (
+                rank_by_excess(told, broken),
+                [v for v, much in zip(values, broken, strict=True) if much == 0.0],
+            )
         state.tell(points, told)
         centre = state.centre()
         if length.whole:
-            tally.generation_over(sound, first.maximise)
+            tally.end_generation(sound, first.maximise)
             seen += values
             if run == 0:
                 refuse_flat(study, store, whole, seen)
             whole += 1
             means += [] if centre is None else [np.clip(centre, 0.0, 1.0)]
-        length.generation_over(values)
+        length.end_generation(values)
     return means
 
 
-def averaged(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
+def averaged_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
     """Average (axis,) of the last half of all means, of the last quarter, and so on, as many as asked for.
 
     On a plateau a mean wanders by chance; the average of many wanders less (Polyak & Juditsky 1992).
@@ -145,7 +150,7 @@ def averaged(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray
     return [np.mean(means[-span:], axis=0) for span in spans]
 
 
-def windowed(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
+def windowed_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
     """Average (axis,) of the means in each of so many equal parts of the last half.
 
     CMA-ES ranks single flights and so ends where most flights are good, which is not where their mean is best if a few
@@ -159,11 +164,11 @@ def _start(study: Study) -> NDArray[np.float64] | None:
     """Where the optimiser starts: None for the middle, or the scenario's own numbers."""
     if study.search.start == "middle":
         return None
-    known = declared(study.scenario)
+    known = declared_numbers(study.scenario)
     return study.space.point({key: float(known[key][1] or 0.0) for key in study.space.keys})
 
 
-def _asked(store: Store, batch: Batch, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _asked(store: FlightStore, batch: CandidateBatch, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """The points that an optimiser asks for, as the store has them if it has."""
     stored = store.asked(batch)
     if not stored:

@@ -4,15 +4,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import Quantity, choice, declarations, quantity
-from airflock.runs.space import Space
+from airflock.core import Parameters as Record, Quantity, choice, declarations, quantity
+from airflock.runs import SearchSpace
 from airflock.search.fitness import Objective
-from airflock.search.optimisers import ALGORITHMS, SEVERAL
+from airflock.search.optimisers import ALGORITHMS, MULTI_OBJECTIVE
 
 S6 = "Vásárhelyi et al. 2018, Table S6"
 SEED_BITS = 40  # numbers of flights within one study; seeds 0, 1, 2, ... that people give by hand lie below all studies
-ALONE = 0.3  # share of generations after which flights of a candidate begin to grow from `seeds` to `late_seeds`
+CONSTANT_SEEDS_SHARE = (
+    0.3  # share of generations after which flights of a candidate begin to grow from `seeds` to `late_seeds`
+)
 FEWEST = 8  # generations of a search with growing flights: one at least of each length but the last
 
 
@@ -24,13 +25,13 @@ FAST: Mapping[str, Any] = {
 }  # fmt: skip
 
 
-def fast(given: Mapping[str, Any], *, limits: bool) -> dict[str, Any]:
+def fast_search_keys(search_keys: Mapping[str, Any], *, limits: bool) -> dict[str, Any]:
     """Keys of the fast search, and those that are given; with limits nobody flies again, as nothing compares them."""
-    return {key: value for key, value in FAST.items() if key != "again" or not limits} | dict(given)
+    return {key: value for key, value in FAST.items() if key != "again" or not limits} | dict(search_keys)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Search(Record):
+class SearchSettings(Record):
     """How a study searches: the table [search]."""
 
     algorithm: str = choice(
@@ -146,11 +147,18 @@ class Search(Record):
 
 
 BROKEN = ("growth", "spread", "reserve")  # numbers that need not be whole
-WHOLE = tuple(n for n, declared, _ in declarations(Search()) if isinstance(declared, Quantity) and n not in BROKEN)
+WHOLE = tuple(
+    n for n, declared, _ in declarations(SearchSettings()) if isinstance(declared, Quantity) and n not in BROKEN
+)
 
 
-def search_faults(
-    search: Search, objectives: Sequence[Objective], space: Space | None, over_scenarios: str, *, limits: bool = False
+def search_errors(
+    search: SearchSettings,
+    objectives: Sequence[Objective],
+    space: SearchSpace | None,
+    over_scenarios: str,
+    *,
+    limits: bool = False,
 ) -> list[str]:
     """What of a search cannot be, one line each; `space` as far as it could be read; limits: whether it has some."""
     faults = [
@@ -158,15 +166,15 @@ def search_faults(
         for name in WHOLE
         if (value := getattr(search, name)) != int(value)
     ]
-    if search.algorithm == SEVERAL and len(objectives) < 2:
+    if search.algorithm == MULTI_OBJECTIVE and len(objectives) < 2:
         faults.append(
-            f"search.algorithm = '{SEVERAL}' is for several objectives, but there is one; "
+            f"search.algorithm = '{MULTI_OBJECTIVE}' is for several objectives, but there is one; "
             "give objective.maximise a list"
         )
-    if search.algorithm != SEVERAL and len(objectives) > 1:
+    if search.algorithm != MULTI_OBJECTIVE and len(objectives) > 1:
         faults.append(
             f"search.algorithm = '{search.algorithm}' takes one objective, but there are {len(objectives)}; "
-            f"give one, or search.algorithm = '{SEVERAL}'"
+            f"give one, or search.algorithm = '{MULTI_OBJECTIVE}'"
         )
     faults += _only_cmaes(search) + _racing_faults(search, objectives, over_scenarios)
     if limits and search.racing != "none":
@@ -193,11 +201,11 @@ def search_faults(
     return faults
 
 
-def _only_cmaes(search: Search) -> list[str]:
+def _only_cmaes(search: SearchSettings) -> list[str]:
     """Faults of keys that mean something for CMA-ES alone, where another algorithm searches."""
     if search.algorithm == "cmaes":
         return []
-    usual, found = Search(), []
+    usual, found = SearchSettings(), []
     for name in ("flights", "racing", "start", "spread", "averages", "windows"):
         value = getattr(search, name)
         if value != getattr(usual, name):
@@ -206,7 +214,7 @@ def _only_cmaes(search: Search) -> list[str]:
     return found
 
 
-def _racing_faults(search: Search, objectives: Sequence[Objective], over_scenarios: str) -> list[str]:
+def _racing_faults(search: SearchSettings, objectives: Sequence[Objective], over_scenarios: str) -> list[str]:
     """Why candidates of this search cannot race."""
     if search.racing == "none":
         return []

@@ -6,23 +6,22 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from airflock.runs.executors import Executor
-from airflock.runs.store import Batch, Store
+from airflock.runs import CandidateBatch, Executor, FlightStore
 from airflock.search.evaluator import Evaluator
 from airflock.search.study import Study
-from airflock.support.errors import StudyError
+from airflock.support import StudyError
 
-METHODS = ("sobol", "morris")
+SENSITIVITY_METHODS = ("sobol", "morris")
 
 
-def sensitivity(
+def run_sensitivity(
     study: Study,
-    store: Store,
+    store: FlightStore,
     executor: Executor,
     *,
     method: str = "morris",
     samples: int = 16,
-    note: Callable[[bool], None] | None = None,
+    on_flight: Callable[[bool], None] | None = None,
 ) -> pd.DataFrame:
     """Effect of each parameter on the first objective over the study's whole space.
 
@@ -32,14 +31,12 @@ def sensitivity(
     half-widths; morris: mu_star (mean absolute effect over the range), its half-width, and sigma (its spread).
     """
     try:
-        from SALib.analyze import morris as analyse_morris
-        from SALib.analyze import sobol as analyse_sobol
-        from SALib.sample import morris as sample_morris
-        from SALib.sample import sobol as sample_sobol
+        from SALib.analyze import morris as analyse_morris, sobol as analyse_sobol
+        from SALib.sample import morris as sample_morris, sobol as sample_sobol
     except ModuleNotFoundError as fault:
         raise StudyError("sensitivity needs SALib: pip install 'airflock[evolve]'") from fault
-    if method not in METHODS:
-        raise StudyError(f"method = {method!r} is none of {', '.join(METHODS)}")
+    if method not in SENSITIVITY_METHODS:
+        raise StudyError(f"method = {method!r} is none of {', '.join(SENSITIVITY_METHODS)}")
     n = len(study.space.axes)
     problem: Any = {"num_vars": n, "names": list(study.space.keys), "bounds": [[0.0, 1.0]] * n}
     seed = study.whole("seed")
@@ -47,10 +44,10 @@ def sensitivity(
         points = sample_sobol.sample(problem, samples, calc_second_order=False, seed=seed)
     else:
         points = sample_morris.sample(problem, samples, seed=seed)
-    batch = Batch(method, samples, 0)
+    batch = CandidateBatch(method, samples, 0)
     k = study.whole("seeds")
     seeds = [[study.seed(3, j) for j in range(k)]] * len(points)  # common: chance must not pass for an effect
-    rows = Evaluator(study, store, executor, note).evaluate(batch, np.asarray(points), seeds=seeds)
+    rows = Evaluator(study, store, executor, on_flight).evaluate(batch, np.asarray(points), seeds=seeds)
     values = np.array([np.nan if row[0] is None else row[0] for row in rows])
     if not np.isfinite(values).any():
         raise StudyError("every candidate failed: no sensitivity")

@@ -10,23 +10,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from airflock.runs.space import Space, declared
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.search.bounds import usual_space
-from airflock.support.errors import ScenarioError, bounded
-from airflock.support.untrusted import is_file
+from airflock.runs import SearchSpace, declared_numbers
+from airflock.scenarios import Scenario, load
+from airflock.search.bounds import default_space
+from airflock.support import ScenarioError, is_file, shortened
 
 OVER_SCENARIOS = ("mean", "worst")
 KEYS = ("scenario", "set")  # of an entry that is a table
 
 
-def of_scenarios(values: Sequence[float | None], how: str, maximise: bool) -> float | None:
+def combine_scenarios(values: Sequence[float | None], over_scenarios: str, maximise: bool) -> float | None:
     """One number from that of each scenario: their mean, or the worst; None if a flight failed in one of them."""
     if any(value is None for value in values):
         return None
     found = [value for value in values if value is not None]
-    if how == "worst":
+    if over_scenarios == "worst":
         return min(found) if maximise else max(found)
     return math.fsum(found) / len(found)
 
@@ -40,18 +38,18 @@ def read_scenarios(
     """
     keys = document.get("set", {})
     if not isinstance(keys, Mapping):
-        return (), (), [f"set = {bounded(repr(keys), 80)} is not a table"]
+        return (), (), [f"set = {shortened(repr(keys), 80)} is not a table"]
     if "scenarios" not in document:
         entries: Any = [document.get("scenario")]
         if not isinstance(entries[0], str):
-            given = f" = {bounded(repr(entries[0]), 80)} is not a name" if "scenario" in document else " is missing"
+            given = f" = {shortened(repr(entries[0]), 80)} is not a name" if "scenario" in document else " is missing"
             return (), (), [f'scenario{given}; write scenario = "NAME", of a preset or a scenario file']
     else:
         entries = document["scenarios"]
         if "scenario" in document:
             return (), (), ["scenario and scenarios are both given; leave out one"]
         if not isinstance(entries, list) or not entries:
-            return (), (), [f"scenarios = {bounded(repr(entries), 80)} is not a list of presets, files or tables"]
+            return (), (), [f"scenarios = {shortened(repr(entries), 80)} is not a list of presets, files or tables"]
     found: list[Scenario] = []
     labels: list[str] = []
     faults: list[str] = []
@@ -69,10 +67,10 @@ def read_scenarios(
             continue
         told = ", ".join(f"{key} = {value}" for key, value in own.items())
         labels.append(f"{name} with {told}" if told else name)
-    return tuple(found), distinct(labels), faults
+    return tuple(found), distinct_labels(labels), faults
 
 
-def distinct(labels: Sequence[str]) -> tuple[str, ...]:
+def distinct_labels(labels: Sequence[str]) -> tuple[str, ...]:
     """Labels with a number where two would be the same."""
     return tuple(f"{label} ({i + 1})" if label in labels[:i] else label for i, label in enumerate(labels))
 
@@ -84,40 +82,42 @@ def _entry(entry: Any, number: int) -> tuple[str, Mapping[str, Any], list[str]]:
         return entry, {}, []
     if not isinstance(entry, Mapping) or not isinstance(entry.get("scenario"), str):
         how = 'write a name, or { scenario = "NAME", set = { "radio.delay" = 1.0 } }'
-        return "", {}, [f"{at} = {bounded(repr(entry), 80)} names no scenario; {how}"]
+        return "", {}, [f"{at} = {shortened(repr(entry), 80)} names no scenario; {how}"]
     faults = [f"{at}.{key}: unknown key; known: {', '.join(KEYS)}" for key in entry if key not in KEYS]
     own = entry.get("set", {})
     if not isinstance(own, Mapping):
-        faults.append(f"{at}.set = {bounded(repr(own), 80)} is not a table")
+        faults.append(f"{at}.set = {shortened(repr(own), 80)} is not a table")
     return str(entry["scenario"]), own if isinstance(own, Mapping) else {}, faults
 
 
-def common_space(scenarios: Sequence[Scenario]) -> tuple[Space, list[str]]:
+def common_space(scenarios: Sequence[Scenario]) -> tuple[SearchSpace, list[str]]:
     """The usual space of the first, its bounds stretched to hold those of the others; and what was done."""
-    space, notes = usual_space(scenarios[0])
+    space, notes = default_space(scenarios[0])
     if len(scenarios) == 1:
         return space, notes
     axes = {axis.key: axis for axis in space.axes}
     for scenario in scenarios[1:]:
-        more, told = usual_space(scenario)
+        more, told = default_space(scenario)
         notes += [note for note in told if note not in notes]
         for axis in more.axes:
             known = axes.get(axis.key, axis)
             axes[axis.key] = replace(known, low=min(known.low, axis.low), high=max(known.high, axis.high))
-    return Space(tuple(axes.values())), notes
+    return SearchSpace(tuple(axes.values())), notes
 
 
-def faults_together(scenarios: Sequence[Scenario], labels: Sequence[str], space: Space | None, how: Any) -> list[str]:
+def joint_errors(
+    scenarios: Sequence[Scenario], labels: Sequence[str], space: SearchSpace | None, over_scenarios: Any
+) -> list[str]:
     """Why one set of numbers cannot be searched for these scenarios, one line each."""
     faults = []
-    if how not in OVER_SCENARIOS:
-        faults.append(f"over_scenarios = {how!r} is none of {', '.join(OVER_SCENARIOS)}")
+    if over_scenarios not in OVER_SCENARIOS:
+        faults.append(f"over_scenarios = {over_scenarios!r} is none of {', '.join(OVER_SCENARIOS)}")
     for label, scenario in zip(labels[1:], scenarios[1:], strict=True):
         first, law = scenarios[0].model.name, scenario.model.name
         if law != first:
             faults.append(f"scenarios: {label} flies {law}, {labels[0]} {first}; one set of numbers needs one law")
             continue
-        known = declared(scenario)
+        known = declared_numbers(scenario)
         keys = () if space is None else (*space.keys, *space.fixed, *space.tied)
         faults += [f"space.{key}: {label} has no such number" for key in keys if key not in known]
     return faults

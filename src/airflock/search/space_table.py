@@ -4,25 +4,25 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.core.parameters import Quantity, with_unit
-from airflock.runs.space import Axis, Space, Tie, declared, usual_scale
-from airflock.scenarios.scenario import Scenario
-from airflock.support.spelling import meant
+from airflock.core import Quantity, format_with_unit
+from airflock.runs import SearchAxis, SearchSpace, TiedParameter, declared_numbers, default_scale
+from airflock.scenarios import Scenario
+from airflock.support import suggest
 
 ENTRY = ("low", "high", "unit", "scale", "integer", "above", "fixed", "tied", "factor", "offset", "source", "note")
 
 
-def read_space(table: Any, scenario: Scenario) -> tuple[Space | None, list[str]]:
+def read_space(table: Any, scenario: Scenario) -> tuple[SearchSpace | None, list[str]]:
     """Space from the table [space] of a study file, or None; and all faults in it. Only what is listed varies."""
-    known = declared(scenario)
+    known = declared_numbers(scenario)
     entries, faults = _entries(table)
-    axes: list[Axis] = []
+    axes: list[SearchAxis] = []
     fixed: dict[str, float] = {}
-    tied: dict[str, Tie] = {}
+    tied: dict[str, TiedParameter] = {}
     for key, entry in entries.items():
         if key not in known:
-            hint = meant(key, known, lead="; ", prefix="space.")
-            if key.startswith("aero.") and not scenario.descends:
+            hint = suggest(key, known, lead="; ", prefix="space.")
+            if key.startswith("aero.") and not scenario.is_aerodynamic:
                 hint = f", which has no section [aero]; --set {key}=VALUE adds drag descent to it"
             faults.append(f"space.{key} is not a number of {scenario.name}{hint}")
             continue
@@ -33,22 +33,24 @@ def read_space(table: Any, scenario: Scenario) -> tuple[Space | None, list[str]]
         if "fixed" in entry:
             fixed[key] = float(entry["fixed"])
         elif "tied" in entry:
-            tied[key] = Tie(str(entry["tied"]), float(entry.get("factor", 1.0)), float(entry.get("offset", 0.0)))
+            tied[key] = TiedParameter(
+                str(entry["tied"]), float(entry.get("factor", 1.0)), float(entry.get("offset", 0.0))
+            )
         else:
             axes.append(_axis(key, entry, known[key][0]))
     for axis in axes:  # a number that another one must stay above takes part even if it does not vary
         other = axis.above
         if other in known and other not in {a.key for a in axes} | set(fixed) and known[other][1] is not None:
             fixed[other] = float(known[other][1] or 0.0)
-    space = Space(tuple(axes), fixed, tied)
+    space = SearchSpace(tuple(axes), fixed, tied)
     faults += _faults_between(space, known, bool(faults))
     return (None if faults else space), faults
 
 
-def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> Axis:
+def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> SearchAxis:
     low, high = float(entry.get("low", how.low)), float(entry.get("high", how.high))
-    scale = str(entry.get("scale", usual_scale(low, high)))
-    return Axis(
+    scale = str(entry.get("scale", default_scale(low, high)))
+    return SearchAxis(
         key, how.unit, low, high, scale, how.whole or bool(entry.get("integer", False)), str(entry.get("above", ""))
     )
 
@@ -81,12 +83,12 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
     for name, value in entry.items():
         numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
         if name not in ENTRY:
-            faults.append(f"space.{key}.{name}: unknown key; {meant(name, ENTRY, ', '.join(ENTRY))}")
+            faults.append(f"space.{key}.{name}: unknown key; {suggest(name, ENTRY, ', '.join(ENTRY))}")
         elif name in ("low", "high", "fixed", "factor", "offset") and not numeric:
             faults.append(f"space.{key}.{name} = {value!r} is not a number; give {how.span}")
         elif name in ("low", "high", "fixed") and not how.low <= value <= how.high:
             faults.append(
-                f"space.{key}.{name} = {with_unit(f'{value:g}', how.unit)} lies outside the declared {how.span}"
+                f"space.{key}.{name} = {format_with_unit(f'{value:g}', how.unit)} lies outside the declared {how.span}"
             )
         elif name == "unit" and value != how.unit:
             faults.append(f"space.{key}.unit = {value!r}: the unit is {how.unit}")
@@ -99,25 +101,25 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
         elif how.whole and name == "fixed" and value != int(value):
             faults.append(f"space.{key}.fixed = {value:g} is not a whole number")
         elif name in ("above", "tied") and not (isinstance(value, str) and value in known):
-            faults.append(f"space.{key}.{name} = {value!r} is not a number{meant(value, known, lead='; ')}")
+            faults.append(f"space.{key}.{name} = {value!r} is not a number{suggest(value, known, lead='; ')}")
     if faults or "fixed" in entry or "tied" in entry:
         return faults
     return _range_faults(_axis(key, entry, how))
 
 
-def _range_faults(axis: Axis) -> list[str]:
-    where, span = f"space.{axis.key}", with_unit(f"[{axis.low:g}, {axis.high:g}]", axis.unit)
+def _range_faults(axis: SearchAxis) -> list[str]:
+    where, span = f"space.{axis.key}", format_with_unit(f"[{axis.low:g}, {axis.high:g}]", axis.unit)
     if not axis.low < axis.high:
         word = "empty" if axis.low == axis.high else "inverted"
         return [f"{where}: the range {span} is {word}; low must lie below high"]
     if axis.scale == "log" and axis.low <= 0.0:
-        return [f"{where}: low = {with_unit(f'{axis.low:g}', axis.unit)} must be above 0 on a logarithmic scale"]
+        return [f"{where}: low = {format_with_unit(f'{axis.low:g}', axis.unit)} must be above 0 on a logarithmic scale"]
     if axis.integer and math.floor(axis.high) < math.ceil(axis.low):
         return [f"{where}: the range {span} holds no whole number"]
     return []
 
 
-def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | None]], told: bool) -> list[str]:
+def _faults_between(space: SearchSpace, known: Mapping[str, tuple[Quantity, float | None]], told: bool) -> list[str]:
     """Ties and orders that cannot hold."""
     faults = []
     axes = {axis.key: axis for axis in space.axes}
@@ -132,7 +134,7 @@ def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | No
             faults.append(f"space.{axis.key}.above = {axis.above!r} neither varies nor is fixed")
         lower = axes[axis.above].high if axis.above in axes else space.fixed.get(axis.above, axis.low)
         if axis.above and lower > axis.high:
-            high = with_unit(f"{axis.high:g}", axis.unit)
+            high = format_with_unit(f"{axis.high:g}", axis.unit)
             faults.append(f"space.{axis.key}.high = {high} lies below {axis.above} = {lower:g}")
     for key, tie in space.tied.items():
         if tie.of not in axes and tie.of not in space.fixed:
@@ -143,7 +145,7 @@ def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | No
         for end in ends:
             value = tie.factor * end + tie.offset
             if not how.low <= value <= how.high:
-                reached = with_unit(f"{value:g}", how.unit)
+                reached = format_with_unit(f"{value:g}", how.unit)
                 faults.append(f"space.{key} = {reached} at {tie.of} = {end:g} lies outside {how.span}")
     if not space.axes and not told:
         faults.append("space: nothing varies; give at least one key low and high")

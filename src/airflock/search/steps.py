@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.runs.space import declared, with_parameters
-from airflock.scenarios.scenario import Scenario
-from airflock.search.intervals import interval
-from airflock.support.errors import ScenarioError
+from airflock.runs import declared_numbers, with_parameters
+from airflock.scenarios import Scenario
+from airflock.search.intervals import mean_interval
+from airflock.support import ScenarioError
 
-Table = Mapping[str, NDArray[np.float64]]  # score → its values (seed,)
+ScoreColumns = Mapping[str, NDArray[np.float64]]  # score → its values (seed,)
 
 S4 = "Table S4"
 
 
 @dataclass(frozen=True)
-class Step:
+class HardeningStep:
     """One change of the recipe: factors on keys, and why.
 
     earlier : time of flight (s) by which r0_shill grows, so that agents brake earlier at walls and obstacles
@@ -28,25 +28,27 @@ class Step:
     name: str
     factors: Mapping[str, float]
     reason: str
-    earlier: float = 0.0
+    braking_lead: float = 0.0
 
 
 # ratios of Table S4 to Table S1, columns 4, 6, 8 m/s: p_rep 2.3, 1.4, 1.7; C_frict 10, 10, 8; v_shill 0.74, 0.71, 0.61;
 # r0_shill from 0.3, 0.5, 0.1 m to 0, 5, 30 m
-RECIPE = (
-    Step("p_rep up", {"model.p_rep": 1.5}, f"{S4}: gain increased to prevent collisions"),
-    Step("c_frict up", {"model.c_frict": 3.0}, f"{S4}: increased substantially to minimise oscillations"),
-    Step("c_frict up again", {"model.c_frict": 3.0}, f"{S4}: 8 to 10 times in all, here in two steps"),
-    Step(
+TABLE_S4_STEPS = (
+    HardeningStep("p_rep up", {"model.p_rep": 1.5}, f"{S4}: gain increased to prevent collisions"),
+    HardeningStep("c_frict up", {"model.c_frict": 3.0}, f"{S4}: increased substantially to minimise oscillations"),
+    HardeningStep("c_frict up again", {"model.c_frict": 3.0}, f"{S4}: 8 to 10 times in all, here in two steps"),
+    HardeningStep(
         "v_shill down, r0_shill up", {"model.v_shill": 0.7}, f"{S4}: a higher r0_shill makes up for it", 0.5
     ),  # 0.5 s: 2 to 4 m; the paper's table has 0, 5 and 30 m
 )
 # where agents leave the arena or enter obstacles
-ROOM = tuple(Step(name, {}, "our choice: earlier braking, nothing else", 0.5) for name in ("r0_shill up", "and again"))
+WALL_STEPS = tuple(
+    HardeningStep(name, {}, "our choice: earlier braking, nothing else", 0.5) for name in ("r0_shill up", "and again")
+)
 
 
 @dataclass(frozen=True)
-class Measured:
+class StepResult:
     """Parameters of one step and what they cost and gain against the optimum, over paired seeds.
 
     fitness, r_min, n_coll : mean over seeds; r_min (m) is the smallest distance of two agents in a flight
@@ -90,10 +92,12 @@ class Measured:
         }
 
 
-def recipe(scenario: Scenario, steps: Sequence[Step] = RECIPE) -> list[tuple[Step, dict[str, float]]]:
+def recipe_parameters(
+    scenario: Scenario, steps: Sequence[HardeningStep] = TABLE_S4_STEPS
+) -> list[tuple[HardeningStep, dict[str, float]]]:
     """Parameters after each step, the optimum first. Values stay inside their declared ranges."""
-    known = declared(scenario)
-    keys = {key for step in (*steps, *RECIPE) for key in step.factors} | {"model.r0_shill"}
+    known = declared_numbers(scenario)
+    keys = {key for step in (*steps, *TABLE_S4_STEPS) for key in step.factors} | {"model.r0_shill"}
     missing = sorted(key for key in keys if key not in known)
     if missing:
         raise ScenarioError(
@@ -103,20 +107,22 @@ def recipe(scenario: Scenario, steps: Sequence[Step] = RECIPE) -> list[tuple[Ste
             ]
         )
     now = {key: float(known[key][1] or 0.0) for key in sorted(keys)}
-    found = [(Step("optimum", {}, "where hardening begins"), dict(now))]
+    found = [(HardeningStep("optimum", {}, "where hardening begins"), dict(now))]
     for step in steps:
-        now = moved(scenario, now, step)
+        now = parameters_after_step(scenario, now, step)
         found.append((step, now))
     return found
 
 
-def moved(scenario: Scenario, now: Mapping[str, float], step: Step, part: float = 1.0) -> dict[str, float]:
+def parameters_after_step(
+    scenario: Scenario, parameters: Mapping[str, float], step: HardeningStep, step_share: float = 1.0
+) -> dict[str, float]:
     """Parameters after a step, or after a part of it; values stay inside their declared ranges."""
-    known, found = declared(scenario), dict(now)
+    known, found = declared_numbers(scenario), dict(parameters)
     for key, factor in step.factors.items():
-        found[key] = _inside(found[key] * factor**part, known[key][0])
-    if step.earlier:
-        far = part * step.earlier * (scenario.measured_by().v_flock or 0.0)
+        found[key] = _inside(found[key] * factor**step_share, known[key][0])
+    if step.braking_lead:
+        far = step_share * step.braking_lead * (scenario.resolved_metrics().v_flock or 0.0)
         found["model.r0_shill"] = _inside(found["model.r0_shill"] + far, known["model.r0_shill"][0])
     return found
 
@@ -125,19 +131,19 @@ def _inside(value: float, how: Any) -> float:
     return min(max(value, float(how.low)), float(how.high))
 
 
-def flown(
+def fly_parameters(
     scenario: Scenario,
     parameters: Sequence[Mapping[str, float]],
     seeds: Sequence[int],
     threads: int | None,
-    done: Callable[[], None] | None,
+    on_done: Callable[[], None] | None,
 ) -> list[dict[str, NDArray[np.float64]]]:
     """Scores (seed,) of each set of parameters on the same seeds."""
     from airflock.engine import score_flights
 
     varied = [with_parameters(scenario, each) for each in parameters]
     rows = score_flights(
-        [s for s in varied for _ in seeds], [s for _ in varied for s in seeds], threads=threads, done=done
+        [s for s in varied for _ in seeds], [s for _ in varied for s in seeds], threads=threads, on_done=on_done
     )
     if "fitness" not in rows[0] or "r_min" not in rows[0]:
         raise ScenarioError([f"{scenario.name}: metrics.kind = '{scenario.measures.name}' has no fitness and no r_min"])
@@ -146,37 +152,37 @@ def flown(
     return [{name: values[i] for name, values in table.items()} for i in range(len(parameters))]
 
 
-def against(
-    before: Table,
-    after: Table,
-    step: Step,
+def compare_with_optimum(
+    before: ScoreColumns,
+    after: ScoreColumns,
+    step: HardeningStep,
     parameters: Mapping[str, float],
-) -> Measured:
+) -> StepResult:
     """A step against the optimum, both on the same seeds."""
-    mean, _, low, high = interval((before["fitness"] - after["fitness"]).tolist())
-    won, _, least, most = interval((after["r_min"] - before["r_min"]).tolist())
+    mean, _, low, high = mean_interval((before["fitness"] - after["fitness"]).tolist())
+    won, _, least, most = mean_interval((after["r_min"] - before["r_min"]).tolist())
     parts = {name: float(values.mean()) for name, values in after.items() if name.startswith("f_")}
     contacts = float((after["phi_wall"] > 0.0).mean()) if "phi_wall" in after else math.nan
     room = float(after["clearance"].mean()) if "clearance" in after else math.nan
     fitness, near, hits = (float(after[name].mean()) for name in ("fitness", "r_min", "n_coll"))
     cost, gain = (mean, low, high), (won, least, most)
-    return Measured(step.name, step.reason, parameters, fitness, near, hits, cost, gain, parts, contacts, room)
+    return StepResult(step.name, step.reason, parameters, fitness, near, hits, cost, gain, parts, contacts, room)
 
 
-def rows_of(table: Table) -> list[dict[str, float]]:
+def table_rows(table: ScoreColumns) -> list[dict[str, float]]:
     """Scores of each flight, from a table of them."""
     names = list(table)
     return [dict(zip(names, row, strict=True)) for row in np.array([table[name] for name in names]).T.tolist()]
 
 
-def joined(rounds: Sequence[Sequence[Table]]) -> list[Table]:
+def join_rounds(rounds: Sequence[Sequence[ScoreColumns]]) -> list[ScoreColumns]:
     """One table for each scenario, of the flights of all rounds."""
     return [
         {name: np.concatenate([t[name] for t in tables]) for name in tables[0]} for tables in zip(*rounds, strict=True)
     ]
 
 
-def together(tables: Sequence[Table]) -> Table:
+def join_scenarios(tables: Sequence[ScoreColumns]) -> ScoreColumns:
     """One table of the flights in all scenarios, of what is measured in each of them."""
     if len(tables) == 1:
         return tables[0]

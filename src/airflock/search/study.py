@@ -8,21 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from airflock import __version__
-from airflock.certificates.limit import Limit
-from airflock.runs.folder import fingerprint
-from airflock.runs.space import Space
-from airflock.scenarios import formats, schema
-from airflock.scenarios.files import presets, tells_of_study
-from airflock.scenarios.scenario import Scenario
+from airflock.certificates import EventLimit
+from airflock.runs import SearchSpace, fingerprint
+from airflock.scenarios import Scenario, formats, presets, schema, tells_of_study
 from airflock.search import portrait
 from airflock.search.fitness import Objective
 from airflock.search.objective_table import read_limits, read_objectives
-from airflock.search.search_table import ALONE, SEED_BITS, Search, search_faults
-from airflock.search.several import common_space, distinct, faults_together, read_scenarios
+from airflock.search.search_table import CONSTANT_SEEDS_SHARE, SEED_BITS, SearchSettings, search_errors
+from airflock.search.several import common_space, distinct_labels, joint_errors, read_scenarios
 from airflock.search.space_table import read_space
-from airflock.support.errors import ScenarioError
-from airflock.support.spelling import meant
-from airflock.support.untrusted import TextError, from_outside, is_file, own_path, read_toml
+from airflock.support import ScenarioError, TextError, as_error, expand_path, is_file, read_toml, suggest
 
 KEYS = ("title", "scenario", "scenarios", "over_scenarios", "set", "space", "objective", "search")
 LAYOUT = 1  # of the study folder; raised whenever an older folder could not be continued
@@ -38,19 +33,19 @@ class Study:
     """
 
     scenario: Scenario
-    space: Space
+    space: SearchSpace
     objectives: tuple[Objective, ...]
-    search: Search
+    search: SearchSettings
     title: str = ""
     device: str = "cpu"  # cpu or cuda: they agree to rounding, and a study's identity is to the bit
     notes: tuple[str, ...] = ()  # where its bounds come from, for a person to read
     others: tuple[Scenario, ...] = ()
     over_scenarios: str = "mean"
     labels: tuple[str, ...] = ()
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[EventLimit, ...] = ()
 
     def __repr__(self) -> str:
-        return f"<{portrait.study_sentence(self)}>"
+        return f"<{portrait.study_summary(self)}>"
 
     def _repr_html_(self) -> str:
         """A table of what varies, for a notebook."""
@@ -72,13 +67,13 @@ class Study:
     def seeds(self, generation: int) -> int:
         """Flights of a candidate in a generation of the search: from `seeds` up to `late_seeds` in equal ratios."""
         first, last = self.search.seeds, self.search.late_seeds
-        begin, end = ALONE * self.search.generations, max(1.0, self.search.generations - 1.0)
+        begin, end = CONSTANT_SEEDS_SHARE * self.search.generations, max(1.0, self.search.generations - 1.0)
         grown = min(max(0.0, (generation - begin) / max(end - begin, 1.0)), 1.0)
         return round(float(first * (max(first, last) / first) ** grown))
 
-    def seed(self, part: int, number: int) -> int:
-        """Seed of a flight: `part` 0 searches, others are further parts; unlike any seed 0, 1, 2, ... given by hand."""
-        return ((self.whole("seed") + 1) << SEED_BITS) + (part << (SEED_BITS - 4)) + number
+    def seed(self, purpose: int, index: int) -> int:
+        """Return the seed of a flight: `purpose` 0 searches, others are further parts; never a small number."""
+        return ((self.whole("seed") + 1) << SEED_BITS) + (purpose << (SEED_BITS - 4)) + index
 
     def document(self) -> dict[str, Any]:
         """The study as plain values: what study.toml holds, and what a resumed study is compared with."""
@@ -123,7 +118,7 @@ def _unpublished(scenario: Scenario) -> dict[str, Any]:
     return {key: value for key, value in scenario.document.items() if key != "published"}
 
 
-def shipped() -> dict[str, Path]:
+def shipped_studies() -> dict[str, Path]:
     """Name → file of every study shipped with the package; a study for a preset bears the preset's name."""
     root = Path(str(resources.files("airflock"))) / "scenarios" / "studies"
     return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
@@ -131,8 +126,8 @@ def shipped() -> dict[str, Path]:
 
 def is_study(name: str | os.PathLike[str]) -> bool:
     """Whether a name is that of a study, rather than of a scenario; a preset's name is the preset's."""
-    path = own_path(name)
-    if str(name) in shipped() and str(name) not in presets():
+    path = expand_path(name)
+    if str(name) in shipped_studies() and str(name) not in presets():
         return True
     if path.suffix != ".toml" or not is_file(path):
         return False
@@ -160,11 +155,11 @@ def load_study(
     trust    : whether code that the files name may run: a law, fitness functions
     Raises ScenarioError with one line per fault.
     """
-    known = shipped()
+    known = shipped_studies()
     text = str(name)
-    path = known.get(text) or own_path(text)
+    path = known.get(text) or expand_path(text)
     document: Mapping[str, Any] = {}
-    with from_outside(path):
+    with as_error(path):
         if path.suffix == ".toml" and is_file(path):
             document = read_toml(path)
         if not tells_of_study(document):
@@ -198,14 +193,16 @@ def make_study(
     scenario : in place of its key of that name; or several, in place of `scenarios`
     limits   : in place of those of its objective; each candidate then flies twice at least, unless `search` has seeds
     """
-    document, faults = formats.current(document, where), []
+    document, faults = formats.to_current_format(document, where), []
     for key in document:
         if key not in KEYS:
-            of_search = key in {field.name for field in fields(Search)}
-            hint = f"did you mean search.{key}?" if of_search else meant(key, KEYS, f"known: {', '.join(KEYS)}")
+            of_search = key in {field.name for field in fields(SearchSettings)}
+            hint = f"did you mean search.{key}?" if of_search else suggest(key, KEYS, f"known: {', '.join(KEYS)}")
             faults.append(f"{key}: unknown key; {hint}")
     table = document.get("search", {})
-    found, more = schema.check("search", {**table, **(search or {})} if isinstance(table, Mapping) else table, Search)
+    found, more = schema.read_section(
+        "search", {**table, **(search or {})} if isinstance(table, Mapping) else table, SearchSettings
+    )
     faults += more
     if scenario is None:
         scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
@@ -214,8 +211,8 @@ def make_study(
             raise ScenarioError(named)
     else:
         scenarios = (scenario,) if isinstance(scenario, Scenario) else tuple(scenario)
-        labels = distinct([each.name for each in scenarios])
-    space: Space | None
+        labels = distinct_labels([each.name for each in scenarios])
+    space: SearchSpace | None
     notes: list[str] = []
     if "space" in document:
         space, more = read_space(document["space"], scenarios[0])
@@ -223,14 +220,14 @@ def make_study(
     else:
         space, notes = common_space(scenarios)
     over = document.get("over_scenarios", "mean")
-    faults += faults_together(scenarios, labels, space, over)
+    faults += joint_errors(scenarios, labels, space, over)
     objectives, more = read_objectives(document.get("objective", {}), scenarios[0], folder, trust=trust)
     kept, of_limits = read_limits({"limits": list(limits)} if limits else document.get("objective", {}), scenarios)
     faults += more + of_limits
     if found is not None:
         if limits and "seeds" not in (search or {}) and found.seeds < 2.0:
             found = replace(found, seeds=2.0)
-        faults += search_faults(found, objectives, space, str(over), limits=bool(kept))
+        faults += search_errors(found, objectives, space, str(over), limits=bool(kept))
     if faults or space is None or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     return Study(

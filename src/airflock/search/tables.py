@@ -7,17 +7,15 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.runs.store import Store, values_of
-from airflock.support import atomic
-from airflock.support.errors import StudyError
-from airflock.support.untrusted import FormatError, from_outside, json_value
+from airflock.runs import FlightStore, parse_values
+from airflock.support import FormatError, StudyError, as_error, atomic, parse_json
 
-DURATION = "duration"  # key of the scenario that short flights set, column of their table
+DURATION_COLUMN = "duration"  # key of the scenario that short flights set, column of their table
 FLOWN = "duration_flown"  # that column beside `duration`, the time that a flight took
 KEY = ["stage", "run", "generation", "candidate"]
 
 
-def candidates(store: Store, objectives: Sequence[str], stage: str = "search") -> pd.DataFrame:
+def candidate_table(store: FlightStore, objectives: Sequence[str], stage: str = "search") -> pd.DataFrame:
     """One row a candidate: its parameters by key, then its fitness, one column for each objective; nan: failed."""
     rows = store.rows(
         "SELECT run, generation, candidate, parameters, fitness FROM candidate WHERE stage=? AND fitness IS NOT NULL "
@@ -27,13 +25,13 @@ def candidates(store: Store, objectives: Sequence[str], stage: str = "search") -
     found = []
     for run, generation, candidate, parameters, fitness in rows:
         place = {"run": run, "generation": generation, "candidate": candidate}
-        with from_outside(f"{store.path}: candidate {candidate} of generation {generation}", StudyError):
+        with as_error(f"{store.path}: candidate {candidate} of generation {generation}", StudyError):
             told = dict(zip(objectives, _fitness(fitness, len(objectives)), strict=True))
-            found.append({**place, **values_of(parameters), **told})
+            found.append({**place, **parse_values(parameters), **told})
     return pd.DataFrame(found)
 
 
-def flights(store: Store, stage: str | None = None) -> pd.DataFrame:
+def flight_table(store: FlightStore, stage: str | None = None) -> pd.DataFrame:
     """One row a flight: parameters by key, seed, order parameters, why it failed, duration (s), worker, versions.
 
     A flight of another length than the scenario's tells it as `duration_flown` (s, simulated).
@@ -49,36 +47,36 @@ def flights(store: Store, stage: str | None = None) -> pd.DataFrame:
     for *key, parameters, scores, reason, duration, worker, versions in rows:
         place = dict(zip([*KEY, "repeat", "seed"], key, strict=True))
         about = {"reason": reason, "duration": duration, "worker": worker, "versions": versions}
-        with from_outside(f"{store.path}: a flight of {' '.join(map(str, key))}", StudyError):
-            values = {name: v for name, v in values_of(scores or "{}").items() if not isinstance(v, list)}
-            given = {FLOWN if key == DURATION else key: value for key, value in values_of(parameters).items()}
+        with as_error(f"{store.path}: a flight of {' '.join(map(str, key))}", StudyError):
+            values = {name: v for name, v in parse_values(scores or "{}").items() if not isinstance(v, list)}
+            given = {FLOWN if key == DURATION_COLUMN else key: value for key, value in parse_values(parameters).items()}
             found.append({**place, **given, **values, **about})
     return pd.DataFrame(found)
 
 
 def _fitness(text: Any, count: int) -> list[float]:
     """Fitness of a row, one number for each objective; nan: failed."""
-    found = json_value(text)
+    found = parse_json(text)
     sound = isinstance(found, list) and len(found) == count
     if not sound or not all(value is None or isinstance(value, (int, float)) for value in found):
         raise FormatError(f"fitness is not a list of {count} numbers")
     return [math.nan if value is None else float(value) for value in found]
 
 
-def export(store: Store, folder: Path, scenarios: Sequence[str] = ()) -> list[Path]:
+def export(store: FlightStore, folder: Path, scenarios: Sequence[str] = ()) -> list[Path]:
     """Write all flights as evaluations.csv, and as evaluations.parquet where pyarrow is installed.
 
     scenarios : what those of the study are called; of several, each flight tells its own
     """
-    table = flights(store)
+    table = flight_table(store)
     if len(scenarios) > 1:
         table["scenario"] = [scenarios[repeat % len(scenarios)] for repeat in table["repeat"]]
     written = [folder / "evaluations.csv"]
     try:
-        atomic.write(written[0], table.to_csv(index=False))
+        atomic.write_file(written[0], table.to_csv(index=False))
         if _has_parquet():
             written.append(folder / "evaluations.parquet")
-            with atomic.atomic(written[1]) as temporary:
+            with atomic.atomic_path(written[1]) as temporary:
                 table.to_parquet(temporary, index=False)
     except OSError as fault:
         raise StudyError(f"{folder}: tables cannot be written: {fault.strerror or fault}") from fault
@@ -93,12 +91,12 @@ def _has_parquet() -> bool:
     return True
 
 
-def best_first(table: pd.DataFrame, objective: str, maximise: bool) -> Any:
+def sort_by_fitness(table: pd.DataFrame, objective: str, maximise: bool) -> Any:
     """Candidates without the failed ones, the best first; of equals the earlier."""
     sound = table[table[objective].notna()]
     return sound.sort_values(objective, ascending=not maximise, kind="stable")
 
 
-def whole_flights(table: pd.DataFrame, growing: bool) -> pd.DataFrame:
+def full_length_candidates(table: pd.DataFrame, growing: bool) -> pd.DataFrame:
     """Candidates that flew as long as the scenario says; those of a search's short flights compare with each other."""
-    return table[table[DURATION].isna()] if growing and DURATION in table else table
+    return table[table[DURATION_COLUMN].isna()] if growing and DURATION_COLUMN in table else table

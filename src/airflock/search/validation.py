@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from airflock.engine import plan_of
-from airflock.recordings.files import fly_again, load_recording
-from airflock.scenarios.files import load
+from airflock.recordings import load_recording, replay_recording
+from airflock.scenarios import load
 from airflock.search.study import is_study, load_study
-from airflock.support.errors import AirflockError
+from airflock.support import AirflockError
 
 
-class Valid(NamedTuple):
+class ValidationReport(NamedTuple):
     """What a valid file is, in one sentence, and notes on it for a person to read."""
 
     verdict: str
@@ -20,7 +20,7 @@ class Valid(NamedTuple):
 
 def validate(
     name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False
-) -> Valid:
+) -> ValidationReport:
     """Check a scenario, a study or a recording; a recording is flown again and its bits are compared.
 
     Parameters
@@ -57,12 +57,12 @@ def validate(
     """
     text = str(name)
     if text.lower().endswith(".nc"):
-        same, differences = fly_again(load_recording(name), law, settings, trust=trust)
+        same, differences = replay_recording(load_recording(name), law, settings, trust=trust)
         if not same:
             told = "".join(f"\n{text}: {line}" for line in differences)
             reason = "see below" if differences else "although nothing relevant differs"
             raise AirflockError(f"{text}: flown again, the positions differ, {reason}{told}")
-        return Valid("flown again with the same bits", tuple(differences))
+        return ValidationReport("flown again with the same bits", tuple(differences))
     if is_study(text):
         if law is not None:
             raise AirflockError(f"{text}: is a study; --law is for scenarios and recordings")
@@ -71,7 +71,9 @@ def validate(
             plan_of(scenario)
         where = ", ".join(study.labels)
         what = f"{len(study.space.axes)} parameters of {where} vary"
-        return Valid(f"valid study; {what}; begin it with airflock evolve {text} --out DIR", ())
+        return ValidationReport(f"valid study; {what}; begin it with airflock evolve {text} --out DIR", ())
     found = load(name, settings, law, trust=trust)
     plan_of(found)  # probes the rules
-    return Valid(f"valid; {found.model.name}, {found.agents} agents, {found.flight.duration:g} s", found.notes)
+    return ValidationReport(
+        f"valid; {found.model.name}, {found.agents} agents, {found.flight.duration:g} s", found.notes
+    )

@@ -14,31 +14,28 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from airflock.runs.executors import Executor
-from airflock.runs.folder import write
-from airflock.runs.space import with_parameters
-from airflock.runs.store import Batch, Store
+from airflock.runs import CandidateBatch, Executor, FlightStore, with_parameters, write_toml_file
 from airflock.search import tables
 from airflock.search.evaluator import Evaluator
-from airflock.search.finalists import EXCESS, excesses, finalist_table, finalists, fly_finalists
-from airflock.search.intervals import interval
-from airflock.search.landscape import dead
-from airflock.search.result import RESULT, Result, best_files, scenario_document
-from airflock.search.safe import kept
+from airflock.search.finalists import EXCESS_COLUMN, candidate_excesses, finalist_table, fly_finalists, select_finalists
+from airflock.search.intervals import mean_interval
+from airflock.search.landscape import dead_reason
+from airflock.search.result import RESULT_FILE, EvolveResult, best_document, best_files
+from airflock.search.safe import limit_reports
 from airflock.search.study import Study
-from airflock.support.errors import StudyError
+from airflock.support import StudyError
 
-SCORE = Batch("score", 0, 0)
+SCORE = CandidateBatch("score", 0, 0)
 
 
-def conclude(
+def conclude_study(
     study: Study,
-    store: Store,
+    store: FlightStore,
     executor: Executor,
     centres: Sequence[NDArray[np.float64]],
     folder: Path,
-    note: Callable[[bool], None] | None = None,
-) -> Result:
+    on_flight: Callable[[bool], None] | None = None,
+) -> EvolveResult:
     """Re-evaluate, choose, and write result.toml, best.toml and the tables into the study's folder.
 
     centres : final mean of each run, points of the unit cube
@@ -47,20 +44,20 @@ def conclude(
     Raises StudyError where every candidate of the search failed.
     """
     first = study.objectives[0]
-    table = tables.candidates(store, [objective.name for objective in study.objectives])
+    table = tables.candidate_table(store, [objective.name for objective in study.objectives])
     sound = _sound_candidates(study, store, table, folder)
-    evaluator = Evaluator(study, store, executor, note)
-    points, origins = finalists(evaluator, sound, centres)
+    evaluator = Evaluator(study, store, executor, on_flight)
+    points, origins = select_finalists(evaluator, sound, centres)
     rows, i = fly_finalists(evaluator, points)
     winner = study.space.parameters(points[i])
     unbiased = [study.seed(2, j) for j in range(study.whole("final_seeds"))]
     evaluator.evaluate(SCORE, points[i : i + 1], seeds=[unbiased])
     flown = store.flown(SCORE)
     values, each = _scored(study, flown)
-    mean, sd, low, high = interval(values)
+    mean, sd, low, high = mean_interval(values)
     safe = _safe(study, sound)
     good = _as_good(study, safe, mean)
-    result = Result(
+    result = EvolveResult(
         folder=folder,
         scenario=with_parameters(study.scenario, winner),
         parameters=winner,
@@ -73,29 +70,29 @@ def conclude(
         origin=origins[i],
         ranges={key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys if len(good)},
         above=len(good),
-        candidates=len(table),
+        candidate_count=len(table),
         failed=int(table[first.name].isna().sum()),
         finalists=finalist_table(study, points, origins, rows),
-        dead=_dead(study, flown),
+        dead_reason=_dead(study, flown),
         scenarios=each,
-        limits=tuple(kept(study, [flown[0, r] for r in range(len(unbiased) * len(study.scenarios))])),
+        limits=tuple(limit_reports(study, [flown[0, r] for r in range(len(unbiased) * len(study.scenarios))])),
     )
-    write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
-    if not result.dead:
+    write_toml_file(folder / RESULT_FILE, result.document(), "What the study found; parameters and ranges in SI units.")
+    if not result.dead_reason:
         for place, name in enumerate(best_files(study)):
-            document = scenario_document(study, winner, result, folder, place)
-            write(folder / name, document, "The winner of a study, ready to fly.")
+            document = best_document(study, winner, result, folder, place)
+            write_toml_file(folder / name, document, "The winner of a study, ready to fly.")
     tables.export(store, folder, study.labels)
     return result
 
 
-def _sound_candidates(study: Study, store: Store, table: pd.DataFrame, folder: Path) -> pd.DataFrame:
+def _sound_candidates(study: Study, store: FlightStore, table: pd.DataFrame, folder: Path) -> pd.DataFrame:
     """Candidates of whole flights that did not fail, the best first; with limits also how far each is from them."""
     first = study.objectives[0]
-    whole = tables.whole_flights(table, study.search.flights == "growing")
+    whole = tables.full_length_candidates(table, study.search.flights == "growing")
     if study.limits:
-        whole = whole.assign(**{EXCESS: excesses(study, store, whole)})
-    sound = tables.best_first(whole, first.name, first.maximise)
+        whole = whole.assign(**{EXCESS_COLUMN: candidate_excesses(study, store, whole)})
+    sound = tables.sort_by_fitness(whole, first.name, first.maximise)
     if not len(sound):
         reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
         raise StudyError(f"{folder}: every candidate failed; the first one: {reason[0][0] if reason else 'unknown'}")
@@ -104,8 +101,8 @@ def _sound_candidates(study: Study, store: Store, table: pd.DataFrame, folder: P
 
 def _safe(study: Study, sound: pd.DataFrame) -> pd.DataFrame:
     """Candidates that keep all limits; all of them where there are no limits, or nobody keeps them."""
-    if study.limits and (sound[EXCESS] == 0.0).any():
-        return sound[sound[EXCESS] == 0.0]
+    if study.limits and (sound[EXCESS_COLUMN] == 0.0).any():
+        return sound[sound[EXCESS_COLUMN] == 0.0]
     return sound
 
 
@@ -130,7 +127,7 @@ def _scored(
     )
     if n == 1:
         return table[:, 0].tolist(), {}
-    each = {label: interval(table[:, place].tolist()) for place, label in enumerate(study.labels)}
+    each = {label: mean_interval(table[:, place].tolist()) for place, label in enumerate(study.labels)}
     means = table.mean(axis=0) * (1.0 if first.maximise else -1.0)
     values = table[:, int(np.argmin(means))] if study.over_scenarios == "worst" else table.mean(axis=1)
     return values.tolist(), {label: (mean, low, high) for label, (mean, _, low, high) in each.items()}
@@ -141,6 +138,6 @@ def _dead(study: Study, flown: Mapping[tuple[int, int], Mapping[str, Any] | None
     n = len(study.scenarios)
     for place, label in enumerate(study.labels):
         rows = [scores for (_, repeat), scores in flown.items() if repeat % n == place]
-        if found := dead(study, rows):
+        if found := dead_reason(study, rows):
             return found if n == 1 else f"{label}: {found}"
     return ""

@@ -1,1 +1,5 @@
 """Studio: a page in the browser that shows an open flight and lets it be played, tuned and measured."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -18,8 +18,8 @@ import websockets.asyncio.server
 from websockets.datastructures import Headers
 from websockets.http11 import Response
 
-REFUSED = b"airflock: this page needs the whole address that the terminal shows, with its token\n"
-OWN = b"""<script>
+REFUSAL_PAGE = b"airflock: this page needs the whole address that the terminal shows, with its token\n"
+PAGE_SCRIPT = b"""<script>
 addEventListener("DOMContentLoaded", () => {
   const field = '[role=slider], input, textarea, [role=combobox]';
   for (const kind of ["keydown", "keyup"])
@@ -66,7 +66,9 @@ addEventListener("DOMContentLoaded", () => {
 </script>"""
 
 
-def admitted(path: str, cookies: str, name: str, token: str, origin: str = "", host: str = "") -> tuple[bool, bool]:
+def check_access(
+    path: str, cookies: str, cookie_name: str, token: str, origin: str = "", host: str = ""
+) -> tuple[bool, bool]:
     """Whether a request may pass, and whether it came with the token in its address.
 
     path   : with its query; cookies : the header; name : of the cookie that holds the token
@@ -82,27 +84,29 @@ def admitted(path: str, cookies: str, name: str, token: str, origin: str = "", h
         asks = urlsplit(origin).netloc
     except (CookieError, ValueError):  # what a stranger sends may be no address at all
         return False, False
-    value = kept[name].value if name in kept else ""
+    value = kept[cookie_name].value if cookie_name in kept else ""
     return hmac.compare_digest(value.encode(), token.encode()) and (not origin or asks == host), False
 
 
 @contextmanager
-def guarded(token: str, port: int) -> Iterator[None]:
+def require_token(token: str, port: int) -> Iterator[None]:
     """Servers of websockets started meanwhile ask for the token."""
     serve, name = websockets.asyncio.server.serve, f"airflock_{port}"
 
     def with_check(handler: Any, *where: Any, process_request: Callable[..., Any], **rest: Any) -> Any:
         def check(connection: Any, request: Any) -> Any:
             cookies, origin, host = ("; ".join(request.headers.get_all(n)) for n in ("Cookie", "Origin", "Host"))
-            passes, anew = admitted(request.path, cookies, name, token, origin, host)
+            passes, anew = check_access(request.path, cookies, name, token, origin, host)
             if not passes:
-                return Response(HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Type": "text/plain"}), REFUSED)
+                return Response(
+                    HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Type": "text/plain"}), REFUSAL_PAGE
+                )
             page = urlsplit(request.path).path in ("", "/", "/index.html")
             if page and "Accept-Encoding" in request.headers:
                 del request.headers["Accept-Encoding"]
             answer = process_request(connection, request)
             if page and answer is not None and answer.body is not None:
-                answer.body = answer.body.replace(b"<head>", b"<head>" + OWN, 1)
+                answer.body = answer.body.replace(b"<head>", b"<head>" + PAGE_SCRIPT, 1)
                 del answer.headers["Content-Length"]
                 answer.headers["Content-Length"] = str(len(answer.body))
             if anew and answer is not None:

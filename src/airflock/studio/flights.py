@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine import Flight, Snapshot
-from airflock.recordings.files import save
-from airflock.scenarios.scenario import Scenario
-from airflock.studio.origin import Origin
-from airflock.studio.saving import flown_again, toml_of
-from airflock.studio.side import Side
-from airflock.support import atomic
-from airflock.support.errors import StudioError
-from airflock.view.replays import replay
+from airflock.recordings import save
+from airflock.scenarios import Scenario
+from airflock.studio.origin import FlightSource
+from airflock.studio.saving import refly, tuned_toml
+from airflock.studio.side import FlightPane
+from airflock.support import StudioError, atomic
+from airflock.view import replay
 
 
 @dataclass(frozen=True)
@@ -36,18 +35,22 @@ class FlightRequest:
     seed: int = 0
     law: Any = None
     trust: bool = False
-    against: str | Mapping[str, Any] | None = None
-    at_once: bool = False
+    compared_with: str | Mapping[str, Any] | None = None
+    interpret_first: bool = False
 
-    def origins(self) -> list[Origin]:
+    def sources(self) -> list[FlightSource]:
         """Where the flights come from, one or two; raises RecordingError for a recording that cannot be flown again."""
-        first = Origin.of(self.where, self.settings, self.law, trust=self.trust)
-        if isinstance(self.against, str):
-            return [first, Origin.of(self.against, self.settings, trust=self.trust)]
-        return [first, replace(first, settings={**first.settings, **self.against})] if self.against else [first]
+        first = FlightSource.of(self.where, self.settings, self.law, trust=self.trust)
+        if isinstance(self.compared_with, str):
+            return [first, FlightSource.of(self.compared_with, self.settings, trust=self.trust)]
+        return (
+            [first, replace(first, settings={**first.settings, **self.compared_with})]
+            if self.compared_with
+            else [first]
+        )
 
 
-class Flights:
+class ComparedFlights:
     """One flight of a scenario, or two side by side. They know no clock: `Player` flies them.
 
     Attributes: origins, where they come from; sides, as they fly; hand, which of them the controls act on; note, what
@@ -55,21 +58,21 @@ class Flights:
     """
 
     def __init__(self, request: FlightRequest):
-        self.origins = request.origins()
-        recording = self.origins[0].recording
+        self.sources = request.sources()
+        recording = self.sources[0].recording
         self.seed = request.seed if recording is None else int(recording.attrs["airflock_seed"])
         self.hand, self.note = 0, ""
         self.fault: Callable[[str], None] = lambda line: None
-        self._at_once = request.at_once
+        self._interpret_first = request.interpret_first
         self._open()
 
-    def _open(self, start: bool = False) -> None:
+    def _open(self, place_agents: bool = False) -> None:
         """Begin the flights of all origins, agents placed if `start`. Raises AirflockError, and changes nothing."""
-        sides = [Side(origin, self.seed, self._at_once) for origin in self.origins]
+        sides = [FlightPane(origin, self.seed, self._interpret_first) for origin in self.sources]
         if len(sides) == 2 and sides[0].scenario.dimensions != sides[1].scenario.dimensions:
             flown = [f"{side.origin.where} in {side.scenario.dimensions}" for side in sides]
             raise StudioError(f"two flights side by side share one scene: {flown[0]} and {flown[1]} dimensions do not")
-        for side in sides if start else ():
+        for side in sides if place_agents else ():
             _ = side.motion
         self.sides, self.hand = sides, min(self.hand, len(sides) - 1)
 
@@ -79,13 +82,13 @@ class Flights:
             _ = side.motion
 
     @property
-    def compiling(self) -> bool:
+    def is_compiling(self) -> bool:
         """Whether interpreted flights stand for those that are being compiled."""
-        return any(side.compiling for side in self.sides)
+        return any(side.is_compiling for side in self.sides)
 
-    def settle(self) -> list[Snapshot | None]:
+    def switch_to_compiled(self) -> list[Snapshot | None]:
         """Go on as compiled flights, once they are compiled: their starts; None for those that are compiled already."""
-        return [side.hand_over() for side in self.sides]
+        return [side.switch_to_compiled() for side in self.sides]
 
     @property
     def time(self) -> float:
@@ -93,7 +96,7 @@ class Flights:
         return self.sides[0].flight.time
 
     @property
-    def side(self) -> Side:
+    def side(self) -> FlightPane:
         """The side that the controls act on."""
         return self.sides[self.hand]
 
@@ -120,7 +123,7 @@ class Flights:
     @property
     def where(self) -> str:
         """What is flown, in words."""
-        first, *others = self.origins
+        first, *others = self.sources
         return " | ".join([first.where, *(other.beside(first) for other in others)])
 
     @property
@@ -135,29 +138,29 @@ class Flights:
 
         A fork ends with its flight; two that were opened side by side begin anew.
         """
-        known = self.seed, self.origins
+        known = self.seed, self.sources
         self.seed = self.seed if seed is None else seed
-        self.origins = [replace(o, settings={**o.settings, **(settings or {})}) for o in self.origins]
+        self.sources = [replace(o, settings={**o.settings, **(settings or {})}) for o in self.sources]
         try:
             self._open()
         except Exception:
-            self.seed, self.origins = known
+            self.seed, self.sources = known
             raise
         self.note = ""
 
-    def open(self, where: str) -> None:
+    def open(self, name: str) -> None:
         """Another scenario, of the same seed: a preset, or a file whose code may not run. A comparison ends.
 
         Raises AirflockError, and flies on as before.
         """
-        known = self.origins
-        self.origins = [Origin.of(where, {})]
+        known = self.sources
+        self.sources = [FlightSource.of(name, {})]
         try:
-            self._open(start=True)
+            self._open(place_agents=True)
         except Exception:
-            self.origins = known
+            self.sources = known
             raise
-        self.note = f"opened {where}"
+        self.note = f"opened {name}"
 
     # ---------------------------------------------------------------------------------------------- comparing
 
@@ -166,14 +169,14 @@ class Flights:
 
         A second flight that there was already ends.
         """
-        self.settle()
-        self.origins, self.sides = [self.side.origin], [self.side, self.side.fork()]
+        self.switch_to_compiled()
+        self.sources, self.sides = [self.side.origin], [self.side, self.side.fork()]
         self.hand = 1
         self.note = f"forked at t = {self.time:g} s: the controls act on B"
 
     def join(self) -> None:
         """End the comparison: the side that the controls act on flies on alone."""
-        self.origins = [self.side.origin]
+        self.sources = [self.side.origin]
         self.sides, self.hand = [self.side], 0
         self.note = ""
 
@@ -184,9 +187,9 @@ class Flights:
         self.side.change({key: value})
         self.note = ""
 
-    def push(self, agent: int, speed: float, side: int = 0) -> None:
+    def push(self, agent: int, speed: float, pane: int = 0) -> None:
         """Push an agent of a side sideways, m/s: at a right angle to its velocity, to its left."""
-        pushed = self.sides[side]
+        pushed = self.sides[pane]
         _, velocity = pushed.motion
         vx, vy = float(velocity[agent, 0]), float(velocity[agent, 1])
         fast = max(float(np.hypot(vx, vy)), 1e-9)
@@ -198,17 +201,17 @@ class Flights:
         for side in self.sides:
             side.gust(east, north, seconds)
 
-    def throw(self, x: float, y: float, width: float) -> None:
+    def throw_obstacle(self, x: float, y: float, width: float) -> None:
         """Throw a square obstacle of a width, m, into the worlds of all sides; refused where an agent is."""
         for name, side in zip("AB", self.sides, strict=False):
-            side.clear_of(x, y, width, name if len(self.sides) > 1 else "")
+            side.check_free(x, y, width, name if len(self.sides) > 1 else "")
         for side in self.sides:
-            side.throw(x, y, width)
+            side.throw_obstacle(x, y, width)
 
-    def move_goal(self, number: int, place: Sequence[float]) -> None:
+    def move_goal(self, number: int, position: Sequence[float]) -> None:
         """Put a goal somewhere else, m, on all sides that have it."""
         for side in self.sides:
-            side.move_goal(number, place)
+            side.move_goal(number, position)
 
     # ------------------------------------------------------------------------------------------------- saving
 
@@ -220,15 +223,17 @@ class Flights:
     def save_toml(self, path: Path) -> Path:
         """Write the preset's file with the keys changed here, its comments and sources kept."""
         origin = self.side.origin
-        atomic.write(path, toml_of(origin.where, self.side.settings, origin.document, self.side.preset.document))
+        atomic.write_file(
+            path, tuned_toml(origin.where, self.side.settings, origin.document, self.side.preset.document)
+        )
         return path
 
     def save_recording(self, path: Path) -> Path:
         """Fly the flight again from its start with all that was done to it, and save it. Raises where bits differ."""
-        self.settle()
-        return save(flown_again(self.flight), path)
+        self.switch_to_compiled()
+        return save(refly(self.flight), path)
 
     def save_replay(self, path: Path) -> Path:
         """Write the flight up to now as one HTML file that plays it."""
-        self.settle()
-        return replay(flown_again(self.flight)).save(path)
+        self.switch_to_compiled()
+        return replay(refly(self.flight)).save(path)

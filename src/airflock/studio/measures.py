@@ -11,12 +11,12 @@ from scipy.spatial import cKDTree
 
 from airflock.engine import Flight
 
-KEPT = 600  # points of a chart
-MOST_LINKS = 2500
-BINS = 40  # of a histogram
+MAX_CHART_POINTS = 600  # points of a chart
+MAX_LINKS = 2500
+HISTOGRAM_BINS = 40  # of a histogram
 
 
-class Instant(NamedTuple):
+class FlockInstant(NamedTuple):
     """One moment of a flock: s, m/s, m."""
 
     time: float
@@ -26,7 +26,7 @@ class Instant(NamedTuple):
     nearest: float
 
 
-class Pairs:
+class AgentPairs:
     """Near pairs of a flock; of a periodic world with the nearest image where its box is given.
 
     period : side of the box along each axis, m; None in an open world
@@ -56,40 +56,40 @@ class Pairs:
         """Pairs (pair, 2) nearer than a distance, m."""
         return np.asarray(self._tree.query_pairs(distance, output_type="ndarray"), np.intp)
 
-    def linked(self, distance: float) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def nearest_pairs_within(self, distance: float) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Pairs (pair, 2) nearer than a distance, m, and how far apart; none through a periodic face.
 
         Of more than can be drawn the nearest.
         """
         size = len(self.position)
         far = distance
-        if size * size > 2 * MOST_LINKS:  # a denser flock than can be drawn: as far as so many neighbours reach
-            count = min(size - 1, max(1, 2 * MOST_LINKS // size))
+        if size * size > 2 * MAX_LINKS:  # a denser flock than can be drawn: as far as so many neighbours reach
+            count = min(size - 1, max(1, 2 * MAX_LINKS // size))
             far = min(distance, float(np.quantile(self._tree.query(self._tree.data, k=count + 1)[0][:, -1], 0.9)))
         pairs = self.within(far)
         length = np.linalg.norm(self.position[pairs[:, 1]] - self.position[pairs[:, 0]], axis=1)
-        order = np.argsort(length, kind="stable")[:MOST_LINKS]
+        order = np.argsort(length, kind="stable")[:MAX_LINKS]
         order = order[length[order] <= distance]  # others lie beyond a periodic face
         return pairs[order], length[order]
 
     def neighbours(self, count: int = 3) -> NDArray[Any]:
         """Segments (segment, 2, 3) from each agent to its nearest others; none through a periodic face."""
-        count = min(count, len(self.position) - 1, max(1, MOST_LINKS // max(len(self.position), 1)))
+        count = min(count, len(self.position) - 1, max(1, MAX_LINKS // max(len(self.position), 1)))
         if count < 1:
             return np.zeros((0, 2, 3))
         _, other = self._tree.query(self._tree.data, k=count + 1)
         ends = self.position[other[:, 1:]].reshape(-1, 3)
         found = np.stack([np.repeat(self.position, count, axis=0), ends], 1)
-        return found if self.period is None else unwrapped(found, self.period)
+        return found if self.period is None else without_periodic_crossings(found, self.period)
 
 
-def unwrapped(segments: NDArray[Any], period: NDArray[Any]) -> NDArray[Any]:
+def without_periodic_crossings(segments: NDArray[Any], period: NDArray[Any]) -> NDArray[Any]:
     """Segments without those that cross a periodic face."""
     long = (np.abs(segments[:, 1] - segments[:, 0]) > 0.5 * period).any(axis=1)
     return np.asarray(segments[~long])
 
 
-def period_of(scenario: Any) -> tuple[float, float, float] | None:
+def world_period(scenario: Any) -> tuple[float, float, float] | None:
     """Sides of a periodic world, m; None of any other."""
     world = scenario.world
     if world.edges != "periodic":
@@ -97,18 +97,18 @@ def period_of(scenario: Any) -> tuple[float, float, float] | None:
     return (world.side, world.side, world.height if scenario.dimensions == 3 else 0.0)
 
 
-class Measures:
+class PaneChartData:
     """What the charts show of one side: instants, the course of one order parameter of the present window, and how
     often which speed and which distance to the nearest neighbour was seen in it.
 
     top, far : ends of the histograms, m/s and m
     """
 
-    def __init__(self, top: float = 1.0, far: float = 1.0) -> None:
-        self.instants: deque[Instant] = deque(maxlen=KEPT)
-        self.course: deque[tuple[float, float]] = deque(maxlen=KEPT)
+    def __init__(self, max_speed: float = 1.0, max_distance: float = 1.0) -> None:
+        self.instants: deque[FlockInstant] = deque(maxlen=MAX_CHART_POINTS)
+        self.score_course: deque[tuple[float, float]] = deque(maxlen=MAX_CHART_POINTS)
         self.name = ""
-        self.speeds, self.distances = Histogram(top), Histogram(far)
+        self.speed_histogram, self.distance_histogram = Histogram(max_speed), Histogram(max_distance)
         self._window = -1
 
     def clear(self) -> None:
@@ -118,11 +118,11 @@ class Measures:
 
     def fresh(self) -> None:
         """A new window begins."""
-        self.course.clear()
-        self.speeds.clear()
-        self.distances.clear()
+        self.score_course.clear()
+        self.speed_histogram.clear()
+        self.distance_histogram.clear()
 
-    def note(self, flight: Flight, velocity: NDArray[Any], pairs: Pairs) -> dict[str, Any]:
+    def note(self, flight: Flight, velocity: NDArray[Any], pairs: AgentPairs) -> dict[str, Any]:
         """Add the present moment, once; returns the scores of the present window."""
         if len(flight.windows) != self._window:
             self._window = len(flight.windows)
@@ -132,21 +132,23 @@ class Measures:
             return scores
         speed, apart = np.sqrt((velocity**2).sum(1)), pairs.apart()
         nearest = float(apart.min()) if len(apart) else math.nan
-        self.instants.append(Instant(flight.time, float(speed.mean()), float(speed.min()), float(speed.max()), nearest))
-        self.speeds.add(speed)
-        self.distances.add(apart)
+        self.instants.append(
+            FlockInstant(flight.time, float(speed.mean()), float(speed.min()), float(speed.max()), nearest)
+        )
+        self.speed_histogram.add(speed)
+        self.distance_histogram.add(apart)
         value = scores.get(self.name)
         if isinstance(value, (int, float)) and math.isfinite(value):
-            self.course.append((flight.time, float(value)))
+            self.score_course.append((flight.time, float(value)))
         return scores
 
 
 class Histogram:
     """How often values from 0 to `top` were seen, as shares of all; what is larger counts in the last bin."""
 
-    def __init__(self, top: float):
-        self.edges = np.linspace(0.0, top, BINS + 1)
-        self.counts = np.zeros(BINS)
+    def __init__(self, max_value: float):
+        self.edges = np.linspace(0.0, max_value, HISTOGRAM_BINS + 1)
+        self.counts = np.zeros(HISTOGRAM_BINS)
 
     def clear(self) -> None:
         """Forget all values."""
@@ -155,7 +157,9 @@ class Histogram:
     def add(self, values: NDArray[Any]) -> None:
         """Count values."""
         width = self.edges[1]
-        self.counts += np.bincount(np.clip((values / width).astype(int), 0, BINS - 1), minlength=BINS)
+        self.counts += np.bincount(
+            np.clip((values / width).astype(int), 0, HISTOGRAM_BINS - 1), minlength=HISTOGRAM_BINS
+        )
 
     @property
     def steps(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -164,7 +168,7 @@ class Histogram:
         return np.repeat(self.edges, 2)[1:-1], np.repeat(share, 2)
 
 
-def chosen_score(names: Mapping[str, Any], published: Mapping[str, Any]) -> str:
+def default_score(names: Mapping[str, Any], published: Mapping[str, Any]) -> str:
     """The order parameter shown first: one that the paper reports, if there is any."""
     for name in ("phi_corr", "fitness", "f_corr", "polarisation"):
         if name in names and (name in published or not published):

@@ -6,25 +6,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from airflock.studio import measures
-from airflock.studio.drawing import NAMES
-from airflock.studio.room import Room
-from airflock.studio.score_tables import score_table
+from airflock.studio.drawing import PANE_NAMES
+from airflock.studio.room import PagePanel
+from airflock.studio.score_tables import score_table_html
 
 if TYPE_CHECKING:
-    from airflock.studio.page import Page
+    from airflock.studio.page import FlightPage
 
 
-BAND = ("paper +", "paper −")
+BAND_NAMES = ("paper +", "paper −")
 
 
-class Measuring(Room):
+class MeasurementPanel(PagePanel):
     """Charts of one side, or of two in one picture."""
 
-    def __init__(self, page: "Page", tab: Any):
+    def __init__(self, page: "FlightPage", tab: Any):
         super().__init__(page)
         self.tab = tab
         self._charts: list[Any] = []
-        self._names: list[str] = []
+        self._score_names: list[str] = []
         self.scores: list[dict[str, Any]] = []
         self.name = ""  # of the order parameter that is drawn
 
@@ -32,47 +32,61 @@ class Measuring(Room):
         """Begin anew, for as many sides as there are."""
         player = self.player
         scores = player.sides[0].flight.scores()
-        self._names = [name for name, value in scores.items() if isinstance(value, (int, float))]
-        if self.name not in self._names:
-            self.name = measures.chosen_score(dict.fromkeys(self._names), player.sides[0].scenario.published)
+        self._score_names = [name for name, value in scores.items() if isinstance(value, (int, float))]
+        if self.name not in self._score_names:
+            self.name = measures.default_score(dict.fromkeys(self._score_names), player.sides[0].scenario.published)
         self.sides = []
-        for side, flock in zip(player.sides, self.drawing.flocks, strict=True):
-            far = float(side.scenario.measured_by().r_cluster or 1.0)
+        for side, flock in zip(player.sides, self.scene.flocks, strict=True):
+            far = float(side.scenario.resolved_metrics().r_cluster or 1.0)
             apart = flock.pairs.apart()
             far = min(far, 4.0 * float(np.median(apart))) if len(apart) else far
-            self.sides.append(measures.Measures(self.drawing.top, max(far, 1e-6)))
+            self.sides.append(measures.PaneChartData(self.scene.top, max(far, 1e-6)))
             self.sides[-1].name = self.name
         self._make_charts()
 
     def _make_charts(self) -> None:
         """Make menu, charts and table anew."""
-        panel, player = self.panel, self.player
+        panel, player = self.widgets, self.player
         for chart in self._charts:
             chart.remove()
-        two, names = len(player.sides) > 1, self._names
+        two, names = len(player.sides) > 1, self._score_names
         banded = self.name in player.sides[0].scenario.published
-        tags = [f" {name}" for name in NAMES] if two else [""]
+        tags = [f" {name}" for name in PANE_NAMES] if two else [""]
         with self.tab:
-            self.menu = panel.menu("order parameter", names, self.name, lambda n: player.ask(lambda: self._choose(n)))
-            self.course = panel.chart(
-                "since the last change", [*(f"value{t}" for t in tags), *(BAND if banded else ())], band=banded
+            self.score_menu = panel.add_menu(
+                "order parameter", names, self.name, lambda n: player.ask(lambda: self._choose(n))
+            )
+            self.score_chart = panel.add_chart(
+                "since the last change", [*(f"value{t}" for t in tags), *(BAND_NAMES if banded else ())], band=banded
             )
             words = ("mean", "slowest", "fastest")
-            self.speeds = panel.chart("speed (m/s)", [f"{w}{t}" for t in tags for w in (words[:1] if two else words)])
-            self.nearest = panel.chart("smallest distance (m)", [f"nearest pair{t}" for t in tags])
-            self.speed_shares = panel.chart("speeds since the last change", [f"share{t}" for t in tags], across="m/s")
-            self.distance_shares = panel.chart("distance to the nearest", [f"share{t}" for t in tags], across="m")
+            self.speed_chart = panel.add_chart(
+                "speed (m/s)", [f"{w}{t}" for t in tags for w in (words[:1] if two else words)]
+            )
+            self.nearest = panel.add_chart("smallest distance (m)", [f"nearest pair{t}" for t in tags])
+            self.speed_histogram_chart = panel.add_chart(
+                "speeds since the last change", [f"share{t}" for t in tags], across="m/s"
+            )
+            self.distance_histogram_chart = panel.add_chart(
+                "distance to the nearest", [f"share{t}" for t in tags], across="m"
+            )
             self.table = panel.text()
         self._charts = [
-            self.menu, self.course, self.speeds, self.nearest, self.speed_shares, self.distance_shares, self.table,
-        ]  # fmt: skip
+            self.score_menu,
+            self.score_chart,
+            self.speed_chart,
+            self.nearest,
+            self.speed_histogram_chart,
+            self.distance_histogram_chart,
+            self.table,
+        ]
 
     def _choose(self, name: str) -> None:
         """Draw another order parameter, from here on; with a band only where the paper tells its value."""
         self.name = name
         for side in self.sides:
             side.name = name
-            side.course.clear()
+            side.score_course.clear()
         self._make_charts()
 
     def clear(self) -> None:
@@ -82,10 +96,10 @@ class Measuring(Room):
 
     def refresh(self) -> None:
         """Add the present moment and draw everything."""
-        flocks, two = self.drawing.flocks, len(self.sides) > 1
+        flocks, two = self.scene.flocks, len(self.sides) > 1
         for side in self.sides:
-            if side.speeds.edges[-1] < self.drawing.top:
-                side.speeds = measures.Histogram(self.drawing.top)
+            if side.speed_histogram.edges[-1] < self.scene.top:
+                side.speed_histogram = measures.Histogram(self.scene.top)
         flights = [flock.side.flight for flock in flocks]
         self.scores = [
             side.note(flock.side.flight, flock.velocity, flock.pairs)
@@ -96,18 +110,18 @@ class Measuring(Room):
         parts = [part[len(part) - count :] for part in instants]
         columns = (1,) if two else (1, 2, 3)
         time = np.ascontiguousarray(parts[0][:, 0])
-        self.speeds.data = time, *(np.ascontiguousarray(part[:, c]) for part in parts for c in columns)
+        self.speed_chart.data = time, *(np.ascontiguousarray(part[:, c]) for part in parts for c in columns)
         self.nearest.data = time, *(np.ascontiguousarray(part[:, 4]) for part in parts)
         self._draw_course()
         for chart, shares in (
-            (self.speed_shares, [side.speeds.steps for side in self.sides]),
-            (self.distance_shares, [side.distances.steps for side in self.sides]),
+            (self.speed_histogram_chart, [side.speed_histogram.steps for side in self.sides]),
+            (self.distance_histogram_chart, [side.distance_histogram.steps for side in self.sides]),
         ):
-            chart.data = _joined(shares)
-        self.table.content = score_table(flights, self.scores)
+            chart.data = _joined_outlines(shares)
+        self.table.content = score_table_html(flights, self.scores)
 
     def _draw_course(self) -> None:
-        courses = [np.array(side.course).reshape(-1, 2) for side in self.sides]
+        courses = [np.array(side.score_course).reshape(-1, 2) for side in self.sides]
         longest = max(courses, key=len)
         if not len(longest):
             return
@@ -121,10 +135,10 @@ class Measuring(Room):
         if self.name in published:
             mean, spread = published[self.name]
             edges = [np.full(len(time), mean + sign * (spread or 0.0)) for sign in (1.0, -1.0)]
-        self.course.data = time, *values, *edges
+        self.score_chart.data = time, *values, *edges
 
 
-def _joined(outlines: list[Any]) -> tuple[Any, ...]:
+def _joined_outlines(outlines: list[Any]) -> tuple[Any, ...]:
     """Outlines of histograms over one axis: values and the share of each at them."""
     if len(outlines) == 1:
         return tuple(outlines[0])

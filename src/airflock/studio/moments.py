@@ -4,18 +4,18 @@ from bisect import bisect_right
 
 from airflock.engine import Snapshot
 
-MOST = 256 * 2**20  # bytes of all moments together
-COUNT = 400  # moments at most
+MAX_BYTES = 256 * 2**20  # bytes of all moments together
+MAX_SNAPSHOTS = 400  # moments at most
 
 
-class Moments:
+class KeptSnapshots:
     """Snapshots in the order of their time; where there are too many, every second moment is dropped.
 
     every : flight seconds between two of them; doubles whenever they are thinned
     """
 
     def __init__(self, every: float = 2.0):
-        self.every = every
+        self.interval = every
         self._kept: list[tuple[Snapshot, ...]] = []
         self._times: list[float] = []
 
@@ -24,16 +24,16 @@ class Moments:
 
     def due(self, time: float) -> bool:
         """Whether the next moment should be kept at this time, s."""
-        return not self._times or time >= self._times[-1] + self.every - 1e-9
+        return not self._times or time >= self._times[-1] + self.interval - 1e-9
 
     def keep(self, time: float, snapshots: tuple[Snapshot, ...]) -> None:
         """Keep a moment, s, one snapshot a flight; those after it belong to a past that is given up."""
         self.forget_after(time)
         self._kept.append(snapshots)
         self._times.append(time)
-        if len(self._kept) > COUNT or sum(len(s.bytes) for moment in self._kept for s in moment) > MOST:
+        if len(self._kept) > MAX_SNAPSHOTS or sum(len(s.bytes) for moment in self._kept for s in moment) > MAX_BYTES:
             self._kept, self._times = self._kept[::2], self._times[::2]
-            self.every *= 2.0
+            self.interval *= 2.0
 
     def forget_after(self, time: float) -> None:
         """Drop all moments at or after a time, s."""

@@ -7,116 +7,122 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.studio.acting import Acting
-from airflock.studio.comparing import Comparing
-from airflock.studio.drawing import Drawing
-from airflock.studio.measuring import Measuring
-from airflock.studio.opening import Opening
+from airflock.studio.acting import ActionPanel
+from airflock.studio.comparing import ComparisonPanel
+from airflock.studio.drawing import PageScene
+from airflock.studio.measuring import MeasurementPanel
+from airflock.studio.opening import OpeningPanel
 from airflock.studio.player import Player
-from airflock.studio.playing import Playing
-from airflock.studio.room import Room, told
-from airflock.studio.selecting import Selecting
-from airflock.studio.tuning import Tuning
-from airflock.studio.view import View
+from airflock.studio.playing import PlaybackPanel
+from airflock.studio.room import PagePanel, status_html
+from airflock.studio.selecting import SelectionPanel
+from airflock.studio.tuning import TuningPanel
+from airflock.studio.view import BrowserView
 
-FRAMES = 30  # per second of real time
-CHARTS = 5  # per second
+FRAMES_PER_SECOND = 30  # per second of real time
+CHARTS_PER_SECOND = 5  # per second
 
 
-class Page:
+class FlightPage:
     """One page: call `run` to fly until `stop` or Ctrl-C."""
 
-    def __init__(self, player: Player, view: View):
+    def __init__(self, player: Player, view: BrowserView):
         self.player, self.view = player, view
-        self._running = True
-        self.drawing = Drawing(player, view)
+        self._is_running = True
+        self.scene = PageScene(player, view)
         panel = view.panel
-        self.title, self.trouble = panel.text(), panel.text()
-        self.rescue = panel.button("Go back one moment", lambda: player.ask(self._rescued))
-        self.rescue.visible = False
-        play, tune, measure, compare = panel.tabs("Play", "Tune", "Measure", "Compare")
+        self.title, self.warning_text = panel.text(), panel.text()
+        self.rescue_button = panel.add_button("Go back one moment", lambda: player.ask(self._rescued))
+        self.rescue_button.visible = False
+        play, tune, measure, compare = panel.add_tabs("Play", "Tune", "Measure", "Compare")
         with play:
-            self.playing, self.selecting, self.acting = Playing(self), Selecting(self), Acting(self)
-            self.opening = Opening(self)
+            self.playback, self.selection, self.actions = PlaybackPanel(self), SelectionPanel(self), ActionPanel(self)
+            self.open_panel = OpeningPanel(self)
         with tune:
-            self.tuning = Tuning(self, tune)
-        self.measuring = Measuring(self, measure)
+            self.tuning = TuningPanel(self, tune)
+        self.measurement = MeasurementPanel(self, measure)
         with compare:
-            self.comparing = Comparing(self, compare)
-        self.rooms: list[Room] = [
-            self.playing, self.selecting, self.acting, self.opening, self.tuning, self.measuring, self.comparing,
-        ]  # fmt: skip
-        for room in self.rooms:
+            self.comparison = ComparisonPanel(self, compare)
+        self.panels: list[PagePanel] = [
+            self.playback,
+            self.selection,
+            self.actions,
+            self.open_panel,
+            self.tuning,
+            self.measurement,
+            self.comparison,
+        ]
+        for room in self.panels:
             room.rebuild()
         self.frame(True)
         view.on_click(lambda origin, way: player.ask(lambda: self._clicked(origin, way)))
 
     def stop(self) -> None:
         """End `run` after the frame at hand; from any thread."""
-        self._running = False
+        self._is_running = False
 
     def run(self) -> None:
         """Fly and draw in real time until the page is stopped."""
         now = drawn = refreshed = time.perf_counter()
         acted = False
-        while self._running:
+        while self._is_running:
             last, now = now, time.perf_counter()
             moved = self.player.tick(now - last)
-            refresh = now - refreshed >= 1.0 / CHARTS
+            refresh = now - refreshed >= 1.0 / CHARTS_PER_SECOND
             if moved or acted or refresh:
                 self.frame(refresh)
             refreshed = now if refresh else refreshed
-            drawn = max(drawn + 1.0 / FRAMES, now)
-            acted = self._answer_until(drawn)
+            drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
+            acted = self._run_actions_until(drawn)
 
-    def _answer_until(self, end: float) -> bool:
+    def _run_actions_until(self, end: float) -> bool:
         """Do at once what a hand asks for, until the next frame is due. Whether anything was done."""
-        acted = self.player.wait(0.001)  # the threads of the page's server come first
-        while self._running and (left := end - time.perf_counter()) > 0.0:
-            acted = self.player.wait(left) or acted
+        acted = self.player.run_actions_within(0.001)  # the threads of the page's server come first
+        while self._is_running and (left := end - time.perf_counter()) > 0.0:
+            acted = self.player.run_actions_within(left) or acted
         return acted
 
     def rebuild(self) -> None:
         """Draw and list everything again, for other flights than before."""
-        self.drawing.rebuild()
-        for room in self.rooms:
+        self.scene.rebuild()
+        for room in self.panels:
             room.rebuild()
         self.frame(True)
 
-    def show_other_time(self) -> None:
+    def on_time_changed(self) -> None:
         """Forget trails, charts, and collisions that lie ahead: the flights are at another time."""
-        self.drawing.forget()
-        if len(self.player.sides) != len(self.drawing.flocks):
+        self.scene.forget()
+        if len(self.player.sides) != len(self.scene.flocks):
             self.rebuild()
-        self.measuring.clear()
+        self.measurement.clear()
         self.tuning.show_values()
 
     def frame(self, refresh: bool) -> None:
         """Draw the present moment, with charts, tables and words if `refresh`."""
-        chosen = self.selecting.chosen
+        chosen = self.selection.chosen
         with self.view.atomic():
             if refresh:
-                self.drawing.rebuild_if_changed()
-            self.drawing.frame(chosen)
+                self.scene.rebuild_if_changed()
+            self.scene.frame(chosen)
             if refresh:
-                for room in self.rooms:
+                for room in self.panels:
                     room.refresh()
                 self._show_status()
 
-    def _clicked(self, origin: NDArray[Any], way: NDArray[Any]) -> None:
-        if self.acting.aiming:
-            self.acting.at(np.asarray(origin), np.asarray(way))
+    def _clicked(self, origin: NDArray[Any], direction: NDArray[Any]) -> None:
+        if self.actions.is_aiming:
+            self.actions.at(np.asarray(origin), np.asarray(direction))
         else:
-            self.selecting.at(np.asarray(origin), np.asarray(way))
+            self.selection.at(np.asarray(origin), np.asarray(direction))
 
     def _rescued(self) -> None:
         """Go back to the last moment that was kept before the flight failed."""
-        self.playing.back(self.player.time)
+        self.playback.go_back(self.player.time)
 
     def _show_status(self) -> None:
         """Say where the flight is, what is wrong, and what has happened."""
         player = self.player
-        state = "paused" if player.paused else "stopped" if player.failure or player.over else "flying"
+        state = "paused" if player.is_paused else "stopped" if player.failure_message or player.over else "flying"
         counts = [side.flight.agents for side in player.sides]
         agents = f"{' and '.join(map(str, counts))} agent{'s' * (counts != [1])}"
         done = " and ".join(str(len(side.flight.events)) for side in player.sides)
@@ -124,5 +130,5 @@ class Page:
             f"<div style='padding:0 0.75em;font-variant-numeric:tabular-nums'><b>{html.escape(player.where)}</b><br>"
             f"<small>t = {player.time:.1f} s · {agents} · seed {player.seed} · {state} · events: {done}</small></div>"
         )
-        self.rescue.visible = bool(player.failure)
-        self.trouble.content = told(player.status, bad=bool(player.failure))
+        self.rescue_button.visible = bool(player.failure_message)
+        self.warning_text.content = status_html(player.status, is_error=bool(player.failure_message))

@@ -8,13 +8,13 @@ import viser
 from viser import uplot
 
 from airflock.studio.charts import Chart
-from airflock.studio.controls import Control
-from airflock.view.stage import colours
+from airflock.studio.controls import ParameterControl
+from airflock.view import colours
 
-TONES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
+CHART_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
 
 
-class Panel:
+class Widgets:
     """The panel of one page.
 
     server : of viser
@@ -23,7 +23,7 @@ class Panel:
     def __init__(self, server: viser.ViserServer):
         self.server = server
 
-    def tabs(self, *names: str) -> list[Any]:
+    def add_tabs(self, *names: str) -> list[Any]:
         """Tabs; each is a context in which controls are made."""
         group = self.server.gui.add_tab_group()
         return [group.add_tab(name) for name in names]
@@ -36,7 +36,7 @@ class Panel:
         """HTML that can be rewritten: `.content`."""
         return self.server.gui.add_html(content)
 
-    def button(self, label: str, action: Callable[[], None], hint: str = "") -> Any:
+    def add_button(self, label: str, action: Callable[[], None], hint: str = "") -> Any:
         """A button; `.label` can be rewritten."""
         handle = self.server.gui.add_button(label, hint=hint or None)
         handle.on_click(lambda _: action())
@@ -50,13 +50,13 @@ class Panel:
         """A key that does something."""
         self.server.gui.add_command(label, hotkey=key).on_trigger(lambda _: action())
 
-    def checkbox(self, label: str, value: bool, action: Callable[[bool], None], hint: str = "") -> Any:
+    def add_checkbox(self, label: str, value: bool, action: Callable[[bool], None], hint: str = "") -> Any:
         """A switch; its state is `.value`."""
         handle = self.server.gui.add_checkbox(label, value, hint=hint or None)
         handle.on_update(lambda event: action(bool(event.target.value)) if event.client is not None else None)
         return handle
 
-    def menu(
+    def add_menu(
         self, label: str, options: Sequence[str], value: str, action: Callable[[str], None], hint: str = ""
     ) -> Any:
         """A menu; what is chosen is `.value`."""
@@ -79,13 +79,13 @@ class Panel:
         """A field for a line of text: `.value`."""
         return self.server.gui.add_text(label, "", hint=hint or None)
 
-    def upload(self, label: str, ending: str, action: Callable[[str, bytes], None], hint: str = "") -> Any:
+    def add_upload_button(self, label: str, ending: str, action: Callable[[str, bytes], None], hint: str = "") -> Any:
         """A button that takes a file from the reader's machine; `action` is called with its name and content."""
         handle = self.server.gui.add_upload_button(label, mime_type=ending, hint=hint or None)
         handle.on_upload(lambda event: action(event.target.value.name, event.target.value.content))
         return handle
 
-    def slide(
+    def add_slider(
         self, label: str, low: float, high: float, step: float, value: float, action: Callable[[float], None],
         hint: str = "",
     ) -> Any:  # fmt: skip
@@ -94,20 +94,28 @@ class Panel:
         handle.on_update(lambda event: action(float(event.target.value)) if event.client is not None else None)
         return handle
 
-    def control(self, given: Control, action: Callable[[str, Any], None]) -> Any:
+    def add_control(self, control: ParameterControl, action: Callable[[str, Any], None]) -> Any:
         """A slider or a menu for a parameter."""
-        if given.is_choice:
-            return self.menu(given.label, given.options, given.value, lambda v: action(given.key, v), given.hint)
-        return self.slide(
-            given.label, given.low, given.high, given.step, given.value, lambda v: action(given.key, v), given.hint
+        if control.is_choice:
+            return self.add_menu(
+                control.label, control.options, control.value, lambda v: action(control.key, v), control.hint
+            )
+        return self.add_slider(
+            control.label,
+            control.low,
+            control.high,
+            control.step,
+            control.value,
+            lambda v: action(control.key, v),
+            control.hint,
         )
 
-    def chart(self, title: str, names: Sequence[str], band: bool = False, across: str = "t (s)") -> Chart:
+    def add_chart(self, title: str, names: Sequence[str], band: bool = False, across: str = "t (s)") -> Chart:
         """A chart: `.data` is (time or what is `across`, *values). With a band, the last two are its ends, shaded."""
         series: list[Any] = [uplot.Series(label=across)]
         for number, name in enumerate(names):
             edge = band and number >= len(names) - 2
-            stroke, width = ("#E69F00", 0.7) if edge else (TONES[number], 2.0)
+            stroke, width = ("#E69F00", 0.7) if edge else (CHART_COLOURS[number], 2.0)
             points = uplot.Series_Points(show=False)
             series.append(uplot.Series(label=name, points=points, stroke=stroke, width=width))
         shade = (uplot.Band(series=(len(names) - 1, len(names)), fill="rgba(230,159,0,0.2)"),) if band else None
@@ -115,10 +123,10 @@ class Panel:
         return Chart(self.server.gui.add_uplot(
             (zero, *[zero] * len(names)), tuple(series), title=title, aspect=2.1, bands=shade, padding=(8, 8, 0, 0),
             scales={"x": uplot.Scale(time=False, range=(0.0, 1.0))}, legend=uplot.Legend(show=True),
-            axes=(uplot.Axis(stroke=colours.INK, size=28), uplot.Axis(stroke=colours.INK, size=46)),
+            axes=(uplot.Axis(stroke=colours.AXIS_COLOUR, size=28), uplot.Axis(stroke=colours.AXIS_COLOUR, size=46)),
         ))  # fmt: skip
 
-    def say(self, title: str, body: str, bad: bool = False) -> None:
+    def notify(self, title: str, body: str, is_error: bool = False) -> None:
         """A notice on every open page."""
         for client in self.server.get_clients().values():
-            client.add_notification(title, body, color="red" if bad else "blue", auto_close_seconds=8.0)
+            client.add_notification(title, body, color="red" if is_error else "blue", auto_close_seconds=8.0)

@@ -7,66 +7,61 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.contract import Model
-from airflock.core.view import View as Seen
-from airflock.core.vocabulary import asks
-from airflock.engine import State as Memory
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.surroundings import Course, Place
-from airflock.studio.side import Side
-from airflock.view.stage import colours
-from airflock.view.stage.arrows import arrow, values, word_of
-from airflock.view.stage.rays import cast_rays
+from airflock.core import AgentView as Seen, Model, argument_names
+from airflock.engine import DriverState as Memory
+from airflock.scenarios import FlightWorld, GoalCourse, Scenario
+from airflock.studio.side import FlightPane
+from airflock.view import arrow_lines, colours, rays_and_command, term_name_and_unit, vector_values
 
-NONE = np.zeros((0, 2, 3))
-WAKE = 6.0  # spans of a wake that are drawn
-REACH = 5.0  # darts; length of the longest arrow
-MOTION = {"dvx", "dvy", "dvz", "dv"}  # what a rule asks for to make velocities alike
-FREE, HIT = colours.GREEN, colours.RED
+NO_LINES = np.zeros((0, 2, 3))
+WAKE_SPANS = 6.0  # spans of a wake that are drawn
+LONGEST_ARROW = 5.0  # darts; length of the longest arrow
+VELOCITY_ARGUMENTS = {"dvx", "dvy", "dvz", "dv"}  # what a rule asks for to make velocities alike
+FREE_RAY_COLOUR, HIT_RAY_COLOUR = colours.GREEN, colours.RED
 
 
-class Drawn(NamedTuple):
+class PerceptDrawing(NamedTuple):
     """Lines about one agent by kind (`view.stage.colours.LINES`): segments (segment, 2, 3) m, their colours, and words.
 
     Kinds that are not named show nothing.
     """
 
     lines: dict[str, tuple[NDArray[Any], NDArray[Any] | None]]
-    words: str
+    html: str
 
 
-class Perceiving:
+class PerceptLines:
     """Eyes of the selected agent; remembers the world that it looked at, and how strong each term has been."""
 
     def __init__(self) -> None:
-        self._place: tuple[Scenario, Place] | None = None
+        self._world: tuple[Scenario, FlightWorld] | None = None
         self._strongest: dict[str, float] = {}
 
-    def of(self, side: Side, agent: int, size: float, top: float) -> Drawn:
+    def of(self, pane: FlightPane, agent: int, dart_length: float, max_speed: float) -> PerceptDrawing:
         """What an agent perceives.
 
         size : of a dart, m; top : speed that gives the longest arrow, m/s
         """
-        seen, scenario = side.flight.look(agent), side.scenario
+        seen, scenario = pane.flight.look(agent), pane.scenario
         own = np.array(seen.true[:3])
-        lines = _neighbours(seen, own, size, side.flight.measured)
+        lines = _neighbour_lines(seen, own, dart_length, pane.flight.measured)
         wish = np.zeros(3)
         wish[: len(seen.command)] = seen.command
-        lines["command"] = arrow(own, own + wish * (REACH * size / max(top, 1e-9))), None
-        points, tones, named = self._terms(seen, own, size, scenario.model)
+        lines["command"] = arrow_lines(own, own + wish * (LONGEST_ARROW * dart_length / max(max_speed, 1e-9))), None
+        points, tones, named = self._term_arrows(seen, own, dart_length, scenario.model)
         lines["terms"] = points, tones
-        words = [*_about(seen, scenario), *named]
-        memory = side.flight.snapshot().state
+        words = [*_agent_words(seen, scenario), *named]
+        memory = pane.flight.snapshot().state
         if scenario.model.sight is not None:
-            found, said = self._rays(scenario, memory, seen)
+            found, said = self._ray_lines(scenario, memory, seen)
             lines["rays"] = found
             words.append(said)
         if "model.circulation" in memory.arrays or "power.circulation" in memory.arrays:
-            lines["wake"] = _wakes(scenario, side.motion), None
-            words.append(_wash(memory, agent))
-        return Drawn(lines, "<br>".join(words))
+            lines["wake"] = _wake_segments(scenario, pane.motion), None
+            words.append(_drag_text(memory, agent))
+        return PerceptDrawing(lines, "<br>".join(words))
 
-    def _terms(
+    def _term_arrows(
         self, seen: Seen, own: NDArray[Any], size: float, model: Model
     ) -> tuple[NDArray[Any], NDArray[Any], list[str]]:
         """Arrows of what the law was given: of all neighbours, of each, and of all surfaces.
@@ -74,120 +69,133 @@ class Perceiving:
         Terms of a law have units of their own, so each is as long as it is beside the strongest of its kind so far.
         """
         pieces, tones, words = [], [], []
-        for number, (name, vector, parts) in enumerate(_vectors(seen, model)):
+        for number, (name, vector, parts) in enumerate(_named_vectors(seen, model)):
             strength = float(np.linalg.norm(vector))
             longest = max([strength, *(float(np.linalg.norm(part)) for part in parts)])
             most = self._strongest[name] = max(self._strongest.get(name, 0.0), longest)
-            tone, scale = colours.TERMS[number % len(colours.TERMS)], REACH * size / max(most, 1e-9)
-            shafts = np.vstack([arrow(own, own + vector * scale), *([[own, own + part * scale]] for part in parts)])
+            tone, scale = (
+                colours.TERM_COLOURS[number % len(colours.TERM_COLOURS)],
+                LONGEST_ARROW * size / max(most, 1e-9),
+            )
+            shafts = np.vstack(
+                [arrow_lines(own, own + vector * scale), *([[own, own + part * scale]] for part in parts)]
+            )
             pieces.append(shafts)
             tones.append(np.tile(tone, (len(shafts), 1)))
-            words.append(f"{_dash(tone)} {html.escape(name)} {strength:.3g}, at most {most:.3g}")
+            words.append(f"{_colour_mark_html(tone)} {html.escape(name)} {strength:.3g}, at most {most:.3g}")
         if not pieces:
-            return NONE, np.zeros((0, 3)), []
+            return NO_LINES, np.zeros((0, 3)), []
         return np.vstack(pieces), np.vstack(tones), words
 
-    def _rays(self, scenario: Scenario, memory: Memory, seen: Seen) -> tuple[tuple[NDArray[Any], NDArray[Any]], str]:
+    def _ray_lines(
+        self, scenario: Scenario, memory: Memory, seen: Seen
+    ) -> tuple[tuple[NDArray[Any], NDArray[Any]], str]:
         """The fan of rays that the agent casts: green where free, red up to what it met."""
-        if self._place is None or self._place[0] is not scenario:
-            self._place = scenario, Place(scenario)
-        place, course = self._place[1], Course(scenario)
+        if self._world is None or self._world[0] is not scenario:
+            self._world = scenario, FlightWorld(scenario)
+        place, course = self._world[1], GoalCourse(scenario)
         if len(memory.arrays["later"]):
             place.shapes[:] = memory.arrays["shapes"].astype(float).tolist()
         if course.points and scenario.goals.kind != "own":
             x, y, z = memory.arrays["aim"][:3].astype(float).tolist()
             course.at = x, y, z
-        rays, _ = cast_rays(scenario, place, course, seen.own, seen.heard, seen.time, seen.agent)
+        rays, _ = rays_and_command(scenario, place, course, seen.own, seen.heard, seen.time, seen.agent)
         at = np.array(seen.own[:3])
         ends = np.array([[ray.free * ray.x, ray.free * ray.y, ray.free * ray.z] for ray in rays]).reshape(-1, 3)
         free = np.array([ray.free >= ray.length for ray in rays], bool)
-        tones = np.where(free[:, None], FREE, HIT)
+        tones = np.where(free[:, None], FREE_RAY_COLOUR, HIT_RAY_COLOUR)
         rays_cast = "1 ray" if len(free) == 1 else f"{len(free)} rays"
-        said = (
-            f"casts {rays_cast}: {_dash(FREE)} {int(free.sum())} free, {_dash(HIT)} {int((~free).sum())} met something"
-        )
+        said = f"casts {rays_cast}: {_colour_mark_html(FREE_RAY_COLOUR)} {int(free.sum())} free, "
+        said += f"{_colour_mark_html(HIT_RAY_COLOUR)} {int((~free).sum())} met something"
         return (np.stack([np.broadcast_to(at, ends.shape), at + ends], 1), tones), said
 
 
-def _vectors(seen: Seen, model: Model) -> list[tuple[str, NDArray[Any], list[NDArray[Any]]]]:
+def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], list[NDArray[Any]]]]:
     """What the law was given, by its own words: each vector, and what each neighbour adds to it; then the surfaces.
 
     A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour that flies alike
     would cause, too, and alignment, which is the rest.
     """
     found: list[tuple[str, NDArray[Any], list[NDArray[Any]]]] = []
-    for name, vector in (values(seen.sums) if seen.sums else {}).items():
-        parts = [values(term)[name] for term in seen.terms]
-        if name or model.terms or model.neighbour is None or not MOTION & set(asks(model.neighbour, "neighbour")):
-            found.append((word_of(model, name)[0], vector, parts))
+    for name, vector in (vector_values(view.sums) if view.sums else {}).items():
+        parts = [vector_values(term)[name] for term in view.terms]
+        if (
+            name
+            or model.terms
+            or model.neighbour is None
+            or not VELOCITY_ARGUMENTS & set(argument_names(model.neighbour, "neighbour"))
+        ):
+            found.append((term_name_and_unit(model, name)[0], vector, parts))
             continue
-        alike = [values(term)[name] for term in seen.alike]
+        alike = [vector_values(term)[name] for term in view.alike]
         apart = [part - same for part, same in zip(parts, alike, strict=True)]
         found += [
             (word, sum(terms, np.zeros(3)), terms) for word, terms in (("repulsion", alike), ("alignment", apart))
         ]
-    if seen.walls:
-        found += [(f"walls {name}".strip(), vector, []) for name, vector in values(seen.walls).items()]
+    if view.walls:
+        found += [(f"walls {name}".strip(), vector, []) for name, vector in vector_values(view.walls).items()]
     return found
 
 
-def _neighbours(seen: Seen, own: NDArray[Any], size: float, measured: NDArray[Any]) -> dict[str, Any]:
+def _neighbour_lines(view: Seen, own: NDArray[Any], size: float, measured: NDArray[Any]) -> dict[str, Any]:
     """Lines to those whom its law takes notice of; crosses where it heard them, and where each now believes to be.
 
     measured : (component, agent), what each believes of itself, m and m/s
     """
-    at = np.array([other.state[:3] for other in seen.heard]).reshape(-1, 3)
-    noticed = at[np.array(_noticed(seen), bool)]
+    at = np.array([other.state[:3] for other in view.heard]).reshape(-1, 3)
+    noticed = at[np.array(_noticed_neighbours(view), bool)]
     believed = np.zeros((1 + len(at), 3))
-    who = [seen.agent, *(other.who for other in seen.heard)]
+    who = [view.agent, *(other.who for other in view.heard)]
     axes = len(measured) // 2
     believed[:, :axes] = measured[:axes, who].T
-    believed[0] = seen.own[:3]
-    ghosts = np.vstack([crosses(believed[:1], 0.7 * size), crosses(believed[1:], 0.25 * size)])
+    believed[0] = view.own[:3]
+    ghosts = np.vstack([cross_segments(believed[:1], 0.7 * size), cross_segments(believed[1:], 0.25 * size)])
     off = float(np.linalg.norm(believed[0] - own)) > 0.0
     return {
         "heard": (np.stack([np.broadcast_to(own, noticed.shape), noticed], 1), None),
-        "ghosts": (crosses(at, 0.5 * size), None),
-        "measured": (ghosts if off else NONE, None),
+        "ghosts": (cross_segments(at, 0.5 * size), None),
+        "measured": (ghosts if off else NO_LINES, None),
     }
 
 
-def _noticed(seen: Seen) -> list[bool]:
+def _noticed_neighbours(view: Seen) -> list[bool]:
     """Of each that is heard, whether the law made anything of it; all where the law has no rule of one neighbour."""
-    return [any(term) for term in seen.terms] if seen.terms else [True] * len(seen.heard)
+    return [any(term) for term in view.terms] if view.terms else [True] * len(view.heard)
 
 
-def crosses(places: NDArray[Any], half: float) -> NDArray[Any]:
+def cross_segments(places: NDArray[Any], half: float) -> NDArray[Any]:
     """Two strokes at each place (place, 3), m."""
     cross = half * np.array([[[-1, -1, 0], [1, 1, 0]], [[-1, 1, 0], [1, -1, 0]]], float)
     return np.asarray((places[:, None, None] + cross).reshape(-1, 2, 3))
 
 
-def _about(seen: Seen, scenario: Scenario) -> list[str]:
+def _agent_words(view: Seen, scenario: Scenario) -> list[str]:
     """What is said of any agent."""
-    oldest = max((other.age for other in seen.heard), default=0.0)
-    off = math.dist(seen.true[:3], seen.own[:3])
-    wish = ", ".join(f"{part:.2f}" for part in seen.command)
+    oldest = max((other.age for other in view.heard), default=0.0)
+    off = math.dist(view.true[:3], view.own[:3])
+    wish = ", ".join(f"{part:.2f}" for part in view.command)
     unit = {"velocity": " m/s", "acceleration": " m/s²"}.get(scenario.model.command, "")
-    others = "nobody" if not seen.heard else "1 other" if len(seen.heard) == 1 else f"{len(seen.heard)} others"
-    heard = f"hears {others}" + (f", at most {oldest:.2g} s old" if seen.heard else "")
-    if sum(_noticed(seen)) < len(seen.heard):
-        heard += f"; its law notices {sum(_noticed(seen))}"
-    crossed = f"{_dash(colours.PURPLE, '✕')} where they were heard"
+    others = "nobody" if not view.heard else "1 other" if len(view.heard) == 1 else f"{len(view.heard)} others"
+    heard = f"hears {others}" + (f", at most {oldest:.2g} s old" if view.heard else "")
+    if sum(_noticed_neighbours(view)) < len(view.heard):
+        heard += f"; its law notices {sum(_noticed_neighbours(view))}"
+    crossed = f"{_colour_mark_html(colours.PURPLE, '✕')} where they were heard"
     if off > 0.0:
-        crossed += f" {_dash(colours.BLUE, '✕')} where each believes to be; this one is {off:.2g} m off"
+        crossed += f" {_colour_mark_html(colours.BLUE, '✕')} where each believes to be; this one is {off:.2g} m off"
     return [
-        f"<b>agent {seen.agent}</b>, {math.hypot(*seen.true[3:]):.2f} m/s",
-        f"{_dash(colours.ORANGE)} {heard}", crossed, f"{_dash(colours.RED)} command ({wish}){unit}",
-    ]  # fmt: skip
+        f"<b>agent {view.agent}</b>, {math.hypot(*view.true[3:]):.2f} m/s",
+        f"{_colour_mark_html(colours.ORANGE)} {heard}",
+        crossed,
+        f"{_colour_mark_html(colours.RED)} command ({wish}){unit}",
+    ]
 
 
-def _dash(tone: tuple[int, int, int], mark: str = "━") -> str:
+def _colour_mark_html(tone: tuple[int, int, int], mark: str = "━") -> str:
     red, green, blue = tone
     return f"<span style='color:#{red:02x}{green:02x}{blue:02x}'>{mark}</span>"
 
 
-def _wakes(scenario: Scenario, motion: tuple[NDArray[Any], NDArray[Any]]) -> NDArray[Any]:
+def _wake_segments(scenario: Scenario, motion: tuple[NDArray[Any], NDArray[Any]]) -> NDArray[Any]:
     """The two outermost trailing legs of every wing, straight back."""
     position, velocity = (part.astype(float) for part in motion)
     span, ahead = float(scenario.wing.span), np.array([1.0, 0.0, 0.0])
@@ -196,14 +204,14 @@ def _wakes(scenario: Scenario, motion: tuple[NDArray[Any], NDArray[Any]]) -> NDA
         ahead = mean / max(float(np.linalg.norm(mean)), 1e-9)
     across = 0.5 * span * np.array([-ahead[1], ahead[0], 0.0])
     ends = position[:, None] + np.array([-across, across])
-    return np.asarray(np.stack([ends, ends - WAKE * span * ahead], 2).reshape(-1, 2, 3))
+    return np.asarray(np.stack([ends, ends - WAKE_SPANS * span * ahead], 2).reshape(-1, 2, 3))
 
 
-def _wash(memory: Memory, agent: int) -> str:
+def _drag_text(memory: Memory, agent: int) -> str:
     """Drag of a bird, and what the wash of the others makes of it."""
     which = "power" if "shared_power_drag" in memory.driver.ROWS else "model"
     drag = float(memory.rows([f"shared_{which}_drag"])[0, agent])
-    said = f"{_dash(colours.SKY)} wakes; induced drag {drag:.3g} N"
+    said = f"{_colour_mark_html(colours.SKY)} wakes; induced drag {drag:.3g} N"
     if which == "power":
         alone = float(memory.rows(["shared_power_solo"])[0, agent])
         said += f", {100.0 * (drag / max(alone, 1e-9) - 1.0):+.0f} % of a lone bird's"

@@ -4,18 +4,17 @@ from collections.abc import Callable
 from time import perf_counter
 
 from airflock.engine import Snapshot
-from airflock.scenarios.own_code import raised_there
-from airflock.studio.flights import FlightRequest, Flights
-from airflock.studio.moments import Moments
-from airflock.studio.pace import Pace
-from airflock.studio.requests import Asked
-from airflock.support.errors import AirflockError, reason
-from airflock.support.spelling import raised
+from airflock.scenarios import user_error_line
+from airflock.studio.flights import ComparedFlights, FlightRequest
+from airflock.studio.moments import KeptSnapshots
+from airflock.studio.pace import PageClock
+from airflock.studio.requests import ActionQueue
+from airflock.support import AirflockError, describe_error, os_error_message
 
-MOST_BUSY = 0.05  # s of real time flown at most before the page is answered again
+MAX_BUSY_SECONDS = 0.05  # s of real time flown at most before the page is answered again
 
 
-class Player(Flights):
+class Player(ComparedFlights):
     """Flights, played: what a page shows and what its controls do.
 
     `ask` may be called from any thread; everything else belongs to the thread that calls `tick`.
@@ -24,32 +23,32 @@ class Player(Flights):
     """
 
     def __init__(self, request: FlightRequest):
-        self.pace, self.paused, self.failure = Pace(1.0), False, ""
-        self._rate = 1e4  # motion steps per second, as measured
-        self._asked = Asked()
+        self.clock, self.is_paused, self.failure_message = PageClock(1.0), False, ""
+        self._steps_per_second = 1e4  # motion steps per second, as measured
+        self._asked = ActionQueue()
         super().__init__(request)
 
     def _open(self, start: bool = False) -> None:
         super()._open(start)
-        self.pace = Pace(self.preset.flight.dt, self.pace.speed)
-        self.moments, self.failure = Moments(), ""
+        self.clock = PageClock(self.preset.flight.dt, self.clock.speed)
+        self.snapshots, self.failure_message = KeptSnapshots(), ""
 
-    def settle(self) -> list[Snapshot | None]:
+    def switch_to_compiled(self) -> list[Snapshot | None]:
         """Go on as compiled flights, once they are compiled; of the moments to go back to the start is left."""
-        if not self.compiling:
+        if not self.is_compiling:
             return []
-        starts = super().settle()
-        self.moments = Moments()
+        starts = super().switch_to_compiled()
+        self.snapshots = KeptSnapshots()
         if None not in starts:
-            self.moments.keep(0.0, tuple(start for start in starts if start is not None))
+            self.snapshots.keep(0.0, tuple(start for start in starts if start is not None))
         return starts
 
     @property
     def status(self) -> str:
         """What a page says while it waits, or why it stopped; empty while all is well."""
-        if self.failure:
-            return self.failure
-        if self.compiling:
+        if self.failure_message:
+            return self.failure_message
+        if self.is_compiling:
             return "compiling … (meanwhile flying interpreted, with different rounding)"
         if self.over:
             return f"a page flies at most {self.time:g} s; Reset starts again"
@@ -66,30 +65,30 @@ class Player(Flights):
         """Do something before the next frame; from any thread."""
         self._asked.put(action)
 
-    def wait(self, seconds: float) -> bool:
+    def run_actions_within(self, seconds: float) -> bool:
         """Wait for some seconds of real time, or until something was asked for and done. Whether it was."""
-        return self._asked.rung(seconds) and self._asked.answer(self._safely)
+        return self._asked.wait(seconds) and self._asked.answer(self._safely)
 
     def tick(self, elapsed: float) -> bool:
         """Do what was asked for, then fly what is due after `elapsed` s of real time. Whether anything moved."""
         asked = self._asked.answer(self._safely)
-        if self.compiling and all(side.compiled for side in self.sides):
+        if self.is_compiling and all(side.is_compiled for side in self.sides):
             asked = self._settled() or asked
-        if self.paused or self.failure or self.over:
+        if self.is_paused or self.failure_message or self.over:
             return asked
-        steps = min(self.pace.due(elapsed), max(1, int(self._rate * MOST_BUSY)))
+        steps = min(self.clock.due(elapsed), max(1, int(self._steps_per_second * MAX_BUSY_SECONDS)))
         if not steps:
             return asked
         began, moved = perf_counter(), self.fly(steps)
-        self._rate = steps / max(perf_counter() - began, 1e-6)
+        self._steps_per_second = steps / max(perf_counter() - began, 1e-6)
         return moved or asked
 
     def _settled(self) -> bool:
         try:
-            self.settle()
+            self.switch_to_compiled()
         except AirflockError as fault:
-            self.failure = f"stopped: {fault}"
-            self.fault(self.failure)
+            self.failure_message = f"stopped: {fault}"
+            self.fault(self.failure_message)
         return True
 
     def _safely(self, action: Callable[[], None]) -> None:
@@ -97,66 +96,66 @@ class Player(Flights):
         try:
             action()
         except AirflockError as fault:
-            self._tell(str(fault))
+            self._report_error(str(fault))
         except OSError as fault:  # a full disk, a folder that is gone
-            self._tell(": ".join(part for part in (fault.filename, reason(fault)) if part))
+            self._report_error(": ".join(part for part in (fault.filename, os_error_message(fault)) if part))
         except Exception as fault:  # the last resort: somebody's flight must not be lost to one press of a button
-            self._tell(f"unexpected {raised(fault)}; please report it")
+            self._report_error(f"unexpected {describe_error(fault)}; please report it")
 
-    def _tell(self, line: str) -> None:
+    def _report_error(self, line: str) -> None:
         self.note = line
         self.fault(line)
 
     def fly(self, steps: int) -> bool:
         """Fly so many steps, and keep a moment where one is due; a flight that fails stops and says why."""
-        if self.moments.due(self.time):
-            self.moments.keep(self.time, tuple(side.flight.snapshot() for side in self.sides))
+        if self.snapshots.due(self.time):
+            self.snapshots.keep(self.time, tuple(side.flight.snapshot() for side in self.sides))
         clock = self.sides[0]
         end = (clock.flight.step + steps) * clock.scenario.flight.dt
         try:
             for side in self.sides:
                 side.fly_to(end)
         except Exception as fault:  # a rule of the user's own may raise anything, until it is compiled
-            told = str(fault) if isinstance(fault, AirflockError) else raised_there(fault)
+            told = str(fault) if isinstance(fault, AirflockError) else user_error_line(fault)
             if not told:
                 raise
-            self.failure = f"stopped: {told}"
-            self.fault(self.failure)
+            self.failure_message = f"stopped: {told}"
+            self.fault(self.failure_message)
             return False
         return True
 
     def step(self) -> None:
         """Pause, and fly to the next decision: one step of the flock."""
-        self.paused = True
+        self.is_paused = True
         scenario, flight = self.sides[0].scenario, self.sides[0].flight
         every = max(1, round(scenario.sensors.period / scenario.flight.dt))
         self.fly(every - flight.step % every)
 
-    def toggle(self) -> None:
+    def toggle_pause(self) -> None:
         """Pause, or fly on."""
-        self.paused = not self.paused
+        self.is_paused = not self.is_paused
 
-    def back(self, time: float) -> None:
+    def go_back(self, time: float) -> None:
         """Go back to a time, s, and wait there; what came after it is given up. Of a failed flight, to a moment before.
 
         Before a fork there is one flight again.
         """
         time = min(max(time, 0.0), self.time)
-        moment = self.moments.at(time)
+        moment = self.snapshots.at(time)
         if moment is None:
             self.note = "no earlier moment is kept"
             return
         del self.sides[len(moment) :]
         self.hand = min(self.hand, len(self.sides) - 1)
-        failed = self.failure
+        failed = self.failure_message
         for side, kept in zip(self.sides, moment, strict=True):
             if failed:
                 side.restore(kept)
             else:
                 side.again(kept, time)
-        self.moments.forget_after(time + 1e-6)
+        self.snapshots.forget_after(time + 1e-6)
         least = "; no earlier moment is kept" if self.time > time + 1e-6 and not failed else ""
-        self.failure, self.note, self.paused = "", f"back at t = {self.time:g} s{least}", True
+        self.failure_message, self.note, self.is_paused = "", f"back at t = {self.time:g} s{least}", True
 
     # ---------------------------------------------------------------------------------------------- comparing
 
@@ -164,9 +163,9 @@ class Player(Flights):
         """Fly a second flight beside this one from here on; of two, moments of both together are given up."""
         two = len(self.sides) > 1
         super().fork()
-        self.moments = Moments() if two else self.moments
+        self.snapshots = KeptSnapshots() if two else self.snapshots
 
     def join(self) -> None:
         """End the comparison: the side that the controls act on flies on alone, and goes back no further than here."""
         super().join()
-        self.moments = Moments()
+        self.snapshots = KeptSnapshots()

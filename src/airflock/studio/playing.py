@@ -3,55 +3,74 @@
 import math
 from typing import TYPE_CHECKING
 
-from airflock.studio.collisions import BOTH, Collision
-from airflock.studio.drawing import FOLLOWED, LINKS, NAMES
-from airflock.studio.room import Room, note
-from airflock.studio.shading import ways
-from airflock.support.errors import AirflockError, StudioError
+from airflock.studio.collisions import BOTH_PANES, Collision
+from airflock.studio.drawing import FOLLOW_CHOICES, LINK_CHOICES, PANE_NAMES
+from airflock.studio.room import PagePanel, small_print_html
+from airflock.studio.shading import available_colourings
+from airflock.support import AirflockError, StudioError
 
 if TYPE_CHECKING:
-    from airflock.studio.page import Page
+    from airflock.studio.page import FlightPage
 
-SOON = 10  # s; how far one press goes back
-BEFORE = 1.0  # s; a jump to a collision ends so long before it
-SPEEDS = {"0.1 ×": 0.1, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0, "20 ×": 20.0, "as fast as possible": 1e9}
-JUMP = "jump to …"
+BACK_SECONDS = 10  # s; how far one press goes back
+SECONDS_BEFORE_COLLISION = 1.0  # s; a jump to a collision ends so long before it
+SPEED_CHOICES = {
+    "0.1 ×": 0.1,
+    "0.5 ×": 0.5,
+    "1 ×": 1.0,
+    "2 ×": 2.0,
+    "5 ×": 5.0,
+    "20 ×": 20.0,
+    "as fast as possible": 1e9,
+}
+NO_JUMP_TEXT = "jump to …"
 
 
-class Playing(Room):
+class PlaybackPanel(PagePanel):
     """Controls of time and of what is drawn."""
 
-    def __init__(self, page: "Page"):
+    def __init__(self, page: "FlightPage"):
         super().__init__(page)
-        panel, player, drawing = self.panel, self.player, self.drawing
-        self.pause = panel.button("Pause", self.ask(player.toggle), "or the key P")
-        panel.row({"Step": self.ask(player.step), f"Back {SOON} s": self.ask(self.back), "Reset": self.ask(self.reset)})
-        self.moment = panel.field("moment (s)", "any time already flown; everything after it is discarded")
+        panel, player, drawing = self.widgets, self.player, self.scene
+        self.pause = panel.add_button("Pause", self.ask(player.toggle_pause), "or the key P")
+        panel.row(
+            {
+                "Step": self.ask(player.step),
+                f"Back {BACK_SECONDS} s": self.ask(self.go_back),
+                "Reset": self.ask(self.reset),
+            }
+        )
+        self.moment_field = panel.field("moment (s)", "any time already flown; everything after it is discarded")
         panel.row({"Go to this moment": self.ask(self._go)})
-        panel.menu("speed", tuple(SPEEDS), "1 ×", lambda chosen: self._speed(SPEEDS[chosen]))
+        panel.add_menu("speed", tuple(SPEED_CHOICES), "1 ×", lambda chosen: self._speed(SPEED_CHOICES[chosen]))
         self.seed = panel.number("seed", player.seed, 0, 2**31, lambda seed: player.ask(lambda: self.reset(seed)))
         most = max(1000, player.flight.agents)
         self.agents = panel.number(
             "agents", player.flight.agents, 1, most, lambda n: player.ask(lambda: self.reset(agents=n)),
             "another number starts another flight",
         )  # fmt: skip
-        self.way = panel.menu(
-            "colour by", ways(drawing.flocks), drawing.shading.way, lambda way: setattr(drawing.shading, "way", way)
+        self.colouring_menu = panel.add_menu(
+            "colour by",
+            available_colourings(drawing.flocks),
+            drawing.colouring.name,
+            lambda way: setattr(drawing.colouring, "name", way),
         )
         self.key = panel.text()
-        panel.checkbox("trails", True, action=lambda on: player.ask(lambda: drawing.trails.show(on)))
-        panel.menu(
-            "links", LINKS, drawing.links, lambda kind: setattr(drawing, "links", kind),
+        panel.add_checkbox("trails", True, action=lambda on: player.ask(lambda: drawing.trails.show(on)))
+        panel.add_menu(
+            "links", LINK_CHOICES, drawing.links, lambda kind: setattr(drawing, "links", kind),
             "to the three nearest, or to all in radio range; paler where packets are lost",
         )  # fmt: skip
-        self.follow = panel.menu("follow", FOLLOWED, FOLLOWED[0], self._follow)
-        self.jump = panel.menu("collisions", (JUMP,), JUMP, self._jump, "goes back to one second before it")
+        self.follow_menu = panel.add_menu("follow", FOLLOW_CHOICES, FOLLOW_CHOICES[0], self._follow)
+        self.collision_menu = panel.add_menu(
+            "collisions", (NO_JUMP_TEXT,), NO_JUMP_TEXT, self._jump, "goes back to one second before it"
+        )
         self.listed = panel.text()
-        self._in_menu: list[Collision] = []
-        self._camera_of = ""  # which scenario the camera is set for
+        self._listed_collisions: list[Collision] = []
+        self._camera_scenario = ""  # which scenario the camera is set for
         for key, label, action in (
-            ("P", "Pause or fly", player.toggle), ("N", "Step", player.step), ("R", "Reset", self.reset),
-            ("B", "Back", self.back),
+            ("P", "Pause or fly", player.toggle_pause), ("N", "Step", player.step), ("R", "Reset", self.reset),
+            ("B", "Back", self.go_back),
         ):  # fmt: skip
             panel.command(label, key, self.ask(action))
 
@@ -59,42 +78,42 @@ class Playing(Room):
         """What may colour the agents of these flights; whom the camera follows in a scenario that is new here."""
         player = self.player
         self._show_seed_and_agents()
-        if self._camera_of != player.side.origin.where:
-            self._camera_of = player.side.origin.where
-            free = player.scenario.world.arena == "none" and not self.drawing.stages[0].solids
-            self.follow.value = self.drawing.follow = FOLLOWED[1 if free else 0]
-        known = ways(self.drawing.flocks)
-        if tuple(self.way.options) != known:
-            self.way.options = known
-            self.drawing.shading.way = self.drawing.shading.way if self.drawing.shading.way in known else known[0]
-            self.way.value = self.drawing.shading.way
+        if self._camera_scenario != player.side.origin.where:
+            self._camera_scenario = player.side.origin.where
+            free = player.scenario.world.arena == "none" and not self.scene.stages[0].solids
+            self.follow_menu.value = self.scene.follow_choice = FOLLOW_CHOICES[1 if free else 0]
+        known = available_colourings(self.scene.flocks)
+        if tuple(self.colouring_menu.options) != known:
+            self.colouring_menu.options = known
+            self.scene.colouring.name = self.scene.colouring.name if self.scene.colouring.name in known else known[0]
+            self.colouring_menu.value = self.scene.colouring.name
 
     def _show_seed_and_agents(self) -> None:
         """Show seed and number of agents of what flies."""
         self.seed.value, self.agents.value = self.player.seed, self.player.flight.agents
 
-    def _follow(self, whom: str) -> None:
-        self.drawing.follow = whom
+    def _follow(self, choice: str) -> None:
+        self.scene.follow_choice = choice
 
     def _go(self) -> None:
         """Go to the moment that was typed."""
         try:
-            time = float(self.moment.value)
+            time = float(self.moment_field.value)
         except ValueError:
             time = math.nan
         if not 0.0 <= time <= self.player.time:
             raise StudioError(
-                f"moment = {self.moment.value or 'nothing'}: give a time from 0 to {self.player.time:g} s"
+                f"moment = {self.moment_field.value or 'nothing'}: give a time from 0 to {self.player.time:g} s"
             )
-        self.back(time)
+        self.go_back(time)
 
     def _speed(self, speed: float) -> None:
-        self.player.pace.speed = speed
+        self.player.clock.speed = speed
 
-    def back(self, time: float | None = None) -> None:
+    def go_back(self, time: float | None = None) -> None:
         """Go back to a time, s, or by ten seconds."""
-        self.player.back(self.player.time - SOON if time is None else time)
-        self.page.show_other_time()
+        self.player.go_back(self.player.time - BACK_SECONDS if time is None else time)
+        self.page.on_time_changed()
 
     def reset(self, seed: int | None = None, agents: int | None = None) -> None:
         """Begin another flight; where that is refused, the fields show what flies."""
@@ -103,31 +122,31 @@ class Playing(Room):
         except AirflockError:
             self._show_seed_and_agents()
             raise
-        self.drawing.collisions.clear()
+        self.scene.collisions.clear()
         self.page.rebuild()
 
-    def _jump(self, chosen: str) -> None:
-        when = next((c.time for c in self._in_menu if self._name(c) == chosen), None)
+    def _jump(self, choice: str) -> None:
+        when = next((c.time for c in self._listed_collisions if self._collision_text(c) == choice), None)
         if when is not None:
-            self.player.ask(lambda: self.back(max(when - BEFORE, 0.0)))
+            self.player.ask(lambda: self.go_back(max(when - SECONDS_BEFORE_COLLISION, 0.0)))
 
-    def _name(self, c: Collision) -> str:
-        side = f", {NAMES[c.side]}" if len(self.player.sides) > 1 and c.side != BOTH else ""
+    def _collision_text(self, c: Collision) -> str:
+        side = f", {PANE_NAMES[c.side]}" if len(self.player.sides) > 1 and c.side != BOTH_PANES else ""
         return f"t = {c.time:.1f} s: {c.first} and {c.second}{side}"
 
     def refresh(self) -> None:
         """The button's words, the key to the colours, and the list of collisions."""
-        label = "Fly" if self.player.paused else "Pause"
+        label = "Fly" if self.player.is_paused else "Pause"
         if self.pause.label != label:
             self.pause.label = label
-        drawing = self.drawing
-        self.key.content = drawing.shading.shown.key
-        if self.way.value != drawing.shading.way:
-            self.way.value = drawing.shading.way
+        drawing = self.scene
+        self.key.content = drawing.colouring.shown.key
+        if self.colouring_menu.value != drawing.colouring.name:
+            self.colouring_menu.value = drawing.colouring.name
         collisions = drawing.collisions.listed
-        if collisions != self._in_menu:
-            self._in_menu = collisions
-            self.jump.options = (JUMP, *dict.fromkeys(map(self._name, collisions)))
-            self.jump.value = JUMP
-            few = "<br>".join(self._name(c) for c in collisions[:8])
-            self.listed.content = note(f"<b>Pairs that collided</b><br>{few}") if collisions else ""
+        if collisions != self._listed_collisions:
+            self._listed_collisions = collisions
+            self.collision_menu.options = (NO_JUMP_TEXT, *dict.fromkeys(map(self._collision_text, collisions)))
+            self.collision_menu.value = NO_JUMP_TEXT
+            few = "<br>".join(self._collision_text(c) for c in collisions[:8])
+            self.listed.content = small_print_html(f"<b>Pairs that collided</b><br>{few}") if collisions else ""

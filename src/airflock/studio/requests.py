@@ -4,29 +4,29 @@ from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from threading import Event
 
-Action = Callable[[], None]
+QueuedAction = Callable[[], None]
 
 
-class Asked:
+class ActionQueue:
     """A queue with a bell: the thread that flies waits for the next frame or the next wish, whichever comes first."""
 
     def __init__(self) -> None:
-        self._actions: SimpleQueue[Action] = SimpleQueue()
-        self._bell = Event()
+        self._actions: SimpleQueue[QueuedAction] = SimpleQueue()
+        self._event = Event()
 
-    def put(self, action: Action) -> None:
+    def put(self, action: QueuedAction) -> None:
         """Ask for something; from any thread."""
         self._actions.put(action)
-        self._bell.set()
+        self._event.set()
 
-    def rung(self, seconds: float) -> bool:
+    def wait(self, seconds: float) -> bool:
         """Wait for some seconds of real time at most. Whether something was asked for."""
-        if not self._bell.wait(max(seconds, 0.0)):
+        if not self._event.wait(max(seconds, 0.0)):
             return False
-        self._bell.clear()
+        self._event.clear()
         return True
 
-    def answer(self, do: Callable[[Action], None]) -> bool:
+    def answer(self, run: Callable[[QueuedAction], None]) -> bool:
         """Hand everything that was asked for to `do`. Whether there was anything."""
         done = False
         while True:
@@ -35,4 +35,4 @@ class Asked:
             except Empty:
                 return done
             done = True
-            do(action)
+            run(action)

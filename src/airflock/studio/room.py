@@ -5,18 +5,18 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from airflock.studio.page import Page
+    from airflock.studio.page import FlightPage
 
 
-class Room:
+class PagePanel:
     """One part of a page.
 
     page : which it belongs to
     """
 
-    def __init__(self, page: "Page"):
+    def __init__(self, page: "FlightPage"):
         self.page, self.player, self.view = page, page.player, page.view
-        self.panel, self.drawing = page.view.panel, page.drawing
+        self.widgets, self.scene = page.view.panel, page.scene
 
     def rebuild(self) -> None:
         """Show other flights than before: another one began, or a second one joined or left."""
@@ -29,12 +29,12 @@ class Room:
         return lambda: self.player.ask(lambda: (action(), None)[1])
 
 
-def note(text: str) -> str:
+def small_print_html(text: str) -> str:
     """Small print of a panel, as HTML."""
     return f"<div style='padding:0 0.75em;font-size:0.85em'>{text}</div>"
 
 
-def told(text: str, bad: bool) -> str:
+def status_html(text: str, is_error: bool) -> str:
     """What a page says above its tabs, as HTML, at a distance from them; red where it is bad."""
-    look = f"padding:0 0.75em 0.6em;font-size:0.85em;color:{'#b00020' if bad else '#555'}"
+    look = f"padding:0 0.75em 0.6em;font-size:0.85em;color:{'#b00020' if is_error else '#555'}"
     return f"<div style='{look}'>{html.escape(text)}</div>" if text else ""

@@ -10,32 +10,30 @@ import tomlkit
 import xarray as xr
 
 from airflock.engine import Flight
-from airflock.recordings.flights import simulate
-from airflock.scenarios.fault_keys import fault_of, is_fault_key
-from airflock.scenarios.files import presets
-from airflock.scenarios.group_keys import is_group_key, kept, parts_of
-from airflock.support.errors import FlightError
+from airflock.recordings import simulate
+from airflock.scenarios import entry_of_key, is_fault_key, is_group_key, presets, split_key, with_old_spread
+from airflock.support import FlightError
 
 
-def toml_of(
-    where: str,
+def tuned_toml(
+    source: str,
     settings: Mapping[str, Any],
-    given: Mapping[str, Any] | None = None,
-    whole: Mapping[str, Any] | None = None,
+    recorded_document: Mapping[str, Any] | None = None,
+    full_document: Mapping[str, Any] | None = None,
 ) -> str:
     """Text of a preset or scenario file with keys set anew; comments, units and sources of the others stay.
 
     given : the scenario of a recording, instead of a file
     whole : what the scenario consists of with all that it extends, for groups and faults that the file does not write
     """
-    path = presets().get(where) or Path(where)
-    text = path.read_text(encoding="utf-8") if given is None else tomlkit.dumps(given)
+    path = presets().get(source) or Path(source)
+    text = path.read_text(encoding="utf-8") if recorded_document is None else tomlkit.dumps(recorded_document)
     document: Any = tomlkit.parse(text)
     for key, value in settings.items():
-        table, name = _place(document, key, whole or {})
+        table, name = _table_and_name(document, key, full_document or {})
         known = table.get(name)
         if is_group_key(key) and not isinstance(value, Mapping):
-            table[name] = kept(known, value)
+            table[name] = with_old_spread(known, value)
         elif isinstance(known, Mapping) and "value" in known and not isinstance(value, Mapping):
             known["value"] = value  # type: ignore[index]
             known.pop("unit", None)  # type: ignore[attr-defined]
@@ -46,7 +44,7 @@ def toml_of(
     return tomlkit.dumps(document)
 
 
-def _place(document: Any, key: str, whole: Mapping[str, Any]) -> tuple[Any, str]:
+def _table_and_name(document: Any, key: str, full_document: Mapping[str, Any]) -> tuple[Any, str]:
     """The table of a document that holds a key, which is made if need be, and the key's name in it."""
     section, _, name = key.partition(".")
     if not name:
@@ -54,16 +52,16 @@ def _place(document: Any, key: str, whole: Mapping[str, Any]) -> tuple[Any, str]
     if not (is_group_key(key) or is_fault_key(key)):
         return document.setdefault(section, tomlkit.table()), name
     if section not in document:
-        document[section] = [dict(entry) for entry in whole.get(section, ())]
+        document[section] = [dict(entry) for entry in full_document.get(section, ())]
     if is_fault_key(key):
-        number, name = fault_of(document[section], key)
+        number, name = entry_of_key(document[section], key)
         return document[section][number], name
-    group, part, name = parts_of(key)
+    group, part, name = split_key(key)
     names = [entry.get("name", f"group_{number}") for number, entry in enumerate(document[section])]
     return document[section][names.index(group)].setdefault(part, tomlkit.inline_table()), name
 
 
-def free(path: Path) -> Path:
+def free_path(path: Path) -> Path:
     """A name that is not taken: flight.nc, flight-2.nc, ..."""
     found, number = path, 2
     while found.exists():
@@ -71,7 +69,7 @@ def free(path: Path) -> Path:
     return found
 
 
-def flown_again(flight: Flight) -> xr.Dataset:
+def refly(flight: Flight) -> xr.Dataset:
     """Recording of an open flight, flown again without a page from its scenario, seed and events.
 
     Raises FlightError where the end of it has other bits than the flight at hand.

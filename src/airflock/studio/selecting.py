@@ -5,94 +5,96 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.parts.faults.registry import KINDS as KINDS_OF_FAULT
-from airflock.studio.drawing import NAMES
-from airflock.studio.perceiving import Drawn, Perceiving
-from airflock.studio.room import Room, note
-from airflock.view.stage import colours
+from airflock.parts.faults import KINDS as KINDS_OF_FAULT
+from airflock.studio.drawing import PANE_NAMES
+from airflock.studio.perceiving import PerceptDrawing, PerceptLines
+from airflock.studio.room import PagePanel, small_print_html
+from airflock.view import colours
 
 if TYPE_CHECKING:
-    from airflock.studio.page import Page
+    from airflock.studio.page import FlightPage
 
-KINDS = tuple(kind for kind in colours.LINES if kind != "links")
-NOBODY = note("click an agent, or press S")
+AGENT_LINE_KINDS = tuple(kind for kind in colours.LINE_STYLES if kind != "links")
+NOTHING_SELECTED_TEXT = small_print_html("click an agent, or press S")
 
 
-class Selecting(Room):
+class SelectionPanel(PagePanel):
     """Whoever is selected, counted through the agents of all sides."""
 
-    def __init__(self, page: "Page"):
+    def __init__(self, page: "FlightPage"):
         super().__init__(page)
         self.chosen: int | None = None
-        self.eyes = Perceiving()
-        with self.panel.folder("Selected agent"):
-            self.about = self.panel.text(NOBODY)
-            self.panel.row(
+        self.percept_lines = PerceptLines()
+        with self.widgets.folder("Selected agent"):
+            self.about = self.widgets.text(NOTHING_SELECTED_TEXT)
+            self.widgets.row(
                 {
-                    "Previous": self.ask(lambda: self.by(-1)),
-                    "Next": self.ask(lambda: self.by(1)),
+                    "Previous": self.ask(lambda: self.select_next(-1)),
+                    "Next": self.ask(lambda: self.select_next(1)),
                     "Push": self.ask(self.push),
-                    "None": self.ask(lambda: self.choose(None)),
+                    "None": self.ask(lambda: self.select(None)),
                 }
             )
-            self.fault = self.panel.menu("fault", tuple(KINDS_OF_FAULT), "motor", lambda _: None, "begins at once")
-            self.panel.row({"Let it fail": self.ask(self.fail)})
-        self.panel.command("Next agent", "S", self.ask(lambda: self.by(1)))
+            self.fault = self.widgets.add_menu(
+                "fault", tuple(KINDS_OF_FAULT), "motor", lambda _: None, "begins at once"
+            )
+            self.widgets.row({"Let it fail": self.ask(self.begin_fault)})
+        self.widgets.command("Next agent", "S", self.ask(lambda: self.select_next(1)))
 
     def rebuild(self) -> None:
         """Nobody is selected in another flight."""
-        self.chosen, self.eyes = None, Perceiving()
+        self.chosen, self.percept_lines = None, PerceptLines()
 
-    def choose(self, agent: int | None) -> None:
+    def select(self, agent: int | None) -> None:
         """Select an agent, or nobody."""
         self.chosen = agent
         self.page.frame(True)
 
-    def by(self, count: int) -> None:
+    def select_next(self, count: int) -> None:
         """Select an agent some numbers on."""
-        many = len(self.drawing.places)
-        self.choose(((-1 if self.chosen is None and count > 0 else self.chosen or 0) + count) % many)
+        many = len(self.scene.positions)
+        self.select(((-1 if self.chosen is None and count > 0 else self.chosen or 0) + count) % many)
 
-    def at(self, origin: NDArray[Any], way: NDArray[Any]) -> None:
+    def at(self, origin: NDArray[Any], direction: NDArray[Any]) -> None:
         """Select the agent nearest to a ray, if it is near."""
-        away = self.drawing.places - origin
-        along = np.maximum(away @ way, 0.0)
-        off = np.linalg.norm(away - along[:, None] * way, axis=1)
+        away = self.scene.positions - origin
+        along = np.maximum(away @ direction, 0.0)
+        off = np.linalg.norm(away - along[:, None] * direction, axis=1)
         best = int(off.argmin())
-        self.choose(best if off[best] < 2.0 * self.drawing.size else None)
+        self.select(best if off[best] < 2.0 * self.scene.size else None)
 
     def push(self) -> None:
         """Push the selected agent, at twice the flock's speed."""
         if self.chosen is not None:
-            side, agent = self.drawing.whose(self.chosen)
-            self.player.push(agent, 2.0 * self.drawing.top / 1.5, side)
+            side, agent = self.scene.pane_and_agent(self.chosen)
+            self.player.push(agent, 2.0 * self.scene.top / 1.5, side)
 
     def refresh(self) -> None:
         """What the selected agent perceives and commands."""
         if self.chosen is None:
-            self.about.content = NOBODY
-            for kind in KINDS:
+            self.about.content = NOTHING_SELECTED_TEXT
+            for kind in AGENT_LINE_KINDS:
                 self.view.extra(kind, np.zeros((0, 2, 3)))
             return
-        if self.player.failure:
+        if self.player.failure_message:
             return  # what it perceived last stays
-        number, agent = self.drawing.whose(self.chosen)
-        flock = self.drawing.flocks[number]
+        number, agent = self.scene.pane_and_agent(self.chosen)
+        flock = self.scene.flocks[number]
         if not flock.side.flight.present[agent]:
-            self._show(Drawn({}, f"<b>agent {agent}</b> has left"), flock.offset, number)
+            self._show(PerceptDrawing({}, f"<b>agent {agent}</b> has left"), flock.offset, number)
             return
-        drawn = self.eyes.of(flock.side, agent, self.drawing.size, self.drawing.top)
+        drawn = self.percept_lines.of(flock.side, agent, self.scene.size, self.scene.top)
         self._show(drawn, flock.offset, number)
 
-    def _show(self, drawn: Drawn, offset: NDArray[Any], side: int) -> None:
-        for kind in KINDS:
+    def _show(self, drawn: PerceptDrawing, offset: NDArray[Any], side: int) -> None:
+        for kind in AGENT_LINE_KINDS:
             points, tones = drawn.lines.get(kind, (np.zeros((0, 2, 3)), None))
             self.view.extra(kind, points + offset, tones)
-        where = f" of {NAMES[side]}" if len(self.player.sides) > 1 else ""
-        self.about.content = note(drawn.words.replace("</b>", f"{where}</b>", 1))
+        where = f" of {PANE_NAMES[side]}" if len(self.player.sides) > 1 else ""
+        self.about.content = small_print_html(drawn.html.replace("</b>", f"{where}</b>", 1))
 
-    def fail(self) -> None:
+    def begin_fault(self) -> None:
         """Let the fault that the menu names begin in the selected agent."""
         if self.chosen is not None:
-            side, agent = self.drawing.whose(self.chosen)
+            side, agent = self.scene.pane_and_agent(self.chosen)
             self.player.sides[side].flight.fault(self.fault.value, agent, wait=False)

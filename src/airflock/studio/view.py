@@ -12,22 +12,22 @@ import rich
 import viser
 from numpy.typing import NDArray
 
-from airflock.studio.door import guarded
-from airflock.studio.panel import Panel
-from airflock.support.errors import StudioError
-from airflock.view.stage.scene import Lines, Solid, dart
+from airflock.studio.door import require_token
+from airflock.studio.panel import Widgets
+from airflock.support import StudioError
+from airflock.view import SceneLines, SceneSolid, dart_mesh
 
-TRAILS = 40  # nodes, rewritten in turn: a trail is so many frames long
-NARROW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
-WIDE = 0.8
-SETTLING = 2.0  # s; a page that was just opened or pointed elsewhere is not led yet
-BREADTH = 1.2  # width by height from which on a page shows a field beside its panel
-TURNED = 0.02  # by which width by height differs when a telephone is turned, and not when a bar slides away
-FEW = 32  # segments of a kind of lines at first
-STILL = (1.0, 0.0, 0.0, 0.0)
+TRAIL_PIECES = 40  # nodes, rewritten in turn: a trail is so many frames long
+FLAT_FIELD_OF_VIEW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
+SPACE_FIELD_OF_VIEW = 0.8
+SETTLING_SECONDS = 2.0  # s; a page that was just opened or pointed elsewhere is not led yet
+FULL_ASPECT = 1.2  # width by height from which on a page shows a field beside its panel
+MIN_ASPECT_CHANGE = 0.02  # by which width by height differs when a telephone is turned, and not when a bar slides away
+FIRST_SEGMENTS = 32  # segments of a kind of lines at first
+NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
 
 
-class View:
+class BrowserView:
     """A page at an address of its own.
 
     host : localhost, unless the page is to be seen from elsewhere; port : the one asked for, 0 for any free one
@@ -37,12 +37,12 @@ class View:
     def __init__(self, host: str, port: int, title: str):
         free = _free_port(host)  # also where a port is given: a host that is not this machine is told as such
         port = port or free
-        _refuse_used(host, port)
+        _check_port_free(host, port)
         token = secrets.token_urlsafe(12)
         console = rich.get_console()
         console.quiet = True  # viser prints panels of its own
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection")  # to a page that has just gone
-        with guarded(token, port):
+        with require_token(token, port):
             self.server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
         if self.server.get_port() != port:
             self.server.stop()
@@ -55,7 +55,7 @@ class View:
         scene.configure_environment_map(None)
         scene.configure_default_lights(True, cast_shadow=False)
         scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(185, 185, 194), intensity=1.0)
-        self.panel = Panel(self.server)
+        self.panel = Widgets(self.server)
         self._standing: list[Any] = []
         self._moving: list[Any] = []
         self._aim: dict[str, Any] = {}
@@ -89,7 +89,7 @@ class View:
 
     def look_at(self, centre: NDArray[Any], span: float, flat: bool) -> None:
         """Put every camera where `span` m around a centre fill it: straight above, or from the south."""
-        field = NARROW if flat else WIDE
+        field = FLAT_FIELD_OF_VIEW if flat else SPACE_FIELD_OF_VIEW
         far = (1.15 if flat else 1.45) * span / np.tan(0.5 * field)
         offset = np.array([0.0, -0.001, 1.0]) if flat else np.array([0.25, -0.8, 0.55])
         place = centre + offset / np.linalg.norm(offset) * far
@@ -107,23 +107,23 @@ class View:
 
     def _sized(self, client: Any) -> None:
         """Point the camera of a page anew that has become narrow, or no longer is: it tells its size as it looks."""
-        narrow = min(client.camera.aspect, BREADTH)
-        if abs(narrow - self._narrow.get(client.client_id, BREADTH)) > TURNED:
+        narrow = min(client.camera.aspect, FULL_ASPECT)
+        if abs(narrow - self._narrow.get(client.client_id, FULL_ASPECT)) > MIN_ASPECT_CHANGE:
             self._narrow[client.client_id] = narrow
             self._welcome(client)
 
-    def _point(self, camera: Any, aspect: float = BREADTH) -> None:
-        for name, value in drawn_back(self._aim, aspect).items():  # the position first: it takes look_at along
+    def _point(self, camera: Any, aspect: float = FULL_ASPECT) -> None:
+        for name, value in camera_for_aspect(self._aim, aspect).items():  # the position first: it takes look_at along
             setattr(camera, name, value)
 
     def _welcome(self, client: Any) -> None:
         """Point the camera of one page; until the page has answered, what it says of its camera is old."""
         self._met[client.client_id] = time.monotonic()
-        self._point(client.camera, self._narrow.get(client.client_id, BREADTH))
+        self._point(client.camera, self._narrow.get(client.client_id, FULL_ASPECT))
 
     def ground(self, name: str, span: float, height: float, centre: NDArray[Any]) -> None:
         """A grid of 20 by 20 squares."""
-        cell = _round(span / 5.0)
+        cell = _round_length(span / 5.0)
         self._standing.append(
             self.server.scene.add_grid(
                 f"/world/{name}", 40.0 * cell, 40.0 * cell, plane="xy", cell_size=cell, section_size=5.0 * cell,
@@ -135,43 +135,43 @@ class View:
     def follow(self, target: NDArray[Any]) -> None:
         """Let the camera of every open page look at a place, m, from where it looks now."""
         for client in self.server.get_clients().values():
-            if time.monotonic() - self._met.get(client.client_id, 0.0) < SETTLING:
+            if time.monotonic() - self._met.get(client.client_id, 0.0) < SETTLING_SECONDS:
                 continue
             camera = client.camera  # what it says of itself is late, so only the difference is taken from it
             offset = np.asarray(camera.position) - np.asarray(camera.look_at)
             camera.position = tuple(target + offset)
             camera.look_at = tuple(target)
 
-    def solid(self, given: Solid, opacity: float | None = None) -> None:
+    def solid(self, solid: SceneSolid, opacity: float | None = None) -> None:
         """Something that stands."""
         self._standing.append(
             self.server.scene.add_mesh_simple(
-                f"/world/{given.name}", given.vertices.astype(np.float32), given.faces, color=given.colour,
+                f"/world/{solid.name}", solid.vertices.astype(np.float32), solid.faces, color=solid.colour,
                 flat_shading=True, side="double", opacity=opacity, cast_shadow=False,
             )
         )  # fmt: skip
 
-    def lines(self, given: Lines, width: float = 2.0) -> None:
+    def lines(self, lines: SceneLines, width: float = 2.0) -> None:
         """Lines that stay."""
-        self._standing.append(self._segments(f"/world/{given.name}", given.points, given.colour, width))
+        self._standing.append(self._segments(f"/world/{lines.name}", lines.points, lines.colour, width))
 
-    def label(self, text: str, place: NDArray[Any]) -> None:
+    def label(self, text: str, position: NDArray[Any]) -> None:
         """Words at a place, m."""
-        self._standing.append(self.server.scene.add_label(f"/world/label_{text}", text, position=_three(place)))
+        self._standing.append(self.server.scene.add_label(f"/world/label_{text}", text, position=_to_tuple(position)))
 
     def handle(
-        self, name: str, place: NDArray[Any], size: float, flat: bool, told: Callable[[NDArray[Any]], None]
+        self, name: str, position: NDArray[Any], size: float, flat: bool, on_move: Callable[[NDArray[Any]], None]
     ) -> None:
         """A handle of a size, m, by which something is dragged; `told` hears where it was let go."""
         made = self.server.scene.add_transform_controls(
             f"/world/{name}", scale=size, disable_rotations=True, active_axes=(True, True, not flat),
-            position=_three(place), depth_test=False,
+            position=_to_tuple(position), depth_test=False,
         )  # fmt: skip
 
         @made.on_update
         def _(event: Any) -> None:
             if event.phase == "end":
-                told(np.array(event.target.position, float))
+                on_move(np.array(event.target.position, float))
 
         self._standing.append(made)
 
@@ -184,36 +184,36 @@ class View:
 
     def agents(self, count: int, size: float, lines: Mapping[str, tuple[Any, float]]) -> None:
         """So many darts of a size, m; their trails; and kinds of lines about them by name: colour and width."""
-        vertices, faces = dart(size)
+        vertices, faces = dart_mesh(size)
         at = np.zeros((count, 3), np.float32)
         self._agents = self.server.scene.add_batched_meshes_simple(
-            "/agents", vertices, faces, batched_wxyzs=np.tile(np.array(STILL, np.float32), (count, 1)),
+            "/agents", vertices, faces, batched_wxyzs=np.tile(np.array(NO_ROTATION, np.float32), (count, 1)),
             batched_positions=at, batched_colors=np.full((count, 3), 128, np.uint8), flat_shading=True, lod="off",
             cast_shadow=False,
         )  # fmt: skip
         blank = np.zeros((count, 2, 3), np.float32)
         tones = np.zeros((count, 2, 3), np.uint8)
-        self._trails = [self._segments(f"/trails/{t}", blank, tones, 1.5) for t in range(TRAILS)]
+        self._trails = [self._segments(f"/trails/{t}", blank, tones, 1.5) for t in range(TRAIL_PIECES)]
         # a page takes colours of single segments only where the first ones had colours of their own
-        few = np.zeros((FEW, 2, 3), np.float32), np.zeros((FEW, 2, 3), np.uint8)
+        few = np.zeros((FIRST_SEGMENTS, 2, 3), np.float32), np.zeros((FIRST_SEGMENTS, 2, 3), np.uint8)
         self._extra = {name: self._segments(f"/{name}", *few, width) for name, (_, width) in lines.items()}
         self._tone = {name: np.array(colour) for name, (colour, _) in lines.items()}
         self._bare = set(self._extra)
-        self._room = dict.fromkeys(self._extra, FEW)  # segments that each kind holds
+        self._room = dict.fromkeys(self._extra, FIRST_SEGMENTS)  # segments that each kind holds
         self._moving += [self._agents, *self._trails, *self._extra.values()]
 
     def move(self, position: NDArray[Any], turn: NDArray[Any], colour: NDArray[Any]) -> None:
         """Put all agents somewhere: positions (agent, 3) m, quaternions (agent, 4), colours (agent, 3)."""
         self._agents.batched_positions = position
         self._agents.batched_wxyzs = turn
-        self._agents.batched_colors = _linear(colour)
+        self._agents.batched_colors = _linear_light(colour)
 
-    def trail(self, begin: NDArray[Any], end: NDArray[Any], colour: NDArray[Any], done: bool) -> None:
+    def trail(self, begin: NDArray[Any], end: NDArray[Any], colour: NDArray[Any], is_complete: bool) -> None:
         """The newest piece of every agent's trail, again; where it is done, the next one takes the oldest's place."""
-        node = self._trails[self._turn % TRAILS]
-        self._turn += done
+        node = self._trails[self._turn % TRAIL_PIECES]
+        self._turn += is_complete
         node.points = np.stack([begin, end], 1)
-        pale = _linear(0.45 * colour + 0.55 * 235)
+        pale = _linear_light(0.45 * colour + 0.55 * 235)
         node.colors = np.repeat(pale[:, None], 2, axis=1)
 
     def no_trails(self) -> None:
@@ -235,23 +235,23 @@ class View:
         if len(points):
             places[len(points) :] = points[0, 0]
             given = self._tone[name] if colour is None else np.asarray(colour)
-            tones[: len(points)] = np.broadcast_to(_linear(given), (len(points), 3))[:, None]
+            tones[: len(points)] = np.broadcast_to(_linear_light(given), (len(points), 3))[:, None]
         node.colors, node.points = tones, places
 
-    def on_click(self, told: Callable[[NDArray[Any], NDArray[Any]], None]) -> None:
+    def on_click(self, callback: Callable[[NDArray[Any], NDArray[Any]], None]) -> None:
         """Tell of a click into the scene: origin and direction of its ray."""
 
         @self.server.scene.on_click()
         def _(event: Any) -> None:
-            told(np.array(event.ray_origin), np.array(event.ray_direction))
+            callback(np.array(event.ray_origin), np.array(event.ray_direction))
 
 
-def _three(place: NDArray[Any]) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in place)
+def _to_tuple(position: NDArray[Any]) -> tuple[float, float, float]:
+    x, y, z = (float(c) for c in position)
     return x, y, z
 
 
-def _linear(colour: NDArray[Any]) -> NDArray[np.uint8]:
+def _linear_light(colour: NDArray[Any]) -> NDArray[np.uint8]:
     """Colours of many meshes or segments, which viser takes as linear light: sRGB (IEC 61966-2-1) decoded."""
     share = np.asarray(colour, float) / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
@@ -269,7 +269,7 @@ def _free_port(host: str) -> int:
         return int(probe.getsockname()[1])
 
 
-def _refuse_used(host: str, port: int) -> None:
+def _check_port_free(host: str, port: int) -> None:
     """Raise StudioError where nothing can listen at a port; viser would take the next one without a word."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -281,20 +281,25 @@ def _refuse_used(host: str, port: int) -> None:
             ) from fault
 
 
-def _round(length: float) -> float:
+def _round_length(length: float) -> float:
     """1, 2 or 5 times a power of ten near a length, m."""
     power = 10.0 ** np.floor(np.log10(max(length, 1e-9)))
     return float(min((1.0, 2.0, 5.0, 10.0), key=lambda digit: abs(digit * power - length)) * power)
 
 
-def drawn_back(aim: Mapping[str, Any], aspect: float) -> dict[str, Any]:
+def camera_for_aspect(camera_aim: Mapping[str, Any], aspect: float) -> dict[str, Any]:
     """An aim of a camera for a page of an aspect, width by height: a narrow one sees as far sideways as others do.
 
     The field of view is that of the height, so the camera of a telephone draws back until the width shows as much.
     """
-    if not aim or not 0.0 < aspect < BREADTH:
-        return dict(aim)
-    closer = aspect / BREADTH
-    target = np.asarray(aim["look_at"])
-    place = target + (np.asarray(aim["position"]) - target) / closer
-    return {**aim, "position": tuple(place), "near": aim["near"] / closer, "far": aim["far"] / closer}
+    if not camera_aim or not 0.0 < aspect < FULL_ASPECT:
+        return dict(camera_aim)
+    closer = aspect / FULL_ASPECT
+    target = np.asarray(camera_aim["look_at"])
+    place = target + (np.asarray(camera_aim["position"]) - target) / closer
+    return {
+        **camera_aim,
+        "position": tuple(place),
+        "near": camera_aim["near"] / closer,
+        "far": camera_aim["far"] / closer,
+    }

@@ -6,7 +6,7 @@ from typing import Any
 
 from airflock.studio.flights import FlightRequest
 from airflock.studio.player import Player
-from airflock.support.errors import StudioError
+from airflock.support import StudioError
 
 
 def watch(
@@ -57,27 +57,27 @@ def watch(
     """
     if str(scenario).lower().endswith(".json"):
         idle = {"settings": settings, "seed": seed, "law": law, "trust": trust, "against": against}
-        _refuse(f"{scenario}: is a flight card; its fleet is shown as it flies", idle, "a scenario")
+        _check_unused(f"{scenario}: is a flight card; its fleet is shown as it flies", idle, "a scenario")
         from airflock.studio.fleet_watch import watch_fleet
 
         watch_fleet(scenario, key, radios, host, port, say)
         return
-    _refuse(f"{scenario}: is flown here", {"radios": radios, "key": key}, "the flight card of a fleet (.json)")
+    _check_unused(f"{scenario}: is flown here", {"radios": radios, "key": key}, "the flight card of a fleet (.json)")
     rival = against if against is None or isinstance(against, Mapping) else str(against)
-    request = FlightRequest(str(scenario), dict(settings or {}), seed, law, trust, rival, at_once=True)
+    request = FlightRequest(str(scenario), dict(settings or {}), seed, law, trust, rival, interpret_first=True)
     player = Player(request)
     for note in dict.fromkeys(note for side in player.sides for note in side.scenario.notes):
         say(f"note: {note}")
-    from airflock.studio.page import Page
-    from airflock.studio.view import View
+    from airflock.studio.page import FlightPage
+    from airflock.studio.view import BrowserView
 
     player.fault = say
-    if player.compiling:
+    if player.is_compiling:
         say("compiling ... (flying interpreted meanwhile)")
     player.start()
-    view = View(host, port, player.where)
+    view = BrowserView(host, port, player.where)
     try:
-        page = Page(player, view)
+        page = FlightPage(player, view)
         try:
             say(f"watch at {view.address}  (Ctrl-C ends)")
             page.run()
@@ -87,8 +87,8 @@ def watch(
         view.stop()
 
 
-def _refuse(what: str, idle: Mapping[str, Any], wanted: str) -> None:
+def _check_unused(subject: str, options: Mapping[str, Any], needed: str) -> None:
     """Raise StudioError for what was given and would do nothing."""
-    given = [name for name, value in idle.items() if value]
+    given = [name for name, value in options.items() if value]
     if given:
-        raise StudioError(f"{what}; {' and '.join(given)} need{'s' * (len(given) == 1)} {wanted}")
+        raise StudioError(f"{subject}; {' and '.join(given)} need{'s' * (len(given) == 1)} {needed}")

@@ -21,7 +21,7 @@ FOUND = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0
 
 
 @contextmanager
-def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path with the same ending to write to; it takes the final name only if the block succeeds.
 
     A link is followed: the file that it names is replaced, not the link. Raises OSError, which names the path, where it
@@ -30,7 +30,7 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(os.path.realpath(path))
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
         raise OSError(0, "is there and is not a regular file", str(path))
-    swept(target.parent)
+    remove_leftovers(target.parent)
     try:
         with _beside(target) as temporary:
             yield temporary
@@ -61,18 +61,18 @@ def _beside(target: Path) -> Iterator[Path]:
 
 def _let_go(handle: int) -> int:
     """Close a file, so that it can be renamed or removed, where the system does that to no open file; else keep it."""
-    if locks.MOVES_OPEN_FILES or handle < 0:
+    if locks.CAN_RENAME_OPEN_FILES or handle < 0:
         return handle
     os.close(handle)
     return -1
 
 
-def write(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
+def write_file(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
     """Write text (UTF-8) or bytes; an OSError, which names the path, leaves the old file, or none, in place.
 
     A memoryview is released in any case: Python 3.12 crashes where an error holds one of a BytesIO that has gone.
     """
-    with content if isinstance(content, memoryview) else nullcontext(), atomic(path) as temporary:
+    with content if isinstance(content, memoryview) else nullcontext(), atomic_path(path) as temporary:
         if isinstance(content, memoryview):
             with open(temporary, "wb") as file:  # Path.write_bytes makes another view, which an error would hold
                 file.write(content)
@@ -81,7 +81,7 @@ def write(path: str | os.PathLike[str], content: str | bytes | memoryview) -> No
 
 
 @cache
-def swept(folder: Path) -> int:
+def remove_leftovers(folder: Path) -> int:
     """Remove what processes that were killed had begun to write into a folder, once a process; how many files."""
     count = 0
     with suppress(OSError):

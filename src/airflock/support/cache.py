@@ -23,17 +23,17 @@ OWNERS = hasattr(os, "geteuid")  # Windows has none: there a user's own folder i
 
 def cache_folder() -> Path:
     """Folder for what is kept between runs; one of this process alone if the usual place is full or not safe to use."""
-    base = usual_folder()
-    return base if not cache_trouble(base) else spare()
+    base = default_cache_folder()
+    return base if not cache_folder_error(base) else private_folder()
 
 
-def usual_folder() -> Path:
+def default_cache_folder() -> Path:
     """The place that the environment names, or the user's cache folder."""
     named = os.environ.get("AIRFLOCK_CACHE")
     return Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "airflock"
 
 
-def cache_trouble(base: Path) -> str:
+def cache_folder_error(base: Path) -> str:
     """Why a folder cannot keep compiled code; empty if it can. It is made if it is missing."""
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -57,7 +57,7 @@ def cache_trouble(base: Path) -> str:
 
 
 @cache
-def spare() -> Path:
+def private_folder() -> Path:
     """A folder of this process alone, whose name nobody can guess; it goes when the process ends."""
     folder = Path(tempfile.mkdtemp(prefix="airflock-"))
     (folder / DRIVERS).mkdir(mode=0o700)
@@ -65,7 +65,7 @@ def spare() -> Path:
     return folder
 
 
-def drivers(base: Path) -> list[tuple[float, int, Path]]:
+def list_drivers(base: Path) -> list[tuple[float, int, Path]]:
     """Last use (s since 1970), bytes and folder of every driver, those of version 0.1 included; the oldest first."""
     found = []
     for parent in (base, base / DRIVERS):
@@ -80,12 +80,12 @@ def drivers(base: Path) -> list[tuple[float, int, Path]]:
     return sorted(found)
 
 
-def shrink(base: Path, most: int = MOST) -> int:
-    """Remove the drivers that were not used for longest until all take less than `most` bytes; how many."""
-    known, count = drivers(base), 0
+def shrink(base: Path, max_bytes: int = MOST) -> int:
+    """Remove the drivers that were not used for longest until all take less than `max_bytes` bytes; how many."""
+    known, count = list_drivers(base), 0
     total = sum(size for _, size, _ in known)
     for used, size, folder in known:
-        if total <= most or time.time() - used < IN_USE:
+        if total <= max_bytes or time.time() - used < IN_USE:
             break
         shutil.rmtree(folder, ignore_errors=True)
         total, count = total - size, count + 1
@@ -94,7 +94,7 @@ def shrink(base: Path, most: int = MOST) -> int:
 
 def clear_cache() -> tuple[int, int]:
     """Remove all drivers; how many there were, and their bytes. Studies behind papers stay."""
-    known = drivers(usual_folder())
+    known = list_drivers(default_cache_folder())
     for _, _, folder in known:
         shutil.rmtree(folder, ignore_errors=True)
     return len(known), sum(size for _, size, _ in known)

@@ -19,7 +19,7 @@ class Geodetic(NamedTuple):
     altitude: float
 
 
-class Site:
+class FlightSite:
     """The point that is the origin of a flight's local coordinates: its arena's centre on the ground."""
 
     def __init__(self, latitude: float, longitude: float, altitude: float):
@@ -38,12 +38,12 @@ class Site:
         north = (latitude - self.origin.latitude) * self._north
         return around * self._east, north, altitude - self.origin.altitude
 
-    def geodetic(self, x: float, y: float, z: float) -> Geodetic:
+    def to_geodetic(self, x: float, y: float, z: float) -> Geodetic:
         """Latitude, longitude (degrees) and altitude (m) of a local point (m)."""
         longitude = (self.origin.longitude + x / self._east + 180.0) % 360.0 - 180.0
         return Geodetic(self.origin.latitude + y / self._north, longitude, self.origin.altitude + z)
 
 
-def turned(a: float, b: float, c: float) -> tuple[float, float, float]:
+def swap_enu_ned(a: float, b: float, c: float) -> tuple[float, float, float]:
     """East-north-up of north-east-down, and the other way round: the exchange is its own inverse."""
     return b, a, -c

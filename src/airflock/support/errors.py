@@ -7,17 +7,17 @@ MOST_LETTERS = 2000  # of one line; what a stranger's file holds is echoed, and 
 MOST_LINES = 50
 
 
-def bounded(text: str, most: int = MOST_LETTERS) -> str:
+def shortened(text: str, max_letters: int = MOST_LETTERS) -> str:
     """A text without its middle where it is longer than `most` letters."""
-    if len(text) <= most:
+    if len(text) <= max_letters:
         return text
-    half = most // 2
+    half = max_letters // 2
     return f"{text[:half]} ... ({len(text) - 2 * half} letters) ... {text[-half:]}"
 
 
-def bounded_lines(lines: list[str]) -> list[str]:
+def shortened_lines(lines: list[str]) -> list[str]:
     """The first lines, each bounded, and how many are left out."""
-    shown = [bounded(line) for line in lines[:MOST_LINES]]
+    shown = [shortened(line) for line in lines[:MOST_LINES]]
     return shown if len(lines) <= MOST_LINES else [*shown, f"and {len(lines) - MOST_LINES} more faults"]
 
 
@@ -26,9 +26,9 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
-def reason(fault: OSError) -> str:
+def os_error_message(error: OSError) -> str:
     """Why a file cannot be used, for the end of a line that begins with its name."""
-    return "no such file" if isinstance(fault, FileNotFoundError) else fault.strerror or str(fault)
+    return "no such file" if isinstance(error, FileNotFoundError) else error.strerror or str(error)
 
 
 class AirflockError(Exception):
@@ -46,12 +46,12 @@ class AirflockError(Exception):
 
 
 @contextmanager
-def gathering(faults: list[str]) -> Iterator[None]:
+def collect_errors(errors: list[str]) -> Iterator[None]:
     """Note the faults of what is checked inside, one line each, and go on, so that all can be told at once."""
     try:
         yield
     except AirflockError as fault:
-        faults += [line for line in str(fault).splitlines() if line not in faults]
+        errors += [line for line in str(fault).splitlines() if line not in errors]
 
 
 class ParameterError(AirflockError):
@@ -61,8 +61,8 @@ class ParameterError(AirflockError):
 class ScenarioError(AirflockError):
     """A scenario file or a set of its keys cannot be used; carries every fault that was found, one line each."""
 
-    def __init__(self, faults: list[str]):
-        self.faults = [printable(fault) for fault in bounded_lines(faults)]
+    def __init__(self, errors: list[str]):
+        self.faults = [printable(fault) for fault in shortened_lines(errors)]
         super().__init__("\n".join(self.faults))
 
 
@@ -97,8 +97,8 @@ class LinkError(AirflockError):
 class CardError(AirflockError):
     """A flight card cannot be flown: carries every fault that was found, one line each."""
 
-    def __init__(self, faults: list[str]):
-        self.faults = [printable(fault) for fault in bounded_lines(faults)]
+    def __init__(self, errors: list[str]):
+        self.faults = [printable(fault) for fault in shortened_lines(errors)]
         super().__init__("\n".join(self.faults))
 
 

@@ -10,21 +10,21 @@ from airflock.support.errors import DeviceError
 INSTALL = "pip install 'airflock[cuda]'"
 
 
-def runtime() -> Any:
+def cuda_runtime() -> Any:
     """numba-cuda's runtime interface."""
     return import_module("numba.cuda")
 
 
 @cache
-def trouble() -> str | None:
+def unavailable_reason() -> str | None:
     """Why no GPU can be used here, as one line; None if one can."""
     try:
         import_module("numba_cuda")
-        cuda = runtime()
+        cuda = cuda_runtime()
     except ImportError as fault:
         missing = isinstance(fault, ModuleNotFoundError) and fault.name == "numba_cuda"
         return f"numba-cuda is not installed; {INSTALL}" if missing else f"numba-cuda: {_first_line(fault)}"
-    if simulating():
+    if is_simulated():
         return "the CUDA simulator is on (NUMBA_ENABLE_CUDASIM); it is only for tests"
     try:
         if not cuda.is_available():
@@ -37,7 +37,7 @@ def trouble() -> str | None:
 
 def _driver_fault() -> str:
     """What the driver says."""
-    fault = runtime().cuda_error()
+    fault = cuda_runtime().cuda_error()
     return _first_line(fault) if fault else "no device found"
 
 
@@ -46,40 +46,40 @@ def _first_line(fault: BaseException | str) -> str:
     return lines[0] if lines else type(fault).__name__
 
 
-def simulating() -> bool:
+def is_simulated() -> bool:
     """Whether Numba's CUDA simulator stands for a GPU."""
     return os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
 
 
-def available() -> bool:
+def is_available() -> bool:
     """Whether a GPU can be used."""
-    return trouble() is None
+    return unavailable_reason() is None
 
 
-def required(simulated: bool = False) -> None:
+def require_gpu(allow_simulator: bool = False) -> None:
     """Raise DeviceError with the reason if no GPU can be used."""
-    if simulated and simulating():
+    if allow_simulator and is_simulated():
         return
-    fault = trouble()
+    fault = unavailable_reason()
     if fault is not None:
         raise DeviceError(f"device = cuda: {fault}; choose device = cpu or auto")
 
 
-def free_memory() -> int:
+def free_gpu_memory() -> int:
     """Free bytes in the GPU's memory."""
-    return int(runtime().current_context().get_memory_info().free)
+    return int(cuda_runtime().current_context().get_memory_info().free)
 
 
-def multiprocessors() -> int:
+def multiprocessor_count() -> int:
     """Multiprocessors of the GPU."""
-    return int(runtime().get_current_device().MULTIPROCESSOR_COUNT)
+    return int(cuda_runtime().get_current_device().MULTIPROCESSOR_COUNT)
 
 
-def describe() -> list[dict[str, Any]]:
+def describe_gpus() -> list[dict[str, Any]]:
     """Every GPU: name, compute capability, multiprocessors, memory in GB."""
-    if not available():
+    if not is_available():
         return []
-    cuda, found = runtime(), []
+    cuda, found = cuda_runtime(), []
     for device in cuda.gpus:
         with device:
             memory = cuda.current_context().get_memory_info()

@@ -12,7 +12,7 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-MOVES_OPEN_FILES = fcntl is not None  # whether a file may be renamed or removed while it is open
+CAN_RENAME_OPEN_FILES = fcntl is not None  # whether a file may be renamed or removed while it is open
 BYTE = 1 << 30  # which byte is locked, where it is bytes that are locked
 
 

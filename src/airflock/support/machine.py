@@ -10,7 +10,7 @@ CPUINFO = Path("/proc/cpuinfo")
 LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")  # of a container
 
 
-def processor() -> str:
+def processor_name() -> str:
     """Model name of the processor, or what the system says of its kind."""
     if CPUINFO.is_file():  # Linux
         for line in CPUINFO.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -35,7 +35,7 @@ def target() -> tuple[str, frozenset[str]]:
     return str(name), frozenset(word[1:] for word in features.split(",") if word.startswith("+"))
 
 
-def kind() -> str:
+def processor_kind() -> str:
     """Kind of the processor for which drivers are compiled: flights of one seed have its bits."""
     return target()[0]
 
@@ -47,7 +47,7 @@ def vector_bits() -> int:
 
 
 @cache
-def toolchain() -> str:
+def toolchain_versions() -> str:
     """Versions and processor that compiled code depends on."""
     import llvmlite
     import numba
@@ -59,7 +59,7 @@ def toolchain() -> str:
             numba.__version__,
             llvmlite.__version__,
             numpy.__version__,
-            kind(),
+            processor_kind(),
         )
     )
 

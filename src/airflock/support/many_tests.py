@@ -4,10 +4,10 @@ import math
 from collections.abc import Sequence
 
 
-def holm(ps: Sequence[float]) -> list[float]:
+def holm_correction(p_values: Sequence[float]) -> list[float]:
     """P values corrected by Holm's step-down method (1979), in their order; nan stays nan and counts as no test."""
-    order = sorted((p, k) for k, p in enumerate(ps) if math.isfinite(p))
-    corrected, most = [math.nan] * len(ps), 0.0
+    order = sorted((p, k) for k, p in enumerate(p_values) if math.isfinite(p))
+    corrected, most = [math.nan] * len(p_values), 0.0
     for rank, (p, k) in enumerate(order):
         most = max(most, min(1.0, (len(order) - rank) * p))
         corrected[k] = most

@@ -3,7 +3,7 @@
 import ctypes
 
 
-def give_back_memory() -> None:
+def trim_heap() -> None:
     """Give back to the system what was freed in small pieces, where the C library can (glibc)."""
     try:
         ctypes.CDLL(None).malloc_trim(0)

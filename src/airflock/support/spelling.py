@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 
-def meant(
-    word: object, known: Iterable[str], otherwise: str = "", *, lead: str = "", prefix: str = "", cutoff: float = 0.5
+def suggest(
+    word: object, known: Iterable[str], fallback: str = "", *, lead: str = "", prefix: str = "", cutoff: float = 0.5
 ) -> str:
     """A question for the nearest of the known words; where none is near, what is said otherwise.
 
@@ -20,10 +20,10 @@ def meant(
     'known: viragh, vasarhelyi'
     """
     near = get_close_matches(str(word), list(known), n=1, cutoff=cutoff)
-    return f"{lead}did you mean {prefix}{near[0]}?" if near else otherwise
+    return f"{lead}did you mean {prefix}{near[0]}?" if near else fallback
 
 
-def raised(fault: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """What was raised, in one line, with the attribute that was meant where another one was asked for.
 
     >>> import math
@@ -33,13 +33,13 @@ def raised(fault: BaseException) -> str:
     ...     raised(fault)
     "AttributeError: module 'math' has no attribute 'sqr'; did you mean sqrt?"
     """
-    line = " ".join(f"{type(fault).__name__}: {fault}".removesuffix(": ").split())
-    if isinstance(fault, AttributeError) and fault.name is not None:
-        line += meant(fault.name, (name for name in dir(fault.obj) if not name.startswith("_")), lead="; ")
+    line = " ".join(f"{type(error).__name__}: {error}".removesuffix(": ").split())
+    if isinstance(error, AttributeError) and error.name is not None:
+        line += suggest(error.name, (name for name in dir(error.obj) if not name.startswith("_")), lead="; ")
     return line
 
 
-def as_name(text: str) -> str:
+def to_identifier(text: str) -> str:
     """A text as a name in a program: whatever no name may hold becomes _.
 
     >>> as_name("my-law 2"), as_name("3law"), as_name("couzin_2002")

@@ -11,36 +11,36 @@ from typing import Any
 _thread = local()  # of each worker: the event that tells it to give up its flight
 
 
-class GivenUp(Exception):
+class Interrupted(Exception):
     """A flight was given up because the work that it belongs to was interrupted."""
 
 
-def heed() -> None:
+def check_interrupted() -> None:
     """Give up the flight of this thread if its work was interrupted. Raises GivenUp, which nobody waits for."""
     event = getattr(_thread, "interrupted", None)
     if event is not None and event.is_set():
-        raise GivenUp
+        raise Interrupted
 
 
-def cores() -> int:
+def available_cores() -> int:
     """Processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def in_threads(
-    jobs: Sequence[Callable[[], Any]], threads: int | None = None, done: Callable[[], None] | None = None
+def run_in_threads(
+    jobs: Sequence[Callable[[], Any]], threads: int | None = None, on_done: Callable[[], None] | None = None
 ) -> Iterator[Any]:
     """Results of jobs in their order, computed by several threads (compiled flights release the interpreter).
 
     `done` is called after each. Ctrl-C gives up the flights in the air, at any moment: this thread shares no lock of
     Python's with the others, which an interruption between taking and giving back would leave taken (futures have one).
     """
-    workers = max(1, min(threads or cores(), len(jobs)))
+    workers = max(1, min(threads or available_cores(), len(jobs)))
     if workers == 1:
         for job in jobs:
             yield job()
-            if done:
-                done()
+            if on_done:
+                on_done()
         return
     ended: SimpleQueue[_Ended] = SimpleQueue()
     interrupted, turns = Event(), iter(range(len(jobs)))
@@ -53,8 +53,8 @@ def in_threads(
             while number not in kept:
                 latest = ended.get()
                 kept[latest.number] = latest
-                if done and latest.fault is None:
-                    done()
+                if on_done and latest.fault is None:
+                    on_done()
             mine = kept.pop(number)
             if mine.fault is not None:
                 raise mine.fault
@@ -86,7 +86,7 @@ def _work(
             ended.put(_Ended(number, fault=fault))
 
 
-def in_background(work: Callable[[], Any]) -> Future[Any]:
+def run_in_background(work: Callable[[], Any]) -> Future[Any]:
     """Do some work in a thread of its own, which ends with the program.
 
     It begins when the caller goes on: a thread that begins at once keeps the interpreter, and its caller waiting, for

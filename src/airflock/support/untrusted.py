@@ -2,7 +2,7 @@
 
 A stranger's text may be too large, nested too deeply, or of numbers without end; parsers then take minutes, gigabytes,
 or raise whatever they happen to. Here the size, the nesting (dotted keys count, too) and the digits are bounded first,
-and `from_outside` turns everything that goes wrong behind the door into one line that names where the text came from.
+and `as_error` turns everything that goes wrong behind the door into one line that names where the text came from.
 """
 
 import json
@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.parsers import expat
 
-from airflock.support.errors import AirflockError, CardError, RecordingError, ScenarioError, bounded, reason
-from airflock.support.spelling import raised
+from airflock.support.errors import AirflockError, CardError, RecordingError, ScenarioError, os_error_message, shortened
+from airflock.support.spelling import describe_error
 
-MOST_BYTES = 5_000_000  # of one text; a polygon of 100,000 corners takes some 4 MB
+MAX_BYTES = 5_000_000  # of one text; a polygon of 100,000 corners takes some 4 MB
 MOST_DEPTH = 32  # tables and lists inside each other
 MOST_DOTS = 16  # parts of one dotted key; the standard parser takes quadratic time and memory over them
 MOST_VALUES = 1_000_000
@@ -54,7 +54,7 @@ class FormatError(TextError):
 
 
 @contextmanager
-def from_outside(where: object, kind: type[AirflockError] = ScenarioError) -> Iterator[None]:
+def as_error(where: object, error_class: type[AirflockError] = ScenarioError) -> Iterator[None]:
     """Whatever is raised while a text from outside is read or used becomes a `kind` of one line that begins `where`.
 
     An AirflockError of another kind has its line already. The cause is kept for `AIRFLOCK_DEBUG=1`.
@@ -64,30 +64,30 @@ def from_outside(where: object, kind: type[AirflockError] = ScenarioError) -> It
     except AirflockError as fault:
         if not isinstance(fault, TextError):
             raise
-        raise _one(kind, f"{where}: {fault}") from fault
+        raise _one(error_class, f"{where}: {fault}") from fault
     except OSError as fault:
-        raise _one(kind, f"{where}: {reason(fault)}") from fault
+        raise _one(error_class, f"{where}: {os_error_message(fault)}") from fault
     except RecursionError as fault:
-        raise _one(kind, f"{where}: is nested too deeply") from fault
+        raise _one(error_class, f"{where}: is nested too deeply") from fault
     except MemoryError as fault:
-        raise _one(kind, f"{where}: needs more memory than there is") from fault
+        raise _one(error_class, f"{where}: needs more memory than there is") from fault
     except Exception as fault:  # the last resort: a stranger's text must not end in a traceback
-        raise _one(kind, f"{where}: cannot be used: {raised(fault)}") from fault
+        raise _one(error_class, f"{where}: cannot be used: {describe_error(fault)}") from fault
 
 
 def _one(kind: type[AirflockError], line: str) -> AirflockError:
-    line = bounded(" ".join(line.split()))
+    line = shortened(" ".join(line.split()))
     return kind([line]) if issubclass(kind, (ScenarioError, CardError)) else kind(line)
 
 
-def path_of(path: Any) -> Path:
+def to_path(path: Any) -> Path:
     """The name of a file as a path. Raises RecordingError for what is no name."""
     if not isinstance(path, (str, os.PathLike)):
-        raise RecordingError(f"{bounded(repr(path), 80)} is not a name of a file; give a text or a Path")
-    return own_path(path)
+        raise RecordingError(f"{shortened(repr(path), 80)} is not a name of a file; give a text or a Path")
+    return expand_path(path)
 
 
-def own_path(name: str | os.PathLike[str]) -> Path:
+def expand_path(name: str | os.PathLike[str]) -> Path:
     """A path as a person writes it: ~ is the home folder, also where no shell has put it in."""
     return Path(os.path.expanduser(name))
 
@@ -95,20 +95,20 @@ def own_path(name: str | os.PathLike[str]) -> Path:
 def is_file(path: str | os.PathLike[str]) -> bool:
     """Whether a path from outside is that of a file; a path that cannot be one (too long, a NUL inside) is not."""
     try:
-        return stat.S_ISREG(own_path(path).stat().st_mode)
+        return stat.S_ISREG(expand_path(path).stat().st_mode)
     except (OSError, ValueError):
         return False
 
 
-def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
+def read_text(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES) -> str:
     """Text of a regular file in UTF-8, with or without a byte order mark; raises TextError or OSError."""
-    source = own_path(path)
+    source = expand_path(path)
     if not stat.S_ISREG(source.stat().st_mode):  # a named pipe would wait for ever
         raise TextError("is not a regular file")
     with source.open("rb") as file:
-        content = file.read(most + 1)
-    if len(content) > most:
-        raise TextError(f"is larger than {most / 1e6:g} MB, more than any file of this kind needs")
+        content = file.read(max_bytes + 1)
+    if len(content) > max_bytes:
+        raise TextError(f"is larger than {max_bytes / 1e6:g} MB, more than any file of this kind needs")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as fault:
@@ -117,10 +117,10 @@ def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     """A TOML file as a dict; raises TextError or OSError."""
-    return toml(read_text(path))
+    return parse_toml(read_text(path))
 
 
-def toml(text: str) -> dict[str, Any]:
+def parse_toml(text: str) -> dict[str, Any]:
     """A TOML text as a dict; raises FormatError where it is none and TextError where it is beyond bounds."""
     _measure(text)
     try:
@@ -139,10 +139,10 @@ def _quotes(text: str, said: str) -> str:
     return f'; a number with its unit stands in quotes: {with_unit[1]} = "{with_unit[2]}"' if with_unit else ""
 
 
-def toml_value(text: str) -> Any:
+def parse_toml_value(text: str) -> Any:
     """A value as TOML writes it, or the text itself where it is none; raises TextError where it is more than one."""
     try:
-        document = toml(f"value = {text}")
+        document = parse_toml(f"value = {text}")
     except FormatError:
         return text.strip()
     if list(document) != ["value"]:
@@ -150,15 +150,15 @@ def toml_value(text: str) -> Any:
     return document["value"]
 
 
-def json_object(text: Any) -> dict[str, Any]:
+def parse_json_object(text: Any) -> dict[str, Any]:
     """A JSON text as a dict; raises FormatError where it is none and TextError where it is beyond bounds."""
-    found = json_value(text)
+    found = parse_json(text)
     if not isinstance(found, dict):
-        raise FormatError(f"holds {type(found).__name__} {bounded(repr(found), 40)}, not an object of keys")
+        raise FormatError(f"holds {type(found).__name__} {shortened(repr(found), 40)}, not an object of keys")
     return found
 
 
-def json_value(text: Any) -> Any:
+def parse_json(text: Any) -> Any:
     """A JSON text as plain values; raises FormatError where it is none and TextError where it is beyond bounds."""
     if not isinstance(text, str):
         raise FormatError(f"is {type(text).__name__}, no text")
@@ -181,13 +181,13 @@ class Element(NamedTuple):
     name: str = ""
 
 
-def xml(text: str) -> Element:
+def parse_xml(text: str) -> Element:
     """An XML text as its outermost element; raises FormatError where it is none, TextError where it is beyond bounds.
 
     A document type is refused before anything of it is read, so that no entity is ever defined, expanded or fetched.
     """
-    if len(text) > MOST_BYTES:
-        raise TextError(f"is larger than {MOST_BYTES / 1e6:g} MB, more than any text of this kind needs")
+    if len(text) > MAX_BYTES:
+        raise TextError(f"is larger than {MAX_BYTES / 1e6:g} MB, more than any text of this kind needs")
     around: list[tuple[str, str, list[str], list[Element]]] = [("", "", [], [])]
     count = 0
 
@@ -220,8 +220,8 @@ def xml(text: str) -> Element:
 
 def _measure(text: str) -> None:
     """Refuse a text beyond bounds before it is parsed, in one pass over it."""
-    if len(text) > MOST_BYTES:
-        raise TextError(f"is larger than {MOST_BYTES / 1e6:g} MB, more than any text of this kind needs")
+    if len(text) > MAX_BYTES:
+        raise TextError(f"is larger than {MAX_BYTES / 1e6:g} MB, more than any text of this kind needs")
     depth = dots = values = 0
     for token in _TOKEN.finditer(text):
         kind = token.group()
@@ -260,11 +260,11 @@ def _walk(document: Any) -> None:
                 raise TextError(f"has more than {MOST_KEYS} keys")
             for key, entry in value.items():
                 if len(key) > MOST_KEY:
-                    raise TextError(f"the key {bounded(key, 40)} has {len(key)} letters, more than {MOST_KEY}")
+                    raise TextError(f"the key {shortened(key, 40)} has {len(key)} letters, more than {MOST_KEY}")
                 left.append((entry, depth + 1, f"{name}.{key}" if name else key))
         elif isinstance(value, list):
             left += [(entry, depth + 1, name) for entry in value]
         elif isinstance(value, int) and not -MOST_WHOLE < value < MOST_WHOLE:
-            raise TextError(f"{name} = {bounded(f'{value:x}', 20)} (hexadecimal) is beyond 2^64")
+            raise TextError(f"{name} = {shortened(f'{value:x}', 20)} (hexadecimal) is beyond 2^64")
         if depth > MOST_DEPTH:
-            raise TextError(f"{bounded(name, 80)} is nested more than {MOST_DEPTH} deep")
+            raise TextError(f"{shortened(name, 80)} is nested more than {MOST_DEPTH} deep")

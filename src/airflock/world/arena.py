@@ -8,8 +8,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, points, quantity, text
+from airflock.core import Parameters as Record, choice, points, quantity, text
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ No stack is needed: a node that is met is followed by the next row, one that is 
 
 import math
 
-from airflock.core.maths import FAR, TINY
+from airflock.core import FAR, TINY
 from airflock.world.arena import Surface
 from airflock.world.casts import entry, inverse, to_shape
 from airflock.world.shapes import GROUND, from_shape

@@ -6,7 +6,7 @@ at all if it moves away; otherwise nothing that once came too near could leave a
 
 import math
 
-from airflock.core.maths import FAR, TINY
+from airflock.core import FAR, TINY
 from airflock.world.shapes import BOX, CYLINDER, GROUND, TRIANGLE, from_shape
 
 SKIN = 1e-4  # m; a sphere as near as this has met a shape: below what positions resolve in single precision

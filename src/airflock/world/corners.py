@@ -6,7 +6,7 @@ Corners = Sequence[Sequence[float]]
 STRAIGHT = 1e-9  # rad; by how much an outline at least turns at a corner
 
 
-def area(corners: Corners) -> float:
+def signed_area(corners: Corners) -> float:
     """Signed area of a polygon, m²: positive if its corners run counter-clockwise."""
     pairs = zip(corners, [*corners[1:], corners[0]], strict=True)
     return 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in pairs)
@@ -14,10 +14,10 @@ def area(corners: Corners) -> float:
 
 def counter_clockwise(corners: Corners) -> list[Sequence[float]]:
     """The corners in counter-clockwise order."""
-    return list(corners) if area(corners) > 0.0 else list(corners)[::-1]
+    return list(corners) if signed_area(corners) > 0.0 else list(corners)[::-1]
 
 
-def polygon_fault(corners: Corners) -> str:
+def polygon_error(corners: Corners) -> str:
     """Why a list of corners is no simple polygon; empty if it is one."""
     if len(corners) < 3:
         return f"has {len(corners)} corners; a polygon needs at least 3"
@@ -32,14 +32,14 @@ def polygon_fault(corners: Corners) -> str:
         for m in range(k + 2, n if k else n - 1):  # neighbours share a corner
             if _meet(*edges[k], *edges[m]):
                 return f"crosses or touches itself near [{edges[m][0][0]:g}, {edges[m][0][1]:g}]"
-    return "" if area(corners) != 0.0 else "has no area"
+    return "" if signed_area(corners) != 0.0 else "has no area"
 
 
 def is_convex(corners: Corners) -> bool:
     """Whether a simple polygon turns one way only."""
     ring = counter_clockwise(corners)
     n = len(ring)
-    return all(_turn(ring[k], ring[(k + 1) % n], ring[(k + 2) % n]) >= -1e-9 * abs(area(ring)) for k in range(n))
+    return all(_turn(ring[k], ring[(k + 1) % n], ring[(k + 2) % n]) >= -1e-9 * abs(signed_area(ring)) for k in range(n))
 
 
 def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
@@ -47,7 +47,7 @@ def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
     return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 
 
-def sides(corners: Corners) -> list[Sequence[float]]:
+def without_straight_corners(corners: Corners) -> list[Sequence[float]]:
     """Corners of a simple polygon at which it turns, in order: a straight side is one side, however it is divided."""
     n = len(corners)
     return [b for k, b in enumerate(corners) if _turns(corners[k - 1], b, corners[(k + 1) % n])]

@@ -4,9 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import TINY
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, points, quantity
+from airflock.core import TINY, Parameters as Record, choice, points, quantity
 
 OURS = "our choice, because the thesis shows moving goals without numbers"
 

@@ -6,7 +6,7 @@ where closed bodies overlap or are turned inside out. Three lines must agree, be
 triangles share may count it twice.
 """
 
-from airflock.core.maths import FAR
+from airflock.core import FAR
 from airflock.world.casts import entry, inverse, ray_to_shape
 from airflock.world.shapes import CLOSED, SEGMENT
 

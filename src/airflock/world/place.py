@@ -8,11 +8,10 @@ from copy import copy
 from dataclasses import dataclass
 from typing import Any, Self
 
-from airflock.core.agent import State
-from airflock.core.maths import FAR, norm
+from airflock.core import FAR, State, norm
 from airflock.world import arena, bvh, edges, excursion, polygon, rays
 from airflock.world.arena import Surface
-from airflock.world.corners import Corners, counter_clockwise, is_convex, sides
+from airflock.world.corners import Corners, counter_clockwise, is_convex, without_straight_corners
 
 FAR_HEIGHT = 1e9  # m; half height of an arena that is flown in a plane
 AWAY = 1e8  # m; nothing is looked for beyond
@@ -29,12 +28,12 @@ def half_sizes(world: arena.Parameters) -> tuple[float, float, float]:
     return 0.5 * world.side, 0.5 * world.side, z
 
 
-def raised(world: arena.Parameters) -> bool:
+def is_off_centre(world: arena.Parameters) -> bool:
     """Whether the middle of an arena between floor and ceiling lies elsewhere than at height 0."""
-    return world.dimensions == "3" and world.arena != "none" and middle(world) != 0.0
+    return world.dimensions == "3" and world.arena != "none" and middle_height(world) != 0.0
 
 
-def middle(world: arena.Parameters) -> float:
+def middle_height(world: arena.Parameters) -> float:
     """Height of the middle of an arena, m."""
     low, high = arena.heights_of(world)
     return 0.5 * (low + high) if world.dimensions == "3" else 0.0
@@ -51,8 +50,8 @@ def edge_rows(world: arena.Parameters) -> tuple[list[list[float]], int, list[lis
     """Edges of all polygons (rows ax ay bx by), how many are the arena's, and first and last row of each obstacle.
 
     A side of the arena that goes straight on over corners is one edge, with one shill agent. Behind the edges of the
-    arena stands the height of its middle where it is `raised`, behind those of each obstacle its two heights where
-    obstacles have any.
+    arena stands the height of its middle where it is `is_off_centre`, behind those of each obstacle its two heights
+    where obstacles have any.
     """
     rows: list[list[float]] = []
     spans = []
@@ -62,10 +61,10 @@ def edge_rows(world: arena.Parameters) -> tuple[list[list[float]], int, list[lis
         rows.extend([*a[:2], *b[:2]] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
 
     if world.arena == "polygon":
-        add(sides(world.corners))
+        add(without_straight_corners(world.corners))
     own = len(rows)
-    if raised(world):
-        rows.append([middle(world), 0.0, 0.0, 0.0])
+    if is_off_centre(world):
+        rows.append([middle_height(world), 0.0, 0.0, 0.0])
     for number, corners in enumerate(world.obstacles):
         first = len(rows)
         add(corners)
@@ -75,7 +74,7 @@ def edge_rows(world: arena.Parameters) -> tuple[list[list[float]], int, list[lis
     return rows, own, spans
 
 
-def walls(world: arena.Parameters) -> Sequence[tuple[Callable[..., Any], tuple[float, ...]]]:
+def wall_functions(world: arena.Parameters) -> Sequence[tuple[Callable[..., Any], tuple[float, ...]]]:
     """Surface function of each wall with its four numbers, in the order in which a driver asks them.
 
     The edges of a polygon are no such walls: `Place.surfaces` asks `polygon.wall`.
@@ -94,10 +93,10 @@ def walls(world: arena.Parameters) -> Sequence[tuple[Callable[..., Any], tuple[f
     if world.arena == "polygon":
         return caps
     corners = ((-h, -h), (h, -h), (h, h), (-h, h))
-    return [(arena.plane, inward(a, b)) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)] + caps
+    return [(arena.plane, inward_plane(a, b)) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)] + caps
 
 
-def inward(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
+def inward_plane(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
     """Normal and distance of the wall from a to b of a counter-clockwise ring, as `arena.plane` takes them."""
     tx, ty = b[0] - a[0], b[1] - a[1]
     length = (tx * tx + ty * ty) ** 0.5
@@ -123,7 +122,7 @@ class Shapes:
     links: Any = ()
 
 
-class Place:
+class WorldMap:
     """The world as one agent asks it.
 
     world  : record of the arena
@@ -137,12 +136,12 @@ class Place:
     ):
         found = shapes or Shapes()
         self._dims, self._look, self._casts = int(world.dimensions), look, casts
-        self._walls, self._half, self._periodic = walls(world), half_sizes(world), world.edges == "periodic"
+        self._walls, self._half, self._periodic = wall_functions(world), half_sizes(world), world.edges == "periodic"
         self._scene = found.shapes, found.nodes, found.links
         kind = "none" if world.edges == "periodic" else world.arena
         self._beyond, self._clear, self._flat = BEYOND[kind], CLEAR[kind], world.arena == "polygon"
         self._edges, self._corners, self._obstacles = edge_rows(world)
-        self._obstacle, self._middle = obstacle_rule(world), middle(world) if raised(world) else 0.0
+        self._obstacle, self._middle = obstacle_rule(world), middle_height(world) if is_off_centre(world) else 0.0
 
     def seen(self, look: float) -> Self:
         """The same world, shapes that appear and all, for an agent to whom shapes say something up to `look`, m."""
@@ -150,7 +149,7 @@ class Place:
         found._look = look
         return found
 
-    def image(self, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
+    def image_offset(self, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
         """Offset (m) to the nearest image in a periodic box; elsewhere the offset itself."""
         if not self._periodic:
             return dx, dy, dz
@@ -161,7 +160,7 @@ class Place:
         """State of another agent at the image that is nearest to own."""
         if not self._periodic:
             return other
-        dx, dy, dz = self.image(other.x - own.x, other.y - own.y, other.z - own.z)
+        dx, dy, dz = self.image_offset(other.x - own.x, other.y - own.y, other.z - own.z)
         return other._replace(x=own.x + dx, y=own.y + dy, z=own.z + dz)
 
     def surfaces(self, x: float, y: float, z: float) -> Iterator[Surface]:
@@ -192,7 +191,7 @@ class Place:
         for first, last in self._obstacles:
             yield self._obstacle(x, y, z, self._edges, first, last)
 
-    def solids(self, x: float, y: float, z: float) -> Iterator[Surface]:
+    def solid_surfaces(self, x: float, y: float, z: float) -> Iterator[Surface]:
         """Distance (m) and unit normal of every obstacle and of the nearest of what stands in the scene."""
         yield from self.obstacles(x, y, z)
         found = bvh.nearest_of(x, y, z, AWAY, 0.0, *self._scene)
@@ -223,7 +222,7 @@ class Place:
                 free = min(free, rays.to_edges(x, y, ux, uy, self._edges, first, last))
         return float(bvh.cast(x, y, z, ux, uy, uz, free, 0.0, *self._scene))
 
-    def blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float) -> bool:
+    def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float) -> bool:
         """Whether an obstacle or the scene stands between two places, m; the walls of an arena hide nothing."""
         dx, dy, dz = to_x - x, to_y - y, to_z - z
         length = norm(dx, dy, dz)

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, points, quantity, text
+from airflock.core import Parameters as Record, choice, points, quantity, text
 
 OURS = "our choice; the thesis's scenes are not available"
 

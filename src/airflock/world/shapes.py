@@ -9,7 +9,7 @@ triangles and segments. All shapes are convex, so a distance along a straight li
 
 import math
 
-from airflock.core.maths import TINY
+from airflock.core import TINY
 from airflock.world.arena import Surface
 
 BOX = 0.0

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-from airflock.core.maths import norm
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, choice, norm, quantity
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 from airflock.world import arena, edges, excursion, rays
-from airflock.world.place import inward
+from airflock.world.place import inward_plane
 
 RAYS = {"square": rays.to_box, "polygon": rays.to_polygon, "circle": rays.to_cylinder, "none": rays.to_nothing}
-EDGES = {"open": None, "bounce": edges.bounce, "periodic": edges.wrap}
+EDGE_RULES = {"open": None, "bounce": edges.bounce, "periodic": edges.wrap}
 
 
 def arena_surfaces(world: arena.Parameters) -> tuple[tuple[Callable[..., Any], ...], Callable[..., float]]:
@@ -35,7 +35,7 @@ def arena_ray(world: arena.Parameters) -> Callable[..., float]:
     return rays.to_nothing if world.edges == "periodic" else RAYS[world.arena]
 
 
-def faces(world: arena.Parameters) -> tuple[list[list[float]], list[int]]:
+def face_rows(world: arena.Parameters) -> tuple[list[list[float]], list[int]]:
     """Rows of the surface functions of `arena_surfaces`, and how many belong to each family."""
     three = world.dimensions == "3"
     h, z = 0.5 * world.side, 0.5 * world.height
@@ -49,5 +49,5 @@ def faces(world: arena.Parameters) -> tuple[list[list[float]], list[int]]:
         rows = [[1.0, 0.0, 0.0, h], [0.0, 1.0, 0.0, h]] + ([[0.0, 0.0, 1.0, z]] if three else [])
         return rows, [len(rows)]
     corners = ((-h, -h), (h, -h), (h, h), (-h, h)) if world.arena == "square" else ()  # a polygon's edges are no planes
-    rows = [list(inward(a, b)) for a, b in zip(corners, (*corners[1:], *corners[:1]), strict=True)]
+    rows = [list(inward_plane(a, b)) for a, b in zip(corners, (*corners[1:], *corners[:1]), strict=True)]
     return rows + caps, [len(rows) + len(caps)]

@@ -7,7 +7,7 @@ is claimed is which of the two is high. The hysteresis between the groups, the p
 
 from collections.abc import Sequence
 
-from airflock.scenarios.files import load
+from airflock.scenarios import load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

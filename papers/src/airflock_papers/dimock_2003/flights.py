@@ -9,11 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine import compile_for, fly
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import FlightError
-from airflock.support.threads import in_threads
+from airflock.engine import compile_for, fly_world
+from airflock.scenarios import Scenario, load
+from airflock.support import FlightError, run_in_threads
 from airflock_papers.dimock_2003.units import FOOT, SPAN, Gains
 from airflock_papers.flights import with_changes
 from airflock_papers.progress import Progress
@@ -97,7 +95,7 @@ class Birds:
         def job(task: Task) -> Callable[[], Flight]:
             return lambda: _flown(bases[task.start.flat], task, self.changes, scatter)
 
-        return list(in_threads([job(task) for task in tasks], self.threads, done))
+        return list(run_in_threads([job(task) for task in tasks], self.threads, done))
 
 
 @cache
@@ -120,7 +118,7 @@ def _flown(base: Scenario, task: Task, changed: Collection[str], scatter: bool) 
     gains = {name: value for name, value in task.gains.si().items() if f"model.{name}" not in changed}
     scenario = replace(base, parameters=replace(base.parameters, **gains), start=replace(base.start, **begin))
     try:
-        found = fly(scenario, task.seed, record=True)
+        found = fly_world(scenario, task.seed, record=True)
     except FlightError:
         if not scatter:
             raise

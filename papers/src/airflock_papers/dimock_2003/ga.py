@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.search.cmaes import CMAES
-from airflock.search.genetic import decode, genetic
+from airflock.search import CMAES, decode, minimise_over_bits
 from airflock_papers.dimock_2003.flights import Birds, Flight, Start, Task, in_row
 from airflock_papers.dimock_2003.units import Gains, gains
 
@@ -146,7 +145,7 @@ def with_genetic(birds: Birds, reading: Reading, seed: int, generations: int = G
     """The paper's algorithm; the gradient holds the others' circulations, winners fly again with the full one."""
     run = Run(reading, seed)
     losses = losses_of(birds, run)
-    genetic(lambda bits: losses(decode(bits)), 50, population=POPULATION, generations=generations, seed=seed)
+    minimise_over_bits(lambda bits: losses(decode(bits)), 50, population=POPULATION, generations=generations, seed=seed)
     return _flown_again(birds, run)
 
 

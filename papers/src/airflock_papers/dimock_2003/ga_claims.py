@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airflock.scenarios.files import load
+from airflock.scenarios import load
 from airflock_papers.claims import Measured
 from airflock_papers.dimock_2003.flights import Flight, holds_vee, spacing
 from airflock_papers.dimock_2003.ga import EARLY, FIRST, GENERATIONS, GREEDY, READINGS, Evolution, Run

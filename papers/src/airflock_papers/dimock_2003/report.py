@@ -101,7 +101,7 @@ def convergence(path: Path, found: Any) -> None:
 def traces(path: Path, flight: Flight, title: str) -> None:
     """Traces in the frame of the flock, and the mean induced drag over time, like Figs 6-8."""
     from airflock.parts.aero import wing as wings
-    from airflock.scenarios.files import load
+    from airflock.scenarios import load
     from airflock_papers.dimock_2003.static import Air
 
     wing: wings.Parameters = load("dimock_2003/published").wing

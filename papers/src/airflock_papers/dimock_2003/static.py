@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.parts.aero import wing as wings
-from airflock.parts.aero.filaments import influences
-from airflock.scenarios.files import load
+from airflock.parts.aero import influences, wing as wings
+from airflock.scenarios import load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.dimock_2003.units import FOOT, FT_LBF, HORSEPOWER, both

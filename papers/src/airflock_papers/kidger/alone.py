@@ -14,10 +14,9 @@ import numpy as np
 import pandas as pd
 from xarray import Dataset
 
-from airflock.recordings.flights import simulate
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.support.threads import in_threads
+from airflock.recordings import simulate
+from airflock.scenarios import Scenario, load
+from airflock.support import run_in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -96,7 +95,9 @@ def fly(flights: Flights) -> Flown:
         "One rule alone", {name: load(preset, keys) for name, (preset, keys) in SCORED.items()}, seeds
     )
     count = flights.counter("Gravity and stragglers", len(cases) * seeds)
-    rows = {n: list(in_threads([job(s, k) for k in range(seeds)], flights.threads, count)) for n, s in cases.items()}
+    rows = {
+        n: list(run_in_threads([job(s, k) for k in range(seeds)], flights.threads, count)) for n, s in cases.items()
+    }
     return Flown(scored, rows)
 
 

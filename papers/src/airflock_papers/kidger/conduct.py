@@ -7,10 +7,9 @@ import numpy as np
 import pandas as pd
 from xarray import Dataset
 
-from airflock.recordings.flights import simulate
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.support.threads import in_threads
+from airflock.recordings import simulate
+from airflock.scenarios import Scenario, load
+from airflock.support import run_in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -89,7 +88,9 @@ def fly(flights: Flights) -> Flown:
     table = flights.score("Four scenes", scenes, seeds)
     turned = flights.score("Separations", {name: load(preset, keys) for name, (preset, keys) in SCORED.items()}, seeds)
     count = flights.counter("Recorded boids", len(cases) * seeds)
-    rows = {n: list(in_threads([job(s, k) for k in range(seeds)], flights.threads, count)) for n, s in cases.items()}
+    rows = {
+        n: list(run_in_threads([job(s, k) for k in range(seeds)], flights.threads, count)) for n, s in cases.items()
+    }
     return Flown(table, turned, rows)
 
 

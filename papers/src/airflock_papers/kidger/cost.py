@@ -4,7 +4,7 @@ import time
 from typing import NamedTuple
 
 from airflock.engine import score_flight
-from airflock.scenarios.files import load
+from airflock.scenarios import load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

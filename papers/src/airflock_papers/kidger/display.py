@@ -5,8 +5,8 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.displays import fly_show, points_of
-from airflock.support.threads import in_threads
+from airflock.displays import fly_show, shape_points
+from airflock.support import run_in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -22,7 +22,7 @@ GUST = {"wind.gust": 3.0, "wind.east": 3.0}
 def fly(flights: Flights) -> pd.DataFrame:
     """Figures of every shape by (share failing, wind, seed, shape)."""
     count = 30 if flights.quick else DRONES
-    shapes = [points_of(text, count, seed=number) for number, text in enumerate(SHAPES)]
+    shapes = [shape_points(text, count, seed=number) for number, text in enumerate(SHAPES)]
     many, few = flights.count(SEEDS, 1), flights.count(FEW, 1)
     cases: list[tuple[float, str, int]] = [(s, "calm", k) for s in FAILING for k in range(many if s == 0.1 else few)]
     cases += [(0.1, "windy", k) for k in range(few)]
@@ -32,8 +32,8 @@ def fly(flights: Flights) -> pd.DataFrame:
     ]
     jobs[0]()  # compiles before threads ask for it
     rows: dict[Any, dict[str, Any]] = {}
-    for case, show in zip(cases, in_threads(jobs, flights.threads), strict=True):
-        rows |= {(*case, number): vars(formed) for number, formed in enumerate(show.formed)}
+    for case, show in zip(cases, run_in_threads(jobs, flights.threads), strict=True):
+        rows |= {(*case, number): vars(formed) for number, formed in enumerate(show.shape_reports)}
     return pd.DataFrame.from_dict(rows, orient="index").sort_index()
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from airflock.recordings.flights import simulate
-from airflock.scenarios.files import load
+from airflock.recordings import simulate
+from airflock.scenarios import load
 from airflock_papers.kidger.tuning import DURATION, PLACES, RADII, SCALES
 
 CURVES = ("flocked", "polarisation", "n_clusters", "r_min_mean", "n_coll", "n_env_coll")
@@ -15,10 +15,7 @@ FLIGHT = {"duration": 30.0}
 
 def draw(folder: Path, tuning: pd.DataFrame) -> None:
     """Draw them all into a folder."""
-    from airflock.view.plots.flocked import flocked
-    from airflock.view.plots.rays import rays
-    from airflock.view.plots.save import save_figure
-    from airflock.view.plots.scene_paths import through
+    from airflock.view import flocked, rays, save_figure, through
 
     city = simulate(load("kidger/city", FLIGHT), 0)
     save_figure(through(city), folder / "city.png")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.scenarios.files import load
+from airflock.scenarios import load
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
 from airflock_papers.kidger.conduct import SCENES

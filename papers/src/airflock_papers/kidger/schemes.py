@@ -6,15 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from airflock.core.agent import Heard, State, decide, meet_neighbours
-from airflock.core.maths import norm
-from airflock.core.senses import Senses
-from airflock.core.vocabulary import Own
+from airflock.core import BoundPercept, HeardNeighbour, Own, State, decide, norm, sum_neighbours
 from airflock.parts.laws import kidger
-from airflock.recordings.flights import simulate
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.surroundings import Course, Place
+from airflock.recordings import simulate
+from airflock.scenarios import FlightWorld, GoalCourse, Scenario, load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -66,11 +61,11 @@ def fly(flights: Flights) -> Flown:
 def overruled(scenario: Scenario, most: int) -> list[Overruled]:
     """What was decided in the frame before each collision with the environment, over as many seeds as it takes."""
     found: list[Overruled] = []
-    place, radius = Place(scenario), scenario.measured_by().r_body
+    place, radius = FlightWorld(scenario), scenario.resolved_metrics().r_body
     for seed in range(40):
         recording = simulate(scenario, seed)
         position, velocity = (recording[name].values[:, :, 0, :] for name in ("position", "velocity"))
-        course, touching = Course(scenario), np.zeros(scenario.agents, bool)
+        course, touching = GoalCourse(scenario), np.zeros(scenario.agents, bool)
         for k in range(1, len(position)):
             flock = [State(*map(float, row)) for row in np.hstack([position[k - 1].T, velocity[k - 1].T])]
             course.advance((k - 1) * scenario.flight.dt, scenario.flight.dt, flock)
@@ -84,15 +79,15 @@ def overruled(scenario: Scenario, most: int) -> list[Overruled]:
     return found
 
 
-def looked_into(scenario: Scenario, place: Place, course: Course, flock: list[State], i: int) -> Overruled:
+def looked_into(scenario: Scenario, place: FlightWorld, course: GoalCourse, flock: list[State], i: int) -> Overruled:
     """Decide once more for agent i, oracle by oracle."""
     p, own, dt = scenario.parameters, flock[i], scenario.flight.dt
-    heard = [Heard(j, state, 0.0) for j, state in enumerate(flock) if j != i]
-    senses = Senses.of(place, own, 0.0, course.of(i), (0, 0, i))
+    heard = [HeardNeighbour(j, state, 0.0) for j, state in enumerate(flock) if j != i]
+    senses = BoundPercept.of(place, own, 0.0, course.of(i), (0, 0, i))
     flown = decide(scenario.model, p, own, heard, (), None, time=0.0, period=dt, index=i, percept=senses).command
     speed = norm(*own[3:])
     me = Own(*own[3:], *(v / speed for v in own[3:]))
-    sums = meet_neighbours(scenario.model, p, own, heard, i)
+    sums = sum_neighbours(scenario.model, p, own, heard, i)
     tally = kidger.others(kidger.Tally(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), me, sums, senses, p)
     suggested = kidger.movement(tally, p)
     size = norm(*suggested)

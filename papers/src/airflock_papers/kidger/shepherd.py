@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from airflock.recordings.flights import simulate
-from airflock.scenarios.files import load
+from airflock.recordings import simulate
+from airflock.scenarios import load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from airflock.runs.space import with_parameters
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.search.study import load_study
+from airflock.runs import with_parameters
+from airflock.scenarios import Scenario, load
+from airflock.search import load_study
 from airflock.support import atomic
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
@@ -87,7 +86,7 @@ def optima() -> dict[str, dict[str, float]]:
 def write(found: Mapping[str, Mapping[str, float]]) -> None:
     """Commit optima; those of other cases stay."""
     rows = [f"{case},{name},{value:.6g}" for case, p in {**optima(), **found}.items() for name, value in p.items()]
-    atomic.write(_path(), "\n".join(["case,parameter,value", *rows]) + "\n")
+    atomic.write_file(_path(), "\n".join(["case,parameter,value", *rows]) + "\n")
 
 
 def _path() -> Path:

@@ -52,7 +52,7 @@ def reproduce(
     if presets is not None:
         for v in data.runs:
             text = (presets / f"{v}ms.toml").read_text(encoding="utf-8")
-            atomic.write(presets / f"evolved_{v}ms.toml", preset(v, data, text))
+            atomic.write_file(presets / f"evolved_{v}ms.toml", preset(v, data, text))
     return claims
 
 

@@ -6,8 +6,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
+from airflock.scenarios import Scenario, load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

@@ -12,10 +12,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from xarray import Dataset
 
-from airflock.recordings.flights import simulate
-from airflock.recordings.scores import over_time
-from airflock.scenarios.scenario import Scenario
-from airflock.support.threads import in_threads
+from airflock.recordings import over_time, simulate
+from airflock.scenarios import Scenario
+from airflock.support import run_in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -107,7 +106,7 @@ def fly(flights: Flights) -> Flown:
     turns = {}
     for v in recordings:
         scenario = flights.as_changed(optimum(v))
-        turns[v] = list(in_threads([job(scenario, seed) for seed in range(recorded)], flights.threads, count))
+        turns[v] = list(run_in_threads([job(scenario, seed) for seed in range(recorded)], flights.threads, count))
     flown = {}
     for key, scenario in cases().items():
         if key in needed:

@@ -10,10 +10,9 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from airflock.runs.space import with_parameters
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.search.study import load_study
+from airflock.runs import with_parameters
+from airflock.scenarios import Scenario, load
+from airflock.search import load_study
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
 from airflock_papers.vasarhelyi_2018.published import SPEEDS

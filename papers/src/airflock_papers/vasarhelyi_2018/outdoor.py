@@ -4,7 +4,7 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.scenarios.files import load
+from airflock.scenarios import load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

@@ -4,7 +4,7 @@ import math
 
 import pandas as pd
 
-from airflock.scenarios.scenario import Scenario
+from airflock.scenarios import Scenario
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

@@ -8,9 +8,8 @@ diluted. Agents are sampled every `metrics.period`, where the program looks at e
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from airflock.core.maths import FAR, bell
-from airflock.parts.metrics import fitness_vasarhelyi
-from airflock.parts.metrics.parameters import Parameters
+from airflock.core import FAR, bell
+from airflock.parts.metrics import Parameters, fitness_vasarhelyi
 
 METRICS = ("speed", "correlation", "nearest", "collisions", "excursion")
 REPORTS = {

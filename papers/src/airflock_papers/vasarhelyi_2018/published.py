@@ -6,8 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
+from airflock.scenarios import Scenario, load
 
 SPEEDS = (4, 6, 8, 16, 32)  # columns of Tables S1 and S2, m/s
 EVALUATIONS = 100  # stochastic evaluations behind each column of S2

@@ -14,10 +14,9 @@ import pandas as pd
 from xarray import Dataset
 
 from airflock.parts.laws import vasarhelyi_2018 as law
-from airflock.recordings.flights import simulate
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.support.threads import in_threads
+from airflock.recordings import simulate
+from airflock.scenarios import Scenario, load
+from airflock.support import run_in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -68,7 +67,9 @@ def fly(flights: Flights) -> Flown:
         return lambda: wall_term(simulate(scenario, seed), scenario)
 
     count = flights.counter("Table S4, wall terms", len(cases) * seeds)
-    walls = {k: list(in_threads([job(s, i) for i in range(seeds)], flights.threads, count)) for k, s in cases.items()}
+    walls = {
+        k: list(run_in_threads([job(s, i) for i in range(seeds)], flights.threads, count)) for k, s in cases.items()
+    }
     windy: dict[Any, Scenario] = {"6 m/s": load("vasarhelyi_2018/real_6ms", {"wind.east": WIND})}
     return Flown(walls, flights.score("Wind of 40 km/h", windy, flights.count(FLIGHTS, 4)).loc["6 m/s"])
 

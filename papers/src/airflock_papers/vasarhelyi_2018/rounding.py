@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.support.many_tests import holm
+from airflock.scenarios import Scenario, load
+from airflock.support import holm_correction
 from airflock_papers.vasarhelyi_2018 import program_wall
 from airflock_papers.vasarhelyi_2018.published import COLUMNS, EVALUATIONS, SPEEDS, optimum
 
@@ -126,5 +125,5 @@ def judged(v: int, flown: Mapping[str, NDArray[np.float64]], target: Target) -> 
         x = flown[measured_as(row, target)]
         mean, sd = np.array([x.mean()]), np.array([x.std(ddof=1)])
         ps.append(float(row_p(v, row, mean, sd, x.size, target.digits)[0]))
-    corrected = holm([0.0 if math.isnan(p) else p for p in ps])
+    corrected = holm_correction([0.0 if math.isnan(p) else p for p in ps])
     return min(corrected), dict(zip(COLUMNS, corrected, strict=True))

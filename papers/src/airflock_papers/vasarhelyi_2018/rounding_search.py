@@ -17,11 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
 from airflock.engine import score_flights
-from airflock.recordings.flights import provenance
-from airflock.support import atomic
-from airflock.support.cache import cache_folder
-from airflock.support.errors import AirflockError
-from airflock.support.untrusted import read_text
+from airflock.recordings import provenance
+from airflock.support import AirflockError, atomic, cache_folder, read_text
 from airflock_papers.flights import Flights
 from airflock_papers.vasarhelyi_2018.published import COLUMNS, EVALUATIONS
 from airflock_papers.vasarhelyi_2018.rounding import NAMES, SURE, TARGETS, Target, box, measured_as, row_p, scenario
@@ -71,7 +68,7 @@ class Kept:
         """Keep a point."""
         self.points.append(point)
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        atomic.write(self.path, "".join(json.dumps(point) + "\n" for point in self.points))
+        atomic.write_file(self.path, "".join(json.dumps(point) + "\n" for point in self.points))
 
 
 def kept(v: int) -> Kept:
@@ -90,7 +87,7 @@ def point(
         low, high = box(v).T
         flown = flights.as_changed(scenario(v, low + x * (high - low)))
         count = flights.counter(f"Rounding, {v} m/s, {title}", len(seeds))
-        rows = score_flights([flown] * len(seeds), list(seeds), threads=flights.threads, done=count)
+        rows = score_flights([flown] * len(seeds), list(seeds), threads=flights.threads, on_done=count)
         values = {name: [float(row[name]) for row in rows] for name in MEASURED}
         found = Point(stage, key, tuple(map(float, x)), values)
         store.add(found)

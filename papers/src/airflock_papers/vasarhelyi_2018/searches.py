@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from airflock.search.result import Result
+from airflock.search import EvolveResult
 from airflock.support import atomic
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
@@ -26,20 +26,20 @@ WALLS = ("v_shill", "a_shill")  # by what runs differ
 Data = Mapping[int, pd.DataFrame]
 
 
-def by_rank(runs: Mapping[int, Sequence[Result]]) -> dict[int, pd.DataFrame]:
+def by_rank(runs: Mapping[int, Sequence[EvolveResult]]) -> dict[int, pd.DataFrame]:
     """Runs of each speed (m/s), best first: largest fitness of a candidate, luck included, and what the optimum has."""
     return {v: pd.DataFrame([_row(run) for run in several]) for v, several in runs.items()}
 
 
-def _row(run: Result) -> dict[str, float]:
+def _row(run: EvolveResult) -> dict[str, float]:
     walls = {name: run.parameters[f"model.{name}"] for name in WALLS}
     return {"largest": run.largest, "fitness": run.fitness, **walls}
 
 
-def write(runs: Mapping[int, Sequence[Result]]) -> None:
+def write(runs: Mapping[int, Sequence[EvolveResult]]) -> None:
     """Commit what is said of the runs, by speed and rank."""
     table = pd.concat(by_rank(runs), names=["v_flock", "run"]).rename(lambda rank: rank + 1, level="run")
-    atomic.write(_path(), table.to_csv(float_format="%.9g", lineterminator="\n"))
+    atomic.write_file(_path(), table.to_csv(float_format="%.9g", lineterminator="\n"))
 
 
 def runs() -> dict[int, pd.DataFrame]:

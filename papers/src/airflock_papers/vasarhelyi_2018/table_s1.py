@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from airflock.runs.space import with_parameters
-from airflock.search.result import Result
-from airflock.support.many_tests import holm
+from airflock.runs import with_parameters
+from airflock.search import EvolveResult
+from airflock.support import holm_correction
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -46,7 +46,7 @@ COLUMNS = (
 class Data(NamedTuple):
     """By speed: the result of every run, the best first; flights of its optimum, of S1, and of S1 refitted."""
 
-    runs: Mapping[int, list[Result]]
+    runs: Mapping[int, list[EvolveResult]]
     ours: Mapping[int, pd.DataFrame]
     published: Mapping[int, pd.DataFrame]
     refitted: Mapping[int, pd.DataFrame]
@@ -88,7 +88,9 @@ def measured(data: Data) -> list[Measured]:
         ranges = {name: _range(best, name) for name in COLUMNS}
         found += [
             *gains(v, data.ours[v], data.published[v], data.refitted.get(v)),
-            Measured(f"s1.count.{v}ms", "evaluations above the mean", at, statistics.one(best.above, best.candidates)),
+            Measured(
+                f"s1.count.{v}ms", "evaluations above the mean", at, statistics.one(best.above, best.candidate_count)
+            ),
             *of_optimum(v, optima[v], data.ours[v], ranges),
         ]
     return means_tested(found)
@@ -98,7 +100,7 @@ def means_tested(found: Sequence[Measured]) -> list[Measured]:
     """Mean fitnesses with p of Welch's test against Table S1, corrected over its columns; the rest as it is."""
     means = {each.id: each.value for each in found if each.id.startswith("s1.mean.")}
     printed = {v: optimum(v).published["fitness"] for v in SPEEDS}
-    ps = holm([
+    ps = holm_correction([
         statistics.welch(means[name], mean, sd or 0.0, EVALUATIONS) if (name := f"s1.mean.{v}ms") in means else math.nan
         for v, (mean, sd) in printed.items()
     ])  # fmt: skip
@@ -148,7 +150,7 @@ def without_wall(scores: pd.DataFrame) -> pd.Series:
     return scores[["f_speed", "f_coll", "f_disc", "f_cluster", "f_corr"]].prod(axis=1)
 
 
-def _range(best: Result, name: str) -> str:
+def _range(best: EvolveResult, name: str) -> str:
     low, high = best.ranges[f"model.{name}"]
     return f"our working range {low:.3g} to {high:.3g}"
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from airflock.support.many_tests import holm
+from airflock.support import holm_correction
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -56,7 +56,7 @@ def measured(data: Data) -> list[Measured]:
 
 def corrected(rows: Sequence[Measured]) -> list[Measured]:
     """Rows of the table with p corrected for their number; what the row would give by itself stands in its note."""
-    ps = holm([math.nan if row.p is None else row.p for row in rows])
+    ps = holm_correction([math.nan if row.p is None else row.p for row in rows])
     return [replace(row, p=p, note=row.note + _alone(row.p or 0.0, p)) for row, p in zip(rows, ps, strict=True)]
 
 

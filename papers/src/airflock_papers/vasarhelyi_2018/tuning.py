@@ -14,12 +14,9 @@ import pandas as pd
 from xarray import Dataset
 
 from airflock.engine import score_flights
-from airflock.recordings.flights import provenance, simulate
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.support import atomic
-from airflock.support.cache import cache_folder
-from airflock.support.threads import in_threads
+from airflock.recordings import provenance, simulate
+from airflock.scenarios import Scenario, load
+from airflock.support import atomic, cache_folder, run_in_threads
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -152,11 +149,13 @@ def _kept(flights: Flights, name: str, v: int, scored: int, recorded: int) -> pd
         return pd.read_csv(path, index_col=0)
     title = f"Tables S3 and S4, {name}, {v} m/s"
     count = flights.counter(title, scored)
-    scores = score_flights([scenario] * scored, list(range(scored)), threads=flights.threads, done=count)
+    scores = score_flights([scenario] * scored, list(range(scored)), threads=flights.threads, on_done=count)
     jobs = [lambda seed=seed: measures(simulate(scenario, seed)) for seed in range(recorded)]
-    found = pd.DataFrame(scores)[list(SCORED)].join(pd.DataFrame(list(in_threads(jobs, flights.threads, lambda: None))))
+    found = pd.DataFrame(scores)[list(SCORED)].join(
+        pd.DataFrame(list(run_in_threads(jobs, flights.threads, lambda: None)))
+    )
     folder.mkdir(parents=True, exist_ok=True)
-    atomic.write(path, found.to_csv())
+    atomic.write_file(path, found.to_csv())
     return found
 
 

@@ -17,8 +17,7 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
+from airflock.scenarios import Scenario, load
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
 from airflock_papers.paper import Flown, Paper

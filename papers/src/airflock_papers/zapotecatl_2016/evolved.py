@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from airflock.runs.space import with_parameters
-from airflock.scenarios.files import load
-from airflock.search.result import Result
+from airflock.runs import with_parameters
+from airflock.scenarios import load
+from airflock.search import EvolveResult
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
@@ -24,7 +24,7 @@ MEASURES = ("quality", "cns_ext", "cns_pol", "extension_cm", "polarization_deg",
 class Data(NamedTuple):
     """The study's result, and paired flights with its parameters and with the paper's best."""
 
-    result: Result
+    result: EvolveResult
     ours: pd.DataFrame
     published: pd.DataFrame
 

@@ -54,7 +54,7 @@ def write(folder: Path, claims: list[Claim], flown: dict[str, Any]) -> None:
     radii(figures / "radii.png", means["sequential"]["quality"].idxmax())
     columns = [*SURFACES, "cns_ext", "cns_pol"]
     rounded = means["sequential"][columns].rename_axis(["r_s", "r_a"]).map(lambda value: float(f"{value:.5g}"))
-    atomic.write(folder / "configurations.csv", rounded.to_csv())
+    atomic.write_file(folder / "configurations.csv", rounded.to_csv())
     sections = [
         replace(each, words=_grid(means[each.start]["quality"])) if each.start in means else each for each in SECTIONS
     ]

@@ -9,10 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from airflock.recordings.flights import simulate
-from airflock.recordings.scores import over_time
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
+from airflock.recordings import over_time, simulate
+from airflock.scenarios import Scenario, load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

@@ -8,6 +8,6 @@ from airflock.core.contract.bodies import Body, body
 from airflock.core.contract.metric_sets import MetricSet
 from airflock.core.contract.metrics import Metric, metric
 from airflock.core.contract.models import Model, model
-from airflock.core.contract.namespaces import names_of
+from airflock.core.contract.namespaces import namespace_names
 
-__all__ = ["Body", "Metric", "MetricSet", "Model", "body", "metric", "model", "names_of"]
+__all__ = ["Body", "Metric", "MetricSet", "Model", "body", "metric", "model", "namespace_names"]

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.contract.declared import COMMANDS
-from airflock.core.contract.namespaces import names_of
-from airflock.core.contract.own_records import beginnings_of, check_memory
+from airflock.core.contract.namespaces import namespace_names
+from airflock.core.contract.own_records import check_memory_record, initial_values
 from airflock.core.parameters import Parameters
-from airflock.core.vocabulary import answer, asks
-from airflock.support.errors import RuleError
+from airflock.core.vocabulary import argument_names, call_rule
+from airflock.support import RuleError
 
 
 @dataclass(frozen=True)
@@ -41,19 +41,19 @@ class Body:
         return hash((self.name, self.move))
 
     @property
-    def beginnings(self) -> tuple[float, ...]:
+    def initial_memory(self) -> tuple[float, ...]:
         """What each field of its Memory is at the start of a flight."""
-        return beginnings_of(self.Memory)
+        return initial_values(self.Memory)
 
-    def lasts(self, **given: Any) -> float:
+    def lasts(self, **arguments: Any) -> float:
         """How long its battery lasts at least, s; 0 once it is empty."""
         if self.endures is None:
             return math.inf
-        return float(answer(self.endures, "endures", given, self.name))
+        return float(call_rule(self.endures, "endures", arguments, self.name))
 
-    def lacks(self, **given: Any) -> list[str]:
+    def limit_errors(self, **arguments: Any) -> list[str]:
         """What this body cannot fly, by what `limits` may ask for."""
-        return [] if self.limits is None else list(answer(self.limits, "limits", given, self.name))
+        return [] if self.limits is None else list(call_rule(self.limits, "limits", arguments, self.name))
 
 
 def body(namespace: Any, name: str = "") -> Body:
@@ -88,18 +88,18 @@ def body(namespace: Any, name: str = "") -> Body:
     >>> airflock.body(Obedient).accepts
     'velocity'
     """
-    found, name = names_of(namespace, name)
+    found, name = namespace_names(namespace, name)
     for needed in ("ACCEPTS", "INTEGRATION", "move"):
         if needed not in found:
             raise RuleError(f"body {name} lacks {needed}")
-    asked = asks(found["move"], "move", name)
+    asked = argument_names(found["move"], "move", name)
     if found["ACCEPTS"] not in COMMANDS or found["INTEGRATION"] not in ("old", "new"):
         raise RuleError(f"body {name}: ACCEPTS is one of {', '.join(COMMANDS)}; INTEGRATION is old or new")
     memory = found.get("Memory")
-    check_memory(f"body {name}", "move", asked, memory)
+    check_memory_record(f"body {name}", "move", asked, memory)
     for optional in ("limits", "endures"):
         if found.get(optional) is not None:
-            asks(found[optional], optional, name)
+            argument_names(found[optional], optional, name)
     return Body(
         name, found.get("Parameters", Parameters), found["ACCEPTS"], found["INTEGRATION"], found["move"],
         dict(found.get("VIOLATES", {})), memory, found.get("limits"), found.get("endures"),

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.contract.metrics import Metric
-from airflock.core.vocabulary import answer, asks
-from airflock.support.errors import RuleError
+from airflock.core.vocabulary import argument_names, call_rule
+from airflock.support import RuleError
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class MetricSet:
 
     def __post_init__(self) -> None:
         if self.fitness is not None:
-            asks(self.fitness, "fitness", self.name)
+            argument_names(self.fitness, "fitness", self.name)
         if self.faults is not None:
-            asks(self.faults, "faults", self.name)
+            argument_names(self.faults, "faults", self.name)
         names = [item.name for item in self.metrics]
         values = [value for item in self.metrics for value in item.Sample._fields]
         for which, found in (("metric", names), ("value", values)):
@@ -57,7 +57,7 @@ class MetricSet:
         if self.fitness is None:
             return dict(values)
         given = {"values": values, "agents": agents, "duration": duration, "q": q}
-        return {**values, **answer(self.fitness, "fitness", given, self.name)}
+        return {**values, **call_rule(self.fitness, "fitness", given, self.name)}
 
     def numbers(self, q: Any) -> tuple[str, ...]:
         """Names of the order parameters that are one number, fitness last."""

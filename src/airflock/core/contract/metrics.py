@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.contract.declared import CLOCKS, OVER_TIME, REDUCTIONS
-from airflock.core.contract.namespaces import names_of
-from airflock.core.vocabulary import asks
+from airflock.core.contract.namespaces import namespace_names
+from airflock.core.vocabulary import argument_names
 from airflock.core.vocabulary.metrics import METRIC
-from airflock.support.errors import RuleError
+from airflock.support import RuleError
 
 ABSENCE = {  # by how instants combine, `vocabulary.OVER_TIME`
     "mean": "mean over instants, each as that of a flock of those who are there",
@@ -118,7 +118,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
     >>> airflock.metric(Height).reports["height"]
     ('m', 'mean height of the flock')
     """
-    found, name = names_of(namespace, name)
+    found, name = namespace_names(namespace, name)
     if "sample" not in found:
         raise RuleError(f"metric {name} lacks sample")
     for rule, record in RULES_AND_RECORDS:
@@ -126,7 +126,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
             raise RuleError(f"metric {name} has a rule {rule} but no {record}")
     for kind in METRIC:
         if kind in found:
-            asks(found[kind], kind, name)
+            argument_names(found[kind], kind, name)
     fields = {f for record in ("Pair", "Agent", "Member", "Cluster") for f in getattr(found.get(record), "_fields", ())}
     for key, how in found.get("REDUCE", {}).items():
         if key not in fields or how not in REDUCTIONS:

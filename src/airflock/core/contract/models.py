@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.contract.declared import COMMANDS, REDUCTIONS
-from airflock.core.contract.namespaces import names_of
+from airflock.core.contract.namespaces import namespace_names
 from airflock.core.parameters import declarations
-from airflock.core.vocabulary import asks
+from airflock.core.vocabulary import argument_names
 from airflock.core.vocabulary.laws import RULES
-from airflock.support.errors import RuleError
+from airflock.support import RuleError
 
 NEEDED = {  # what each law brings, and what it is
     "Parameters": "a record of its numbers, derived from airflock.Parameters",
@@ -73,7 +73,7 @@ class Model:
     added: "Model | None" = None
 
     @property
-    def deciding(self) -> tuple[Callable[..., Any], ...]:
+    def decide_rules(self) -> tuple[Callable[..., Any], ...]:
         """Rules whose commands add up."""
         return (self.decide,) if self.added is None else (self.decide, self.added.decide)
 
@@ -118,7 +118,7 @@ def model(namespace: Any, name: str = "") -> Model:
     >>> airflock.model(Straight).command
     'velocity'
     """
-    found, name = names_of(namespace, name)
+    found, name = namespace_names(namespace, name)
     if missing := [f"{needed} ({what})" for needed, what in NEEDED.items() if needed not in found]:
         raise RuleError(f"model {name} lacks {', '.join(missing)}")
     if found["COMMAND"] not in COMMANDS:
@@ -128,7 +128,7 @@ def model(namespace: Any, name: str = "") -> Model:
             raise RuleError(f"model {name} has a rule {rule} but no {record} ({RECORDS[record]})")
     for kind in RULES:
         if kind in found:
-            asks(found[kind], kind, name)
+            argument_names(found[kind], kind, name)
     reduce = dict(found.get("REDUCE", {}))
     for key, how in reduce.items():
         if key not in getattr(found.get("Sums"), "_fields", ()) or how not in REDUCTIONS:

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 from functools import cache, lru_cache
 from typing import Any
 
-from airflock.core.rules.nodes import walk
-from airflock.support.errors import RuleError
+from airflock.core.rules.nodes import walk_tree
+from airflock.support import RuleError
 
 BITWISE = (ast.LShift, ast.RShift, ast.BitAnd, ast.BitOr, ast.BitXor)
 KEEPING = {"min", "max", "abs"}  # integers of integers
@@ -39,14 +39,14 @@ def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
 
 
 @cache
-def integers_of(rule: Callable[..., Any]) -> frozenset[str]:
+def integer_names(rule: Callable[..., Any]) -> frozenset[str]:
     """Names in a rule that hold integers: its variables, and integers of its module."""
     node = tree_of(rule)
     found = {name for name, value in rule.__globals__.items() if type(value) is int}
     found -= set(rule.__code__.co_varnames)
     while True:
         known = len(found)
-        for item in walk(node):
+        for item in walk_tree(node):
             for used in _integer_places(item, rule):
                 found |= set(_terms(used))
             if isinstance(item, ast.For) and _called(item.iter) == "range":
@@ -78,7 +78,7 @@ def is_integer(node: ast.expr, integers: set[str] | frozenset[str], rule: Callab
         name = _called(node)
         if name in KEEPING:
             return all(is_integer(argument, integers, rule) for argument in node.args)
-        return name in MAKING or _gives_integer(plain_function(name, rule))
+        return name in MAKING or _gives_integer(resolve_function(name, rule))
     return False
 
 
@@ -91,12 +91,12 @@ def _integer_places(item: ast.AST, rule: Callable[..., Any]) -> Iterator[ast.exp
     elif isinstance(item, ast.BinOp) and isinstance(item.op, ast.FloorDiv) and isinstance(item.right, ast.Constant):
         yield from [item.left] if type(item.right.value) is int else []
     elif isinstance(item, ast.Call):
-        called = plain_function(_called(item), rule)
+        called = resolve_function(_called(item), rule)
         if _called(item) == "range":
             yield from item.args
         elif called is not None:
             names = called.__code__.co_varnames[: called.__code__.co_argcount]
-            integers = integers_of(called)
+            integers = integer_names(called)
             yield from (given for name, given in zip(names, item.args, strict=False) if name in integers)
 
 
@@ -128,15 +128,15 @@ def _called(node: ast.AST) -> str:
     return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
 
 
-def free(name: str, rule: Callable[..., Any]) -> Any:
+def resolve_global(name: str, rule: Callable[..., Any]) -> Any:
     """What a free name of a rule stands for; None if for nothing."""
     closure = dict(zip(rule.__code__.co_freevars, rule.__closure__ or (), strict=True))
     return rule.__globals__.get(name, closure[name].cell_contents if name in closure else None)
 
 
-def plain_function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] | None:
+def resolve_function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] | None:
     """The plain function that a rule calls by this name; None for itself."""
-    found = free(name, rule)
+    found = resolve_global(name, rule)
     return found if isinstance(found, types.FunctionType) and found is not rule else None
 
 
@@ -146,5 +146,5 @@ def _gives_integer(rule: Callable[..., Any] | None) -> bool:
     if rule is None:
         return False
     node = tree_of(rule)
-    returned = [item.value for item in walk(node) if isinstance(item, ast.Return) and item.value is not None]
-    return bool(returned) and all(is_integer(value, integers_of(rule), rule) for value in returned)
+    returned = [item.value for item in walk_tree(node) if isinstance(item, ast.Return) and item.value is not None]
+    return bool(returned) and all(is_integer(value, integer_names(rule), rule) for value in returned)

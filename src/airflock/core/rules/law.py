@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any
 
-from airflock.core.rules.integers import BITWISE, integers_of, is_integer, tree_of
-from airflock.core.rules.nodes import walk
-from airflock.support.errors import RuleError
+from airflock.core.rules.integers import BITWISE, integer_names, is_integer, tree_of
+from airflock.core.rules.nodes import walk_tree
+from airflock.support import RuleError
 
 ALLOWED_CALLS = {"min", "max", "abs", "float", "int", "range", "len"}
-RESERVED = {"min": "least", "max": "most"}  # what a driver calls instead: no name for a variable beside it
-TAKEN = "real"  # what a driver makes of every literal
+RENAMED_BUILTINS = {"min": "least", "max": "most"}  # what a driver calls instead: no name for a variable beside it
+CAST_NAME = "real"  # what a driver makes of every literal
 INSTEAD = {"random": "percept.normal(0) or percept.uniform(0) in decide", "time": "percept.time in decide"}
 NOT_FINITE = {"inf", "nan", "isinf", "isnan", "isfinite"}  # compiled arithmetic takes all numbers for finite
 INNER = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
@@ -23,7 +23,7 @@ FORBIDDEN = (
 )  # fmt: skip
 
 
-def faults(rule: Callable[..., Any]) -> list[str]:
+def rule_errors(rule: Callable[..., Any]) -> list[str]:
     """Everything in a rule that a compiler or a GPU would not take, each as one line with its place."""
     if not inspect.isfunction(rule):
         name = getattr(rule, "__name__", type(rule).__name__)
@@ -31,7 +31,7 @@ def faults(rule: Callable[..., Any]) -> list[str]:
         raise RuleError(f"{place_of(rule)}: rule {name} {what}; a rule is a plain function")
     node = tree_of(rule)
     told: list[tuple[ast.AST, str]] = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
-    for item in walk(node):
+    for item in walk_tree(node):
         told += [(item, text) for text in (*_of_text(item, node), *_of_numbers(item, rule), *_of_names(item, rule))]
     return [f"{place_of(rule, getattr(item, 'lineno', 1) - 1)}: rule {rule.__name__}: {text}" for item, text in told]
 
@@ -41,8 +41,8 @@ def _of_signature(node: ast.FunctionDef, variables: tuple[str, ...]) -> Iterator
         yield "has a decorator; a rule is a plain function"
     if node.args.kwonlyargs or node.args.vararg or node.args.kwarg:
         yield "has * in its arguments; a rule is called with values in their order"
-    if TAKEN in variables:
-        yield f"{TAKEN} is what the engine calls here; give the variable another name"
+    if CAST_NAME in variables:
+        yield f"{CAST_NAME} is what the engine calls here; give the variable another name"
 
 
 def _of_text(item: ast.AST, node: ast.FunctionDef) -> Iterator[str]:
@@ -60,7 +60,7 @@ def _of_text(item: ast.AST, node: ast.FunctionDef) -> Iterator[str]:
 def _of_numbers(item: ast.AST, rule: Callable[..., Any]) -> Iterator[str]:
     """Integers among floats, and numbers that are not finite."""
     if isinstance(item, ast.BinOp) and not isinstance(item.op, (ast.Pow, *BITWISE)):
-        integers = integers_of(rule)
+        integers = integer_names(rule)
         for side, other in ((item.left, item.right), (item.right, item.left)):
             if isinstance(side, ast.Constant) and type(side.value) is int and not is_integer(other, integers, rule):
                 yield f"integer {side.value} in float arithmetic; write {side.value}.0"
@@ -70,8 +70,8 @@ def _of_numbers(item: ast.AST, rule: Callable[..., Any]) -> Iterator[str]:
 
 def _of_names(item: ast.AST, rule: Callable[..., Any]) -> Iterator[str]:
     """Names that the engine has for itself, and names of modules."""
-    if isinstance(item, ast.Call) and isinstance(item.func, ast.Name) and item.func.id in RESERVED:
-        called = RESERVED[item.func.id]
+    if isinstance(item, ast.Call) and isinstance(item.func, ast.Name) and item.func.id in RENAMED_BUILTINS:
+        called = RENAMED_BUILTINS[item.func.id]
         if called in rule.__code__.co_varnames:
             yield f"{called} is what the engine calls here; give the variable another name"
         if len(item.args) < 2:
@@ -104,10 +104,10 @@ def _instead(module: Any, name: str) -> str:
 
 @lru_cache(maxsize=4096)
 def _told(rule: Callable[..., Any]) -> tuple[str, ...]:
-    return tuple(faults(rule))
+    return tuple(rule_errors(rule))
 
 
-def check(rule: Callable[..., Any]) -> None:
+def check_rule(rule: Callable[..., Any]) -> None:
     """Raise a RuleError that lists every fault of a rule; do nothing if it has none. Each is looked for once."""
     found = _told(rule)
     if found:

@@ -6,7 +6,7 @@ LEAVES = ast.Name, ast.Constant, ast.expr_context, ast.operator, ast.unaryop, as
 WORDS = {"ctx", "op", "ops", "id", "attr", "name", "asname", "module", "level", "names", "kind", "type_comment"}
 
 
-def walk(tree: ast.AST) -> list[ast.AST]:
+def walk_tree(tree: ast.AST) -> list[ast.AST]:
     """All nodes of a tree in the order of `ast.walk`, without contexts (`Load`), operators and what is imported."""
     found = [tree]
     for node in found:  # which grows

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from airflock.core.rules.integers import plain_function, tree_of
-from airflock.core.rules.nodes import walk
+from airflock.core.rules.integers import resolve_function, tree_of
+from airflock.core.rules.nodes import walk_tree
 
 
 @cache
 def fields_read(rule: Callable[..., Any], record: str) -> frozenset[str] | None:
     """Fields that a rule may read of the record that it calls by this name; None where its text does not tell."""
-    nodes = walk(tree_of(rule))
+    nodes = walk_tree(tree_of(rule))
     found: set[str] = set()
     told = 0
     for item in nodes:
@@ -37,7 +37,7 @@ def _is(node: ast.AST, name: str) -> bool:
 
 def _read_below(call: ast.Call, place: int, rule: Callable[..., Any]) -> frozenset[str] | None:
     """What a function reads of the record that a rule hands it at this place."""
-    called = plain_function(call.func.id, rule) if isinstance(call.func, ast.Name) else None
+    called = resolve_function(call.func.id, rule) if isinstance(call.func, ast.Name) else None
     if called is None or any(isinstance(given, ast.Starred) for given in call.args):
         return None
     names = list(inspect.signature(called).parameters)

@@ -10,8 +10,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from airflock.core.vocabulary import bodies, faults, laws, metrics, radios, sensors, topologies
-from airflock.support.errors import RuleError
-from airflock.support.spelling import meant
+from airflock.support import RuleError, suggest
 
 VOCABULARY: dict[str, dict[str, str]] = {
     **laws.RULES,
@@ -72,7 +71,7 @@ class Percept(NamedTuple):
         return 0.5
 
 
-BOUND = ("ray", "cast", "normal", "uniform")  # methods of Percept that an engine binds
+PERCEPT_METHODS = ("ray", "cast", "normal", "uniform")  # methods of Percept that an engine binds
 
 
 class Mean(NamedTuple):
@@ -91,14 +90,14 @@ class Mean(NamedTuple):
 
 
 @cache
-def asks(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...]:
+def argument_names(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...]:
     """Names that a rule asks for, checked against the vocabulary of its kind."""
     asked = inspect.signature(rule).parameters
     names = tuple(asked)
     known = VOCABULARY[kind]
     for name in names:
         if name not in known:
-            hint = meant(name, known, ".", lead="; ", cutoff=0.6)
+            hint = suggest(name, known, ".", lead="; ", cutoff=0.6)
             if asked[name].default is not inspect.Parameter.empty:
                 hint = f"; a number of the rule's own is declared in Parameters, and read as p.{name}."
             elif name == "self":
@@ -108,10 +107,10 @@ def asks(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...
     return names
 
 
-def answer(rule: Callable[..., Any], kind: str, given: Mapping[str, Any], owner: str = "") -> Any:
+def call_rule(rule: Callable[..., Any], kind: str, arguments: Mapping[str, Any], owner: str = "") -> Any:
     """Call a rule with what it asks for by name."""
-    names = asks(rule, kind, owner)
-    values = [given.get(name) for name in names]
+    names = argument_names(rule, kind, owner)
+    values = [arguments.get(name) for name in names]
     for place, value in enumerate(values):
         if value is None:
             raise RuleError(f"{owner}.{kind} asks for {names[place]}, which {owner} does not provide".lstrip("."))

@@ -1,1 +1,5 @@
 """Layer 3: bytes and their meaning: MAVLink 2 frames, signatures, coordinates, status packets, autopilots."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(__name__, ["dialect", "orders", "status", "witness"])

@@ -9,24 +9,24 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from airflock.drones.mavlink import dialect
-from airflock.drones.mavlink.frames import Packer
-from airflock.support.coordinates import turned
+from airflock.drones.mavlink.frames import FramePacker
+from airflock.support import swap_enu_ned
 
-ARM = 400
-DO_SET_MODE = 176
-REQUEST_MESSAGE = 512
-MESSAGE_INTERVAL = 511
-TAKE_OFF = 22
-CUSTOM_MODE = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, first parameter of DO_SET_MODE
-FORCE_DISARM = 21196.0  # second parameter of ARM: also in the air
-ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED in HEARTBEAT.base_mode
-VELOCITY_ONLY = 0x0DC7  # type mask of a setpoint: velocity counts; position, acceleration, yaw and its rate do not
-LOCAL_NED = 1  # MAV_FRAME
-INT32 = 6  # MAV_PARAM_TYPE
-STREAMS = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message → rate that a node asks for, 1/s
+ARM_COMMAND = 400
+SET_MODE_COMMAND = 176
+REQUEST_MESSAGE_COMMAND = 512
+MESSAGE_INTERVAL_COMMAND = 511
+TAKE_OFF_COMMAND = 22
+CUSTOM_MODE_ENABLED = 1.0  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, first parameter of DO_SET_MODE
+FORCE_DISARM_CODE = 21196.0  # second parameter of ARM: also in the air
+ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED in HEARTBEAT.base_mode
+VELOCITY_ONLY_MASK = 0x0DC7  # type mask of a setpoint: velocity counts; position, acceleration, yaw and its rate do not
+LOCAL_NED_FRAME = 1  # MAV_FRAME
+INT32_TYPE = 6  # MAV_PARAM_TYPE
+STREAM_RATES = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message → rate that a node asks for, 1/s
 
 
-class Guard(NamedTuple):
+class ParameterCheck(NamedTuple):
     """A parameter of the autopilot that must lie between two values before anything arms, and why.
 
     but    : a value between them that is not safe either
@@ -39,8 +39,8 @@ class Guard(NamedTuple):
     high: float
     why: str
     own: bool = False
-    silent: float = 0.0
-    but: float | None = None
+    timeout: float = 0.0
+    unsafe_value: float | None = None
 
     def range(self, member: int) -> tuple[float, float]:
         """Least and largest value that is safe for a member of a flock."""
@@ -51,19 +51,19 @@ class Guard(NamedTuple):
         if self.own and member is None:
             return "to the own system id"
         low, high = self.range(member or 0)
-        return f"within [{low:g}, {high:g}]" + ("" if self.but is None else f", not {self.but:g}")
+        return f"within [{low:g}, {high:g}]" + ("" if self.unsafe_value is None else f", not {self.unsafe_value:g}")
 
     def safe(self, value: float, member: int) -> bool:
         """Whether a value is safe for a member of a flock."""
         low, high = self.range(member)
-        return low <= value <= high and value != self.but
+        return low <= value <= high and value != self.unsafe_value
 
     def reason(self, speed: float, response: float) -> str:
         """Why, for a drone of a largest speed (m/s) that gets slower with a relaxation time (s)."""
-        if not self.silent:
+        if not self.timeout:
             return self.why
-        way = speed * (self.silent + response)
-        return f"{self.why}: {way:.3g} m at the limit of {speed:g} m/s with {self.silent:g} s"
+        way = speed * (self.timeout + response)
+        return f"{self.why}: {way:.3g} m at the limit of {speed:g} m/s with {self.timeout:g} s"
 
 
 @dataclass(frozen=True)
@@ -82,19 +82,19 @@ class Autopilot:
     ours: int
     land: int
     hold: int
-    climbs: bool
-    bytewise: bool
-    guards: tuple[Guard, ...]
+    takes_off_by_setpoints: bool
+    integers_as_bytes: bool
+    parameter_checks: tuple[ParameterCheck, ...]
 
     def mode_parameters(self, mode: int) -> tuple[float, ...]:
         """Parameters of DO_SET_MODE for a custom mode."""
         if self.name == "px4":
-            return CUSTOM_MODE, float(mode >> 16 & 0xFF), float(mode >> 24 & 0xFF)
-        return CUSTOM_MODE, float(mode)
+            return CUSTOM_MODE_ENABLED, float(mode >> 16 & 0xFF), float(mode >> 24 & 0xFF)
+        return CUSTOM_MODE_ENABLED, float(mode)
 
-    def parameter(self, value: float, type_: int) -> float:
+    def parameter_value(self, value: float, type_: int) -> float:
         """Value of a PARAM_VALUE, whose integers may travel as their bytes."""
-        if self.bytewise and type_ == INT32:
+        if self.integers_as_bytes and type_ == INT32_TYPE:
             return float(struct.unpack("<i", struct.pack("<f", value))[0])
         return value
 
@@ -106,50 +106,74 @@ def px4_mode(main: int, sub: int = 0) -> int:
 
 AUTOPILOTS = {
     "px4": Autopilot(
-        "px4", number=12, ours=px4_mode(6), land=px4_mode(4, 6), hold=px4_mode(4, 3), climbs=True, bytewise=True,
-        guards=(
-            Guard("COM_OF_LOSS_T", 0.0, 1.0, "s after the last setpoint until it acts", silent=1.0),
-            Guard("COM_OBL_RC_ACT", 4.0, 4.0, "on lost setpoints: 4 land; one that hovers is hit by one that flies on"),
-            Guard("GF_ACTION", 2.0, 5.0, "its own fence acts: 2 hold, 3 return, 5 land; 4 cuts the motors", but=4.0),
+        "px4",
+        number=12,
+        ours=px4_mode(6),
+        land=px4_mode(4, 6),
+        hold=px4_mode(4, 3),
+        takes_off_by_setpoints=True,
+        integers_as_bytes=True,
+        parameter_checks=(
+            ParameterCheck("COM_OF_LOSS_T", 0.0, 1.0, "s after the last setpoint until it acts", timeout=1.0),
+            ParameterCheck(
+                "COM_OBL_RC_ACT", 4.0, 4.0, "on lost setpoints: 4 land; one that hovers is hit by one that flies on"
+            ),
+            ParameterCheck(
+                "GF_ACTION",
+                2.0,
+                5.0,
+                "its own fence acts: 2 hold, 3 return, 5 land; 4 cuts the motors",
+                unsafe_value=4.0,
+            ),
         ),
     ),
     "ardupilot": Autopilot(
-        "ardupilot", number=3, ours=4, land=9, hold=17, climbs=False, bytewise=False,
-        guards=(
-            Guard("GUID_TIMEOUT", 0.1, 1.0, "s after the last setpoint until it brakes", silent=3.0),
-            Guard("FENCE_ENABLE", 1.0, 1.0, "its own fence is on"),
-            Guard("FENCE_ACTION", 1.0, 5.0, "and acts; 0 reports only"),
-            Guard("FS_GCS_ENABLE", 5.0, 5.0, "when heartbeats end: 5 land; a drone that hovers is hit in the end"),
-            Guard("FS_GCS_TIMEOUT", 2.0, 5.0, "s after the last heartbeat until it lands"),
-            Guard("SYSID_MYGCS", 1.0, 250.0, "whose heartbeats count: those of the node, of the same system", own=True),
+        "ardupilot",
+        number=3,
+        ours=4,
+        land=9,
+        hold=17,
+        takes_off_by_setpoints=False,
+        integers_as_bytes=False,
+        parameter_checks=(
+            ParameterCheck("GUID_TIMEOUT", 0.1, 1.0, "s after the last setpoint until it brakes", timeout=3.0),
+            ParameterCheck("FENCE_ENABLE", 1.0, 1.0, "its own fence is on"),
+            ParameterCheck("FENCE_ACTION", 1.0, 5.0, "and acts; 0 reports only"),
+            ParameterCheck(
+                "FS_GCS_ENABLE", 5.0, 5.0, "when heartbeats end: 5 land; a drone that hovers is hit in the end"
+            ),
+            ParameterCheck("FS_GCS_TIMEOUT", 2.0, 5.0, "s after the last heartbeat until it lands"),
+            ParameterCheck(
+                "SYSID_MYGCS", 1.0, 250.0, "whose heartbeats count: those of the node, of the same system", own=True
+            ),
         ),
     ),
-}  # fmt: skip
+}
 
 
-class Speaker:
+class AutopilotCommands:
     """Packs what a node says to its autopilot.
 
     system : of the autopilot; the node is another component of the same system
     """
 
     def __init__(self, autopilot: Autopilot, system: int, component: int = 191):
-        self.autopilot, self.system, self._pack = autopilot, system, Packer(system, component)
+        self.autopilot, self.system, self._pack = autopilot, system, FramePacker(system, component)
 
     def heartbeat(self) -> bytes:
         """A sign of life of an onboard computer (MAV_TYPE 18)."""
-        return self._pack(dialect.common().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+        return self._pack(dialect.common_dialect().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
 
     def velocity(self, velocity: tuple[float, float, float], boot_ms: int) -> bytes:
         """A setpoint: velocity east, north, up, m/s."""
-        vx, vy, vz = turned(*velocity)
+        vx, vy, vz = swap_enu_ned(*velocity)
         return self._pack(
-            dialect.common().MAVLink_set_position_target_local_ned_message(
+            dialect.common_dialect().MAVLink_set_position_target_local_ned_message(
                 boot_ms & 0xFFFFFFFF,
                 self.system,
                 1,
-                LOCAL_NED,
-                VELOCITY_ONLY,
+                LOCAL_NED_FRAME,
+                VELOCITY_ONLY_MASK,
                 0.0,
                 0.0,
                 0.0,
@@ -167,25 +191,27 @@ class Speaker:
     def command(self, number: int, *parameters: float) -> bytes:
         """A command with up to seven parameters."""
         seven = (*parameters, *(0.0,) * (7 - len(parameters)))
-        return self._pack(dialect.common().MAVLink_command_long_message(self.system, 1, number, 0, *seven))
+        return self._pack(dialect.common_dialect().MAVLink_command_long_message(self.system, 1, number, 0, *seven))
 
     def set_mode(self, mode: int) -> bytes:
         """Ask for a custom mode."""
-        return self.command(DO_SET_MODE, *self.autopilot.mode_parameters(mode))
+        return self.command(SET_MODE_COMMAND, *self.autopilot.mode_parameters(mode))
 
     def arm(self, yes: bool, force: bool = False) -> bytes:
         """Ask to arm or to disarm; force cuts the motors in the air."""
-        return self.command(ARM, float(yes), FORCE_DISARM if force else 0.0)
+        return self.command(ARM_COMMAND, float(yes), FORCE_DISARM_CODE if force else 0.0)
 
     def request_parameter(self, name: str) -> bytes:
         """Ask for the value of one parameter."""
-        kind: Any = dialect.common().MAVLink_param_request_read_message
+        kind: Any = dialect.common_dialect().MAVLink_param_request_read_message
         return self._pack(kind(self.system, 1, name.encode("ascii"), -1))
 
     def request_message(self, number: int) -> bytes:
         """Ask for one message once."""
-        return self.command(REQUEST_MESSAGE, float(number))
+        return self.command(REQUEST_MESSAGE_COMMAND, float(number))
 
     def request_streams(self) -> list[bytes]:
         """Ask for all messages that a node flies by, at their rates."""
-        return [self.command(MESSAGE_INTERVAL, float(number), 1e6 / rate) for number, rate in STREAMS.items()]
+        return [
+            self.command(MESSAGE_INTERVAL_COMMAND, float(number), 1e6 / rate) for number, rate in STREAM_RATES.items()
+        ]

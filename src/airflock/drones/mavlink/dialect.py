@@ -6,11 +6,11 @@
 from functools import cache
 from typing import Any, NamedTuple
 
-from airflock.support.errors import LinkError
+from airflock.support import LinkError
 
 
 @cache
-def common() -> Any:
+def common_dialect() -> Any:
     """The module of the common dialect; LinkError where pymavlink is not installed."""
     try:
         from pymavlink.dialects.v20 import common as found
@@ -19,7 +19,7 @@ def common() -> Any:
     return found
 
 
-class Layout(NamedTuple):
+class MessageLayout(NamedTuple):
     """Layout of one message on the wire.
 
     unpack : payload of full length → values in wire order; size : of that payload, bytes
@@ -32,15 +32,15 @@ class Layout(NamedTuple):
     unpack: Any
     size: int
     crc_extra: int
-    single: tuple[tuple[str, int], ...]
+    numbers: tuple[tuple[str, int], ...]
     arrays: tuple[tuple[str, int, int], ...]
     texts: tuple[tuple[str, int], ...]
 
 
 @cache
-def layout(message: int) -> Layout | None:
+def message_layout(message: int) -> MessageLayout | None:
     """Layout of a message by its number; None where the dialect does not know it."""
-    kind = common().mavlink_map.get(message)
+    kind = common_dialect().mavlink_map.get(message)
     if kind is None:
         return None
     single, arrays, texts, index = [], [], [], 0
@@ -54,21 +54,21 @@ def layout(message: int) -> Layout | None:
             single.append((name, index))
         index += 1 if type_ == "char" else max(1, count)
     unpacker = kind.unpacker
-    return Layout(
+    return MessageLayout(
         kind.msgname, unpacker.unpack, unpacker.size, kind.crc_extra, tuple(single), tuple(arrays), tuple(texts)
     )
 
 
-def values(message: int, payload: bytes) -> dict[str, Any]:
+def message_fields(message: int, payload: bytes) -> dict[str, Any]:
     """Fields of a message by name; a payload that was cut at its trailing zeros is filled up again.
 
     Raises LinkError where the dialect does not know the message or the payload is too long for it.
     """
-    known = layout(message)
+    known = message_layout(message)
     if known is None or len(payload) > known.size:
         raise LinkError(f"message {message} with {len(payload)} bytes is not in the common dialect")
     flat = known.unpack(payload.ljust(known.size, b"\0"))
-    found: dict[str, Any] = {name: flat[index] for name, index in known.single}
+    found: dict[str, Any] = {name: flat[index] for name, index in known.numbers}
     for name, index, count in known.arrays:
         found[name] = flat[index : index + count]
     for name, index in known.texts:
@@ -78,6 +78,6 @@ def values(message: int, payload: bytes) -> dict[str, Any]:
 
 def checksum(data: bytes, crc_extra: int) -> int:
     """Checksum of a frame's bytes after the first, with the message's extra byte (CRC-16/MCRF4XX)."""
-    found = common().x25crc(data)
+    found = common_dialect().x25crc(data)
     found.accumulate(bytes((crc_extra,)))
     return int(found.crc)

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 
 from airflock.drones.mavlink import dialect
 
-MAGIC = 0xFD
-HEADER = 10
-CHECKSUM = 2
-SIGNATURE = 13
-SIGNED = 1  # incompatibility flag
-LONGEST = HEADER + 255 + CHECKSUM + SIGNATURE
+FRAME_MAGIC = 0xFD
+HEADER_LENGTH = 10
+CHECKSUM_LENGTH = 2
+SIGNATURE_LENGTH = 13
+SIGNED_FLAG = 1  # incompatibility flag
+MAX_FRAME_LENGTH = HEADER_LENGTH + 255 + CHECKSUM_LENGTH + SIGNATURE_LENGTH
 
 
-class Frame(NamedTuple):
+class MavlinkFrame(NamedTuple):
     """A whole frame with a right checksum: who sent it, what it is, and its payload without trailing zeros."""
 
     system: int
@@ -27,18 +27,18 @@ class Frame(NamedTuple):
 
     def values(self) -> dict[str, Any]:
         """Its fields by name."""
-        return dialect.values(self.message, self.payload)
+        return dialect.message_fields(self.message, self.payload)
 
 
-class Packer:
+class FramePacker:
     """Packs messages of one sender; counts its frames as MAVLink wants it."""
 
     def __init__(self, system: int, component: int):
-        self._mav = dialect.common().MAVLink(None, srcSystem=system, srcComponent=component)
+        self._mav = dialect.common_dialect().MAVLink(None, srcSystem=system, srcComponent=component)
 
     def __call__(self, message: Any) -> bytes:
         """Bytes of a message of the dialect, unsigned."""
-        data = bytes(message.pack(self._mav))
+        data = bytes(message._packer(self._mav))
         self._mav.seq = (self._mav.seq + 1) & 0xFF
         return data
 
@@ -48,30 +48,30 @@ def message_number(head: bytes) -> int:
     return int.from_bytes(head[7:10], "little")
 
 
-def frame_at(data: bytes, start: int) -> tuple[Frame | None, int]:
+def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
     """The frame that starts at an index, and how many bytes it takes.
 
     (None, 0) means that more bytes must come before this can be told; (None, 1) that no frame starts here.
     """
-    if data[start] != MAGIC:
+    if data[start] != FRAME_MAGIC:
         return None, 1
-    head = data[start : start + HEADER]
-    if len(head) < HEADER:
+    head = data[start : start + HEADER_LENGTH]
+    if len(head) < HEADER_LENGTH:
         return None, 0
-    length, flags, known = head[1], head[2], dialect.layout(message_number(head))
-    if known is None or length > known.size or length == 0 or flags & ~SIGNED:
+    length, flags, known = head[1], head[2], dialect.message_layout(message_number(head))
+    if known is None or length > known.size or length == 0 or flags & ~SIGNED_FLAG:
         return None, 1
-    end = start + HEADER + length
-    whole = end + CHECKSUM + (SIGNATURE if flags & SIGNED else 0)
+    end = start + HEADER_LENGTH + length
+    whole = end + CHECKSUM_LENGTH + (SIGNATURE_LENGTH if flags & SIGNED_FLAG else 0)
     if len(data) < whole:
         return None, 0
-    told = int.from_bytes(data[end : end + CHECKSUM], "little")
+    told = int.from_bytes(data[end : end + CHECKSUM_LENGTH], "little")
     if told != dialect.checksum(data[start + 1 : end], known.crc_extra):
         return None, 1
-    return Frame(head[5], head[6], message_number(head), data[start + HEADER : end]), whole - start
+    return MavlinkFrame(head[5], head[6], message_number(head), data[start + HEADER_LENGTH : end]), whole - start
 
 
-def frames_in(datagram: bytes) -> list[Frame]:
+def frames_in(datagram: bytes) -> list[MavlinkFrame]:
     """All whole frames in one datagram; a part of a frame is lost."""
     found, start = [], 0
     while start < len(datagram):
@@ -82,21 +82,21 @@ def frames_in(datagram: bytes) -> list[Frame]:
     return found
 
 
-class Stream:
+class FrameStream:
     """Frames from a serial line: keeps what is not whole yet, at most one frame's length."""
 
     def __init__(self) -> None:
         self._rest = b""
 
-    def __call__(self, data: bytes) -> list[Frame]:
+    def __call__(self, data: bytes) -> list[MavlinkFrame]:
         """Frames that are whole now."""
-        return [frame for frame, _ in self._whole(data)]
+        return [frame for frame, _ in self._frames_and_bytes(data)]
 
-    def raw(self, data: bytes) -> list[bytes]:
+    def whole_frames(self, data: bytes) -> list[bytes]:
         """The bytes of frames that are whole now, with their signatures."""
-        return [whole for _, whole in self._whole(data)]
+        return [whole for _, whole in self._frames_and_bytes(data)]
 
-    def _whole(self, data: bytes) -> list[tuple[Frame, bytes]]:
+    def _frames_and_bytes(self, data: bytes) -> list[tuple[MavlinkFrame, bytes]]:
         self._rest += data
         found, start = [], 0
         while start < len(self._rest):

@@ -3,9 +3,9 @@
 import os
 from pathlib import Path
 
-from airflock.support.errors import LinkError, reason
+from airflock.support import LinkError, os_error_message
 
-LENGTH = 32  # bytes
+KEY_LENGTH = 32  # bytes
 
 
 def write_key(path: Path, key: bytes) -> None:
@@ -19,7 +19,7 @@ def write_key(path: Path, key: bytes) -> None:
             file.write(key.hex() + "\n")
     except OSError as fault:  # a full disk; half a key is none
         path.unlink(missing_ok=True)
-        raise LinkError(f"{path}: cannot be written: {reason(fault)}") from fault
+        raise LinkError(f"{path}: cannot be written: {os_error_message(fault)}") from fault
 
 
 def read_key(path: Path) -> bytes:
@@ -27,15 +27,15 @@ def read_key(path: Path) -> bytes:
     try:
         mode, text = path.stat().st_mode, path.read_text(encoding="ascii").strip()
     except OSError as fault:
-        raise LinkError(f"{path}: the key cannot be read: {reason(fault)}") from fault
+        raise LinkError(f"{path}: the key cannot be read: {os_error_message(fault)}") from fault
     except UnicodeDecodeError as fault:
-        raise LinkError(f"{path}: is not a key; give {2 * LENGTH} hexadecimal digits") from fault
+        raise LinkError(f"{path}: is not a key; give {2 * KEY_LENGTH} hexadecimal digits") from fault
     if mode & 0o077:
         raise LinkError(f"{path}: is readable by others (mode {mode & 0o777:04o}); chmod 600 {path}")
     try:
         key = bytes.fromhex(text)
     except ValueError:
         key = b""
-    if len(key) != LENGTH:
-        raise LinkError(f"{path}: is not a key; give {2 * LENGTH} hexadecimal digits")
+    if len(key) != KEY_LENGTH:
+        raise LinkError(f"{path}: is not a key; give {2 * KEY_LENGTH} hexadecimal digits")
     return key

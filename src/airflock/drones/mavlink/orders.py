@@ -10,16 +10,16 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 from airflock.drones.mavlink import dialect
-from airflock.support.errors import LinkError
+from airflock.support import LinkError
 
-MESSAGE = 385  # TUNNEL
-OPERATOR = 255  # system id of the operator's station
-CONTENT = struct.Struct("<2sBBBIQQiii")
-MAGIC, VERSION = b"AF", 1
-SEAL = 64  # bytes of an Ed25519 signature
+TUNNEL_MESSAGE = 385  # TUNNEL
+OPERATOR_SYSTEM = 255  # system id of the operator's station
+ORDER_FORMAT = struct.Struct("<2sBBBIQQiii")
+ORDER_MAGIC, ORDER_VERSION = b"AF", 1
+SEAL_LENGTH = 64  # bytes of an Ed25519 signature
 
 
-class Do(IntEnum):
+class OrderKind(IntEnum):
     """What an operator may order."""
 
     START = 1  # arm and take off, at the time that the order is for
@@ -34,10 +34,12 @@ class Do(IntEnum):
     PING = 10  # the operator is there
 
 
-CALL_OFF = frozenset({Do.HOLD, Do.RETURN, Do.LAND})  # they end what is flown, and call off a start not yet followed
+CALL_OFF_ORDERS = frozenset(
+    {OrderKind.HOLD, OrderKind.RETURN, OrderKind.LAND}
+)  # they end what is flown, and call off a start not yet followed
 
 
-class Order(NamedTuple):
+class OperatorOrder(NamedTuple):
     """One order.
 
     do    : what; target : system id, 0 for all; mission : number of the mission
@@ -45,65 +47,65 @@ class Order(NamedTuple):
     point : latitude and longitude in 1e-7 degrees, altitude in mm; only for GOTO
     """
 
-    do: Do
+    kind: OrderKind
     target: int
     mission: int
-    given: int
+    given_at: int
     at: int = 0
     point: tuple[int, int, int] = (0, 0, 0)
 
 
-def content(order: Order) -> bytes:
+def order_bytes(order: OperatorOrder) -> bytes:
     """The bytes that are signed."""
-    return CONTENT.pack(
-        MAGIC, VERSION, int(order.do), order.target, order.mission, order.given, order.at, *order.point
+    return ORDER_FORMAT.pack(
+        ORDER_MAGIC, ORDER_VERSION, int(order.kind), order.target, order.mission, order.given_at, order.at, *order.point
     )  # fmt: skip
 
 
-def new_keys() -> tuple[bytes, bytes]:
+def new_operator_keys() -> tuple[bytes, bytes]:
     """A private and a public key, 32 bytes each."""
     private = _ed25519().Ed25519PrivateKey.generate()
     return private.private_bytes_raw(), private.public_key().public_bytes_raw()
 
 
-def message(order: Order, private_key: bytes) -> Any:
+def order_message(order: OperatorOrder, private_key: bytes) -> Any:
     """The dialect's message of an order, sealed with the operator's private key."""
-    data = content(order)
+    data = order_bytes(order)
     sealed = data + _ed25519().Ed25519PrivateKey.from_private_bytes(private_key).sign(data)
     padded = list(sealed.ljust(128, b"\0"))
-    return dialect.common().MAVLink_tunnel_message(order.target, 0, 0, len(sealed), padded)
+    return dialect.common_dialect().MAVLink_tunnel_message(order.target, 0, 0, len(sealed), padded)
 
 
-def order_of(values: dict[str, Any], public_key: bytes) -> Order | None:
+def parse_order(values: dict[str, Any], public_key: bytes) -> OperatorOrder | None:
     """The order in the fields of a message; None if it is no order or its seal is not the operator's.
 
     Raises LinkError where the library that checks seals is not installed.
     """
     data = bytes(values["payload"])[: values["payload_length"]]
-    if len(data) != CONTENT.size + SEAL or values["payload_type"] != 0:
+    if len(data) != ORDER_FORMAT.size + SEAL_LENGTH or values["payload_type"] != 0:
         return None
-    magic, version, do, target, mission, given, at, *point = CONTENT.unpack(data[: CONTENT.size])
-    if magic != MAGIC or version != VERSION or do not in Do.__members__.values():
+    magic, version, do, target, mission, given, at, *point = ORDER_FORMAT.unpack(data[: ORDER_FORMAT.size])
+    if magic != ORDER_MAGIC or version != ORDER_VERSION or do not in OrderKind.__members__.values():
         return None
     keys = _ed25519()
     try:
-        keys.Ed25519PublicKey.from_public_bytes(public_key).verify(data[CONTENT.size :], data[: CONTENT.size])
+        keys.Ed25519PublicKey.from_public_bytes(public_key).verify(data[ORDER_FORMAT.size :], data[: ORDER_FORMAT.size])
     except (keys.InvalidSignature, ValueError):
         return None
-    return Order(Do(do), target, mission, given, at, (point[0], point[1], point[2]))
+    return OperatorOrder(OrderKind(do), target, mission, given, at, (point[0], point[1], point[2]))
 
 
-class _Ed25519(NamedTuple):
+class _KeyClasses(NamedTuple):
     Ed25519PrivateKey: Any
     Ed25519PublicKey: Any
     InvalidSignature: Any
 
 
-def _ed25519() -> _Ed25519:
+def _ed25519() -> _KeyClasses:
     """The library's keys, loaded when a seal is first made or checked: it takes longer to load than all the rest."""
     try:
         from cryptography.exceptions import InvalidSignature
         from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
     except ImportError as fault:
         raise LinkError("orders of the operator need cryptography: pip install 'airflock[fly]'") from fault
-    return _Ed25519(Ed25519PrivateKey, Ed25519PublicKey, InvalidSignature)
+    return _KeyClasses(Ed25519PrivateKey, Ed25519PublicKey, InvalidSignature)

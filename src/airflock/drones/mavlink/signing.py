@@ -14,20 +14,27 @@ from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 from airflock.drones.mavlink import dialect
-from airflock.drones.mavlink.frames import CHECKSUM, HEADER, MAGIC, SIGNATURE, SIGNED, message_number
+from airflock.drones.mavlink.frames import (
+    CHECKSUM_LENGTH,
+    FRAME_MAGIC,
+    HEADER_LENGTH,
+    SIGNATURE_LENGTH,
+    SIGNED_FLAG,
+    message_number,
+)
 
-EPOCH = 1_420_070_400_000_000  # 2015-01-01 in µs of Unix time
+SIGNING_EPOCH = 1_420_070_400_000_000  # 2015-01-01 in µs of Unix time
 STAMPS_PER_SECOND = 100_000
-LAST_STAMP = 2**48 - 1
-REFUSALS = ("short", "header", "length", "own", "stranger", "signature", "clock", "replay")
+MAX_STAMP = 2**48 - 1
+PACKET_REFUSALS = ("short", "header", "length", "own", "stranger", "signature", "clock", "replay")
 
 
-def stamp_at(utc: int) -> int:
+def stamp_of_time(utc: int) -> int:
     """Stamp of a time (µs of Unix time)."""
-    return (utc - EPOCH) // 10
+    return (utc - SIGNING_EPOCH) // 10
 
 
-class Signer:
+class PacketSigner:
     """Packs and signs messages of one sender.
 
     last   : stamp that was used last, also before a restart; stamps only grow, and no time is taken from others
@@ -35,23 +42,23 @@ class Signer:
     """
 
     def __init__(self, key: bytes, system: int, component: int = 191, last: int = 0):
-        self._mav = dialect.common().MAVLink(None, srcSystem=system, srcComponent=component)
+        self._mav = dialect.common_dialect().MAVLink(None, srcSystem=system, srcComponent=component)
         signing = self._mav.signing
         signing.secret_key, signing.sign_outgoing, signing.link_id = key, True, 0
         self.last = last
-        self.recent: deque[int] = deque(maxlen=256)
+        self.recent_stamps: deque[int] = deque(maxlen=256)
 
     def __call__(self, message: Any, utc: int) -> bytes:
         """Signed bytes of a message of the dialect, sent at utc (µs of Unix time)."""
-        self.last = max(stamp_at(utc), self.last + 1)
-        self.recent.append(self.last)
+        self.last = max(stamp_of_time(utc), self.last + 1)
+        self.recent_stamps.append(self.last)
         self._mav.signing.timestamp = self.last
-        data = bytes(message.pack(self._mav))
+        data = bytes(message._packer(self._mav))
         self._mav.seq = (self._mav.seq + 1) & 0xFF
         return data
 
 
-class Received(NamedTuple):
+class ReceivedMessage(NamedTuple):
     """A genuine message: sender, its stamp, number of the message, and its payload without trailing zeros."""
 
     system: int
@@ -62,10 +69,10 @@ class Received(NamedTuple):
     @property
     def values(self) -> dict[str, Any]:
         """Its fields by name."""
-        return dialect.values(self.message, self.payload)
+        return dialect.message_fields(self.message, self.payload)
 
 
-class Receiver:
+class PacketReceiver:
     """Accepts signed frames of known senders, each once, and near the own time.
 
     key     : secret of the mission
@@ -80,61 +87,68 @@ class Receiver:
     def __init__(
         self,
         key: bytes,
-        own: int,
+        own_id: int,
         senders: Mapping[int, Collection[int]],
         *,
         started: int,
-        heard: Mapping[int, int] | None = None,
-        spread: float = 1.0,
+        last_stamps: Mapping[int, int] | None = None,
+        max_clock_difference: float = 1.0,
     ):
-        self._key, self._own = key, own
+        self._key, self._own = key, own_id
         self._senders = {message: frozenset(systems) for message, systems in senders.items()}
-        self._floor, self._spread = stamp_at(started), round(spread * STAMPS_PER_SECOND)
-        self.heard = {int(system): stamp for system, stamp in (heard or {}).items() if 0 <= stamp <= LAST_STAMP}
-        self._last: dict[int, bytes] = {}  # system → the last datagram of it that was accepted
-        self.refused = dict.fromkeys(REFUSALS, 0)
-        self.accepted = 0
-        self.own_heard: int | None = None  # stamp of the last genuine, fresh frame that bears our own system id
+        self._min_stamp, self._max_clock_difference = (
+            stamp_of_time(started),
+            round(max_clock_difference * STAMPS_PER_SECOND),
+        )
+        self.heard = {int(system): stamp for system, stamp in (last_stamps or {}).items() if 0 <= stamp <= MAX_STAMP}
+        self._last_datagrams: dict[int, bytes] = {}  # system → the last datagram of it that was accepted
+        self.refused = dict.fromkeys(PACKET_REFUSALS, 0)
+        self.accepted_count = 0
+        self.own_id_stamp: int | None = None  # stamp of the last genuine, fresh frame that bears our own system id
 
-    def __call__(self, datagram: bytes, utc: int) -> Received | None:
+    def __call__(self, datagram: bytes, utc: int) -> ReceivedMessage | None:
         """The message of a datagram that arrived at utc (µs of Unix time); None if it is refused."""
-        fault = self._fault(datagram, utc)
+        fault = self._refusal_reason(datagram, utc)
         if fault:
             self.refused[fault] += 1
             if fault == "own":
-                self.own_heard = _stamp_of(datagram)
+                self.own_id_stamp = _datagram_stamp(datagram)
             return None
-        system, stamp, message = datagram[5], _stamp_of(datagram), message_number(datagram)
+        system, stamp, message = datagram[5], _datagram_stamp(datagram), message_number(datagram)
         self.heard[system] = stamp
-        self._last[system] = bytes(datagram)
-        self.accepted += 1
-        payload = bytes(datagram[HEADER : HEADER + datagram[1]])
-        return Received(system, stamp, message, payload)
+        self._last_datagrams[system] = bytes(datagram)
+        self.accepted_count += 1
+        payload = bytes(datagram[HEADER_LENGTH : HEADER_LENGTH + datagram[1]])
+        return ReceivedMessage(system, stamp, message, payload)
 
-    def _fault(self, data: bytes, utc: int) -> str:
+    def _refusal_reason(self, data: bytes, utc: int) -> str:
         """Why a datagram is refused; empty if it is not. Changes nothing."""
-        if len(data) < HEADER + CHECKSUM + SIGNATURE + 1:
+        if len(data) < HEADER_LENGTH + CHECKSUM_LENGTH + SIGNATURE_LENGTH + 1:
             return "short"
         message = message_number(data)
-        if data[0] != MAGIC or data[2] != SIGNED or message not in self._senders:
+        if data[0] != FRAME_MAGIC or data[2] != SIGNED_FLAG or message not in self._senders:
             return "header"
-        known = dialect.layout(message)
+        known = dialect.message_layout(message)
         length = data[1]
-        if known is None or not 0 < length <= known.size or len(data) != HEADER + length + CHECKSUM + SIGNATURE:
+        if (
+            known is None
+            or not 0 < length <= known.size
+            or len(data) != HEADER_LENGTH + length + CHECKSUM_LENGTH + SIGNATURE_LENGTH
+        ):
             return "length"
         if data[5] != self._own and data[5] not in self._senders[message]:
             return "stranger"
-        if data != self._last.get(data[5]):
+        if data != self._last_datagrams.get(data[5]):
             tag = hashlib.sha256(self._key + data[:-6]).digest()[:6]
             if not hmac.compare_digest(tag, bytes(data[-6:])):
                 return "signature"
-        stamp = _stamp_of(data)
-        if abs(stamp - stamp_at(utc)) > self._spread:
+        stamp = _datagram_stamp(data)
+        if abs(stamp - stamp_of_time(utc)) > self._max_clock_difference:
             return "clock"
-        if stamp <= max(self.heard.get(data[5], 0), self._floor):
+        if stamp <= max(self.heard.get(data[5], 0), self._min_stamp):
             return "replay"
         return "own" if data[5] == self._own else ""
 
 
-def _stamp_of(data: bytes) -> int:
+def _datagram_stamp(data: bytes) -> int:
     return int.from_bytes(data[-12:-6], "little")

@@ -12,43 +12,44 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from airflock.core.agent import State
-from airflock.core.contract import Model
-from airflock.core.hearing import Hearing
-from airflock.core.maths import FAR
-from airflock.core.pilot import Pilot
-from airflock.core.silence import Parameters as Silence
+from airflock.core import FAR, Model, PacketPolicy, Pilot, SilenceParameters, State
 from airflock.drones.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.drones.onboard.fence import Fence
-from airflock.drones.onboard.fields import are_shapes, frozen, hexadecimal, is_ring, numbers_in, record
-from airflock.drones.onboard.laws import body_of, law_of, look_of, own_of
-from airflock.drones.onboard.safety import Safety
-from airflock.parts.topologies import parameters as topologies
-from airflock.parts.topologies.registry import TOPOLOGIES
-from airflock.support import atomic
-from airflock.support.coordinates import Site
-from airflock.support.errors import CardError, gathering
-from airflock.support.spelling import meant
-from airflock.support.untrusted import from_outside, json_value, read_text
-from airflock.world import arena
-from airflock.world.corners import polygon_fault
-from airflock.world.place import Place, Shapes
+from airflock.drones.onboard.fields import (
+    are_valid_shapes,
+    is_ring,
+    read_numbers,
+    read_public_key,
+    read_record,
+    to_tuples,
+)
+from airflock.drones.onboard.laws import read_body, read_law, read_member_parts, wall_reach
+from airflock.drones.onboard.safety import SafetyLimits
+from airflock.parts.topologies import TOPOLOGIES, parameters as topologies
+from airflock.support import CardError, FlightSite, as_error, atomic, collect_errors, parse_json, read_text, suggest
+from airflock.world import Shapes, WorldMap, arena, polygon_error
 
-VERSION = 2  # a card of version 1 does not name its rule of silence
-KEYS = (
+CARD_VERSION = 2  # a card of version 1 does not name its rule of silence
+CARD_KEYS = (
     "airflock_card", "name", "mission", "expires", "site", "members", "operator", "autopilot", "law", "body", "own",
     "world", "shapes", "radio", "silence", "safety", "fence", "height", "period", "seed", "hash",
 )  # fmt: skip
-OPTIONAL = ("topology", "groups")  # left out where a drone meets all whom it hears, where no law asks for groups
-HEARS = ("once", "any_stamp")  # of `radio`; left out on real drones: how a simulated agent hears (`core.hearing`)
-NUMBERS = {
+OPTIONAL_CARD_KEYS = (
+    "topology",
+    "groups",
+)  # left out where a drone meets all whom it hears, where no law asks for groups
+HEARING_KEYS = (
+    "once",
+    "any_stamp",
+)  # of `radio`; left out on real drones: how a simulated agent hears (`core.hearing`)
+NUMBER_RANGES = {
     "mission": (1, 2**32 - 1), "expires": (1, 2**40), "height": (1.0, 1e4), "period": (0.01, 60.0), "seed": (0, 2**63),
 }  # fmt: skip
-LARGEST_SYSTEM = 250  # system ids above are left to ground stations
+MAX_SYSTEM_ID = 250  # system ids above are left to ground stations
 
 
 @dataclass(frozen=True)
-class Card:
+class FlightCard:
     """A checked card.
 
     mission  : number of the mission; expires: Unix time, s
@@ -64,7 +65,7 @@ class Card:
     name: str
     mission: int
     expires: int
-    site: Site
+    site: FlightSite
     members: tuple[int, ...]
     operator: bytes
     autopilot: Autopilot
@@ -74,12 +75,12 @@ class Card:
     body_parameters: Any
     own: tuple[tuple[Model, Any, Any], ...]
     groups: tuple[int, ...]
-    place: Place
-    hearing: Hearing
+    place: WorldMap
+    hearing: PacketPolicy
     delay: float
-    silence: Silence
+    silence: SilenceParameters
     topology: topologies.Parameters
-    safety: Safety
+    safety: SafetyLimits
     fence: Fence
     low: float
     high: float
@@ -103,7 +104,7 @@ class Card:
         index = self.members.index(member)
         law, p, b = self.own[index] if self.own else (self.model, self.parameters, self.body_parameters)
         return Pilot(
-            law, p, self.place.seen(look_of(law, p)), index=index, period=self.period, groups=self.groups,
+            law, p, self.place.seen(wall_reach(law, p)), index=index, period=self.period, groups=self.groups,
             hearing=self.hearing, body=self.body, b=b, silence=self.silence, flat=self.flat,
             seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
         )  # fmt: skip
@@ -111,7 +112,7 @@ class Card:
     def sides(self, own: State) -> list[tuple[float, float, float, float]]:
         """Distance (m, negative beyond) and inward normal of the fence's sides and of obstacles, for the limiter."""
         found = self.fence.sides(own.x, own.y)
-        return found + [(s.distance, s.nx, s.ny, s.nz) for s in self.place.solids(*self.law_state(own)[:3])]
+        return found + [(s.distance, s.nx, s.ny, s.nz) for s in self.place.solid_surfaces(*self.law_state(own)[:3])]
 
     def outside(self, x: float, y: float, z: float) -> float:
         """Distance of a local position beyond the fence or its heights, m; negative inside."""
@@ -128,135 +129,155 @@ class Card:
         return bool(self.document["shapes"].get("shapes"))
 
 
-def hash_of(document: Mapping[str, Any]) -> str:
+def card_hash(document: Mapping[str, Any]) -> str:
     """SHA-256 of a card without its own entry, over JSON with sorted keys and no spaces."""
     rest = {key: value for key, value in document.items() if key != "hash"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
-def write_card(path: Path, document: Mapping[str, Any]) -> Card:
+def write_card(path: Path, document: Mapping[str, Any]) -> FlightCard:
     """Check a card, add its hash and write it."""
-    sealed = {**document, "hash": hash_of(document)}
-    card = card_of(sealed, str(path))
-    atomic.write(path, json.dumps(sealed, indent=1) + "\n")
+    sealed = {**document, "hash": card_hash(document)}
+    card = parse_card(sealed, str(path))
+    atomic.write_file(path, json.dumps(sealed, indent=1) + "\n")
     return card
 
 
-def read_card(path: Path) -> Card:
+def read_card(path: Path) -> FlightCard:
     """Card from its file; CardError with one line per fault."""
-    with from_outside(path, CardError):
-        return card_of(json_value(read_text(path)), str(path))
+    with as_error(path, CardError):
+        return parse_card(parse_json(read_text(path)), str(path))
 
 
-def card_of(document: Any, where: str = "card") -> Card:
+def parse_card(document: Any, source: str = "card") -> FlightCard:
     """Card from its document, all faults at once."""
-    if not isinstance(document, dict) or document.get("airflock_card") != VERSION:
-        raise CardError([f"{where}: is not a flight card of version {VERSION}"])
+    if not isinstance(document, dict) or document.get("airflock_card") != CARD_VERSION:
+        raise CardError([f"{source}: is not a flight card of version {CARD_VERSION}"])
     faults: list[str] = []
     for key in document:
-        if key not in (*KEYS, *OPTIONAL):
-            faults.append(f"{key} is not known{meant(key, (*KEYS, *OPTIONAL), lead='; ', cutoff=0.6)}")
-    faults += [f"{key} is missing" for key in KEYS if key not in document]
+        if key not in (*CARD_KEYS, *OPTIONAL_CARD_KEYS):
+            faults.append(f"{key} is not known{suggest(key, (*CARD_KEYS, *OPTIONAL_CARD_KEYS), lead='; ', cutoff=0.6)}")
+    faults += [f"{key} is missing" for key in CARD_KEYS if key not in document]
     if faults:
-        raise CardError([f"{where}: {fault}" for fault in faults])
-    if document["hash"] != hash_of(document):
-        raise CardError([f"{where}: was changed after it was written: its hash does not match"])
+        raise CardError([f"{source}: {fault}" for fault in faults])
+    if document["hash"] != card_hash(document):
+        raise CardError([f"{source}: was changed after it was written: its hash does not match"])
     card = _made(document, faults)
     if not faults and card is not None:
-        faults += _geometry_faults(card)
+        faults += _geometry_errors(card)
     if faults or card is None:
-        raise CardError([f"{where}: {fault}" for fault in faults])
+        raise CardError([f"{source}: {fault}" for fault in faults])
     return card
 
 
-def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
+def _made(d: Mapping[str, Any], errors: list[str]) -> FlightCard | None:
     """Card from a document whose keys are all there; None where something is wrong with what they hold, as noted."""
-    site = numbers_in(
+    site = read_numbers(
         d["site"],
         "site",
         {"latitude": (-85.0, 85.0), "longitude": (-180.0, 180.0), "altitude": (-500.0, 9000.0)},
-        faults,
+        errors,
     )
-    fence = numbers_in(d["fence"], "fence", {"low": (0.0, 1e4), "high": (1.0, 1e4)}, faults, more=("corners",))
+    fence = read_numbers(d["fence"], "fence", {"low": (0.0, 1e4), "high": (1.0, 1e4)}, errors, other_keys=("corners",))
     heard = d["radio"]
-    odd = {key: heard[key] for key in HEARS if key in heard} if isinstance(heard, dict) else {}
-    faults += [f"radio.{key} = {value!r}: give true or false" for key, value in odd.items() if type(value) is not bool]
+    odd = {key: heard[key] for key in HEARING_KEYS if key in heard} if isinstance(heard, dict) else {}
+    errors += [f"radio.{key} = {value!r}: give true or false" for key, value in odd.items() if type(value) is not bool]
     heard = {key: value for key, value in heard.items() if key not in odd} if isinstance(heard, dict) else heard
     spans = {"delay": (0.0, 30.0), "forget": (0.0, 600.0)}
-    radio = numbers_in(heard, "radio", spans, faults, more=("extrapolate",))
-    one = numbers_in({key: d[key] for key in NUMBERS}, "", NUMBERS, faults)
+    radio = read_numbers(heard, "radio", spans, errors, other_keys=("extrapolate",))
+    one = read_numbers({key: d[key] for key in NUMBER_RANGES}, "", NUMBER_RANGES, errors)
     members, groups, rows = d["members"], d.get("groups", []), d["shapes"]
     corners: Any = d["fence"].get("corners") if isinstance(d["fence"], dict) else None
-    faults += _member_faults(members)
+    errors += _member_errors(members)
     if not isinstance(d["autopilot"], str) or d["autopilot"] not in AUTOPILOTS:
-        faults.append(f"autopilot = {d['autopilot']!r} is none of {', '.join(AUTOPILOTS)}")
-    faults += _corner_faults(corners)
-    operator = hexadecimal(d["operator"], faults)
-    law, parameters = law_of(d["law"], faults)
-    body, numbers = body_of(d["body"], faults)
-    own = own_of(d, law, body, faults)
-    world = record(arena.Parameters, d["world"], "world", faults)
-    silence = record(Silence, d["silence"], "silence", faults)
-    topology = record(topologies.Parameters, d.get("topology", {}), "topology", faults)
-    safety = record(Safety, d["safety"], "safety", faults)
-    faults += _group_faults(groups, members)
-    if not are_shapes(rows):
-        faults.append("shapes: give the tables shapes (18 numbers each), nodes (6) and links (3)")
-    if faults or law is None:
+        errors.append(f"autopilot = {d['autopilot']!r} is none of {', '.join(AUTOPILOTS)}")
+    errors += _corner_errors(corners)
+    operator = read_public_key(d["operator"], errors)
+    law, parameters = read_law(d["law"], errors)
+    body, numbers = read_body(d["body"], errors)
+    own = read_member_parts(d, law, body, errors)
+    world = read_record(arena.Parameters, d["world"], "world", errors)
+    silence = read_record(SilenceParameters, d["silence"], "silence", errors)
+    topology = read_record(topologies.Parameters, d.get("topology", {}), "topology", errors)
+    safety = read_record(SafetyLimits, d["safety"], "safety", errors)
+    errors += _group_errors(groups, members)
+    if not are_valid_shapes(rows):
+        errors.append("shapes: give the tables shapes (18 numbers each), nodes (6) and links (3)")
+    if errors or law is None:
         return None
-    place = Place(
+    place = WorldMap(
         world, Shapes(rows.get("shapes", ()), rows.get("nodes", ()), rows.get("links", ())),
-        look=look_of(law, parameters), casts=any(each.sight is not None for each in (law, *(row[0] for row in own))),
+        look=wall_reach(law, parameters), casts=any(each.sight is not None for each in (law, *(row[0] for row in own))),
     )  # fmt: skip
-    return Card(
-        name=str(d["name"]), mission=int(one["mission"]), expires=int(one["expires"]),
-        site=Site(site["latitude"], site["longitude"], site["altitude"]), members=tuple(members), operator=operator,
-        autopilot=AUTOPILOTS[d["autopilot"]], model=law, parameters=parameters, body=body, body_parameters=numbers,
-        own=own, groups=tuple(groups),
-        place=place, hearing=_hearing(bool(heard["extrapolate"]), radio["forget"], **odd), delay=radio["delay"],
-        silence=silence, topology=topology, safety=safety, fence=Fence(corners),
-        low=fence["low"], high=fence["high"], height=one["height"], flat=world.dimensions == "2",
-        period=one["period"], seed=int(one["seed"]), hash=str(d["hash"]), document=d,
-    )  # fmt: skip
+    return FlightCard(
+        name=str(d["name"]),
+        mission=int(one["mission"]),
+        expires=int(one["expires"]),
+        site=FlightSite(site["latitude"], site["longitude"], site["altitude"]),
+        members=tuple(members),
+        operator=operator,
+        autopilot=AUTOPILOTS[d["autopilot"]],
+        model=law,
+        parameters=parameters,
+        body=body,
+        body_parameters=numbers,
+        own=own,
+        groups=tuple(groups),
+        place=place,
+        hearing=_packet_policy(bool(heard["extrapolate"]), radio["forget"], **odd),
+        delay=radio["delay"],
+        silence=silence,
+        topology=topology,
+        safety=safety,
+        fence=Fence(corners),
+        low=fence["low"],
+        high=fence["high"],
+        height=one["height"],
+        flat=world.dimensions == "2",
+        period=one["period"],
+        seed=int(one["seed"]),
+        hash=str(d["hash"]),
+        document=d,
+    )
 
 
-def _hearing(extrapolate: bool, forget: float, once: bool = False, any_stamp: bool = False) -> Hearing:
+def _packet_policy(extrapolate: bool, max_age: float, use_once: bool = False, any_stamp: bool = False) -> PacketPolicy:
     """What is done with neighbours' data; any_stamp: they count whatever time they say that they are of."""
     stamps = {"early": FAR, "in_order": False} if any_stamp else {}
-    return Hearing(extrapolate, forget, once, **stamps)  # type: ignore[arg-type]
+    return PacketPolicy(extrapolate, max_age, use_once, **stamps)  # type: ignore[arg-type]
 
 
-def _member_faults(members: Any) -> list[str]:
+def _member_errors(members: Any) -> list[str]:
     """What is wrong with the list of system ids."""
     listed = members if isinstance(members, list) else []
-    wrong = [m for m in listed if type(m) is not int or not 1 <= m <= LARGEST_SYSTEM]
+    wrong = [m for m in listed if type(m) is not int or not 1 <= m <= MAX_SYSTEM_ID]
     if wrong:
-        return [f"members: {wrong[0]!r} is none of the system ids from 1 to {LARGEST_SYSTEM}"]
+        return [f"members: {wrong[0]!r} is none of the system ids from 1 to {MAX_SYSTEM_ID}"]
     if not listed:
-        return [f"members = {members!r}: give a list of system ids from 1 to {LARGEST_SYSTEM}"]
+        return [f"members = {members!r}: give a list of system ids from 1 to {MAX_SYSTEM_ID}"]
     return [f"members = {members}: a system id occurs twice"] if len(set(listed)) < len(listed) else []
 
 
-def _corner_faults(corners: Any) -> list[str]:
+def _corner_errors(corners: Any) -> list[str]:
     """What is wrong with the corners of the fence."""
     if not is_ring(corners):
         return ["fence.corners: give a list of points [east, north] in m"]
-    fault = polygon_fault(corners)
+    fault = polygon_error(corners)
     return [f"fence.corners {fault}"] if fault else []
 
 
-def _group_faults(groups: Any, members: Any) -> list[str]:
+def _group_errors(groups: Any, members: Any) -> list[str]:
     """What is wrong with the numbers of the members' groups."""
-    sound = isinstance(groups, list) and all(type(g) is int and -1 <= g <= LARGEST_SYSTEM for g in groups)
+    sound = isinstance(groups, list) and all(type(g) is int and -1 <= g <= MAX_SYSTEM_ID for g in groups)
     if not sound or (groups and isinstance(members, list) and len(groups) != len(members)):
         return [f"groups = {groups!r}: give the number of each member's group, -1 in none"]
     return []
 
 
-def _geometry_faults(card: Card) -> list[str]:
+def _geometry_errors(card: FlightCard) -> list[str]:
     """Why fence, heights, layers and walls do not fit together, or why no drone can fly the law."""
     faults = []
-    world = arena.Parameters(**frozen(card.document["world"]))
+    world = arena.Parameters(**to_tuples(card.document["world"]))
     top = card.layer(card.members[-1])
     if not card.low < card.safety.base or top > card.high:
         faults.append(
@@ -269,7 +290,7 @@ def _geometry_faults(card: Card) -> list[str]:
             f"height = {card.height:g} m from {low:+g} m to {high:+g} m does not lie between fence.low = {card.low:g} "
             f"m and fence.high = {card.high:g} m"
         )
-    for x, y in _outline(world):
+    for x, y in _arena_points(world):
         if card.outside(x, y, card.height) > 1e-6:
             faults.append(f"fence: does not enclose the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
             break
@@ -279,12 +300,12 @@ def _geometry_faults(card: Card) -> list[str]:
     if world.edges != "open":
         faults.append(f"world.edges = {world.edges!r}: real space has no such edges; set world.edges = 'open'")
     for member in card.members if card.own else card.members[:1]:
-        with gathering(faults):
+        with collect_errors(faults):
             card.pilot(member)
     return faults
 
 
-def _outline(world: arena.Parameters) -> list[tuple[float, float]]:
+def _arena_points(world: arena.Parameters) -> list[tuple[float, float]]:
     h, r = 0.5 * world.side, world.radius
     if world.arena == "polygon":
         return [(float(c[0]), float(c[1])) for c in world.corners]

@@ -4,59 +4,64 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from airflock.support.errors import ParameterError
-from airflock.support.spelling import meant
-from airflock.world.shapes import COLUMNS
+from airflock.support import ParameterError, suggest
+from airflock.world import COLUMNS
 
 
-def record(kind: Any, table: Any, where: str, faults: list[str]) -> Any:
+def read_record(record_class: Any, table: Any, section: str, errors: list[str]) -> Any:
     """A record of parameters from a table, its faults noted."""
     if not isinstance(table, dict):
-        faults.append(f"{where} = {table!r} is not a table")
+        errors.append(f"{section} = {table!r} is not a table")
         return None
-    known = kind.__dataclass_fields__
+    known = record_class.__dataclass_fields__
     for key in table:
         if key not in known:
-            faults.append(f"{where}.{key} is not known{meant(key, known, lead='; ', prefix=f'{where}.', cutoff=0.6)}")
+            errors.append(
+                f"{section}.{key} is not known{suggest(key, known, lead='; ', prefix=f'{section}.', cutoff=0.6)}"
+            )
     try:
-        return kind(**frozen({key: value for key, value in table.items() if key in known}))
+        return record_class(**to_tuples({key: value for key, value in table.items() if key in known}))
     except ParameterError as fault:
-        faults += [f"{where}.{line.partition('.')[2]}" for line in str(fault).splitlines()]
+        errors += [f"{section}.{line.partition('.')[2]}" for line in str(fault).splitlines()]
     except (TypeError, ValueError) as fault:
-        faults.append(f"{where}: {fault}")
+        errors.append(f"{section}: {fault}")
     return None
 
 
-def frozen(table: Any) -> Any:
+def to_tuples(table: Any) -> Any:
     """A table whose lists are tuples."""
     if isinstance(table, dict):
-        return {key: frozen(value) for key, value in table.items()}
-    return tuple(frozen(value) for value in table) if isinstance(table, list) else table
+        return {key: to_tuples(value) for key, value in table.items()}
+    return tuple(to_tuples(value) for value in table) if isinstance(table, list) else table
 
 
-def numbers_in(
-    table: Any, where: str, spans: Mapping[str, tuple[float, float]], faults: list[str], more: tuple[str, ...] = ()
+def read_numbers(
+    table: Any,
+    key_prefix: str,
+    ranges: Mapping[str, tuple[float, float]],
+    errors: list[str],
+    other_keys: tuple[str, ...] = (),
 ) -> dict[str, float]:
     """Numbers of a table within their ranges; what is wrong is noted."""
     found = {}
     if not isinstance(table, dict):
-        faults.append(f"{where} = {table!r} is not a table")
+        errors.append(f"{key_prefix} = {table!r} is not a table")
         return {}
-    at = f"{where}." if where else ""
-    faults += [f"{at}{key} is not known" for key in table if key not in spans and key not in more]
-    faults += [f"{at}{key} is missing" for key in more if key not in table]
-    for key, (low, high) in spans.items():
+    at = f"{key_prefix}." if key_prefix else ""
+    errors += [f"{at}{key} is not known" for key in table if key not in ranges and key not in other_keys]
+    errors += [f"{at}{key} is missing" for key in other_keys if key not in table]
+    for key, (low, high) in ranges.items():
         value = table.get(key)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-            faults.append(f"{at}{key} = {value!r} is not a number")
+            errors.append(f"{at}{key} = {value!r} is not a number")
         elif not low <= value <= high:
-            faults.append(f"{at}{key} = {value:g} lies outside [{low:g}, {high:g}]")
+            errors.append(f"{at}{key} = {value:g} lies outside [{low:g}, {high:g}]")
         else:
             found[key] = value
     return found
 
 
-def are_shapes(rows: Any) -> bool:
+def are_valid_shapes(rows: Any) -> bool:
     """Whether the rows of a scene can be read: `world.shapes` and the tree of `world.bvh`."""
     if not isinstance(rows, dict) or set(rows) != {"shapes", "nodes", "links"}:
         return False
@@ -78,12 +83,12 @@ def is_ring(corners: Any) -> bool:
     )
 
 
-def hexadecimal(text: Any, faults: list[str]) -> bytes:
+def read_public_key(text: Any, errors: list[str]) -> bytes:
     """A public key from its digits; empty for none."""
     try:
         key = bytes.fromhex(text)
     except (TypeError, ValueError):
         key = b"?"
     if len(key) not in (0, 32):
-        faults.append("operator: is not a public key of 64 hexadecimal digits")
+        errors.append("operator: is not a public key of 64 hexadecimal digits")
     return key

@@ -4,16 +4,15 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
-from airflock.core.contract import Model, model
-from airflock.core.maths import FAR
-from airflock.drones.onboard.fields import record
-from airflock.parts.bodies.registry import BODIES
-from airflock.support.errors import AirflockError, CardError
+from airflock.core import FAR, Model, model
+from airflock.drones.onboard.fields import read_record
+from airflock.parts.bodies import BODIES
+from airflock.support import AirflockError, CardError
 
-PARTS = ("law", "body")  # of which members may have numbers of their own
+MEMBER_PARTS = ("law", "body")  # of which members may have numbers of their own
 
 
-def find_law(name: str) -> Model:
+def law_of_package(name: str) -> Model:
     """A law of the package by its name."""
     if not name.isidentifier():
         raise CardError([f"law.kind = {name!r} is not a law of this version"])
@@ -23,54 +22,59 @@ def find_law(name: str) -> Model:
         raise CardError([f"law.kind = {name!r} is not a law of this version"]) from fault
 
 
-def law_of(table: Any, faults: list[str], where: str = "law") -> tuple[Model | None, Any]:
+def read_law(table: Any, errors: list[str], section: str = "law") -> tuple[Model | None, Any]:
     """Law and parameters of a card; what is wrong is added to the faults."""
     try:
-        found = find_law(str(table["kind"]))
+        found = law_of_package(str(table["kind"]))
     except (AirflockError, KeyError, TypeError) as fault:
-        faults.append(str(fault) if isinstance(fault, AirflockError) else f"{where}.kind is missing")
+        errors.append(str(fault) if isinstance(fault, AirflockError) else f"{section}.kind is missing")
         return None, None
-    return found, record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, where, faults)
+    return found, read_record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, section, errors)
 
 
-def body_of(table: Any, faults: list[str]) -> tuple[Any, Any]:
+def read_body(table: Any, errors: list[str]) -> tuple[Any, Any]:
     """Body and parameters of a card; what is wrong is added to the faults."""
     kind = table.get("kind") if isinstance(table, dict) else None
     if not isinstance(kind, str) or kind not in BODIES:
-        faults.append(f"body.kind = {kind!r} is none of {', '.join(BODIES)}")
+        errors.append(f"body.kind = {kind!r} is none of {', '.join(BODIES)}")
         return None, None
-    return BODIES[kind], record(
-        BODIES[kind].Parameters, {k: v for k, v in table.items() if k != "kind"}, "body", faults
+    return BODIES[kind], read_record(
+        BODIES[kind].Parameters, {k: v for k, v in table.items() if k != "kind"}, "body", errors
     )  # fmt: skip
 
 
-def own_of(d: Mapping[str, Any], law: Model | None, body: Any, faults: list[str]) -> tuple[tuple[Model, Any, Any], ...]:
+def read_member_parts(
+    d: Mapping[str, Any], law: Model | None, body: Any, errors: list[str]
+) -> tuple[tuple[Model, Any, Any], ...]:
     """Law, its numbers and those of the body of each member; none where all are alike."""
     rows = d["own"]
     if rows == [] or law is None or body is None:
         return ()
     if not isinstance(rows, list) or not isinstance(d["members"], list) or len(rows) != len(d["members"]):
-        faults.append("own: give a table with law and body for each member, or an empty list")
+        errors.append("own: give a table with law and body for each member, or an empty list")
         return ()
     found = []
     for number, row in enumerate(rows):
-        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in PARTS)
+        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in MEMBER_PARTS)
         if not sound:
-            faults.append(f"own[{number}] = {row!r}: give the tables law and body")
+            errors.append(f"own[{number}] = {row!r}: give the tables law and body")
             continue
-        where, usual = f"own[{number}]", {part: {k: v for k, v in d[part].items() if k != "kind"} for part in PARTS}
-        b = record(body.Parameters, usual["body"] | row["body"], f"{where}.body", faults)
+        where, usual = (
+            f"own[{number}]",
+            {part: {k: v for k, v in d[part].items() if k != "kind"} for part in MEMBER_PARTS},
+        )
+        b = read_record(body.Parameters, usual["body"] | row["body"], f"{where}.body", errors)
         if "kind" in row["law"]:
-            other, p = law_of(row["law"], faults, f"{where}.law")
+            other, p = read_law(row["law"], errors, f"{where}.law")
             if other is not None and other.command != law.command:
-                faults.append(f"{where}.law commands {other.command}, and law {law.command}; one body carries all")
+                errors.append(f"{where}.law commands {other.command}, and law {law.command}; one body carries all")
         else:
-            other, p = law, record(law.Parameters, usual["law"] | row["law"], f"{where}.law", faults)
+            other, p = law, read_record(law.Parameters, usual["law"] | row["law"], f"{where}.law", errors)
         if other is not None:
             found.append((other, p, b))
     return tuple(found)
 
 
-def look_of(law: Model, p: Any) -> float:
+def wall_reach(law: Model, p: Any) -> float:
     """How far (m) a law with these numbers looks for what stands in the world."""
     return FAR if law.wall_reach is None else float(law.wall_reach(p))

@@ -9,37 +9,36 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock.core.agent import State
-from airflock.drones.onboard.card import Card
+from airflock.core import State
+from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.limiter import Velocity
-from airflock.drones.onboard.mission import Phase
-from airflock.drones.onboard.node import Memory, Node, Out
-from airflock.support.errors import LinkError
-from airflock.support.untrusted import FormatError, TextError, from_outside, json_object, json_value, read_text
+from airflock.drones.onboard.mission import MissionPhase
+from airflock.drones.onboard.node import Node, NodeMemory, NodeOutput
+from airflock.support import FormatError, LinkError, TextError, as_error, parse_json, parse_json_object, read_text
 
-VERSION = 1
-MOST_RADIOS = 16
-LONGEST_GAP = 3600.0  # s between two lines; a node ticks many times a second
-FAR = 1e12  # s; clocks count from the start of a computer
+LOG_VERSION = 1
+MAX_RADIOS = 16
+MAX_GAP = 3600.0  # s between two lines; a node ticks many times a second
+MAX_CLOCK = 1e12  # s; clocks count from the start of a computer
 
 
-class Logged:
+class LoggingNode:
     """A node whose inputs and outputs are written down; it is used like the node itself.
 
     write : takes one line without its end
     """
 
     def __init__(
-        self, node: Node, write: Callable[[str], None], *, now: float, memory: Memory, radios: tuple[float, ...]
+        self, node: Node, write: Callable[[str], None], *, now: float, memory: NodeMemory, radios: tuple[float, ...]
     ):
         self.node, self._write = node, write
         self._line(
-            log=VERSION, card=node.card.hash, member=node.member, now=now, utc=node.utc(now), sent=memory.sent,
-            heard=memory.heard, order=memory.order, radios=radios, since=node.since,
+            log=LOG_VERSION, card=node.card.hash, member=node.member, now=now, utc=node.utc(now), sent=memory.sent,
+            heard=memory.heard, order=memory.order, radios=radios, since=node.accepted_since,
         )  # fmt: skip
 
-    def _line(self, **what: Any) -> None:
-        self._write(json.dumps(what, separators=(",", ":")))
+    def _line(self, **values: Any) -> None:
+        self._write(json.dumps(values, separators=(",", ":")))
 
     def autopilot(self, data: bytes, now: float) -> None:
         """Take bytes that came from the autopilot."""
@@ -51,32 +50,32 @@ class Logged:
         self._line(r=datagram.hex(), t=now)
         self.node.radio(datagram, now)
 
-    def tick(self, now: float) -> Out:
+    def tick(self, now: float) -> NodeOutput:
         """Let the node decide."""
         out = self.node.tick(now)
-        s = self.node.wire.state
+        s = self.node.autopilot_link.state
         told = {"phase": self.node.phase.name, "own": None if s is None else list(s), "set": list(self.node.command)}
         notes = {"notes": out.notes} if out.notes else {}
-        self._line(t=now, out=digest(out), **told, **notes)
+        self._line(t=now, out=output_digest(out), **told, **notes)
         return out
 
 
-def digest(out: Out) -> str:
+def output_digest(out: NodeOutput) -> str:
     """First 16 digits of the SHA-256 of everything that a tick gave."""
     text = repr((out.autopilot, out.radios, out.notes))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-class Replayed(NamedTuple):
+class ReplayedTick(NamedTuple):
     """One tick of a log flown again: its time, what the log tells, what the node gave, and whether they agree."""
 
     time: float
     told: dict[str, Any]
-    out: Out
+    out: NodeOutput
     same: bool
 
 
-class Ticked(NamedTuple):
+class LoggedTick(NamedTuple):
     """What a log tells of one tick: its line, the time of the own clock (s), phase, own state, and command (m/s).
 
     own : x, y, z (m), vx, vy, vz (m/s); None where the node did not know it
@@ -84,114 +83,116 @@ class Ticked(NamedTuple):
 
     line: int
     time: float
-    phase: Phase
+    phase: MissionPhase
     own: State | None
     command: Velocity
 
 
-class Told(NamedTuple):
+class LogTicks(NamedTuple):
     """What a log tells without being flown again: whose it is, Unix time (µs) at a time of its clock (s), its ticks."""
 
     member: int
     now: float
     utc: int
-    ticks: list[Ticked]
+    ticks: list[LoggedTick]
 
 
-def read_ticks(path: Path) -> Told:
+def read_log_ticks(path: Path) -> LogTicks:
     """What the log of a file tells of its ticks; LinkError, which names file and line, where it is no log."""
-    with from_outside(path, LinkError):
+    with as_error(path, LinkError):
         try:
             with open(path, encoding="utf-8") as lines:
                 rows = enumerate(_rows(lines), 1)
                 _, head = next(rows, (0, {}))
-                begun, utc, member = _numbers([head.get("now")], 1), head.get("utc"), head.get("member")
-                if head.get("log") != VERSION or begun is None or type(utc) is not int or type(member) is not int:
+                begun, utc, member = _numbers_or_none([head.get("now")], 1), head.get("utc"), head.get("member")
+                if head.get("log") != LOG_VERSION or begun is None or type(utc) is not int or type(member) is not int:
                     raise LinkError("this is not a log of a flight on board")
                 ticks, before = [], begun[0]
                 for number, row in rows:
-                    before, _ = _row(row, number, before)
+                    before, _ = _time_and_bytes(row, number, before)
                     if "out" in row:
                         ticks.append(_tick(row, number, before))
-                return Told(member, begun[0], utc, ticks)
+                return LogTicks(member, begun[0], utc, ticks)
         except LinkError as fault:
             raise LinkError(f"{path}: {fault}") from fault
         except UnicodeDecodeError as fault:
             raise LinkError(f"{path}: this is not a log of a flight on board") from fault
 
 
-def _tick(row: Mapping[str, Any], number: int, now: float) -> Ticked:
+def _tick(row: Mapping[str, Any], number: int, now: float) -> LoggedTick:
     """What a line tells of a tick; LinkError where it is none that a node wrote."""
     given, phase = row.get("own"), str(row.get("phase"))
-    own, command = _numbers(given, 6), _numbers(row.get("set"), 3)
-    if (own is None and given is not None) or command is None or phase not in Phase.__members__:
+    own, command = _numbers_or_none(given, 6), _numbers_or_none(row.get("set"), 3)
+    if (own is None and given is not None) or command is None or phase not in MissionPhase.__members__:
         raise LinkError(f"line {number}: was not written by a node")
-    return Ticked(number, now, Phase[phase], None if own is None else State(*own), (command[0], command[1], command[2]))
+    return LoggedTick(
+        number, now, MissionPhase[phase], None if own is None else State(*own), (command[0], command[1], command[2])
+    )
 
 
-def replay(lines: Iterable[str], card: Card, key: bytes) -> Iterator[Replayed]:
+def replay(lines: Iterable[str], card: FlightCard, key: bytes) -> Iterator[ReplayedTick]:
     """Fly a log again; LinkError where it is of another card or is no log."""
     rows = enumerate(_rows(lines), 1)
     _, head = next(rows, (0, {}))
-    if head.get("log") != VERSION:
+    if head.get("log") != LOG_VERSION:
         raise LinkError("this is not a log of a flight on board")
     if head.get("card") != card.hash:
         raise LinkError("the log belongs to another card")
-    node = _node(head, card, key)
+    node = _node_at_start(head, card, key)
     now = float(head["now"])
     for number, row in rows:
-        now, data = _row(row, number, now)
+        now, data = _time_and_bytes(row, number, now)
         if "a" in row:
             node.autopilot(data, now)
         elif "r" in row:
             node.radio(data, now)
         else:
             out = node.tick(now)
-            yield Replayed(now, row, out, digest(out) == row["out"])
+            yield ReplayedTick(now, row, out, output_digest(out) == row["out"])
 
 
-def _node(head: Mapping[str, Any], card: Card, key: bytes) -> Node:
+def _node_at_start(head: Mapping[str, Any], card: FlightCard, key: bytes) -> Node:
     """The node as it was when the log began; LinkError where the first line does not tell it."""
     heard, radios = head.get("heard"), head.get("radios")
     stamps = [head.get(name) for name in ("sent", "order", "utc", "since")]
     stamps += list(heard.values()) if isinstance(heard, dict) else [None]
-    periods: list[Any] = radios if isinstance(radios, list) and 0 < len(radios) <= MOST_RADIOS else [None]
+    periods: list[Any] = radios if isinstance(radios, list) and 0 < len(radios) <= MAX_RADIOS else [None]
     sound = all(type(stamp) is int and 0 <= stamp < 2**63 for stamp in stamps) and head.get("member") in card.members
     sound = sound and all(_is_number(period) and period > 0.0 for period in periods) and _is_number(head.get("now"))
     if not sound or not isinstance(heard, dict) or not all(who.isascii() and who.isdigit() for who in heard):
         raise LinkError("line 1: does not say how the node began")
-    memory = Memory(head["sent"], {int(who): stamp for who, stamp in heard.items()}, head["order"])
+    memory = NodeMemory(head["sent"], {int(who): stamp for who, stamp in heard.items()}, head["order"])
     return Node(
         card, head["member"], key, now=float(head["now"]), utc=head["utc"], memory=memory, radios=tuple(periods),
         since=head["since"],
     )  # fmt: skip
 
 
-def _row(row: Mapping[str, Any], number: int, before: float) -> tuple[float, bytes]:
+def _time_and_bytes(row: Mapping[str, Any], number: int, before: float) -> tuple[float, bytes]:
     """Time (s) and bytes of a line; LinkError where it is none that a node wrote."""
     now: Any
     try:
         now, data = row["t"], bytes.fromhex(row.get("a", row.get("r", "")))
     except (KeyError, TypeError, ValueError):
         now, data = None, b""
-    if not _is_number(now) or not before <= now <= before + LONGEST_GAP or not {"a", "r", "out"} & set(row):
+    if not _is_number(now) or not before <= now <= before + MAX_GAP or not {"a", "r", "out"} & set(row):
         raise LinkError(f"line {number}: was not written by a node")
     return float(now), data
 
 
-def _numbers(values: Any, count: int) -> tuple[float, ...] | None:
+def _numbers_or_none(values: Any, count: int) -> tuple[float, ...] | None:
     """So many numbers of a line; None if they are none."""
     sound = isinstance(values, list) and len(values) == count and all(map(_is_number, values))
     return tuple(map(float, values)) if sound else None
 
 
 def _is_number(value: Any) -> bool:
-    return type(value) in (int, float) and abs(value) < FAR
+    return type(value) in (int, float) and abs(value) < MAX_CLOCK
 
 
-def read_log(path: Path, card: Card, key: bytes) -> Iterator[Replayed]:
+def replay_log_file(path: Path, card: FlightCard, key: bytes) -> Iterator[ReplayedTick]:
     """Fly the log of a file again; LinkError, which names the file, where it is of another card or is no log."""
-    with from_outside(path, LinkError):
+    with as_error(path, LinkError):
         try:
             with open(path, encoding="utf-8") as lines:
                 yield from replay(lines, card, key)
@@ -204,24 +205,24 @@ def read_log(path: Path, card: Card, key: bytes) -> Iterator[Replayed]:
 def _rows(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
     for line in lines:
         try:
-            row = json_value(line)
+            row = parse_json(line)
         except FormatError:
             return  # the last line of a log that ended with the power
         if isinstance(row, dict):
             yield row
 
 
-def read_memory(path: Path) -> Memory:
+def read_node_memory(path: Path) -> NodeMemory:
     """What outlived a restart; nothing where there is no file yet."""
     try:
-        row = json_object(read_text(path))
-        return Memory(int(row["sent"]), {int(k): int(v) for k, v in row["heard"].items()}, int(row["order"]))
+        row = parse_json_object(read_text(path))
+        return NodeMemory(int(row["sent"]), {int(k): int(v) for k, v in row["heard"].items()}, int(row["order"]))
     except FileNotFoundError:
-        return Memory()
+        return NodeMemory()
     except (OSError, TextError, ValueError, OverflowError, KeyError, TypeError, AttributeError) as fault:
         raise LinkError(f"{path}: cannot be read as the memory of a node; remove it, on the ground only") from fault
 
 
-def memory_text(memory: Memory) -> str:
-    """The text of the file that `read_memory` reads."""
+def memory_json(memory: NodeMemory) -> str:
+    """The text of the file that `read_node_memory` reads."""
     return json.dumps(memory._asdict())

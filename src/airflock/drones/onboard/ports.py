@@ -10,7 +10,7 @@ import socket
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from airflock.support.errors import LinkError
+from airflock.support import LinkError
 
 termios: Any
 try:
@@ -18,10 +18,10 @@ try:
 except ImportError:  # Windows
     termios = None
 
-FORMS = "give udp:HOST:PORT, udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD"
-LONGEST = 2048  # bytes read at once
-MOST = 1000  # datagrams read at one look; what a flood brings beyond waits, or is lost as on a jammed radio
-KEPT = 1 << 20  # bytes that wait unread in a socket, as far as the system allows
+PORT_FORMS = "give udp:HOST:PORT, udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD"
+MAX_DATAGRAM = 2048  # bytes read at once
+MAX_DATAGRAMS = 1000  # datagrams read at one look; what a flood brings beyond waits, or is lost as on a jammed radio
+RECEIVE_BUFFER = 1 << 20  # bytes that wait unread in a socket, as far as the system allows
 
 
 class Port(Protocol):
@@ -40,11 +40,11 @@ class Port(Protocol):
         """Close it."""
 
 
-class Place(NamedTuple):
+class UdpAddresses(NamedTuple):
     """Where a UDP port listens and sends."""
 
     here: tuple[str, int]
-    there: tuple[str, int] | None
+    destination: tuple[str, int] | None
 
 
 def open_port(text: str) -> Port:
@@ -52,17 +52,17 @@ def open_port(text: str) -> Port:
     kind, _, rest = text.partition(":")
     try:
         if kind == "udp":
-            return Udp(_place(rest, text))
+            return UdpPort(_place(rest, text))
         if kind == "serial":
-            return Serial(rest, text)
+            return SerialPort(rest, text)
     except OSError as fault:
         raise LinkError(f"{text}: {fault.strerror}") from fault
     except UnicodeError as fault:
         raise LinkError(f"{text}: is not a valid name of a computer") from fault
-    raise LinkError(f"{text}: {FORMS}")
+    raise LinkError(f"{text}: {PORT_FORMS}")
 
 
-def sound_port(text: str) -> None:
+def check_port(text: str) -> None:
     """Refuse the text of a port that can be none, before it is opened. Raises LinkError, one line."""
     kind, _, rest = text.partition(":")
     if kind == "udp":
@@ -70,12 +70,12 @@ def sound_port(text: str) -> None:
         for told in (here, there) if there else (here,):
             _address(told, text)
     elif kind != "serial":
-        raise LinkError(f"{text}: {FORMS}")
+        raise LinkError(f"{text}: {PORT_FORMS}")
 
 
-def _place(rest: str, text: str) -> Place:
+def _place(rest: str, text: str) -> UdpAddresses:
     here, _, there = rest.partition(">")
-    return Place(_address(here, text), _resolved(*_address(there, text)) if there else None)
+    return UdpAddresses(_address(here, text), _resolved(*_address(there, text)) if there else None)
 
 
 def _resolved(host: str, port: int) -> tuple[str, int]:
@@ -83,28 +83,28 @@ def _resolved(host: str, port: int) -> tuple[str, int]:
     return socket.gethostbyname(host), port
 
 
-def _address(told: str, text: str) -> tuple[str, int]:
-    host, _, port = told.rpartition(":")
+def _address(address: str, text: str) -> tuple[str, int]:
+    host, _, port = address.rpartition(":")
     if not host or not port.isdigit() or not 0 < int(port) < 65536:
-        raise LinkError(f"{text}: {told!r} is not HOST:PORT with a port from 1 to 65535")
+        raise LinkError(f"{text}: {address!r} is not HOST:PORT with a port from 1 to 65535")
     return host, int(port)
 
 
-class Udp:
+class UdpPort:
     """A UDP socket."""
 
-    def __init__(self, place: Place):
-        self._there = place.there
+    def __init__(self, addresses: UdpAddresses):
+        self._destination = addresses.destination
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, KEPT)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         self._socket.setblocking(False)
         try:
-            self._socket.bind(place.here)
+            self._socket.bind(addresses.here)
         except OSError:
             self._socket.close()
             raise
-        self._answers = place.there is None
+        self._answers_last_sender = addresses.destination is None
 
     @property
     def here(self) -> tuple[str, int]:
@@ -118,7 +118,7 @@ class Udp:
 
     def aim(self, there: tuple[str, int]) -> None:
         """Send there from now on, whoever speaks."""
-        self._there, self._answers = there, False
+        self._destination, self._answers_last_sender = there, False
 
     def read(self) -> list[bytes]:
         """The datagrams that have arrived."""
@@ -128,18 +128,18 @@ class Udp:
         """The datagrams that have arrived, each with who sent it; at most MOST of them."""
         found: list[tuple[bytes, tuple[str, int]]] = []
         take = self._socket.recvfrom
-        while len(found) < MOST:
+        while len(found) < MAX_DATAGRAMS:
             try:
-                found.append(take(LONGEST))
+                found.append(take(MAX_DATAGRAM))
             except OSError:  # nothing more has arrived, or the network is down
                 break
-        if self._answers and found:
-            self._there = found[-1][1]
+        if self._answers_last_sender and found:
+            self._destination = found[-1][1]
         return found
 
     def write(self, data: bytes) -> bool:
         """Send a datagram."""
-        return self._there is not None and self.send(data, self._there)
+        return self._destination is not None and self.send(data, self._destination)
 
     def send(self, data: bytes, there: tuple[str, int]) -> bool:
         """Send a datagram to an address; False if the port could not take it now."""
@@ -154,7 +154,7 @@ class Udp:
         self._socket.close()
 
 
-class Serial:
+class SerialPort:
     """A serial line, raw, eight bits."""
 
     def __init__(self, rest: str, text: str):
@@ -184,7 +184,7 @@ class Serial:
     def read(self) -> list[bytes]:
         """The bytes that have arrived."""
         try:
-            data = os.read(self._file, LONGEST)
+            data = os.read(self._file, MAX_DATAGRAM)
         except OSError:  # nothing has arrived, or the line was pulled out
             return []
         return [data] if data else []

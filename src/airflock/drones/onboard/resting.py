@@ -1,6 +1,7 @@
 """Resting: what lives on the real clock does what is due, and then rests until a time while it hears its ports.
 
-A life is a generator that yields its rests. `alone` lives it with the system's own poll, in a process that does nothing
+A life is a generator that yields its rests. `run_alone` lives it with the system's own poll, in a process that does
+nothing
 else: there a wake-up by an event loop costs three times as much, and a node wakes forty times a second.
 """
 
@@ -11,43 +12,47 @@ from typing import NamedTuple, TypeVar
 
 from airflock.drones.onboard.ports import Port
 
-T = TypeVar("T")
-Hand = Callable[[bytes, float], None]  # takes bytes, and when they were read, s
+Result = TypeVar("Result")
+DataHandler = Callable[[bytes, float], None]  # takes bytes, and when they were read, s
 
 
-class Rest(NamedTuple):
+class TaskRest(NamedTuple):
     """A rest.
 
     until : time.monotonic, s; hears: ports that are read as soon as anything arrives, each with who takes it
     """
 
     until: float
-    hears: Sequence[tuple[Port, Hand]] = ()
+    handlers: Sequence[tuple[Port, DataHandler]] = ()
 
 
-def take(port: Port, hand: Hand) -> None:
+def hand_on_data(port: Port, handler: DataHandler) -> None:
     """Hand on what has arrived."""
     for data in port.read():
-        hand(data, time.monotonic())
+        handler(data, time.monotonic())
 
 
-def alone(life: Generator[Rest, None, T]) -> T:
+def run_alone(task: Generator[TaskRest, None, Result]) -> Result:
     """Live a life to its end; what it returns. Its ports are heard at least once at each rest, however late it is."""
-    hears: Sequence[tuple[Port, Hand]] = ()
+    hears: Sequence[tuple[Port, DataHandler]] = ()
     poll, hands = select.poll(), {}  # type: ignore[var-annotated]
     while True:
         try:
-            rest = next(life)
+            rest = next(task)
         except StopIteration as end:
-            found: T = end.value
+            found: Result = end.value
             return found
-        if rest.hears is not hears:
-            hears, poll, hands = rest.hears, select.poll(), {port.fileno(): (port, hand) for port, hand in rest.hears}
+        if rest.handlers is not hears:
+            hears, poll, hands = (
+                rest.handlers,
+                select.poll(),
+                {port.fileno(): (port, hand) for port, hand in rest.handlers},
+            )
             for number in hands:
                 poll.register(number, select.POLLIN)
         while True:
             for number, events in poll.poll(1e3 * max(0.0, rest.until - time.monotonic())):
-                take(*hands[number])
+                hand_on_data(*hands[number])
                 if events & select.POLLHUP:
                     poll.unregister(number)  # a serial line that was pulled out would wake it without end
             if time.monotonic() >= rest.until:

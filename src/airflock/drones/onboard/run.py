@@ -11,27 +11,28 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple, NoReturn, Protocol, TextIO
 
-from airflock.drones.mavlink.frames import Stream
+from airflock.drones.mavlink.frames import FrameStream
 from airflock.drones.mavlink.keys import read_key
-from airflock.drones.onboard.card import Card, read_card
-from airflock.drones.onboard.log import Logged, memory_text, read_memory
-from airflock.drones.onboard.node import Node, Out
-from airflock.drones.onboard.ports import Port, Serial, open_port
-from airflock.drones.onboard.resting import Hand, Rest, alone, take
-from airflock.support import atomic
-from airflock.support.errors import AirflockError, CardError, LinkError, gathering
+from airflock.drones.onboard.card import FlightCard, read_card
+from airflock.drones.onboard.log import LoggingNode, memory_json, read_node_memory
+from airflock.drones.onboard.node import Node, NodeOutput
+from airflock.drones.onboard.ports import Port, SerialPort, open_port
+from airflock.drones.onboard.resting import DataHandler, TaskRest, hand_on_data, run_alone
+from airflock.support import AirflockError, CardError, LinkError, atomic, collect_errors
 
-HELP = "Fly one member of a flock: this computer beside its autopilot. Nothing arms before the operator orders it."
-EXAMPLE = """example:
+COMMAND_HELP = (
+    "Fly one member of a flock: this computer beside its autopilot. Nothing arms before the operator orders it."
+)
+COMMAND_EXAMPLE = """example:
   python -m airflock.drones.onboard mission.json --member 3 --autopilot udp:127.0.0.1:14540 \\
       --radio 'udp:0.0.0.0:14600>192.168.1.255:14600' --radio serial:/dev/ttyUSB0:57600 --i-am-the-pilot
 
 The first radio sends every safety.status_period, the others every safety.slow_period; what arrives by several counts
 once. A person with a transmitter must be able to take over each drone at any time."""
-SAVE = 1.0  # s between two writes of what outlives a restart
+SAVE_PERIOD = 1.0  # s between two writes of what outlives a restart
 
 
-class Arguments(argparse.ArgumentParser):
+class ArgumentParser(argparse.ArgumentParser):
     """Arguments whose faults are one line, as all others are."""
 
     def error(self, message: str) -> NoReturn:
@@ -39,10 +40,10 @@ class Arguments(argparse.ArgumentParser):
         self.exit(2, f"airflock: {message}; {self.prog} --help lists all options\n")
 
 
-def parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
     """Arguments of the command."""
-    found = Arguments(
-        prog="python -m airflock.drones.onboard", description=HELP, epilog=EXAMPLE,
+    found = ArgumentParser(
+        prog="python -m airflock.drones.onboard", description=COMMAND_HELP, epilog=COMMAND_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
     )  # fmt: skip
     found.add_argument("card", type=Path, help="flight card, written by `airflock fly prepare`")
@@ -60,7 +61,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; exit status 2 and one line per fault for whatever cannot be flown."""
-    given = parser().parse_args(arguments)
+    given = make_parser().parse_args(arguments)
     if threading.current_thread() is threading.main_thread():  # only there are signals heard
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # a service that is stopped ends as by Ctrl-C
         if hasattr(signal, "SIGHUP"):  # none on Windows
@@ -76,32 +77,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
-def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
+def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, list[Port]]:
     """Card, key and open ports; all faults at once."""
     faults: list[str] = []
     card, key = None, b""
-    with gathering(faults):
-        card = read_card(given.card)
-        if given.member not in card.members:
-            faults.append(f"--member {given.member}: the card's members are {', '.join(map(str, card.members))}")
+    with collect_errors(faults):
+        card = read_card(arguments.card)
+        if arguments.member not in card.members:
+            faults.append(f"--member {arguments.member}: the card's members are {', '.join(map(str, card.members))}")
         if time.time() >= card.expires:
-            faults.append(f"{given.card}: expired at {time.strftime('%Y-%m-%d %H:%M UTC', time.gmtime(card.expires))}")
-    with gathering(faults):
-        key = read_key(given.key or given.card.with_suffix(".key"))
-    if not given.i_am_the_pilot and not given.check:
+            faults.append(
+                f"{arguments.card}: expired at {time.strftime('%Y-%m-%d %H:%M UTC', time.gmtime(card.expires))}"
+            )
+    with collect_errors(faults):
+        key = read_key(arguments.key or arguments.card.with_suffix(".key"))
+    if not arguments.i_am_the_pilot and not arguments.check:
         faults.append("--i-am-the-pilot is missing: somebody must hold the transmitter, know the law of the place, and "
                       "be able to take over each drone at any time")  # fmt: skip
     if card is not None and find_spec("cryptography") is None:
         sys.stderr.write("airflock: note: cryptography is not installed, so no order can be checked or obeyed\n")
     ports: list[Port] = []
-    for text in (given.autopilot, *given.radio):
-        with gathering(faults):
+    for text in (arguments.autopilot, *arguments.radio):
+        with collect_errors(faults):
             ports.append(open_port(text))
     if faults or card is None:
         for port in ports:
             port.close()
         raise CardError(faults)
-    for text in given.radio:
+    for text in arguments.radio:
         if text.startswith("udp:") and ">" not in text:
             sys.stderr.write(
                 f"airflock: note: --radio {text} sends to nobody before it has heard somebody; where no router speaks "
@@ -110,17 +113,19 @@ def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
     return card, key, ports
 
 
-def _run(given: argparse.Namespace) -> int:
-    card, key, ports = checked(given)
-    stem = f"{given.card.stem}-{given.member}"
-    memory_file = given.card.with_name(f"{stem}.memory")
-    log_file = given.log or given.card.with_name(f"{stem}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}.log")
+def _run(arguments: argparse.Namespace) -> int:
+    card, key, ports = check_arguments(arguments)
+    stem = f"{arguments.card.stem}-{arguments.member}"
+    memory_file = arguments.card.with_name(f"{stem}.memory")
+    log_file = arguments.log or arguments.card.with_name(f"{stem}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}.log")
     try:
-        if given.check:
-            sys.stdout.write(f"{given.card}: {card.name}, {len(card.members)} members, hash {card.hash[:8]}: fits\n")
+        if arguments.check:
+            sys.stdout.write(
+                f"{arguments.card}: {card.name}, {len(card.members)} members, hash {card.hash[:8]}: fits\n"
+            )
             return 0
         with open(log_file, "x", encoding="utf-8", buffering=1 << 16) as log:
-            fly(card, given.member, key, ports, memory_file, log, say=_say)
+            run_node(card, arguments.member, key, ports, memory_file, log, write_line=_write_line)
     except OSError as fault:
         raise LinkError(f"{fault.filename or log_file}: {fault.strerror}") from fault
     finally:
@@ -129,19 +134,19 @@ def _run(given: argparse.Namespace) -> int:
     return 0
 
 
-def _say(text: str) -> None:
+def _write_line(text: str) -> None:
     """Say a line, if anybody can still hear it: a terminal that has gone or a full disk must not bring a drone down."""
     with suppress(OSError):
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
 
 
-def fly(
-    card: Card, member: int, key: bytes, ports: Sequence[Port], memory_file: Path, log: TextIO,
-    say: Callable[[str], None], until: Callable[[], bool] = lambda: False,
+def run_node(
+    card: FlightCard, member: int, key: bytes, ports: Sequence[Port], memory_file: Path, log: TextIO,
+    write_line: Callable[[str], None], has_ended: Callable[[], bool] = lambda: False,
 ) -> None:  # fmt: skip
     """Make a node, and let it live on the real clock with a log and a memory; the first port is the autopilot's."""
-    s, memory = card.safety, read_memory(memory_file)
+    s, memory = card.safety, read_node_memory(memory_file)
     radios = (s.status_period, *(s.slow_period,) * (len(ports) - 2))
     now, utc = time.monotonic(), time.time_ns() // 1000
     node = Node(card, member, key, now=now, utc=utc, memory=memory, radios=radios)
@@ -161,23 +166,23 @@ def fly(
     def write(line: str) -> None:
         kept("log", lambda: log.write(line + "\n"))
 
-    logged = Logged(node, write, now=now, memory=memory, radios=radios)
+    logged = LoggingNode(node, write, now=now, memory=memory, radios=radios)
 
     def save() -> None:
-        kept("memory", lambda: atomic.write(memory_file, memory_text(node.memory)))
+        kept("memory", lambda: atomic.write_file(memory_file, memory_json(node.memory)))
         kept("log", log.flush)
 
     def tell(note: str) -> None:
-        say(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
+        write_line(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
 
     try:
-        ticks = alone(live(logged, ports, s.tick, tell, until, save))
+        ticks = run_alone(tick_task(logged, ports, s.tick, tell, has_ended, save))
     finally:
         save()
     tell(f"{ticks.total} ticks, {ticks.late} of them late by more than half a period, at most {ticks.worst:.3f} s")
 
 
-class Ticking(Protocol):
+class NodeLike(Protocol):
     """A node, or what is used like one."""
 
     def autopilot(self, data: bytes, now: float, /) -> None:
@@ -186,11 +191,11 @@ class Ticking(Protocol):
     def radio(self, datagram: bytes, now: float, /) -> None:
         """Take a datagram that came by radio."""
 
-    def tick(self, now: float, /) -> Out:
+    def tick(self, now: float, /) -> NodeOutput:
         """Let the node decide."""
 
 
-class Ticks(NamedTuple):
+class TickCounts(NamedTuple):
     """Ticks of a node on the real clock: how many, how many were late by more than half a period, the worst (s)."""
 
     total: int
@@ -198,10 +203,10 @@ class Ticks(NamedTuple):
     worst: float
 
 
-def live(
-    node: Ticking, ports: Sequence[Port], period: float, tell: Callable[[str], None],
-    until: Callable[[], bool], save: Callable[[], None] = lambda: None,
-) -> Generator[Rest, None, Ticks]:  # fmt: skip
+def tick_task(
+    node: NodeLike, ports: Sequence[Port], period: float, notify: Callable[[str], None],
+    has_ended: Callable[[], bool], save: Callable[[], None] = lambda: None,
+) -> Generator[TaskRest, None, TickCounts]:  # fmt: skip
     """Tick a node every `period` s on the real clock until `until` says so, and pass bytes.
 
     What the autopilot and serial lines send is read as it comes: an own state holds when it arrives, and a line keeps
@@ -210,15 +215,15 @@ def live(
 
     ports : the autopilot's first, then those of the radios; tell: takes the node's notes; save: called every second
     """
-    at_once: list[tuple[Port, Hand]] = [(ports[0], node.autopilot)]
-    at_ticks: list[tuple[Port, Hand]] = []
+    at_once: list[tuple[Port, DataHandler]] = [(ports[0], node.autopilot)]
+    at_ticks: list[tuple[Port, DataHandler]] = []
     for port in ports[1:]:
-        (at_once if isinstance(port, Serial) else at_ticks).append((port, _datagrams(port, node.radio)))
+        (at_once if isinstance(port, SerialPort) else at_ticks).append((port, _whole_frames(port, node.radio)))
     due = save_at = time.monotonic()
     count, late, worst = 0, 0, 0.0
-    while not until():
+    while not has_ended():
         for port, hand in at_ticks:
-            take(port, hand)
+            hand_on_data(port, hand)
         now = time.monotonic()
         count, late, worst = count + 1, late + (now - due > 0.5 * period), max(worst, now - due)
         out = node.tick(now)
@@ -228,23 +233,23 @@ def live(
             for datagram in datagrams:
                 port.write(datagram)
         for note in out.notes:
-            tell(note)
+            notify(note)
         if now >= save_at:
-            save_at = now + SAVE
+            save_at = now + SAVE_PERIOD
             save()
         due = max(due + period, now)
-        yield Rest(due, at_once)
-    return Ticks(count, late, worst)
+        yield TaskRest(due, at_once)
+    return TickCounts(count, late, worst)
 
 
-def _datagrams(port: Port, hand: Hand) -> Hand:
+def _whole_frames(port: Port, hand: DataHandler) -> DataHandler:
     """Hand on whole signed frames: a serial radio gives pieces of a stream, UDP gives datagrams."""
-    if not isinstance(port, Serial):
+    if not isinstance(port, SerialPort):
         return hand
-    line = Stream()
+    line = FrameStream()
 
     def whole(data: bytes, now: float) -> None:
-        for raw in line.raw(data):
+        for raw in line.whole_frames(data):
             hand(raw, now)
 
     return whole

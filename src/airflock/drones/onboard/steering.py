@@ -3,21 +3,19 @@
 from math import isfinite
 from typing import NamedTuple
 
-from airflock.core.agent import State
-from airflock.core.maths import norm
-from airflock.core.pilot import Pilot
+from airflock.core import Pilot, State, norm
 from airflock.drones.onboard import guidance
-from airflock.drones.onboard.card import Card
-from airflock.drones.onboard.limiter import STILL, Velocity, limit
-from airflock.drones.onboard.mission import Phase
-from airflock.drones.onboard.situation import SLOW
-from airflock.support.errors import AirflockError
+from airflock.drones.onboard.card import FlightCard
+from airflock.drones.onboard.limiter import NO_VELOCITY, Velocity, limit_velocity
+from airflock.drones.onboard.mission import MissionPhase
+from airflock.drones.onboard.situation import STANDING_SPEED
+from airflock.support import AirflockError
 
-EPSILON = 1e-6  # s; two clocks of a lock-step meet within it
-Point = tuple[float, float, float]
+TIME_TOLERANCE = 1e-6  # s; two clocks of a lock-step meet within it
+Position = tuple[float, float, float]
 
 
-class Moment(NamedTuple):
+class SteeringInput(NamedTuple):
     """What a velocity depends on beside the own state.
 
     now : s of the own clock; home : above the place of the start, at the own layer
@@ -26,62 +24,64 @@ class Moment(NamedTuple):
     """
 
     now: float
-    phase: Phase
-    home: Point | None
+    phase: MissionPhase
+    home: Position | None
     stay: Velocity | None
     near: list[State]
-    navigates: bool
+    has_navigation: bool
 
 
-class Steering:
+class PhaseVelocity:
     """What one drone commands.
 
     goal   : point that was ordered; failed : the law failed since this was last set to False
     fenced : the limiter has turned the last velocity along the fence; notes : lines for a person to read
     """
 
-    def __init__(self, card: Card, pilot: Pilot, now: float, notes: list[str]):
+    def __init__(self, card: FlightCard, pilot: Pilot, now: float, notes: list[str]):
         self._card, self._pilot, self._notes = card, pilot, notes
-        self.goal: Point | None = None
-        self.failed = self.fenced = False
-        self._wish: Velocity = STILL
-        self._next_law = now
-        self._stands_at: Point | None = None  # where it came to stand in HOLD
+        self.goal: Position | None = None
+        self.failed = self.is_fenced = False
+        self._law_velocity: Velocity = NO_VELOCITY
+        self._next_decision = now
+        self._hold_position: Position | None = None  # where it came to stand in HOLD
 
     def begin(self, now: float) -> None:
         """Ask the law at once, as it is to be flown from now on."""
-        self._next_law = now
+        self._next_decision = now
 
-    def velocity(self, own: State, at: Moment) -> Velocity:
+    def velocity(self, own: State, at: SteeringInput) -> Velocity:
         """What is commanded, m/s: the wish, within the limits and the fence."""
-        low = -1.0 if at.phase in (Phase.ARMING, Phase.TAKEOFF) else self._card.low
-        wish = self._wished(own, at)
-        made = limit(wish, own, self._card.sides(own), (low, self._card.high), self._card.safety)
-        self.fenced = made.fenced
+        low = -1.0 if at.phase in (MissionPhase.ARMING, MissionPhase.TAKEOFF) else self._card.low
+        wish = self._wanted_velocity(own, at)
+        made = limit_velocity(wish, own, self._card.sides(own), (low, self._card.high), self._card.safety)
+        self.is_fenced = made.is_fenced
         return made.velocity
 
-    def _wished(self, own: State, at: Moment) -> Velocity:
+    def _wanted_velocity(self, own: State, at: SteeringInput) -> Velocity:
         """What the phase wishes to fly, m/s."""
         s, phase = self._card.safety, at.phase
-        if phase == Phase.HOLD and at.navigates:
-            if self._stands_at is None and norm(*own[3:]) < SLOW:
-                self._stands_at = own[:3]
-            return STILL if self._stands_at is None else guidance.stay_at(own, self._stands_at, s)
-        self._stands_at = None
-        if phase in (Phase.TAKEOFF, Phase.GATHER) and at.home is not None:
-            return guidance.keep(own, at.home, s)
-        if phase == Phase.RETURN and at.home is not None:
-            wish = guidance.homewards(own, at.home, at.near, s)
+        if phase == MissionPhase.HOLD and at.has_navigation:
+            if self._hold_position is None and norm(*own[3:]) < STANDING_SPEED:
+                self._hold_position = own[:3]
+            return (
+                NO_VELOCITY if self._hold_position is None else guidance.velocity_to_stay(own, self._hold_position, s)
+            )
+        self._hold_position = None
+        if phase in (MissionPhase.TAKEOFF, MissionPhase.GATHER) and at.home is not None:
+            return guidance.velocity_to_hover_point(own, at.home, s)
+        if phase == MissionPhase.RETURN and at.home is not None:
+            wish = guidance.velocity_home(own, at.home, at.near, s)
             return wish if at.stay is None else (*at.stay[:2], wish[2])
-        if phase not in (Phase.FLOCK, Phase.GOTO):
-            return STILL
-        if at.now >= self._next_law - EPSILON:
-            self._next_law = max(self._next_law + self._card.period, at.now)
-            self._wish = self._law(own, at.now, self.goal if phase == Phase.GOTO else None)
-        x, y, z = self._wish if at.stay is None else at.stay
-        return x, y, guidance.climb(own, self._card.height, s) if self._card.flat else z
+        if phase not in (MissionPhase.FLOCK, MissionPhase.GOTO):
+            return NO_VELOCITY
+        if at.now >= self._next_decision - TIME_TOLERANCE:
+            self._next_decision = max(self._next_decision + self._card.period, at.now)
+            self._law_velocity = self._law(own, at.now, self.goal if phase == MissionPhase.GOTO else None)
+        x, y, z = self._law_velocity if at.stay is None else at.stay
+        return x, y, guidance.climb_rate(own, self._card.height, s) if self._card.flat else z
 
-    def _law(self, own: State, now: float, goal: Point | None) -> Velocity:
+    def _law(self, own: State, now: float, goal: Position | None) -> Velocity:
         """What the law wishes, m/s; a law that fails or commands what is no velocity counts as an overload."""
         at = self._card.law_state(own)
         try:
@@ -90,12 +90,12 @@ class Steering:
         except (AirflockError, ArithmeticError, ValueError, TypeError, IndexError) as fault:
             self.failed = True
             self._notes.append(f"the law failed: {type(fault).__name__}: {fault}")
-            return STILL
+            return NO_VELOCITY
         if not (isfinite(x) and isfinite(y) and isfinite(z)):
             self.failed = True
             self._notes.append(f"the law commanded {(x, y, z)}, which is not a velocity")
-            return STILL
+            return NO_VELOCITY
         if goal is not None:
-            gx, gy, _ = guidance.make_for(own, goal, self._card.safety)
+            gx, gy, _ = guidance.velocity_towards(own, goal, self._card.safety)
             x, y = 0.5 * (x + gx), 0.5 * (y + gy)
         return x, y, z

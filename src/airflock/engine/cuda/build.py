@@ -7,17 +7,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from textwrap import indent
 
-from airflock.core.contract import Metric
-from airflock.engine.cuda.clusters import clusters
-from airflock.engine.cuda.lower import lowered, used
-from airflock.engine.cuda.primitives import head
-from airflock.engine.cuda.reciprocals import Forms, spelled, with_reciprocals
-from airflock.engine.cuda.rows import Context, parse
-from airflock.engine.cuda.shape import Shape
-from airflock.engine.passes.build import JIT, Builder, branch, in_place
+from airflock.core import Metric
+from airflock.engine.cuda.clusters import cluster_lines
+from airflock.engine.cuda.lower import lower_statements, used_names
+from airflock.engine.cuda.primitives import primitives_text
+from airflock.engine.cuda.reciprocals import SecondForms, reciprocal_name, with_reciprocals
+from airflock.engine.cuda.rows import LoweringContext, parse_lines
+from airflock.engine.cuda.shape import BlockLayout
+from airflock.engine.passes.build import JIT_DECORATOR, Builder, branch_lines, inline_lines
 from airflock.engine.plan import Plan
-from airflock.engine.replace import must_replace
-from airflock.engine.text.rewrite import law_mark
+from airflock.engine.replace import checked_replace
+from airflock.engine.text.rewrite import law_suffix
 
 STAGES = (
     "snapshot", "perceive", "tune", "neighbours", "boundaries", "flock", "decide", "stop", "overrule", "move", "aim_",
@@ -26,12 +26,12 @@ STAGES = (
 # Stages that a kernel has within others: in `move`, so that registers carry them over; in `neighbours`, whose rows of
 # one agent they read and write.
 WITHIN = {"noise": "move", "gusts": "move", "meet": "neighbours"}
-ACROSS = ("away0", "away1", "away2", "square", "hidden", "fade", "met", "heap", "weak")  # rows over the others
-REDUCED = 24  # totals that one stage reduces at once, at most
+PAIR_ROWS = ("away0", "away1", "away2", "square", "hidden", "fade", "met", "heap", "weak")  # rows over the others
+MAX_TOTALS = 24  # totals that one stage reduces at once, at most
 
 
 @dataclass(frozen=True)
-class Stage:
+class DeviceStage:
     """One stage as a device function.
 
     arguments : names that it takes from the kernel; registers among them
@@ -42,48 +42,48 @@ class Stage:
     arguments: tuple[str, ...]
     results: tuple[str, ...]
 
-    def call(self, **given: str) -> str:
+    def call(self, **renamed: str) -> str:
         """Statement that calls it; `given` renames what the kernel calls otherwise."""
-        call = f"{self.name}({', '.join(given.get(name, name) for name in self.arguments)})"
+        call = f"{self.name}({', '.join(renamed.get(name, name) for name in self.arguments)})"
         return f"{', '.join(self.results)} = {call}" if self.results else call
 
 
 class CudaBuilder(Builder):
     """Takes the same calls as the builder of a CPU driver; `function` lowers what is a stage."""
 
-    abreast = False
-    drops = False  # threads exchange their parts, which counts as being read
+    pairs_two_agents = False
+    drops_unread_sums = False  # threads exchange their parts, which counts as being read
     apart = False
     ranges = False
-    by_pairs = True
-    drifts = False
-    trails = False
+    draws_per_pair = True
+    can_use_drift = False
+    puts_rare_rows_last = False
 
-    def __init__(self, plan: Plan, shape: Shape):
+    def __init__(self, plan: Plan, shape: BlockLayout):
         super().__init__(plan.built(grid=False))
         self.shape = shape
-        self.stages: dict[str, Stage] = {}
+        self.stages: dict[str, DeviceStage] = {}
         self.letters: set[str] = set()
         self.bound: set[str] = set()
         self.names: set[str] = set()  # of every row, also of those that share another's
         self.across: dict[str, int] = {}
         self.within: dict[str, tuple[list[str], set[str], set[str]]] = {}
-        self.forms = Forms(self.source.blocks, JIT)
+        self.forms = SecondForms(self.source.blocks, JIT_DECORATOR)
         self.reciprocals: dict[tuple[str, str], None] = {}  # of numbers, that the kernel takes once
         self.slots = plan.absence
         self.order()
-        self.head = head(plan.model.name, plan.bits, shape)
-        self.plain = {node.name for node in parse(self.head) if isinstance(node, ast.FunctionDef)} | {
+        self.head = primitives_text(plan.model.name, plan.bits, shape)
+        self.plain = {node.name for node in parse_lines(self.head) if isinstance(node, ast.FunctionDef)} | {
             "four_low",
             "four_high",
         }
 
     # -------------------------------------------------------------------------------- what the passes call
 
-    def bind(self, names: Iterable[str]) -> list[str]:
+    def bind_rows(self, names: Iterable[str]) -> list[str]:
         """Rows are registers, or bound by the stage."""
         for name in names:
-            if name in ACROSS:
+            if name in PAIR_ROWS:
                 self.across.setdefault(name, len(self.across))
                 continue
             self.row(name)
@@ -93,7 +93,7 @@ class CudaBuilder(Builder):
 
     def order(self) -> list[str]:
         """Numbers of agents are one more row, where those who are absent lie behind the others."""
-        return self.bind(["order"]) if self.slots else []
+        return self.bind_rows(["order"]) if self.slots else []
 
     def records(self, letters: str) -> list[str]:
         """Records of numbers are read once, by the kernel."""
@@ -106,7 +106,7 @@ class CudaBuilder(Builder):
         return []
 
     @property
-    def in_turn(self) -> bool:
+    def is_sequential(self) -> bool:
         """Never: a kernel takes one agent after another by its own loop."""
         return False
 
@@ -129,21 +129,23 @@ class CudaBuilder(Builder):
             self.letters, self.bound = set(), set()
         else:
             self.plain.add(name)
-            self.functions.append(f"{JIT}\ndef {head}:\n" + indent("\n".join(lines), "    "))
+            self.functions.append(f"{JIT_DECORATOR}\ndef {head}:\n" + indent("\n".join(lines), "    "))
 
     def once(self, lines: Iterable[str]) -> list[str]:
         """Lines that one thread of the block runs."""
-        return ["cuda.syncthreads()", *branch("tid == 0", lines), "cuda.syncthreads()"]
+        return ["cuda.syncthreads()", *branch_lines("tid == 0", lines), "cuda.syncthreads()"]
 
     def clusters(self, metric: Metric) -> list[str]:
         """Clusters are found by all threads of a block together."""
-        return clusters(self, metric)
+        return cluster_lines(self, metric)
 
     # ---------------------------------------------------------------------------------------------- lowering
 
-    def known(self) -> set[str]:
+    def module_names(self) -> set[str]:
         """Names of the driver module."""
-        constants = {t.id for s in parse(self.head) if isinstance(s, ast.Assign) for t in s.targets if hasattr(t, "id")}
+        constants = {
+            t.id for s in parse_lines(self.head) if isinstance(s, ast.Assign) for t in s.targets if hasattr(t, "id")
+        }
         here = self.source.names() | self.forms.names | self.plain | {stage.name for stage in self.stages.values()}
         return constants | here | set(dir(builtins)) | {"math", "np", "cuda"}
 
@@ -158,7 +160,7 @@ class CudaBuilder(Builder):
         found = {a: ("truth", c) for c, a in enumerate(plan.axes)}
         table = "said" if plan.late or plan.suffers("sense", "tell") else "truth"
         found |= {f"h{name}": (table, c) for c, name in enumerate(plan.motion)}
-        more = ["group"] * plan.grouped + ["order"] * plan.absence
+        more = ["group"] * plan.uses_groups + ["order"] * plan.absence
         first = 1 + max(c for table, c in found.values() if table == "truth")
         found |= {name: ("truth", first + c) for c, name in enumerate(more)}
         clocks = ["clock", *["sent_clock"] * plan.late]
@@ -169,7 +171,7 @@ class CudaBuilder(Builder):
         """Name of the record of numbers behind a letter; a kernel reads those of all laws."""
         law = letter.removeprefix("p")
         if letter != "p" and law.isdigit():
-            return self.source.record(f"PP{law_mark(int(law))}", fields)
+            return self.source.record(f"PP{law_suffix(int(law))}", fields)
         return super().kind(letter, fields)
 
     def named(self, letter: str) -> str:
@@ -180,33 +182,33 @@ class CudaBuilder(Builder):
         """Lines around a pair loop that runs over cells; none where it runs over all pairs."""
         return ()
 
-    def prepared(self, name: str, lines: list[str]) -> list[str]:
+    def prepare_stage(self, name: str, lines: list[str]) -> list[str]:
         """Text of a stage before it is lowered."""
         if name == "snapshot" or (name == "perceive" and self.plan.late):
-            return must_replace(lines, "ring[", "past[")
+            return checked_replace(lines, "ring[", "past[")
         if name.startswith("measure_") and any("j in range(m)" in line for line in lines):
-            return must_replace(lines, " & (integer(j) < nn)", "")  # its pair loops end with the last agent
+            return checked_replace(lines, " & (integer(j) < nn)", "")  # its pair loops end with the last agent
         shared = self.shape.registers and self.shape.per_agent > 1
-        return shared_noise(lines) if self.drawn_for_two(name) and shared else lines
+        return shared_noise(lines) if self.draws_two_steps(name) and shared else lines
 
-    def drawn_for_two(self, name: str) -> bool:
+    def draws_two_steps(self, name: str) -> bool:
         """Whether a stage draws the outer noise of two steps at once: in a plane four words are two steps."""
         plan = self.plan
-        return name == "move" and plan.dimensions == 2 and self.wants(plan.body.move, "move", "gx", "gy", "gz")
+        return name == "move" and plan.dimensions == 2 and self.rule_asks(plan.body.move, "move", "gx", "gy", "gz")
 
     def _stage(self, name: str, lines: list[str]) -> None:
         of_all = name.removesuffix(self.mark)  # each law has such a stage
         lines = self._with_parts(of_all, lines)
         rows = self.names | {"u0", "u1", "u2", "u3"}
-        statements = parse(self.prepared(name, lines))
+        statements = parse_lines(self.prepare_stage(name, lines))
         turn = self.plan.sequential and of_all in ("neighbours", "boundaries", "decide", "move")
-        context = Context(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
+        context = LoweringContext(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
         context.cells, context.across = self.cells(), self.across
         context.exact = name.startswith("measure_") or bool(
             self.across
         )  # nobody says whom an agent beyond the last met
-        context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
-        body = lowered(statements, context)
+        context.alone = name == "appear_" or (name == "aim_" and self.plan.is_shepherd)
+        body = lower_statements(statements, context)
         body = [_Renamed(self).visit(s) for s in body]
         body, numbers = with_reciprocals(self.forms, body, {self.named(letter) for letter in self.plan.records})
         self.source.blocks += self.forms.made
@@ -214,14 +216,14 @@ class CudaBuilder(Builder):
         if name == "move":  # which runs at every step: the kernel takes the reciprocals once
             self.reciprocals |= dict.fromkeys(numbers)
         else:
-            body = [*parse(reciprocal_lines(numbers)), *body]
+            body = [*parse_lines(reciprocal_lines(numbers)), *body]
         self._add(name, body, context.rows)
 
     def _with_parts(self, stage: str, lines: list[str]) -> list[str]:
         """Lines of a stage with those that it holds in place of their calls, such as the noise in `move`."""
         for name, (part, letters, bound) in self.within.items():
             if WITHIN[name] == stage:
-                lines = in_place([line for text in lines for line in text.splitlines()], name, part)
+                lines = inline_lines([line for text in lines for line in text.splitlines()], name, part)
                 self.letters, self.bound = self.letters | letters, self.bound | bound
         return lines
 
@@ -232,15 +234,15 @@ class CudaBuilder(Builder):
         if isinstance(last, ast.Return):
             body.pop()
             if last.value is not None and not isinstance(last.value, ast.Constant):
-                body += parse(f"answer = {ast.unparse(last.value)}")
+                body += parse_lines(f"answer = {ast.unparse(last.value)}")
                 results = ["answer"]
-        read, stored = used(body)
+        read, stored = used_names(body)
         registers = {
             r for r in read | stored if r.endswith("_i") and (r[:-2] in rows or re.match(r"(mem|kept)\d+_i", r))
         }
         values = sorted((s for s in stored if re.fullmatch(r"value\d+", s)), key=lambda s: int(s[5:]))
         results = [*sorted(registers & stored), *values, *results]
-        free = (read - stored - self.known()) | registers
+        free = (read - stored - self.module_names()) | registers
         tables = [] if self.shape.registers else sorted(self.bound_rows(read))
         lines = [f"{row} = work[{self.row(row)}]" for row in tables]
         free = (free - set(tables)) | ({"work"} if tables else set())
@@ -250,8 +252,10 @@ class CudaBuilder(Builder):
             text = ["cuda.syncthreads()", *text]
         if results:
             text += [f"return {', '.join(results)}"]
-        self.functions.append(f"{JIT}\ndef {name}({', '.join(order)}):\n" + indent("\n".join(text or ["pass"]), "    "))
-        self.stages[name] = Stage(name, order, tuple(results))
+        self.functions.append(
+            f"{JIT_DECORATOR}\ndef {name}({', '.join(order)}):\n" + indent("\n".join(text or ["pass"]), "    ")
+        )
+        self.stages[name] = DeviceStage(name, order, tuple(results))
 
     def bound_rows(self, read: set[str]) -> set[str]:
         """Rows of the table that a stage takes by name."""
@@ -260,19 +264,19 @@ class CudaBuilder(Builder):
 
 def shared_noise(lines: list[str]) -> list[str]:
     """The threads of an agent draw the noise of different steps, and hand it round when its step comes (in a plane)."""
-    lines = must_replace(lines, "if step % 2 == 0:", "if step % (2 * PER_AGENT) == 0:")
-    lines = must_replace(lines, " step // 2,", " step // 2 + sub,")
+    lines = checked_replace(lines, "if step % 2 == 0:", "if step % (2 * PER_AGENT) == 0:")
+    lines = checked_replace(lines, " step // 2,", " step // 2 + sub,")
     for number in (2, 3):
         (line,) = (line for line in lines if line.endswith(f" if step % 2 == 0 else g{number}"))
         name = line.partition(" = ")[0]
         handed = f"{line}\n{name}[i] = from_thread({name}[i], (step // 2) % PER_AGENT, tid)"
-        lines = must_replace(lines, line, handed)
+        lines = checked_replace(lines, line, handed)
     return lines
 
 
 def reciprocal_lines(numbers: Iterable[tuple[str, str]]) -> list[str]:
     """Lines that take the reciprocals of numbers (record, field)."""
-    return [f"{spelled(f'{record}.{field}')} = ONE / {record}.{field}" for record, field in numbers]
+    return [f"{reciprocal_name(f'{record}.{field}')} = ONE / {record}.{field}" for record, field in numbers]
 
 
 class _Renamed(ast.NodeTransformer):

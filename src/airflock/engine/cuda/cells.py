@@ -8,24 +8,24 @@ loss.
 
 from typing import Any
 
-from airflock.core.contract.own_records import beginnings_of
+from airflock.core import initial_values
 from airflock.engine.cuda.build import CudaBuilder
-from airflock.engine.cuda.shape import Shape
-from airflock.engine.cuda.sorting import FOURS, PLAIN_FOURS, SORT
-from airflock.engine.cuda.start import heading_off, tried
-from airflock.engine.cuda.state import numbers
-from airflock.engine.passes.build import branch, loop
-from airflock.engine.passes.driver import MADE
+from airflock.engine.cuda.shape import BlockLayout
+from airflock.engine.cuda.sorting import LOAD_FOURS_TEXT, SIMULATED_FOURS_TEXT, SORT_TEXT
+from airflock.engine.cuda.start import heading_off, try_place_lines
+from airflock.engine.cuda.state import number_lines
+from airflock.engine.passes.build import branch_lines, loop_lines
+from airflock.engine.passes.driver import STAGE_MAKERS
 from airflock.engine.plan import Plan
-from airflock.engine.replace import must_replace
-from airflock.engine.schedule import order
+from airflock.engine.replace import checked_replace
+from airflock.engine.schedule import stages_of_events
 from airflock.engine.stages import start
-from airflock.engine.stages.decide import NEAR as GATHERED
-from airflock.engine.stages.state import SCENE
+from airflock.engine.stages.decide import MAX_GATHERED as GATHERED
+from airflock.engine.stages.state import SCENE_ARRAYS
 
-NEAR = 8  # columns of the table that neighbours read: x y z number, vx vy vz nothing
+NEIGHBOUR_COLUMNS = 8  # columns of the table that neighbours read: x y z number, vx vy vz nothing
 GUSTS = 3  # deviations from the mean wind, one per axis
-COMMON = ("row", "whole", "faces", "edges", "spans", "shapes", "nodes", "links", "box", "count")
+COMMON_ARGUMENTS = ("row", "whole", "faces", "edges", "spans", "shapes", "nodes", "links", "box", "count")
 AROUND = (
     "for qz in range(low_z, high_z):",
     "for qy in range(low_y, high_y):",
@@ -50,30 +50,30 @@ ACROSS = (
 )
 
 
-def crowd(plan: Plan, simulated: bool = False) -> str:
+def large_flock_text(plan: Plan, simulated: bool = False) -> str:
     """Text of the driver of one big flock."""
     threads = 4 if simulated else 128
-    build = CellBuilder(plan, Shape(32, 1, threads, simulated=simulated))
+    build = CellBuilder(plan, BlockLayout(32, 1, threads, simulated=simulated))
     for name in _stages(build):
-        MADE[name](build)
+        STAGE_MAKERS[name](build)
     options = "fastmath=True" + ("" if simulated else ", cache=True")
-    kernels = [SORT.format(options=options, scan=8 if simulated else 1024, near=NEAR)]
-    kernels += ["\n".join(_kernel(options, "begin", "near", "rest", *COMMON, body=_begin(build)))]
-    given = ("near", "rest", "sorted_", "rest_sorted", "starts", "meet", "step", *COMMON)
+    kernels = [SORT_TEXT.format(options=options, scan=8 if simulated else 1024, near=NEIGHBOUR_COLUMNS)]
+    kernels += ["\n".join(_kernel(options, "begin", "near", "rest", *COMMON_ARGUMENTS, body=_begin(build)))]
+    given = ("near", "rest", "sorted_", "rest_sorted", "starts", "meet", "step", *COMMON_ARGUMENTS)
     kernels += ["\n".join(_kernel(options, "advance", *given, body=_advance(build)))]
-    fours = FOURS if plan.bits == 32 and not simulated else PLAIN_FOURS
+    fours = LOAD_FOURS_TEXT if plan.bits == 32 and not simulated else SIMULATED_FOURS_TEXT
     parts = [build.head, fours, *build.source.blocks, *build.functions, *kernels]
-    constants = [f"REST = {rest_columns(plan)}", f"SCAN = {8 if simulated else 1024}"]
+    constants = [f"REST = {private_columns(plan)}", f"SCAN = {8 if simulated else 1024}"]
     return "\n\n".join([*parts, *constants]) + "\n"
 
 
 def _stages(build: CudaBuilder) -> tuple[str, ...]:
     """What an agent does in a step: nobody is told anything but the truth, so nothing is perceived."""
-    events = order(build.plan)
+    events = stages_of_events(build.plan)
     return tuple(name for name in (*events["decide"], *events["move"]) if name != "perceive")
 
 
-def rest_columns(plan: Plan) -> int:
+def private_columns(plan: Plan) -> int:
     """Columns that only the agent itself reads, in whole vectors: command, the model's memory, and gusts.
 
     Each agent keeps the gusts of the flock: they go on from step to step, and no launch can hand them to all others.
@@ -104,14 +104,14 @@ class CellBuilder(CudaBuilder):
         """Never: candidates come at their image."""
         return False
 
-    def prepared(self, name: str, lines: list[str]) -> list[str]:
+    def prepare_stage(self, name: str, lines: list[str]) -> list[str]:
         """Numbers of agents instead of places in the table; noise of an odd step is drawn again."""
         if name == "neighbours":
-            lines = must_replace(lines, "integer(j)", "sorted_[j, 3]")
-            lines = must_replace(lines, "ii = integer(i)", "ii = real(i)")
+            lines = checked_replace(lines, "integer(j)", "sorted_[j, 3]")
+            lines = checked_replace(lines, "ii = integer(i)", "ii = real(i)")
             for a in self.plan.axes:
-                lines = must_replace(lines, f"[j] - own_{a}", f"[j] - base_{a}")
-        return must_replace(lines, "if step % 2 == 0:", "if step >= 0:") if self.drawn_for_two(name) else lines
+                lines = checked_replace(lines, f"[j] - own_{a}", f"[j] - base_{a}")
+        return checked_replace(lines, "if step % 2 == 0:", "if step >= 0:") if self.draws_two_steps(name) else lines
 
 
 def _kernel(options: str, name: str, *arguments: str, body: list[str]) -> list[str]:
@@ -120,27 +120,27 @@ def _kernel(options: str, name: str, *arguments: str, body: list[str]) -> list[s
 
 def _common(build: CellBuilder) -> list[str]:
     """What every kernel of a flock knows."""
-    lines, local = numbers(build), f"np.float{build.plan.bits}"
+    lines, local = number_lines(build), f"np.float{build.plan.bits}"
     lines += ["sub = integer(0); tid = integer(0); slot = integer(cuda.grid(1)); late = ZERO"]
     lines += [f"gust = cuda.local.array({GUSTS}, {local})", f"aim = cuda.local.array(4, {local})"]
     lines += [f"near_ = cuda.local.array({GATHERED}, np.int32)", "counts = cuda.local.array(2, np.int32)"]
     names = {"near": "near_", "goals": "edges", "reached": "aim", "later": "edges"}
-    return [*lines, f"scene = ({', '.join(names.get(part, part) for part in SCENE)})"]
+    return [*lines, f"scene = ({', '.join(names.get(part, part) for part in SCENE_ARRAYS)})"]
 
 
 def _begin(build: CellBuilder) -> list[str]:
     """Every agent at a random place, whoever else is there."""
     plan = build.plan
-    draw = tried(build, "i")
-    draw += branch("free", ["placed = True", "break"])
+    draw = try_place_lines(build, "i")
+    draw += branch_lines("free", ["placed = True", "break"])
     turn = heading_off(build, ("vx", "vy", "vz"))
     body = ["i = slot; placed = False; s_x = ZERO; s_y = ZERO; s_z = ZERO; vx = ZERO; vy = ZERO; vz = ZERO"]
-    body += [*loop(f"attempt in range({start.ATTEMPTS})", draw), *branch("row_w.speed > ZERO", turn)]
+    body += [*loop_lines(f"attempt in range({start.ATTEMPTS})", draw), *branch_lines("row_w.speed > ZERO", turn)]
     put = ("s_x", "s_y", "s_z", "real(i if placed else -1 - i)", "vx", "vy", "vz", "ZERO")
     body += [f"near[i, {c}] = {value}" for c, value in enumerate(put)]
-    values = ["ZERO"] * 3 + [f"real({start})" for start in beginnings_of(plan.model.Memory)]
-    body += [f"rest[i, {c}] = {v}" for c, v in enumerate(values + ["ZERO"] * (rest_columns(plan) - len(values)))]
-    return [*_common(build), *branch("slot < n", body)]
+    values = ["ZERO"] * 3 + [f"real({start})" for start in initial_values(plan.model.Memory)]
+    body += [f"rest[i, {c}] = {v}" for c, v in enumerate(values + ["ZERO"] * (private_columns(plan) - len(values)))]
+    return [*_common(build), *branch_lines("slot < n", body)]
 
 
 def _advance(build: CellBuilder) -> list[str]:
@@ -164,9 +164,9 @@ def _advance(build: CellBuilder) -> list[str]:
     meet = ["i = integer(sorted_[slot, 3])", *fetch, *_edges(build)]
     meet += ["number = step // decide_every"]
     meet += [build.stages[name].call(k_="number") for name in _stages(build)[:-1]]
-    body += ["i = integer(near[slot, 3])", *load, *branch("meet != 0", meet), build.stages["move"].call()]
+    body += ["i = integer(near[slot, 3])", *load, *branch_lines("meet != 0", meet), build.stages["move"].call()]
     store = [f"{table}[slot, {c}] = {name}" for name, (table, c) in state.items()]
-    return [*_common(build), *branch("slot < n", [*body, *store, "near[slot, 3] = real(i)"])]
+    return [*_common(build), *branch_lines("slot < n", [*body, *store, "near[slot, 3] = real(i)"])]
 
 
 def _edges(build: CellBuilder) -> list[str]:

@@ -6,38 +6,55 @@ thread keeps the links of its agent as bits, so that a round reads a few words; 
 
 from typing import Any
 
-from airflock.core.contract import Metric
-from airflock.engine.passes.build import Builder, branch, loop
+from airflock.core import Metric
+from airflock.engine.passes.build import Builder, branch_lines, loop_lines
 from airflock.engine.plan import Plan
 from airflock.engine.specialise.stage import specialise
-from airflock.engine.specialise.values import Components, argument
-from airflock.engine.stages.clusters import mean_over, member
-from airflock.engine.stages.measure import add, clear, filled, ways
-from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import HALF, START, ZERO, X, Y, Z, ask, real, reduced, totals, vector
-from airflock.world.edges import nearest_image
+from airflock.engine.specialise.values import LocalVector, driver_argument
+from airflock.engine.stages.clusters import call_member, mean_from_sums
+from airflock.engine.stages.measure import add_terms, clear_totals, record_of_totals, reductions
+from airflock.engine.stages.state import FlockRows
+from airflock.engine.stages.words import (
+    HALF,
+    REDUCTION_START,
+    ZERO,
+    X,
+    Y,
+    Z,
+    call_rule,
+    real,
+    reduce_term,
+    totals,
+    vector,
+)
+from airflock.world import nearest_image
 
 VALID = "np.uint32(FULL) if n >= 32 * part + 32 else (np.uint32((1 << max(n - 32 * part, 0)) - 1))"
 
 
-def clusters(build: Builder, metric: Metric) -> list[str]:
+def cluster_lines(build: Builder, metric: Metric) -> list[str]:
     """Lines that sum the cluster rule of one metric over all clusters."""
     registers = build.shape.registers  # type: ignore[attr-defined]
-    build.bind(["mine", "earlier", "joins"])
-    totals_of = {"total": Components("u", "totals"), "record": metric.Cluster}
-    lines = specialise(build, clear, metric=metric, **totals_of).lines
-    lines += loop("i in range(n)", ["mine[i] = ZERO; earlier[i] = ZERO; joins[i] = ZERO"])
+    build.bind_rows(["mine", "earlier", "joins"])
+    totals_of = {"total": LocalVector("u", "totals"), "record": metric.Cluster}
+    lines = specialise(build, clear_totals, metric=metric, **totals_of).lines
+    lines += loop_lines("i in range(n)", ["mine[i] = ZERO; earlier[i] = ZERO; joins[i] = ZERO"])
     lines += _links(build, metric) if registers else []
     grow = _grow_by_masks() if registers else _grow_by_pairs(build, metric)
     made = specialise(
-        build, grown, mine=argument("mine"), size=argument("size"), mean=argument("mean"), metric=metric
-    )  # fmt: skip
+        build,
+        grown,
+        mine=driver_argument("mine"),
+        size=driver_argument("size"),
+        mean=driver_argument("mean"),
+        metric=metric,
+    )
     body = [*grow, *made.lines, f"t = {made.answer}"]
-    body += specialise(build, add, t=argument("t"), metric=metric, **totals_of).lines
-    body += loop("i in range(n)", ["earlier[i] = most(earlier[i], mine[i])"])
+    body += specialise(build, add_terms, t=driver_argument("t"), metric=metric, **totals_of).lines
+    body += loop_lines("i in range(n)", ["earlier[i] = most(earlier[i], mine[i])"])
     body += ["done += size", "cuda.syncthreads()"]
     lines += ["done = integer(0)", "while done < n:", *[f"    {line}" for line in body]]
-    return [*lines, f"clusters = {specialise(build, filled, **totals_of).answer}", "return clusters"]
+    return [*lines, f"clusters = {specialise(build, record_of_totals, **totals_of).answer}", "return clusters"]
 
 
 def _offset(build: Builder, other: str) -> list[str]:
@@ -49,7 +66,7 @@ def _offset(build: Builder, other: str) -> list[str]:
 
 
 def _linked(build: Builder, metric: Metric) -> tuple[list[str], str]:
-    root = ["r = math.sqrt(r2)"] if build.wants(metric.linked, "linked", "r") else []
+    root = ["r = math.sqrt(r2)"] if build.rule_asks(metric.linked, "linked", "r") else []
     return root, build.call(metric.linked, "linked", {}, metric.name)  # type: ignore[arg-type]
 
 
@@ -62,35 +79,42 @@ def _links(build: Builder, metric: Metric) -> list[str]:
         eight += [f"eight = np.uint32(eight | (np.uint32({1 << bit}) if {link} else np.uint32(0)))"]
         eight += ["other = np.uint32(other + np.uint32(1))"]
     word = ["bits = np.uint32(0); other = np.uint32(32 * part)"]
-    word += loop(
+    word += loop_lines(
         "e in range(4)", ["eight = np.uint32(0)", *eight, "bits = np.uint32(bits | (eight << np.uint32(8 * e)))"]
     )
     word += [f"links_[part] = np.uint32(bits & ({VALID}))"]
-    lines = [f"own_{a} = {a}_i" for a in build.plan.axes] + loop("part in range(sub, WORDS, PER_AGENT)", word)
-    return [*lines, *loop("part in range(tid, WORDS, THREADS)", ["seen[part] = np.uint32(0)"]), "cuda.syncthreads()"]
+    lines = [f"own_{a} = {a}_i" for a in build.plan.axes] + loop_lines("part in range(sub, WORDS, PER_AGENT)", word)
+    return [
+        *lines,
+        *loop_lines("part in range(tid, WORDS, THREADS)", ["seen[part] = np.uint32(0)"]),
+        "cuda.syncthreads()",
+    ]
 
 
 def _grow_by_masks() -> list[str]:
     """One cluster, from the first agent that no earlier one holds."""
     find = [f"left = np.uint32(~seen[part] & ({VALID}))"]
-    find += branch("(first < 0) and (left != np.uint32(0))", ["first = integer(32 * part + cuda.ffs(left) - 1)"])
+    find += branch_lines("(first < 0) and (left != np.uint32(0))", ["first = integer(32 * part + cuda.ffs(left) - 1)"])
     put = ["grown[part] = np.uint32(1) << np.uint32(first & 31) if part == (first >> 5) else np.uint32(0)"]
     touch = ["touched = np.uint32(0)"]
-    touch += loop(
+    touch += loop_lines(
         "part in range(sub, WORDS, PER_AGENT)", ["touched = np.uint32(touched | (links_[part] & grown[part]))"]
     )
     touch += ["hit = integer(1) if touched != np.uint32(0) else integer(0)"]
-    growth = ["hit = integer(0)", *branch("(i < n) and (mine_i + earlier_i < HALF)", touch)]
+    growth = ["hit = integer(0)", *branch_lines("(i < n) and (mine_i + earlier_i < HALF)", touch)]
     growth += ["hit = integer(group_max(hit, tid))"]
     growth += ["fresh = integer(cuda.syncthreads_count(hit if sub == 0 else integer(0)))"]
-    join = ["mine_i = ONE", *branch("sub == 0", ["cuda.atomic.or_(grown, i >> 5, np.uint32(1) << np.uint32(i & 31))"])]
-    growth += [*branch("hit != 0", join), "size = integer(size + fresh)", "cuda.syncthreads()"]
+    join = [
+        "mine_i = ONE",
+        *branch_lines("sub == 0", ["cuda.atomic.or_(grown, i >> 5, np.uint32(1) << np.uint32(i & 31))"]),
+    ]
+    growth += [*branch_lines("hit != 0", join), "size = integer(size + fresh)", "cuda.syncthreads()"]
     growth += ["growing = (fresh > 0) and (done + size < n)"]
     return [
-        "first = integer(-1)", *loop("part in range(WORDS)", find), "mine_i = ONE if i == first else ZERO",
-        *loop("part in range(tid, WORDS, THREADS)", put), "size = integer(1); growing = done + size < n",
+        "first = integer(-1)", *loop_lines("part in range(WORDS)", find), "mine_i = ONE if i == first else ZERO",
+        *loop_lines("part in range(tid, WORDS, THREADS)", put), "size = integer(1); growing = done + size < n",
         "cuda.syncthreads()", *["while growing:", *[f"    {line}" for line in growth]],
-        *loop("part in range(tid, WORDS, THREADS)", ["seen[part] = np.uint32(seen[part] | grown[part])"]),
+        *loop_lines("part in range(tid, WORDS, THREADS)", ["seen[part] = np.uint32(seen[part] | grown[part])"]),
     ]  # fmt: skip
 
 
@@ -99,23 +123,23 @@ def _grow_by_pairs(build: Builder, metric: Metric) -> list[str]:
     axes = build.plan.axes
     root, link = _linked(build, metric)
     pair = [*_offset(build, "{a}[j]"), *root, f"hit = most(hit, (ONE if {link} & (mine[j] > HALF) else ZERO))"]
-    meet = [f"own_{a} = {a}[i]" for a in axes] + ["hit = ZERO", *loop("j in range(m)", pair)]
+    meet = [f"own_{a} = {a}[i]" for a in axes] + ["hit = ZERO", *loop_lines("j in range(m)", pair)]
     meet += ["joins[i] = hit if mine[i] + earlier[i] < HALF else ZERO", "fresh += joins[i]"]
-    growth = ["fresh = ZERO", *loop("i in range(n)", meet), "size = integer(size + integer(fresh))"]
-    growth += loop("i in range(n)", ["mine[i] = most(mine[i], joins[i])"])
+    growth = ["fresh = ZERO", *loop_lines("i in range(n)", meet), "size = integer(size + integer(fresh))"]
+    growth += loop_lines("i in range(n)", ["mine[i] = most(mine[i], joins[i])"])
     growth += ["cuda.syncthreads()", "growing = (fresh > HALF) and (done + size < n)"]
     return [
         "first = FAR",
-        *loop("i in range(n)", ["first = least(first, (real(i) if earlier[i] < HALF else FAR))"]),
+        *loop_lines("i in range(n)", ["first = least(first, (real(i) if earlier[i] < HALF else FAR))"]),
         "size = integer(1); growing = done + size < n and first < FAR",
-        *loop("i in range(n)", ["mine[i] = ONE if real(i) == first else ZERO"]),
+        *loop_lines("i in range(n)", ["mine[i] = ONE if real(i) == first else ZERO"]),
         "cuda.syncthreads()",
         *["while growing:", *[f"    {line}" for line in growth]],
     ]
 
 
 def grown(
-    mine: Any, size: Any, mean: Any, flock: Flock, numbers: Any, n: int, *, plan: Plan, metric: Metric
+    mine: Any, size: Any, mean: Any, flock: FlockRows, numbers: Any, n: int, *, plan: Plan, metric: Metric
 ) -> Any:  # fmt: skip
     """What the cluster rule says of the agents that `mine` marks with 1; mean : over the flock."""
     axes, h = range(plan.dimensions), flock.heading
@@ -135,16 +159,16 @@ def grown(
             for total, row in ((cx, flock.position), (cv, flock.velocity), (ch, h)):
                 for a in axes:
                     total[a] = total[a] + mine[i] * row[a][i]
-    own_mean = mean_over(size, cx, cv, ch, mean, plan=plan, metric=metric)
+    own_mean = mean_from_sums(size, cx, cv, ch, mean, plan=plan, metric=metric)
     k = totals()
     if metric.member is not None:
-        clear(k, metric.Member, metric)
+        clear_totals(k, metric.Member, metric)
         for i in range(n):
-            t = member(i, own_mean, flock, numbers, metric=metric)
-            for c, way in enumerate(ways(metric.Member, metric)):
-                k[c] = reduced(way, k[c], t[c] if mine[i] > HALF else START[way])
-    members = filled(metric.Member, k) if metric.member is not None else None
-    return ask(
+            t = call_member(i, own_mean, flock, numbers, metric=metric)
+            for c, way in enumerate(reductions(metric.Member, metric)):
+                k[c] = reduce_term(way, k[c], t[c] if mine[i] > HALF else REDUCTION_START[way])
+    members = record_of_totals(metric.Member, k) if metric.member is not None else None
+    return call_rule(
         metric.cluster, n=real(size), hx=s[X], hy=s[Y], hz=s[Z], hh=hh, members=members, mean=own_mean,
         q=numbers.q,
     )  # fmt: skip

@@ -5,38 +5,38 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
-from airflock.engine.compile_shortcuts import Spared, call_type, exchanging, processed, rewritten
+from airflock.engine.compile_shortcuts import Replacement, cached_call_type, patched, post_processed, rename_in_blocks
 
 TRIED = (0, 30), (0, 30)  # first and last version of numba-cuda of which this was tried
 
 
 @contextmanager
-def sparing() -> Iterator[None]:
+def shortcuts() -> Iterator[None]:
     """Around the compilation of kernels by one thread at a time."""
     tried = TRIED[0] <= tuple(map(int, import_module("numba_cuda").__version__.split(".")[:2])) <= TRIED[1]
-    with exchanging(*_spared() if tried else ()):
+    with patched(*_spared() if tried else ()):
         yield
 
 
 @contextmanager
-def at_first(kernel: Any) -> Iterator[None]:
+def first_launch(kernel: Any) -> Iterator[None]:
     """Around a launch: the first one of a kernel compiles it, or finds it on disk. Two fifths of the time are saved."""
     if getattr(kernel, "overloads", True):  # the simulator's kernels have none and are never compiled
         yield
         return
     lock: Any = import_module("numba.cuda.core.compiler_lock").global_compiler_lock
-    with lock, sparing():
+    with lock, shortcuts():
         yield
 
 
-def _spared() -> tuple[Spared, ...]:
+def _spared() -> tuple[Replacement, ...]:
     """Those of numba-cuda, which has a compiler of its own with the names of Numba's."""
     core = "numba.cuda.core."
     flags: Any = import_module(core + "targetconfig").TargetConfig
     return (
-        (import_module("numba.core.types").functions.BaseFunction, "get_call_type", call_type),
-        (import_module(core + "postproc").PostProcessor, "run", processed),
-        (import_module(core + "ssa"), "_run_block_rewrite", rewritten),
+        (import_module("numba.core.types").functions.BaseFunction, "get_call_type", cached_call_type),
+        (import_module(core + "postproc").PostProcessor, "run", post_processed),
+        (import_module(core + "ssa"), "_run_block_rewrite", rename_in_blocks),
         (flags, "values", _values),
         (flags, "__hash__", _hash),
         (flags, "__eq__", _equal),

@@ -6,7 +6,7 @@ from importlib import import_module
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
-from airflock.engine.cuda.compile_shortcuts import sparing
+from airflock.engine.cuda.compile_shortcuts import shortcuts
 from airflock.engine.cuda.kernel import ARGUMENTS
 
 # dimensions and kind of every argument: r real, i 64-bit and s 32-bit whole numbers, u words
@@ -26,7 +26,7 @@ def signature(bits: int) -> tuple[Any, ...]:
 
 
 @contextmanager
-def pretending(capability: tuple[int, int]) -> Iterator[None]:
+def target_capability(capability: tuple[int, int]) -> Iterator[None]:
     """Device functions are compiled for this compute capability instead of the present GPU's."""
     dispatcher: Any = import_module("numba.cuda.dispatcher")
     kept = dispatcher.get_current_device
@@ -47,7 +47,7 @@ def ptx(
     compiler: Any = import_module("numba.cuda.compiler")
     dispatched = getattr(driver, kernel)
     options = dispatched.targetoptions
-    with pretending(capabilities[0]), sparing():
+    with target_capability(capabilities[0]), shortcuts():
         library, _ = compiler._compile_pyfunc_with_fixup(
             dispatched.py_func,
             types,

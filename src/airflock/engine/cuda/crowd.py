@@ -8,35 +8,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.contract.own_records import beginnings_of
-from airflock.engine.cpu import Flown
-from airflock.engine.cuda.cells import COMMON, NEAR, crowd, rest_columns
-from airflock.engine.cuda.launch import configured
-from airflock.engine.cuda.memory import SHARE, unfit
-from airflock.engine.measuring import measured
-from airflock.engine.passes.build import columns
-from airflock.engine.passes.flock import owners
+from airflock.core import initial_values
+from airflock.engine.cpu import DriverResult
+from airflock.engine.cuda.cells import COMMON_ARGUMENTS, NEIGHBOUR_COLUMNS, large_flock_text, private_columns
+from airflock.engine.cuda.launch import configure_kernel
+from airflock.engine.cuda.memory import MAX_MEMORY_SHARE, memory_message
+from airflock.engine.measuring import score_tables
+from airflock.engine.passes.build import sampled_columns
+from airflock.engine.passes.flock import flock_rules
 from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
-from airflock.engine.tables import Tables, tables
-from airflock.engine.totals import combined
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.timing import clock
-from airflock.scenarios.wings import FORMATIONS
-from airflock.support.errors import DeviceError
-from airflock.support.gpu import free_memory, required, runtime, simulating
+from airflock.engine.tables import WorldTables, world_tables
+from airflock.engine.totals import combine_sums
+from airflock.scenarios import FORMATIONS, Scenario, step_counts
+from airflock.support import DeviceError, cuda_runtime, free_gpu_memory, is_simulated, require_gpu
 
 CELLS = 4  # at most so many cells per agent, as on the CPU
 PAIRED = 20_000  # agents from which order parameters that look at all pairs are refused
 
 
 @cache
-def crowd_driver(plan: Plan, simulated: bool) -> ModuleType:
+def large_flock_driver(plan: Plan, simulated: bool) -> ModuleType:
     """Driver of one big flock."""
-    return load_driver(crowd(plan, simulated), f"{plan.model.name}_crowd")
+    return load_driver(large_flock_text(plan, simulated), f"{plan.model.name}_crowd")
 
 
-def refused(plan: Plan, agents: int) -> str | None:
+def cell_plan_error(plan: Plan, agents: int) -> str | None:
     """Why a plan cannot be flown by cells on a GPU; None if it can."""
     if not plan.grid:
         return "cells need at least 1000 agents, a model of finite reach and perception without noise or delay"
@@ -46,7 +43,7 @@ def refused(plan: Plan, agents: int) -> str | None:
         return "one big flock with faults, or whose agents leave, flies on cpu"
     if plan.topology is not None:
         return f"one big flock with topology.kind = {plan.topology.name} flies on cpu"
-    if owners(plan):
+    if flock_rules(plan):
         return f"{plan.model.name} or its order parameters solve for the whole flock"
     if plan.start in FORMATIONS and not plan.given_start:
         return f"one big flock starts at random or given places, not in start.kind = {plan.start}"
@@ -63,7 +60,7 @@ def refused(plan: Plan, agents: int) -> str | None:
     return None
 
 
-def cells_of(scenario: Scenario, plan: Plan, tables: Tables) -> tuple[list[float], list[float], list[int]]:
+def cell_grid(scenario: Scenario, plan: Plan, tables: WorldTables) -> tuple[list[float], list[float], list[int]]:
     """Lower corner and size of the cells (m), and their number, per axis. Who is outside is in the nearest cell."""
     row = dict(zip([f"{k}.{f}" for k, fields in plan.records.items() for f in fields], tables.row, strict=True))
     assert scenario.model.reach is not None
@@ -79,16 +76,18 @@ def cells_of(scenario: Scenario, plan: Plan, tables: Tables) -> tuple[list[float
     return [-h for h in half], size, count
 
 
-def too_large(scenario: Scenario, plan: Plan) -> str | None:
+def memory_error(scenario: Scenario, plan: Plan) -> str | None:
     """Why a flock does not fit into the GPU's free memory: what it needs and how many agents fit; None if it does."""
-    each = 2 * (NEAR + rest_columns(plan)) * plan.bits // 8 + 12  # two copies of the tables; cell, rank, number
+    each = (
+        2 * (NEIGHBOUR_COLUMNS + private_columns(plan)) * plan.bits // 8 + 12
+    )  # two copies of the tables; cell, rank, number
     each += 8 * CELLS  # at most so many cells, each with a count and a first agent
-    room = int(SHARE * free_memory())
+    room = int(MAX_MEMORY_SHARE * free_gpu_memory())
     n = scenario.agents
-    return None if n * each <= room else unfit(n, n * each, room, room // each)
+    return None if n * each <= room else memory_message(n, n * each, room, room // each)
 
 
-class Crowd:
+class LargeFlock:
     """One big flock in the GPU's memory.
 
     Its tables are in the order of the cells of the last decision: near (agent, 8) holds x y z number vx vy vz nothing,
@@ -96,26 +95,26 @@ class Crowd:
     """
 
     def __init__(self, scenario: Scenario, plan: Plan, seed: int = 0, start: Any = None):
-        required(simulating())
+        require_gpu(is_simulated())
         self.plan = plan.built(grid=True)
         self.scenario, self.agents, self.step = scenario, scenario.agents, 0
-        fault = refused(self.plan, self.agents)
+        fault = cell_plan_error(self.plan, self.agents)
         if fault is not None:
             raise DeviceError(f"device = cuda: {fault}")
         if scenario.separation() > 0.0 and start is None:
             raise DeviceError("device = cuda: one big flock starts at random places; set start.separation = 0")
-        self.tables: Tables = tables(scenario, self.plan, seed)
-        self.times = clock(scenario)
-        self.driver = crowd_driver(self.plan, simulating())
+        self.tables: WorldTables = world_tables(scenario, self.plan, seed)
+        self.times = step_counts(scenario)
+        self.driver = large_flock_driver(self.plan, is_simulated())
         self._allocate()
         self._begin(start)
 
     def _allocate(self) -> None:
         """All tables."""
-        cuda, real, n = runtime(), self.tables.row.dtype, self.agents
-        low, size, count = cells_of(self.scenario, self.plan, self.tables)
+        cuda, real, n = cuda_runtime(), self.tables.row.dtype, self.agents
+        low, size, count = cell_grid(self.scenario, self.plan, self.tables)
         cells = int(np.prod(count))
-        fault = None if simulating() else too_large(self.scenario, self.plan)
+        fault = None if is_simulated() else memory_error(self.scenario, self.plan)
         if fault is not None:
             raise DeviceError(f"device = cuda: {fault}")
         t = self.tables
@@ -124,8 +123,8 @@ class Crowd:
         arrays = [t.row, t.whole, *(a if len(a) else np.zeros((1, a.shape[1]), a.dtype) for a in whole[:3]), *whole[3:]]
         given = [*arrays, np.array([*low, *size], real), np.array(count, np.int32)]
         self.common = [cuda.to_device(np.ascontiguousarray(array)) for array in given]
-        assert len(self.common) == len(COMMON)
-        self.near, self.sorted = (cuda.to_device(np.zeros((n, NEAR), real)) for _ in range(2))
+        assert len(self.common) == len(COMMON_ARGUMENTS)
+        self.near, self.sorted = (cuda.to_device(np.zeros((n, NEIGHBOUR_COLUMNS), real)) for _ in range(2))
         self.rest, self.rest_sorted = (cuda.to_device(np.zeros((n, self.driver.REST), real)) for _ in range(2))
         self.cell, self.rank, self.listed = (cuda.to_device(np.zeros(n, np.int32)) for _ in range(3))
         self.counts = cuda.to_device(np.zeros(cells, np.int32))
@@ -137,15 +136,15 @@ class Crowd:
         """Agents at random places, or at given ones: (component, agent)."""
         dims = self.plan.dimensions
         if start is None:
-            configured(self.driver.begin, *self._grid(self.agents))(self.near, self.rest, *self.common)
+            configure_kernel(self.driver.begin, *self._grid(self.agents))(self.near, self.rest, *self.common)
             return
-        near = np.zeros((self.agents, NEAR), self.tables.row.dtype)
+        near = np.zeros((self.agents, NEIGHBOUR_COLUMNS), self.tables.row.dtype)
         near[:, :dims], near[:, 4 : 4 + dims] = np.asarray(start)[:dims].T, np.asarray(start)[dims:].T
         near[:, 3] = np.arange(self.agents)
         rest = np.zeros((self.agents, self.driver.REST), near.dtype)
-        for c, value in enumerate(beginnings_of(self.plan.model.Memory)):
+        for c, value in enumerate(initial_values(self.plan.model.Memory)):
             rest[:, 3 + c] = value
-        self.near, self.rest = runtime().to_device(near), runtime().to_device(rest)
+        self.near, self.rest = cuda_runtime().to_device(near), cuda_runtime().to_device(rest)
 
     def _grid(self, work: int) -> tuple[int, int]:
         """Blocks and threads for this many threads."""
@@ -156,7 +155,7 @@ class Crowd:
         each, scan = self._grid(self.agents), (self.blocks, int(self.driver.SCAN))
         most = self._grid(max(self.agents, len(self.counts)))
         count, within, before, list_, copy, move = (
-            configured(getattr(self.driver, name), *grid)
+            configure_kernel(getattr(self.driver, name), *grid)
             for name, grid in (("count_agents", each), ("sum_within", scan), ("sum_before", scan),
                                ("list_agents", most), ("copy_agents", each), ("advance", each))
         )  # fmt: skip
@@ -193,18 +192,18 @@ class Crowd:
         return float(np.mean(found))
 
 
-def fly_crowd(scenario: Scenario, plan: Plan, seed: int, start: Any = None) -> Flown:
+def fly_large_flock(scenario: Scenario, plan: Plan, seed: int, start: Any = None) -> DriverResult:
     """Fly one big flock and measure it at each sample."""
-    flock = Crowd(scenario, plan, seed, start)
+    flock = LargeFlock(scenario, plan, seed, start)
     every, steps = flock.times["sample_every"], flock.times["steps"]
-    once = plan.built(grid=True, record=False)
+    once = plan.built(grid=True, keep_frames=False)
     table = flock.tables.changed(sample_every=1)
     frames, series = [], []
     places = flock.state()[0]
     for step in range(0, steps + 1, every):
         flock.advance(step - flock.step)
         places = flock.state()[0]
-        series.append(measured(once, table, places[None])[1][0])
+        series.append(score_tables(once, table, places[None])[1][0])
         if plan.record:  # the command of this instant is decided by the step that follows
             flock.advance()
             frames.append(np.concatenate([places, flock.state()[1]]))
@@ -213,12 +212,12 @@ def fly_crowd(scenario: Scenario, plan: Plan, seed: int, start: Any = None) -> F
         places = flock.state()[0]
     status = min(0, int(flock.near.copy_to_host()[:, 3].min()))
     kept = np.stack(frames) if plan.record else None
-    return Flown(combined(plan, _sums(plan, np.array(series))), kept, places, status)
+    return DriverResult(combine_sums(plan, _sums(plan, np.array(series))), kept, places, status)
 
 
 def _sums(plan: Plan, series: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sums over time as a driver keeps them, from the values of every sample."""
     found = []
-    for c, (_, how, _) in enumerate(columns(plan.metrics)):
+    for c, (_, how, _) in enumerate(sampled_columns(plan.metrics)):
         found.append({"min": np.min, "max": np.max}.get(how, np.sum)(series[:, c]))
     return np.array([*found, float(len(series)), 0.0])

@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.cuda.build import CudaBuilder
-from airflock.engine.cuda.start import agents, own, tables
-from airflock.engine.passes.build import branch, loop
-from airflock.engine.passes.flock import owners
+from airflock.engine.cuda.start import agent_loop, own_row, table_widths
+from airflock.engine.passes.build import branch_lines, loop_lines
+from airflock.engine.passes.flock import flock_rules
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import fault_row
-from airflock.engine.tables import Tables
+from airflock.engine.tables import WorldTables
 
 STEP, KIND, AGENT, LEAVES = range(4)  # columns of the table of whole numbers; that of reals: how long, then numbers
 
 
-def due(plan: Plan, jobs: Sequence[Tables], real: Any) -> dict[str, NDArray[Any]]:
+def onset_tables(plan: Plan, jobs: Sequence[WorldTables], real: Any) -> dict[str, NDArray[Any]]:
     """Tables of what begins in each flock, by argument name; a step that never comes where there is no more."""
     kinds = {kind.name: number for number, kind in enumerate(plan.faults)}
     found = [[onset for onset in tables.due if onset.kind in kinds] for tables in jobs]
@@ -37,7 +37,7 @@ def due(plan: Plan, jobs: Sequence[Tables], real: Any) -> dict[str, NDArray[Any]
     return {"all_due": whole, "all_hits": hits}
 
 
-def presence(tables: Tables, flown: int) -> tuple[float, NDArray[np.bool_]]:
+def presence_results(tables: WorldTables, flown: int) -> tuple[float, NDArray[np.bool_]]:
     """Share of agents and instants at which an agent was there, and who is absent at the end.
 
     flown : the last step that was flown
@@ -51,24 +51,29 @@ def presence(tables: Tables, flown: int) -> tuple[float, NDArray[np.bool_]]:
     return there / (n * (flown + 1)), np.array([agent in gone for agent in range(n)])
 
 
-def begin_faults(build: CudaBuilder) -> list[str]:
+def begin_fault_lines(build: CudaBuilder) -> list[str]:
     """Lines that let begin what is due before a step."""
     if not build.plan.faults:
         return []
-    number = f"integer({own(build, 'order')})" if build.slots else "i"
+    number = f"integer({own_row(build, 'order')})" if build.slots else "i"
     hit: list[str] = []
     for place, kind in enumerate(build.plan.faults):
         written = {"onset": "time", "lasts": "hits[begun, 0]"}
         written |= {name: f"hits[begun, {1 + c}]" for c, name in enumerate(kind.fields)}
-        known = {name: name.removeprefix("at_") for name in kind.onset}
-        written |= {name: own(build, row) for name, row in known.items() if row in build.names}
+        known = {name: name.removeprefix("at_") for name in kind.onset_names}
+        written |= {name: own_row(build, row) for name, row in known.items() if row in build.names}
         rows = {name: fault_row(kind.name, name) for name in written}
-        lines = [f"{own(build, rows[name])} = {said}" for name, said in written.items() if rows[name] in build.names]
-        hit += branch(f"due[begun, {KIND}] == {place}", lines) if lines else []
-    here = branch(f"{number} == due[begun, {AGENT}]", hit or ["pass"])
-    body = agents(build, here)
+        lines = [
+            f"{own_row(build, rows[name])} = {said}" for name, said in written.items() if rows[name] in build.names
+        ]
+        hit += branch_lines(f"due[begun, {KIND}] == {place}", lines) if lines else []
+    here = branch_lines(f"{number} == due[begun, {AGENT}]", hit or ["pass"])
+    body = agent_loop(build, here)
     if build.slots:
-        body = [*branch(f"due[begun, {LEAVES}] == 0", body), *branch(f"due[begun, {LEAVES}] != 0", _leave(build))]
+        body = [
+            *branch_lines(f"due[begun, {LEAVES}] == 0", body),
+            *branch_lines(f"due[begun, {LEAVES}] != 0", _leave(build)),
+        ]
     body += ["begun = integer(begun + 1)"]
     test = f"begun < due.shape[0] and due[begun, {STEP}] == step"
     return [f"while {test}:", *[f"    {line}" for text in body for line in text.splitlines()]]
@@ -77,8 +82,13 @@ def begin_faults(build: CudaBuilder) -> list[str]:
 def _leave(build: CudaBuilder) -> list[str]:
     """Lines that put an agent behind the others."""
     plan, registers = build.plan, build.shape.registers
-    find = branch(f"integer({own(build, 'order')}) == due[begun, {AGENT}]", ["found[0] = i"])
-    lines = ["cuda.syncthreads()", *branch("tid == 0", ["found[0] = -1"]), "cuda.syncthreads()", *agents(build, find)]
+    find = branch_lines(f"integer({own_row(build, 'order')}) == due[begun, {AGENT}]", ["found[0] = i"])
+    lines = [
+        "cuda.syncthreads()",
+        *branch_lines("tid == 0", ["found[0] = -1"]),
+        "cuda.syncthreads()",
+        *agent_loop(build, find),
+    ]
     lines += ["cuda.syncthreads()", "gone = integer(found[0])", "last = integer(n - 1)"]
     up = _in_registers(build) if registers else _in_tables()
     up += _shifted("past", "slots * past.shape[1]", "e // past.shape[1], e % past.shape[1], {c}") if plan.late else []
@@ -86,13 +96,15 @@ def _leave(build: CudaBuilder) -> list[str]:
         up += [*_shifted("store", "store.shape[0] * LANES", "e // LANES, e % LANES, {c}"), "cuda.syncthreads()"]
         up += _shifted("store", "store.shape[0] * LANES", "e // LANES, {c}, e % LANES")
     if registers:
-        for table, width in tables(build).items():
+        for table, width in table_widths(build).items():
             blank = [f"{table}[last, {c}] = {'AWAY' if c < len(plan.axes) else 'ZERO'}" for c in range(width)]
-            up += branch("tid == 0", blank)
-    if owners(plan):  # what rules of the whole flock go on from is found anew
-        up += loop("e in range(tid, room.shape[0], THREADS)", loop("c in range(room.shape[1])", ["room[e, c] = ZERO"]))
+            up += branch_lines("tid == 0", blank)
+    if flock_rules(plan):  # what rules of the whole flock go on from is found anew
+        up += loop_lines(
+            "e in range(tid, room.shape[0], THREADS)", loop_lines("c in range(room.shape[1])", ["room[e, c] = ZERO"])
+        )
     up += ["n = last", *["m = n"] * bool(build.across), "cuda.syncthreads()"]
-    return [*lines, *branch("gone >= 0", up)]
+    return [*lines, *branch_lines("gone >= 0", up)]
 
 
 def _in_registers(build: CudaBuilder) -> list[str]:
@@ -100,10 +112,10 @@ def _in_registers(build: CudaBuilder) -> list[str]:
     carried = {name for stage in build.stages.values() for name in (*stage.arguments, *stage.results)}
     carried = {name for name in carried if name.endswith("_i") and not re.fullmatch(r"u[0-3]_i", name)}
     lines = []
-    for name in sorted(carried | {own(build, "order")}):
+    for name in sorted(carried | {own_row(build, "order")}):
         lines += [f"moved_up[tid] = {name}", "cuda.syncthreads()"]
-        lines += branch("gone <= i < last", [f"{name} = moved_up[tid + PER_AGENT]"])
-        lines += branch("i == last", [f"{name} = moved_up[gone * PER_AGENT + sub]"])
+        lines += branch_lines("gone <= i < last", [f"{name} = moved_up[tid + PER_AGENT]"])
+        lines += branch_lines("i == last", [f"{name} = moved_up[gone * PER_AGENT + sub]"])
         lines += ["cuda.syncthreads()"]
     return lines
 
@@ -119,5 +131,5 @@ def _in_tables() -> list[str]:
 def _shifted(table: str, rows: str, place: str) -> list[str]:
     """Lines that move up all entries behind one of each row; that one goes to the last place."""
     at = [f"{table}[{place.format(c=c)}]" for c in ("gone", "c", "c + 1", "last")]
-    body = [f"kept = {at[0]}", *loop("c in range(gone, last)", [f"{at[1]} = {at[2]}"]), f"{at[3]} = kept"]
-    return loop(f"e in range(tid, {rows}, THREADS)", body)
+    body = [f"kept = {at[0]}", *loop_lines("c in range(gone, last)", [f"{at[1]} = {at[2]}"]), f"{at[3]} = kept"]
+    return loop_lines(f"e in range(tid, {rows}, THREADS)", body)

@@ -10,37 +10,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.cpu import Flown
-from airflock.engine.cuda.compile_shortcuts import at_first
-from airflock.engine.cuda.individuals import due, presence
-from airflock.engine.cuda.kernel import ARGUMENTS, flight
-from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
-from airflock.engine.cuda.shape import Shape
-from airflock.engine.initial_rows import first_memories, memories, of_pairs
-from airflock.engine.passes.build import columns
+from airflock.engine.cpu import DriverResult
+from airflock.engine.cuda.compile_shortcuts import first_launch
+from airflock.engine.cuda.individuals import onset_tables, presence_results
+from airflock.engine.cuda.kernel import ARGUMENTS, flight_text
+from airflock.engine.cuda.memory import MAX_MEMORY_SHARE, array_shapes, lacking, layout_of, needed_bytes, scratch_of
+from airflock.engine.cuda.shape import BlockLayout
+from airflock.engine.initial_rows import law_memories, metric_memories, pair_values
+from airflock.engine.passes.build import sampled_columns
 from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
-from airflock.engine.tables import Tables
-from airflock.engine.totals import combined, goals_reached
-from airflock.support.errors import DeviceError
-from airflock.support.gpu import free_memory, multiprocessors, required, runtime, simulating
+from airflock.engine.tables import WorldTables
+from airflock.engine.totals import combine_sums, goal_times
+from airflock.support import DeviceError, cuda_runtime, free_gpu_memory, is_simulated, multiprocessor_count, require_gpu
 
 AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress
 
 
 @lru_cache(maxsize=256)
-def flight_driver(plan: Plan, shape: Shape) -> ModuleType:
+def flight_driver(plan: Plan, shape: BlockLayout) -> ModuleType:
     """Driver of a plan for one layout of flocks."""
-    return load_driver(flight(plan, shape), f"{plan.model.name}_cuda")
+    return load_driver(flight_text(plan, shape), f"{plan.model.name}_cuda")
 
 
 def fly_many(
     plan: Plan,
-    jobs: Sequence[Tables],
+    jobs: Sequence[WorldTables],
     starts: Sequence[NDArray[Any]] | None = None,
-    done: Callable[[], None] | None = None,
-    shape: Shape | None = None,
-) -> list[Flown]:
+    on_done: Callable[[], None] | None = None,
+    shape: BlockLayout | None = None,
+) -> list[DriverResult]:
     """Fly many worlds of one plan, each from its tables; results in the order of the jobs.
 
     starts : (component, agent) of each world where the plan asks for it
@@ -49,13 +48,13 @@ def fly_many(
 
     Raises DeviceError where no GPU can be used, or one flock does not fit into its memory.
     """
-    required(shape is not None and shape.simulated)
+    require_gpu(shape is not None and shape.simulated)
     groups: dict[Any, list[int]] = {}
     for number, tables in enumerate(jobs):
         groups.setdefault(_alike(plan, tables), []).append(number)
-    flown_by: dict[int, Flown] = {}
+    flown_by: dict[int, DriverResult] = {}
     for key, members in groups.items():
-        layout = shape or layout_of(plan, key[0], len(members), multiprocessors())
+        layout = shape or layout_of(plan, key[0], len(members), multiprocessor_count())
         driver = flight_driver(plan, layout)
         size = _batch(plan, driver, layout, [jobs[m] for m in members])
         for first in range(0, len(members), size):
@@ -64,12 +63,12 @@ def fly_many(
             flown = _fly(plan, driver, layout, [jobs[m] for m in batch], given)
             for member, result in zip(batch, flown, strict=True):
                 flown_by[member] = result
-                if done:
-                    done()
+                if on_done:
+                    on_done()
     return [flown_by[number] for number in range(len(jobs))]
 
 
-def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
+def _alike(plan: Plan, tables: WorldTables) -> tuple[Any, ...]:
     """Flights with the same key go into one launch: flock size, recorded frames, goals and scene."""
     whole = tables.integers
     frames = whole["steps"] // whole["sample_every"] if plan.record else 0
@@ -77,43 +76,49 @@ def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
     return whole["agents"], frames, len(tables.goals), len(tables.later), scene
 
 
-def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> int:
+def _batch(plan: Plan, driver: ModuleType, shape: BlockLayout, jobs: Sequence[WorldTables]) -> int:
     """How many flocks one launch takes; raises DeviceError if not even one fits."""
     if shape.simulated:
         return len(jobs)
-    free = free_memory()
+    free = free_gpu_memory()
     largest = _largest(jobs)
     fault = lacking(plan, driver.ROWS, largest, free)
     if fault is not None:
         raise DeviceError(f"device = cuda: {fault}")
-    return max(1, min(AT_ONCE, int(SHARE * free) // needed(plan, driver.ROWS, shape, largest), len(jobs)))
+    return max(
+        1, min(AT_ONCE, int(MAX_MEMORY_SHARE * free) // needed_bytes(plan, driver.ROWS, shape, largest), len(jobs))
+    )
 
 
-def _largest(jobs: Sequence[Tables]) -> Tables:
+def _largest(jobs: Sequence[WorldTables]) -> WorldTables:
     """That of flights of one launch whose ring of past states is the longest."""
     return max(jobs, key=lambda tables: tables.integers["ring"])
 
 
-def too_large(plan: Plan, tables: Tables) -> str | None:
+def memory_error(plan: Plan, tables: WorldTables) -> str | None:
     """Why one such flock does not fit into the GPU's free memory; None if it does."""
     layout = layout_of(plan, tables.integers["agents"], 1)
     rows = 0 if layout.registers else flight_driver(plan, layout).ROWS  # making a driver's text takes a while
-    return lacking(plan, rows, tables, free_memory())
+    return lacking(plan, rows, tables, free_gpu_memory())
 
 
 def _fly(
-    plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables], starts: Sequence[NDArray[Any]] | None
-) -> list[Flown]:
+    plan: Plan,
+    driver: ModuleType,
+    shape: BlockLayout,
+    jobs: Sequence[WorldTables],
+    starts: Sequence[NDArray[Any]] | None,
+) -> list[DriverResult]:
     """One launch."""
-    own = arrays(plan, driver, shape, jobs, starts)
-    with at_first(driver.fly):
-        configured(driver.fly, len(jobs), shape.threads)(*(own[name] for name in ARGUMENTS))
-    return results(plan, jobs, own)
+    own = make_arguments(plan, driver, shape, jobs, starts)
+    with first_launch(driver.fly):
+        configure_kernel(driver.fly, len(jobs), shape.threads)(*(own[name] for name in ARGUMENTS))
+    return read_results(plan, jobs, own)
 
 
-def configured(kernel: Any, blocks: int, threads: int) -> Any:
+def configure_kernel(kernel: Any, blocks: int, threads: int) -> Any:
     """A kernel for so many blocks. Numba warns of fewer than 128; here they are as many as there are flocks."""
-    if simulating():
+    if is_simulated():
         return kernel[blocks, threads]
     settings: Any = import_module("numba.cuda.core.config")
     warned, settings.CUDA_LOW_OCCUPANCY_WARNINGS = settings.CUDA_LOW_OCCUPANCY_WARNINGS, 0
@@ -123,12 +128,16 @@ def configured(kernel: Any, blocks: int, threads: int) -> Any:
         settings.CUDA_LOW_OCCUPANCY_WARNINGS = warned
 
 
-def arrays(
-    plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables], starts: Sequence[NDArray[Any]] | None
+def make_arguments(
+    plan: Plan,
+    driver: ModuleType,
+    shape: BlockLayout,
+    jobs: Sequence[WorldTables],
+    starts: Sequence[NDArray[Any]] | None,
 ) -> dict[str, Any]:
     """All arguments of a kernel, in the GPU's memory, by name."""
-    cuda, real = runtime(), jobs[0].row.dtype
-    size = sizes(plan, driver.ROWS, shape, _largest(jobs))
+    cuda, real = cuda_runtime(), jobs[0].row.dtype
+    size = array_shapes(plan, driver.ROWS, shape, _largest(jobs))
     written = ("pasts", "works", "states", "all_sums", "all_frames", "scratches", "all_across")
     own: dict[str, Any] = {name: cuda.device_array((len(jobs), *size[name]), real) for name in written}
     own["all_words"] = cuda.device_array((len(jobs), *size["all_words"]), np.uint32)
@@ -137,13 +146,13 @@ def arrays(
     own["starts"] = cuda.to_device(_stacked(starts, real) if starts is not None else np.zeros((len(jobs), 1, 1), real))
     lanes = size["all_mem"][1]
     beginning = {
-        "stores": of_pairs(plan, size["stores"][1], size["stores"][2], real),
-        "all_mem": first_memories(plan, np.zeros(lanes, int), real),
-        "all_memory": memories(plan, lanes, real),
+        "stores": pair_values(plan, size["stores"][1], size["stores"][2], real),
+        "all_mem": law_memories(plan, np.zeros(lanes, int), real),
+        "all_memory": metric_memories(plan, lanes, real),
     }
     for name, one in beginning.items():
         own[name] = cuda.to_device(np.repeat(one[None, : size[name][0]], len(jobs), axis=0))
-    own |= {name: cuda.to_device(array) for name, array in due(plan, jobs, real).items()}
+    own |= {name: cuda.to_device(array) for name, array in onset_tables(plan, jobs, real).items()}
     if plan.absence:  # who is absent has no place
         for name in ("states", "all_frames"):
             own[name] = cuda.to_device(np.full((len(jobs), *size[name]), np.nan, real))
@@ -171,30 +180,32 @@ def arrays(
     return own
 
 
-def results(plan: Plan, jobs: Sequence[Tables], own: dict[str, Any]) -> list[Flown]:
+def read_results(plan: Plan, jobs: Sequence[WorldTables], own: dict[str, Any]) -> list[DriverResult]:
     """Results of a launch, flight by flight."""
     names = ("all_sums", "states", "statuses", *(("all_frames",) if plan.record else ()))
     names += ("all_reached",) if plan.goals else ()
     left = {name: own[name].copy_to_host() for name in names}
-    count = len(columns(plan.metrics))
+    count = len(sampled_columns(plan.metrics))
     found = []
     for flock, tables in enumerate(jobs):
         n = tables.integers["agents"]
         exact = left["all_sums"][flock].astype(np.float64)
         sums = exact[:, 0].copy()
         sums[:count] -= exact[:count, 1]  # what Kahan's sum has lost so far
-        values = combined(plan, sums) | goals_reached(
+        values = combine_sums(plan, sums) | goal_times(
             plan, left["all_reached"][flock][: len(tables.goals)] if plan.goals else tables.goals
         )
         frames = left["all_frames"][flock][:, :, :n] if plan.record else None
         absent, samples = None, int(sums[count])
         if plan.absence:
             flown = int(sums[count + 2])
-            values["present"], absent = presence(tables, flown)
+            values["present"], absent = presence_results(tables, flown)
             samples = -(-flown // tables.integers["sample_every"])
         if frames is not None and plan.stop and (not plan.absence or flown < tables.integers["steps"]):
             frames = frames[:samples]
-        found.append(Flown(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock]), absent))
+        found.append(
+            DriverResult(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock]), absent)
+        )
     return found
 
 
@@ -218,7 +229,7 @@ def _wide(own: NDArray[Any], size: tuple[int, ...], real: Any) -> NDArray[Any]:
     return np.pad(own, ((0, 0), (0, size[1] - own.shape[1])), mode="edge").astype(real)
 
 
-def _remembered(plan: Plan, tables: Tables, size: tuple[int, ...], real: Any) -> NDArray[Any]:
+def _remembered(plan: Plan, tables: WorldTables, size: tuple[int, ...], real: Any) -> NDArray[Any]:
     """What laws remember at the start, of each lane what its law does."""
     laws = _wide(tables.own, (len(plan.columns), size[1]), np.float64)[plan.columns.index(("", "law"))]
-    return first_memories(plan, laws.astype(np.int64), real)[: size[0]]
+    return law_memories(plan, laws.astype(np.int64), real)[: size[0]]

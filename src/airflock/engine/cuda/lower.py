@@ -12,28 +12,38 @@ The passes of `engine.passes` are the only text of a stage. Here its syntax tree
 import ast
 import re
 
-from airflock.core.rules.nodes import walk
-from airflock.engine.cuda.rows import Across, Bound, Context, Everyone, Halves, Numbers, Others, Registers, parse
+from airflock.core import walk_tree
+from airflock.engine.cuda.rows import (
+    AgentNumbers,
+    AllAgentsLoop,
+    DropBindings,
+    HalvesToShifts,
+    LoweringContext,
+    OtherRows,
+    OwnRegisters,
+    PairRows,
+    parse_lines,
+)
 from airflock.engine.cuda.shape import UNROLL
 from airflock.engine.replace import ReplacementError
-from airflock.engine.specialise.dead import read, written
-from airflock.engine.stages.words import START
+from airflock.engine.specialise.dead import read_names, written_names
+from airflock.engine.stages.words import REDUCTION_START
 
-NEUTRAL = {how: start.spelled for how, start in START.items()}
+NEUTRAL = {how: start.spelled for how, start in REDUCTION_START.items()}
 TOTAL = {"sum": "{a} += {b}", "min": "{a} = least({a}, {b})", "max": "{a} = most({a}, {b})"}
 
 
-def lowered(statements: list[ast.stmt], context: Context) -> list[ast.stmt]:
+def lower_statements(statements: list[ast.stmt], context: LoweringContext) -> list[ast.stmt]:
     """Statements of a stage as one thread runs them."""
-    kept = [Bound(context).visit(Halves().visit(s)) for s in statements]
-    done = _Totals(context).run([Numbers().visit(s) for s in kept if s is not None])
-    return [ast.fix_missing_locations(Across(context).visit(s)) for s in done]
+    kept = [DropBindings(context).visit(HalvesToShifts().visit(s)) for s in statements]
+    done = _Totals(context).run([AgentNumbers().visit(s) for s in kept if s is not None])
+    return [ast.fix_missing_locations(PairRows(context).visit(s)) for s in done]
 
 
 class _Totals:
     """Walks statements in order; totals over agents wait, and are reduced together when one of them is read."""
 
-    def __init__(self, context: Context):
+    def __init__(self, context: LoweringContext):
         self.context = context
         self.waiting: dict[str, str] = {}
         self.count = 0
@@ -47,40 +57,40 @@ class _Totals:
         done: list[ast.stmt] = []
         for statement in statements:
             agents = _over_agents(statement)
-            if self.waiting and (_of_one_thread(statement) or read([statement]) & set(self.waiting)):
+            if self.waiting and (_of_one_thread(statement) or read_names([statement]) & set(self.waiting)):
                 done += self.flush()
             if agents is not None:
                 done += self.agents(agents)
             elif isinstance(statement, (ast.For, ast.While, ast.If)):
                 if isinstance(statement, ast.If):
-                    statement.test = Registers(self.context).visit(statement.test)
+                    statement.test = OwnRegisters(self.context).visit(statement.test)
                 statement.body = [*self.walk(statement.body), *self.flush()]
                 statement.orelse = self.walk(statement.orelse) if statement.orelse else []
                 done.append(statement)
             else:
-                done.append(Registers(self.context).visit(statement))
+                done.append(OwnRegisters(self.context).visit(statement))
         return [ast.fix_missing_locations(s) for s in done]
 
     def agents(self, loop: ast.For) -> list[ast.stmt]:
         """A loop over agents."""
         context, shape = self.context, self.context.shape
         if context.alone and any(isinstance(s, ast.If) for s in loop.body):
-            return [Everyone(context).visit(loop)] if shape.registers else [loop]
+            return [AllAgentsLoop(context).visit(loop)] if shape.registers else [loop]
         totals = carried_totals(loop.body)
-        paired = any(isinstance(s, ast.For) and _target(s) == "j" for s in walk(loop))
+        paired = any(isinstance(s, ast.For) and _target(s) == "j" for s in walk_tree(loop))
         body = _Pairs(context).walk(loop.body)
-        body = [Registers(context).visit(s) for s in body]
+        body = [OwnRegisters(context).visit(s) for s in body]
         if not context.carried:
             self.waiting |= totals
         if context.turn:
             return body
         if shape.registers:
             if not paired:
-                masked = parse(f"{t} = {t} if sub == 0 else {NEUTRAL[totals[t]]}" for t in totals)
+                masked = parse_lines(f"{t} = {t} if sub == 0 else {NEUTRAL[totals[t]]}" for t in totals)
                 rest = masked if shape.per_agent > 1 and not context.carried else []
                 test = ast.Compare(ast.Name("i", ast.Load()), [ast.Lt()], [ast.Name("n", ast.Load())])
                 return [ast.If(test, body, []), *rest]
-            own = parse(f"{t} = {t} if (i < n) and (sub == 0) else {NEUTRAL[totals[t]]}" for t in totals)
+            own = parse_lines(f"{t} = {t} if (i < n) and (sub == 0) else {NEUTRAL[totals[t]]}" for t in totals)
             return [*body, *own]
         first, stride = ("tid // PER_AGENT", "THREADS // PER_AGENT") if paired else ("tid", "THREADS")
         loop.iter = ast.parse(f"range({first}, n, {stride})", mode="eval").body
@@ -88,8 +98,8 @@ class _Totals:
         if not paired:
             return [loop]
         # rows that a pair loop reads or writes belong to other threads before and after it
-        own = parse(f"{t} = {t} if sub == 0 else {NEUTRAL[totals[t]]}" for t in totals)
-        return [*parse("cuda.syncthreads()"), loop, *parse("cuda.syncthreads()"), *own]
+        own = parse_lines(f"{t} = {t} if sub == 0 else {NEUTRAL[totals[t]]}" for t in totals)
+        return [*parse_lines("cuda.syncthreads()"), loop, *parse_lines("cuda.syncthreads()"), *own]
 
     def flush(self) -> list[ast.stmt]:
         """Reduce all waiting totals over the block, so that every thread holds them."""
@@ -107,13 +117,13 @@ class _Totals:
             text += ["for part in range(1, WARPS):", *(f"    {line}" for line in turn)]
         self.waiting = {}
         self.count += 1
-        return parse(text)
+        return parse_lines(text)
 
 
 class _Pairs:
     """Loops over the other agents j, within the loop over agents."""
 
-    def __init__(self, context: Context):
+    def __init__(self, context: LoweringContext):
         self.context = context
 
     def walk(self, statements: list[ast.stmt]) -> list[ast.stmt]:
@@ -124,7 +134,7 @@ class _Pairs:
                 done += self.pairs(statement)
             elif isinstance(statement, ast.Expr) and self.context.shape.per_agent > 1:  # one call for all its threads
                 alone = ast.If(ast.parse("sub == 0", mode="eval").body, [statement], [])
-                done += [*parse("cuda.syncthreads()"), alone, *parse("cuda.syncthreads()")]
+                done += [*parse_lines("cuda.syncthreads()"), alone, *parse_lines("cuda.syncthreads()")]
             elif isinstance(statement, ast.If) and _by_law(statement):
                 statement.body = self.walk(statement.body)
                 done.append(statement)
@@ -136,8 +146,8 @@ class _Pairs:
         """One pair loop: each thread of an agent takes every so-manieth partner, then all add up."""
         context, shape = self.context, self.context.shape
         totals = carried_totals(loop.body)
-        body = [Others(context).visit(s) for s in loop.body]
-        after = parse(f"{t} = group_{how}({t}, tid)" for t, how in totals.items()) if shape.per_agent > 1 else []
+        body = [OtherRows(context).visit(s) for s in loop.body]
+        after = parse_lines(f"{t} = group_{how}({t}, tid)" for t, how in totals.items()) if shape.per_agent > 1 else []
         if not shape.registers:
             loop.iter = ast.parse("range(sub, n, PER_AGENT)", mode="eval").body
             loop.body = body
@@ -150,7 +160,7 @@ class _Pairs:
                 depth += "    " if line.startswith("for ") else ""
             inner = ["j = starts[line + first]", "stop = starts[line + last]", "while j < stop:"]
             inner += [*(f"    {line}" for line in _by_fours(text)), "    j = np.uint32(j + np.uint32(1))"]
-            return parse([*around, *(f"{depth}{line}" for line in inner)])
+            return parse_lines([*around, *(f"{depth}{line}" for line in inner)])
         step = "j = np.uint32(j + np.uint32(PER_AGENT))"
         turns = max(1, min(UNROLL, shape.lanes // shape.per_agent))
         once = [f"    {line}" for line in [*text.splitlines(), step]]
@@ -159,7 +169,7 @@ class _Pairs:
             ahead = (turns - 1) * shape.per_agent
             loops[1] = f"while np.uint32(j + np.uint32({ahead})) < np.uint32(n):"
             loops += ["while j < np.uint32(n):", *once]
-        return [*parse(loops), *after]
+        return [*parse_lines(loops), *after]
 
 
 def _by_fours(text: str) -> list[str]:
@@ -213,7 +223,7 @@ def _target(loop: ast.For) -> str:
     return loop.target.id if isinstance(loop.target, ast.Name) else ""
 
 
-def used(statements: list[ast.stmt]) -> tuple[set[str], set[str]]:
+def used_names(statements: list[ast.stmt]) -> tuple[set[str], set[str]]:
     """Names that statements read, those among them that they add to, and names that they write."""
-    sums = [item.target for s in statements for item in walk(s) if isinstance(item, ast.AugAssign)]
-    return read(statements) | written(sums), written(statements)
+    sums = [item.target for s in statements for item in walk_tree(s) if isinstance(item, ast.AugAssign)]
+    return read_names(statements) | written_names(sums), written_names(statements)

@@ -4,24 +4,24 @@ from typing import Any
 
 import numpy as np
 
-from airflock.engine.cuda.build import ACROSS
-from airflock.engine.cuda.shape import Shape, shape_of
-from airflock.engine.passes.build import columns
-from airflock.engine.passes.flock import owners, scratch_sizes
+from airflock.engine.cuda.build import PAIR_ROWS
+from airflock.engine.cuda.shape import BlockLayout, block_layout
+from airflock.engine.passes.build import sampled_columns
+from airflock.engine.passes.flock import flock_rules, scratch_sizes
 from airflock.engine.plan import Plan
-from airflock.engine.tables import Tables
-from airflock.scenarios.cost import most_below
+from airflock.engine.tables import WorldTables
+from airflock.scenarios import largest_fitting
 
-SHARE = 0.9  # of the free memory that may be used
+MAX_MEMORY_SHARE = 0.9  # of the free memory that may be used
 
 
-def layout_of(plan: Plan, agents: int, flocks: int, processors: int = 132) -> Shape:
+def layout_of(plan: Plan, agents: int, flocks: int, processors: int = 132) -> BlockLayout:
     """Layout of flocks of one plan and size."""
-    whole, apart = bool(owners(plan)), bool(plan.laws) or plan.topology is not None
-    return shape_of(agents, flocks, processors, sequential=plan.sequential, whole=whole, apart=apart)
+    whole, apart = bool(flock_rules(plan)), bool(plan.laws) or plan.topology is not None
+    return block_layout(agents, flocks, processors, sequential=plan.sequential, whole_flock=whole, apart=apart)
 
 
-def sizes(plan: Plan, rows: int, shape: Shape, tables: Tables) -> dict[str, tuple[int, ...]]:
+def array_shapes(plan: Plan, rows: int, shape: BlockLayout, tables: WorldTables) -> dict[str, tuple[int, ...]]:
     """Shapes of the arrays that a launch works on, for one flock, by argument name; rows: of the table of states."""
     whole, dims, lanes = tables.integers, plan.dimensions, shape.lanes
     n, table = whole["agents"], not shape.registers
@@ -37,15 +37,15 @@ def sizes(plan: Plan, rows: int, shape: Shape, tables: Tables) -> dict[str, tupl
         "all_mem": (max(model, 1), lanes) if table or plan.laws else (1, 1),
         "all_memory": (max(kept, 1), lanes) if table else (1, 1),
         "states": (2 * dims, n),
-        "all_sums": (len(columns(plan.metrics)) + 2 + plan.absence, 2),
+        "all_sums": (len(sampled_columns(plan.metrics)) + 2 + plan.absence, 2),
         "all_reached": (max(len(tables.goals), 1),),
         "all_frames": (whole["steps"] // whole["sample_every"] + 1, 3 * dims, n) if plan.record else (1, 1, 1),
         "scratches": scratch_of(plan, tables)[0],
-        "all_across": (len(ACROSS), lanes, lanes) if plan.topology is not None else (1, 1, 1),
+        "all_across": (len(PAIR_ROWS), lanes, lanes) if plan.topology is not None else (1, 1, 1),
     }
 
 
-def scratch_of(plan: Plan, tables: Tables) -> tuple[tuple[int, int], list[int]]:
+def scratch_of(plan: Plan, tables: WorldTables) -> tuple[tuple[int, int], list[int]]:
     """One table that holds all scratch arrays of a flock below each other: its shape, and the first row of each."""
     found = scratch_sizes(plan, tables.row, tables.integers["agents"])
     first, width = [0], 1
@@ -55,29 +55,29 @@ def scratch_of(plan: Plan, tables: Tables) -> tuple[tuple[int, int], list[int]]:
     return (max(first[-1], 1), width), first
 
 
-def needed(plan: Plan, rows: int, shape: Shape, tables: Tables) -> int:
+def needed_bytes(plan: Plan, rows: int, shape: BlockLayout, tables: WorldTables) -> int:
     """Bytes in the GPU's memory that one such flock needs, its share of the scene included."""
-    numbers = sum(int(np.prod(size)) for size in sizes(plan, rows, shape, tables).values())
+    numbers = sum(int(np.prod(size)) for size in array_shapes(plan, rows, shape, tables).values())
     given: list[Any] = [tables.row, tables.whole, tables.faces, tables.edges, tables.spans, tables.goals, tables.later]
     given += [tables.shapes] if len(tables.later) else []
     return numbers * plan.bits // 8 + sum(int(array.nbytes) for array in given) + 256
 
 
-def lacking(plan: Plan, rows: int, tables: Tables, free: int) -> str | None:
+def lacking(plan: Plan, rows: int, tables: WorldTables, free: int) -> str | None:
     """Why one such flock does not fit into this many free bytes: what it needs and how many agents fit; or None."""
-    agents, room = tables.integers["agents"], int(SHARE * free)
+    agents, room = tables.integers["agents"], int(MAX_MEMORY_SHARE * free)
 
     def bytes_of(n: int) -> int:
-        return needed(plan, rows, layout_of(plan, n, 1), tables.changed(agents=n))
+        return needed_bytes(plan, rows, layout_of(plan, n, 1), tables.changed(agents=n))
 
     if bytes_of(agents) <= room:
         return None
-    return unfit(agents, bytes_of(agents), room, most_below(agents, lambda n: bytes_of(n) <= room))
+    return memory_message(agents, bytes_of(agents), room, largest_fitting(agents, lambda n: bytes_of(n) <= room))
 
 
-def unfit(agents: int, bytes_: int, room: int, fit: int) -> str:
+def memory_message(agents: int, bytes_: int, room: int, fitting_agents: int) -> str:
     """The one line about it."""
     return (
         f"a flock of {agents} agents needs {bytes_ / 1e9:.3g} GB of the GPU's memory and {room / 1e9:.3g} GB are free; "
-        f"about {fit} agents fit"
+        f"about {fitting_agents} agents fit"
     )

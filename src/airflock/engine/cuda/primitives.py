@@ -4,7 +4,7 @@ Integers are those of every other engine, bit by bit. Logarithm, sine and cosine
 and agree to rounding. The simulator's forms of the sums go through shared memory: it has no shuffles.
 """
 
-from airflock.engine.cuda.shape import Shape
+from airflock.engine.cuda.shape import BlockLayout
 from airflock.engine.primitives import DECLARED, NARROW
 
 HEAD = (
@@ -117,7 +117,7 @@ def from_thread(value, q, tid):
 TWO = {"sum": "{a} + {b}", "min": "min({a}, {b})", "max": "max({a}, {b})"}
 
 
-def head(label: str, bits: int, shape: Shape) -> str:
+def primitives_text(label: str, bits: int, shape: BlockLayout) -> str:
     """Text of constants and primitives."""
     text = HEAD.format(
         label=label, bits=bits, lanes=shape.lanes, per_agent=shape.per_agent, threads=shape.threads,

@@ -11,13 +11,13 @@ import ast
 from collections.abc import Callable, Iterable
 from copy import deepcopy
 
-from airflock.core.rules.nodes import walk
-from airflock.engine.specialise.dead import written
+from airflock.core import walk_tree
+from airflock.engine.specialise.dead import written_names
 
 PREFIX = "per_"
 
 
-class Forms:
+class SecondForms:
     """Second forms of rules, made on demand from the text of a driver.
 
     `made` holds their text in order of need until a driver takes it, `names` the names of all.
@@ -52,14 +52,14 @@ class Forms:
         return self._keys[name]
 
     def _make(self, rule: ast.FunctionDef) -> None:
-        given = {argument.arg for argument in rule.args.args} - written([rule])
+        given = {argument.arg for argument in rule.args.args} - written_names([rule])
 
         def known(expression: ast.expr) -> str | None:
             text = ast.unparse(expression)
             return text if text.partition(".")[0] in given and text.replace(".", "", 1).isidentifier() else None
 
         node = deepcopy(rule)
-        change = Products(self, known)
+        change = DivisionsToProducts(self, known)
         node.body = [change.visit(statement) for statement in node.body]
         root = single_root(rule)
         if root is not None:
@@ -68,7 +68,7 @@ class Forms:
             return
         node.name = f"{rule.name}_per"
         node.decorator_list = []
-        node.args.args += [ast.arg(spelled(key)) for key in change.found]
+        node.args.args += [ast.arg(reciprocal_name(key)) for key in change.found]
         self._keys[rule.name] = list(change.found) if root is None else None
         self.names.add(node.name)
         self.made.append(f"{self.decorator}\n{ast.unparse(ast.fix_missing_locations(node))}")
@@ -82,18 +82,18 @@ class Forms:
         return True
 
 
-class Products(ast.NodeTransformer):
+class DivisionsToProducts(ast.NodeTransformer):
     """Divisions by what is known as products; known: the key of an expression whose reciprocal can be had, or None."""
 
-    def __init__(self, forms: Forms, known: Callable[[ast.expr], str | None]):
+    def __init__(self, forms: SecondForms, known: Callable[[ast.expr], str | None]):
         self.forms, self.known = forms, known
         self.found: dict[str, None] = {}
         self.changed = False
 
-    def per(self, key: str) -> ast.expr:
+    def reciprocal(self, key: str) -> ast.expr:
         """The reciprocal of a key, noted as needed."""
         self.found[key] = None
-        return ast.Name(spelled(key), ast.Load())
+        return ast.Name(reciprocal_name(key), ast.Load())
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         """A quotient becomes a product."""
@@ -103,7 +103,7 @@ class Products(ast.NodeTransformer):
         key = self.known(node.right)
         if key is not None:
             self.changed = True
-            return ast.BinOp(node.left, ast.Mult(), self.per(key))
+            return ast.BinOp(node.left, ast.Mult(), self.reciprocal(key))
         call = node.right
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and self.forms.is_root(call.func.id):
             self.changed = True
@@ -130,12 +130,12 @@ class Products(ast.NodeTransformer):
         self.changed = True
         return ast.Call(
             ast.Name(f"{node.func.id}_per", ast.Load()),
-            [*node.args, *(self.per(key) for key in wanted if key is not None)],
+            [*node.args, *(self.reciprocal(key) for key in wanted if key is not None)],
             [],
         )
 
 
-class Roots(ast.NodeTransformer):
+class RootsToReciprocals(ast.NodeTransformer):
     """x = sqrt(s) as per_x = 1 / sqrt(s), x = s · per_x, for the names that are asked for; s is never zero."""
 
     def __init__(self, names: Iterable[str]):
@@ -147,28 +147,28 @@ class Roots(ast.NodeTransformer):
         if name is None or name not in self.names:
             return node
         square = ast.unparse(node.value.args[0])  # type: ignore[attr-defined]
-        text = f"square_{name} = {square}\n{spelled(name)} = inverse_root(square_{name})\n"
-        return ast.parse(f"{text}{name} = square_{name} * {spelled(name)}").body
+        text = f"square_{name} = {square}\n{reciprocal_name(name)} = inverse_root(square_{name})\n"
+        return ast.parse(f"{text}{name} = square_{name} * {reciprocal_name(name)}").body
 
 
 def with_reciprocals(
-    forms: Forms, body: list[ast.stmt], records: set[str]
+    forms: SecondForms, body: list[ast.stmt], records: set[str]
 ) -> tuple[list[ast.stmt], list[tuple[str, str]]]:
     """A stage with products for divisions, and the numbers (record, field) whose reciprocals it takes.
 
     records : names of the records of numbers that the stage reads
     """
-    roots = {name for s in body for item in walk(s) if (name := root_name(item)) is not None}
-    roots -= {name for s in body for item in walk(s) for name in stored_otherwise(item)}
+    roots = {name for s in body for item in walk_tree(s) if (name := root_name(item)) is not None}
+    roots -= {name for s in body for item in walk_tree(s) for name in otherwise_assigned(item)}
 
     def known(expression: ast.expr) -> str | None:
         text = ast.unparse(expression)
         owner, dot, field = text.partition(".")
         return text if (owner in records and field.isidentifier()) or (text in roots and not dot) else None
 
-    change = Products(forms, known)
+    change = DivisionsToProducts(forms, known)
     changed: list[ast.stmt] = [change.visit(statement) for statement in body]
-    rewrite = Roots(key for key in change.found if key in roots)
+    rewrite = RootsToReciprocals(key for key in change.found if key in roots)
     done: list[ast.stmt] = []
     for statement in changed:
         found = rewrite.visit(statement)
@@ -177,7 +177,7 @@ def with_reciprocals(
     return [ast.fix_missing_locations(s) for s in done], numbers
 
 
-def spelled(key: str) -> str:
+def reciprocal_name(key: str) -> str:
     """Name of the reciprocal of a key."""
     return PREFIX + key.replace(".", "_")
 
@@ -190,12 +190,12 @@ def single_root(rule: ast.FunctionDef) -> ast.expr | None:
     return last.value.args[0] if ast.unparse(last.value.func) == "math.sqrt" else None
 
 
-def stored_otherwise(node: ast.AST) -> set[str]:
+def otherwise_assigned(node: ast.AST) -> set[str]:
     """Names that a statement stores, if it does not assign the root of a square: their reciprocal is not at hand."""
     if not isinstance(node, (ast.Assign, ast.AugAssign, ast.For)) or root_name(node) is not None:
         return set()
     targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-    return {item.id for target in targets for item in walk(target) if isinstance(item, ast.Name)}
+    return {item.id for target in targets for item in walk_tree(target) if isinstance(item, ast.Name)}
 
 
 def root_name(node: ast.AST) -> str | None:

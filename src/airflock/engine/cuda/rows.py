@@ -4,14 +4,14 @@ import ast
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from airflock.engine.cuda.shape import Shape
+from airflock.engine.cuda.shape import BlockLayout
 from airflock.engine.replace import ReplacementError
 
 PER_AGENT_TABLES = {"mem": "mem", "memory": "kept"}  # second index is the agent
 
 
 @dataclass
-class Context:
+class LoweringContext:
     """What lowering has to know.
 
     shape    : layout of a flock
@@ -25,7 +25,7 @@ class Context:
     across   : rows over the others that each agent has to itself, and their places in the table that holds them
     """
 
-    shape: Shape
+    shape: BlockLayout
     rows: set[str]
     columns: dict[str, tuple[str, int]]
     turn: bool = False
@@ -36,15 +36,15 @@ class Context:
     across: Mapping[str, int] = field(default_factory=dict)
 
 
-def parse(lines: Iterable[str] | str) -> list[ast.stmt]:
+def parse_lines(lines: Iterable[str] | str) -> list[ast.stmt]:
     """Statements of a text."""
     return ast.parse(lines if isinstance(lines, str) else "\n".join(lines)).body
 
 
-class Bound(ast.NodeTransformer):
+class DropBindings(ast.NodeTransformer):
     """Drops statements that only take a row or a part of a tuple of arrays: the kernel holds them by name."""
 
-    def __init__(self, context: Context):
+    def __init__(self, context: LoweringContext):
         self.known = ("words", "scene") if context.shape.registers else ("scene",)
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt | None:
@@ -53,7 +53,7 @@ class Bound(ast.NodeTransformer):
         return None if isinstance(source, ast.Name) and source.id in self.known else node
 
 
-class Halves(ast.NodeTransformer):
+class HalvesToShifts(ast.NodeTransformer):
     """Remainders and quotients of the step by two, which is never negative: a bit and a shift."""
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
@@ -68,7 +68,7 @@ class Halves(ast.NodeTransformer):
         return node
 
 
-class Numbers(ast.NodeTransformer):
+class AgentNumbers(ast.NodeTransformer):
     """Numbers of agents, which a table of reals holds, as whole numbers."""
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
@@ -79,10 +79,10 @@ class Numbers(ast.NodeTransformer):
         return node
 
 
-class Across(ast.NodeTransformer):
+class PairRows(ast.NodeTransformer):
     """Rows over the others that each agent has to itself: `square[j]` of agent i lies at across[c, i, j]."""
 
-    def __init__(self, context: Context):
+    def __init__(self, context: LoweringContext):
         self.places = context.across
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
@@ -103,10 +103,10 @@ class Across(ast.NodeTransformer):
         return ast.parse(f"across[{self.places[node.id]}, i]", mode="eval").body
 
 
-class Others(ast.NodeTransformer):
+class OtherRows(ast.NodeTransformer):
     """Rows of another agent: columns of the shared tables."""
 
-    def __init__(self, context: Context):
+    def __init__(self, context: LoweringContext):
         self.context = context
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
@@ -123,10 +123,10 @@ class Others(ast.NodeTransformer):
         return node
 
 
-class Everyone(ast.NodeTransformer):
+class AllAgentsLoop(ast.NodeTransformer):
     """A loop over all agents in the shared table, for a thread that looks at them one after another."""
 
-    def __init__(self, context: Context):
+    def __init__(self, context: LoweringContext):
         self.context = context
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
@@ -143,10 +143,10 @@ class Everyone(ast.NodeTransformer):
         return ast.Name("every", node.ctx) if node.id == "i" else node
 
 
-class Registers(ast.NodeTransformer):
+class OwnRegisters(ast.NodeTransformer):
     """Rows of the own agent: registers."""
 
-    def __init__(self, context: Context):
+    def __init__(self, context: LoweringContext):
         self.context = context
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:

@@ -13,7 +13,7 @@ UNROLL = 2  # pairs per turn of a pair loop: 4 cost registers and were slower (t
 
 
 @dataclass(frozen=True)
-class Shape:
+class BlockLayout:
     """Layout of one flock.
 
     lanes     : agents that the shared tables hold, a multiple of 32
@@ -29,7 +29,7 @@ class Shape:
     per_agent: int
     threads: int
     registers: bool = True
-    crowded: bool = True
+    is_crowded: bool = True
     simulated: bool = False
 
     def __post_init__(self) -> None:
@@ -48,7 +48,7 @@ class Shape:
         registers; with 128 none is spilled. On an H200 a flock of 100 agents flies 60 s in 5.4 ms with 128
         registers and in 6.1 with 96; 1,000 flocks in 19.4 and 20.0, 5,000 in 89.2 and 85.5. Fewer are slower.
         """
-        registers = SATURATED if self.crowded else ROOMY
+        registers = SATURATED if self.is_crowded else ROOMY
         alone = not self.registers or self.per_agent > 1  # a multiprocessor, and all the registers that it can use
         return self.threads, 1 if alone else max(1, REGISTERS // (registers * self.threads))
 
@@ -58,10 +58,10 @@ class Shape:
         return self.lanes // WARP
 
 
-def shape_of(
-    agents: int, flocks: int, processors: int = 132, *, sequential: bool = False, whole: bool = False,
+def block_layout(
+    agents: int, flocks: int, processors: int = 132, *, sequential: bool = False, whole_flock: bool = False,
     apart: bool = False,
-) -> Shape:  # fmt: skip
+) -> BlockLayout:  # fmt: skip
     """Layout for many flocks of this size on a GPU with this many multiprocessors.
 
     Few flocks leave most of a GPU idle. Where a flock is one warp, several threads then share the pairs of one agent;
@@ -76,12 +76,12 @@ def shape_of(
     """
     lanes = -(-agents // WARP) * WARP
     if sequential:  # one agent after another: a warp shares its pairs
-        return Shape(lanes, WARP, WARP, registers=False)
-    if whole:
-        return Shape(lanes, 1, WARP, registers=False)
+        return BlockLayout(lanes, WARP, WARP, registers=False)
+    if whole_flock:
+        return BlockLayout(lanes, 1, WARP, registers=False)
     if agents > MOST_REGISTERED:
-        return Shape(lanes, 1, MOST_THREADS, registers=False)
+        return BlockLayout(lanes, 1, MOST_THREADS, registers=False)
     per_agent, busy = 1, flocks * lanes / (processors * 128.0)  # 1.0: a warp for each that can run at once
     while not apart and lanes == WARP and per_agent < 4 and busy * per_agent < 1.0:
         per_agent *= 2
-    return Shape(lanes, per_agent, lanes * per_agent, crowded=busy > MANY)
+    return BlockLayout(lanes, per_agent, lanes * per_agent, is_crowded=busy > MANY)

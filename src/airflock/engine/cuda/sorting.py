@@ -2,7 +2,7 @@
 
 # Rows of near are two vectors of four. A compiler that knows nothing of their place loads number by number, seven times
 # as often: one instruction of the GPU loads four. (Tables begin at multiples of 256 bytes.)
-FOURS = """
+LOAD_FOURS_TEXT = """
 from llvmlite import ir
 from numba.cuda import types
 from numba.cuda.extending import intrinsic
@@ -30,7 +30,7 @@ def four_at(offset):
 four_low = four_at(0)
 four_high = four_at(16)
 """
-PLAIN_FOURS = """
+SIMULATED_FOURS_TEXT = """
 @njit()
 def four_low(table, row):
     return table[row, 0], table[row, 1], table[row, 2], table[row, 3]
@@ -40,7 +40,7 @@ def four_low(table, row):
 def four_high(table, row):
     return table[row, 4], table[row, 5], table[row, 6], table[row, 7]
 """
-SORT = """
+SORT_TEXT = """
 @njit()
 def cell_along(x, low, size, count):
     return min(max(integer((x - low) / size), integer(0)), integer(count - 1))

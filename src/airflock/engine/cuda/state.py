@@ -2,17 +2,17 @@
 
 import re
 
-from airflock.core.contract.own_records import beginnings_of
-from airflock.engine.cuda.build import REDUCED, CudaBuilder, reciprocal_lines
-from airflock.engine.cuda.start import tables
+from airflock.core import initial_values
+from airflock.engine.cuda.build import MAX_TOTALS, CudaBuilder, reciprocal_lines
+from airflock.engine.cuda.start import table_widths
 from airflock.engine.passes import flock
-from airflock.engine.passes.build import columns, loop
-from airflock.engine.plan import WHOLE, Plan
-from airflock.engine.stages.decide import NEAR
-from airflock.engine.stages.state import SCENE, own_row
+from airflock.engine.passes.build import loop_lines, sampled_columns
+from airflock.engine.plan import INTEGER_NAMES, Plan
+from airflock.engine.stages.decide import MAX_GATHERED
+from airflock.engine.stages.state import SCENE_ARRAYS, own_row
 
 
-def memory(build: CudaBuilder) -> list[str]:
+def memory_lines(build: CudaBuilder) -> list[str]:
     """Where everything of this flock and this thread lies."""
     plan, shape = build.plan, build.shape
     lines = ["block = cuda.blockIdx.x; tid = integer(cuda.threadIdx.x)"]
@@ -24,27 +24,27 @@ def memory(build: CudaBuilder) -> list[str]:
     lines += _across(build)
     lines += ["due = all_due[block]; hits = all_hits[block]"] if plan.faults else []
     lines += ["later = all_later[block]; shapes = all_shapes[block % all_shapes.shape[0]]"]
-    lines += [*numbers(build), "late = real(delay) * row_c.dt"]
+    lines += [*number_lines(build), "late = real(delay) * row_c.dt"]
     kind, align = f"np.float{plan.bits}", "" if shape.simulated else ", alignment=16"
     if shape.registers:
-        for table, width in tables(build).items():
+        for table, width in table_widths(build).items():
             lines += [f"{table} = cuda.shared.array((LANES, {width}), {kind}{align})"]
         lines += ["links_ = cuda.local.array(WORDS, np.uint32)"]
         lines += ["seen = cuda.shared.array(WORDS, np.uint32)", "grown = cuda.shared.array(WORDS, np.uint32)"]
     else:
         lines += ["work = works[block]; words = all_words[block]; mem = all_mem[block]; memory = all_memory[block]"]
-    lines += [f"reduced = cuda.shared.array((2, WARPS, {REDUCED}), {kind})"]
+    lines += [f"reduced = cuda.shared.array((2, WARPS, {MAX_TOTALS}), {kind})"]
     lines += [f"moved_up = cuda.shared.array(THREADS, {kind})"] if plan.absence and shape.registers else []
     lines += ["found = cuda.shared.array(1, np.int32)"] if plan.absence else []
-    count = len(columns(plan.metrics))
+    count = len(sampled_columns(plan.metrics))
     lines += [f"totals = cuda.shared.array(({max(count, 1)}, 2), {kind})"]
     parts = 5 if plan.dryden else 3
     lines += [f"gust = cuda.local.array({parts}, {kind})", "; ".join(f"gust[{c}] = ZERO" for c in range(parts))]
     lines += [f"aim = cuda.local.array(4, {kind})", "counts = cuda.local.array(2, np.int32)"]
-    lines += [f"near = cuda.local.array({NEAR}, np.int32)", "counts[0] = 0; counts[1] = 0; aim[3] = ZERO"]
+    lines += [f"near = cuda.local.array({MAX_GATHERED}, np.int32)", "counts[0] = 0; counts[1] = 0; aim[3] = ZERO"]
     lines += ["aim[0] = ZERO; aim[1] = ZERO; aim[2] = ZERO"]
     lines += [f"aim[{c}] = goals[0, {c}]" for c in range(3)] if plan.goals else []
-    lines += [f"scene = ({', '.join(SCENE)})"]
+    lines += [f"scene = ({', '.join(SCENE_ARRAYS)})"]
     return [*lines, *_scratch(plan), *_registers(build)]
 
 
@@ -52,8 +52,10 @@ def _across(build: CudaBuilder) -> list[str]:
     """Rows over the others that each agent has to itself; zeros, as not every flight has what fills each of them."""
     if not build.across:
         return []
-    rows = loop("c in range(across.shape[0])", loop("j in range(across.shape[2])", ["across[c, e, j] = ZERO"]))
-    zeros = loop("e in range(tid, across.shape[1], THREADS)", rows)
+    rows = loop_lines(
+        "c in range(across.shape[0])", loop_lines("j in range(across.shape[2])", ["across[c, e, j] = ZERO"])
+    )
+    zeros = loop_lines("e in range(tid, across.shape[1], THREADS)", rows)
     return ["across = all_across[block]", *zeros, "cuda.syncthreads()"]
 
 
@@ -68,14 +70,18 @@ def _scratch(plan: Plan) -> list[str]:
             ", ".join(f"room[scratch_rows[{c}] : scratch_rows[{c + 1}]]" for c in range(first, first + len(arrays)))
         ]
         first += len(arrays)
-    zeros = loop("e in range(tid, room.shape[0], THREADS)", loop("c in range(room.shape[1])", ["room[e, c] = ZERO"]))
+    zeros = loop_lines(
+        "e in range(tid, room.shape[0], THREADS)", loop_lines("c in range(room.shape[1])", ["room[e, c] = ZERO"])
+    )
     return ["room = scratches[block]", *zeros, f"scratch = ({' '.join(f'({arrays}),' for arrays in made)})"]
 
 
-def numbers(build: CudaBuilder) -> list[str]:
+def number_lines(build: CudaBuilder) -> list[str]:
     """Integers and records of numbers of this world, once per kernel."""
     wide = {"seed_low": "u32", "seed_high": "u32"}
-    lines = [f"{'slots' if w == 'ring' else w} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
+    lines = [
+        f"{'slots' if w == 'ring' else w} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(INTEGER_NAMES)
+    ]
     return [
         *lines,
         "n = agents",
@@ -100,7 +106,7 @@ def _registers(build: CudaBuilder) -> list[str]:
         return lines
     tables = [f"work[{build.row(name)}, i] = differing[{c}, i]" for name, c in rows.items() if name in build.names]
     tables += [f"work[{build.row('order')}, i] = real(i)"] * build.slots
-    return [*loop("i in range(tid, n, THREADS)", tables), "cuda.syncthreads()"] if tables else []
+    return [*loop_lines("i in range(tid, n, THREADS)", tables), "cuda.syncthreads()"] if tables else []
 
 
 def _first_value(build: CudaBuilder, name: str) -> str:
@@ -116,5 +122,5 @@ def _first_value(build: CudaBuilder, name: str) -> str:
     if kept[1] == "mem" and build.plan.laws:
         return f"all_mem[block, {kept[2]}, i]"
     records = [build.plan.model.Memory] if kept[1] == "mem" else [metric.Memory for metric in build.plan.metrics]
-    starts = [start for record in records for start in beginnings_of(record)]
+    starts = [start for record in records for start in initial_values(record)]
     return f"real({starts[int(kept[2])]})"

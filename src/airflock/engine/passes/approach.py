@@ -4,27 +4,27 @@ from airflock.engine.passes.build import Builder
 from airflock.engine.plan import Plan
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.stages import approach
-from airflock.engine.stages.measure import Measured, measured
+from airflock.engine.stages.measure import MeasuredMetric, measured_metrics
 
 
-def watched(plan: Plan) -> tuple[Measured, ...]:
+def skippable_metrics(plan: Plan) -> tuple[MeasuredMetric, ...]:
     """Metrics that look for collisions, if all of them promise a distance beyond which there are none."""
-    found = measured(plan, "collision")
+    found = measured_metrics(plan, "collision")
     return found if all(one.metric.within is not None for one in found) else ()
 
 
-def drifts(build: Builder) -> bool:
+def uses_drift(build: Builder) -> bool:
     """Whether what counts is how fast agents are beside the drift of the flock, and not how fast they are."""
-    return build.drifts and build.plan.flows and bool(watched(build.plan))
+    return build.can_use_drift and build.plan.flows and bool(skippable_metrics(build.plan))
 
 
-def foretold(build: Builder) -> bool:
+def uses_nearest_pair(build: Builder) -> bool:
     """Whether the least distance of a pair is looked for alone, as long as there is nothing to measure."""
-    return drifts(build) and not build.plan.near
+    return uses_drift(build) and not build.plan.near
 
 
-def nearest(build: Builder) -> None:
+def add_nearest(build: Builder) -> None:
     """Function nearest: the least distance of a pair, where it is looked for alone."""
-    if foretold(build):
+    if uses_nearest_pair(build):
         made = specialise(build, approach.nearest)
         build.function("nearest(n, m, row, whole, work)", made.lines, f"return {made.answer}", once=True)

@@ -6,19 +6,18 @@ from copy import copy
 from textwrap import indent
 from typing import Any
 
-from airflock.core.contract import Metric
-from airflock.core.vocabulary import asks
-from airflock.engine.plan import WHOLE, Plan
-from airflock.engine.replace import ReplacementError, must_replace
-from airflock.engine.specialise.values import Function
-from airflock.engine.stages.state import FAULT, NUMBER, SCENE
-from airflock.engine.text.generate import Source
-from airflock.engine.text.rewrite import law_mark
+from airflock.core import Metric, argument_names
+from airflock.engine.plan import INTEGER_NAMES, Plan
+from airflock.engine.replace import ReplacementError, checked_replace
+from airflock.engine.specialise.values import StageFunction
+from airflock.engine.stages.state import FAULT_PREFIX, NUMBER_PREFIX, SCENE_ARRAYS
+from airflock.engine.text.generate import DriverSource
+from airflock.engine.text.rewrite import law_suffix
 
-JIT = "@njit(**JIT)"
+JIT_DECORATOR = "@njit(**JIT)"
 ONCE = "@njit(**ONCE)"
 # what names of rows begin with that only numbers that differ need, and faults of motion, radio and clock
-FEW = (FAULT, NUMBER, "unhindered_", "reach_", "clock", "sent_clock")
+FEW = (FAULT_PREFIX, NUMBER_PREFIX, "unhindered_", "reach_", "clock", "sent_clock")
 
 
 class Builder:
@@ -37,24 +36,24 @@ class Builder:
 
     clusters: Callable[[Metric], list[str]] | None = None
     slots = False
-    abreast = True
-    drops = True
+    pairs_two_agents = True
+    drops_unread_sums = True
     apart = True
     ranges = True
-    by_pairs = False
-    drifts = True
-    trails = True
+    draws_per_pair = False
+    can_use_drift = True
+    puts_rare_rows_last = True
 
     def __init__(self, plan: Plan):
         self.plan = plan
-        self.source = Source(JIT, plan.constants, plan.vectors)
+        self.source = DriverSource(JIT_DECORATOR, plan.constants, plan.vectors)
         self.first: dict[str, int] = {}
         self.last: dict[str, int] = {}
         self.functions: list[str] = []
         self.stages: dict[str, Any] = {}  # functions of the driver by name, as other stages call them
-        self.turns: dict[str, tuple[list[str], Function]] = {}  # in a sequential step: what it reads, its call
+        self.turns: dict[str, tuple[list[str], StageFunction]] = {}  # in a sequential step: what it reads, its call
 
-    def bind(self, names: Iterable[str]) -> list[str]:
+    def bind_rows(self, names: Iterable[str]) -> list[str]:
         """Lines that bind rows of the work table to local names."""
         return [f"{name} = work[{self.row(name)}]" for name in names]
 
@@ -70,7 +69,7 @@ class Builder:
             name = name[1:]
         if not plan.told and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
             name = name[1:]
-        if self.trails and (name.startswith(FEW) or (name == "order" and not plan.grid)):
+        if self.puts_rare_rows_last and (name.startswith(FEW) or (name == "order" and not plan.grid)):
             return self.last.setdefault(name, -1 - len(self.last))
         return self.first.setdefault(name, len(self.first))
 
@@ -95,14 +94,14 @@ class Builder:
     @property
     def mark(self) -> str:
         """What functions and records end in that are of one law of several."""
-        return law_mark(self.plan.law)
+        return law_suffix(self.plan.law)
 
     def kind(self, letter: str, fields: tuple[str, ...]) -> str:
         """Name of the record of numbers behind a letter."""
         return self.source.record(letter.upper() * 2 + (self.mark if letter == "p" else ""), fields)
 
     @property
-    def in_turn(self) -> bool:
+    def is_sequential(self) -> bool:
         """Whether a loop over all agents is the body alone, for the agent in turn."""
         return self.plan.sequential
 
@@ -130,20 +129,20 @@ class Builder:
 
     def whole(self, *names: str) -> list[str]:
         """Lines that read integers of this world."""
-        return [f"{name} = whole[{WHOLE.index(name)}]" for name in names]
+        return [f"{name} = whole[{INTEGER_NAMES.index(name)}]" for name in names]
 
     def scene(self, *names: str) -> list[str]:
         """Lines that take arrays out of the scene."""
-        return [f"{name} = scene[{SCENE.index(name)}]" for name in names]
+        return [f"{name} = scene[{SCENE_ARRAYS.index(name)}]" for name in names]
 
-    def call(self, rule: Callable[..., Any], kind: str, given: Mapping[str, str], owner: str = "") -> str:
+    def call(self, rule: Callable[..., Any], kind: str, arguments: Mapping[str, str], owner: str = "") -> str:
         """Text of a call of a rule with what it asks for."""
-        names = asks(rule, kind, owner)
-        return f"{self.source.name(rule)}({', '.join(given.get(name, name) for name in names)})"
+        names = argument_names(rule, kind, owner)
+        return f"{self.source.name(rule)}({', '.join(arguments.get(name, name) for name in names)})"
 
-    def wants(self, rule: Callable[..., Any] | None, kind: str, *names: str) -> bool:
+    def rule_asks(self, rule: Callable[..., Any] | None, kind: str, *names: str) -> bool:
         """Whether a rule exists and asks for any of these names."""
-        return rule is not None and bool(set(asks(rule, kind)) & set(names))
+        return rule is not None and bool(set(argument_names(rule, kind)) & set(names))
 
     def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False, once: bool = False) -> None:
         """Add one compiled function of the driver; a parallel one spreads its prange over all cores.
@@ -154,8 +153,8 @@ class Builder:
         for body in bodies:
             lines += [body] if isinstance(body, str) else list(body)
         name, _, parameters = head.rstrip(")").partition("(")
-        self.stages[name] = Function(name, tuple(parameters.split(", ")))
-        decorator = "@njit(parallel=True, **JIT)" if parallel else ONCE if once else JIT
+        self.stages[name] = StageFunction(name, tuple(parameters.split(", ")))
+        decorator = "@njit(parallel=True, **JIT)" if parallel else ONCE if once else JIT_DECORATOR
         lines = ["alone()", *lines] if once else lines
         self.functions.append(f"{decorator}\ndef {head}:\n" + indent("\n".join(["wide_vectors()", *lines]), "    "))
 
@@ -168,7 +167,7 @@ class Builder:
         """
         if not self.plan.sequential and not (apart and self.apart):
             spread = self.plan.grid and name == f"decide{self.mark}"
-            body = must_replace(body, "i in range(n)", "i in prange(n)") if spread else body
+            body = checked_replace(body, "i in range(n)", "i in prange(n)") if spread else body
             self.function(f"{name}({arguments})", lines, body, f"return {answer}", parallel=spread)
             return
         first = [] if self.plan.sequential else ["apart()"]
@@ -184,7 +183,7 @@ class Builder:
             called = self.stages[f"{name}_of"]
             if self.mark:  # the stages of all turns share their names
                 *lines, given = _marked([*lines, given], read, self.mark)
-                called = Function(called.name, tuple(given.split(", ")))
+                called = StageFunction(called.name, tuple(given.split(", ")))
             self.turns[name] = lines, called
         else:
             self.function(f"{name}({arguments})", lines, f"return {name}_of({given})")
@@ -204,7 +203,7 @@ def _marked(lines: list[str], names: list[str], mark: str) -> list[str]:
     return [words.sub(rf"\1{mark}", line) for line in lines] if names else lines
 
 
-def in_place(lines: list[str], name: str, part: list[str]) -> list[str]:
+def inline_lines(lines: list[str], name: str, part: list[str]) -> list[str]:
     """Lines in which those of a function stand in place of its call. Raises ReplacementError where they do not fit."""
     (call,) = (line for line in lines if f"{name}(" in line)
     at, answer, margin = lines.index(call), call.strip().rpartition(" = ")[0] or "0", call[: -len(call.lstrip())]
@@ -214,17 +213,17 @@ def in_place(lines: list[str], name: str, part: list[str]) -> list[str]:
     return [*lines[:at], *inner, *lines[at + 1 :]]
 
 
-def loop(over: str, lines: Iterable[str]) -> list[str]:
+def loop_lines(iterable: str, lines: Iterable[str]) -> list[str]:
     """A for loop around lines."""
-    return [f"for {over}:", *[f"    {line}" for text in lines for line in text.splitlines()]]
+    return [f"for {iterable}:", *[f"    {line}" for text in lines for line in text.splitlines()]]
 
 
-def branch(test: str, lines: Iterable[str]) -> list[str]:
+def branch_lines(test: str, lines: Iterable[str]) -> list[str]:
     """An if around lines."""
     return [f"if {test}:", *[f"    {line}" for text in lines for line in text.splitlines()]]
 
 
-def columns(metrics: Iterable[Metric]) -> list[tuple[str, str, str]]:
+def sampled_columns(metrics: Iterable[Metric]) -> list[tuple[str, str, str]]:
     """Of every value that metrics sample: name, how it combines over time, and the clock that samples it."""
     return [
         (name, metric.over_time.get(name, "mean"), metric.clock) for metric in metrics for name in metric.Sample._fields

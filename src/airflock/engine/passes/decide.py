@@ -2,52 +2,62 @@
 
 from airflock.engine.passes import grid, perceive, percept
 from airflock.engine.passes.build import Builder
-from airflock.engine.passes.perceive import RECEIVE
+from airflock.engine.passes.perceive import RECEIVE_CALLS
 from airflock.engine.specialise.stage import specialise
-from airflock.engine.specialise.values import Call, argument
-from airflock.engine.stages import decide as deciding
-from airflock.engine.stages import neighbours as meeting
-from airflock.engine.stages.words import live
+from airflock.engine.specialise.values import StageCall, driver_argument
+from airflock.engine.stages import decide as deciding, neighbours as meeting
+from airflock.engine.stages.words import nonzero_fields
 
 
-def neighbours(build: Builder) -> None:
+def add_neighbours(build: Builder) -> None:
     """Function neighbours: the neighbour rule over all others in range of each agent, all pairs or by cells."""
     plan, model = build.plan, build.plan.model
     fields = model.Sums._fields  # type: ignore[union-attr]
-    sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
-    draw, drawn = (None, Call(perceive.word(plan))) if build.by_pairs else (Call(RECEIVE[False]), None)
-    more = perceive.around(plan)
-    meet = Call(f"meet({', '.join([perceive.MEET, *more])})")
+    sums = tuple(
+        (c, model.reduce.get(fields[c], "sum")) for c in _asked(build, nonzero_fields(model.Sums, plan.dimensions))
+    )
+    draw, drawn = (
+        (None, StageCall(perceive.pair_word(plan))) if build.draws_per_pair else (StageCall(RECEIVE_CALLS[False]), None)
+    )
+    more = perceive.world_arguments(plan)
+    meet = StageCall(f"meet({', '.join([perceive.MEET_ARGUMENTS, *more])})")
     if plan.grid:
-        grid.neighbours(build, sums)
+        grid.add_neighbours(build, sums)
         return
     made = specialise(
-        build, meeting.neighbours, n=argument("n"), decision=argument("k_"), draw=draw, drawn=drawn, meet=meet,
-        sums=sums, images=build.images,
-    )  # fmt: skip
+        build,
+        meeting.neighbours,
+        n=driver_argument("n"),
+        decision=driver_argument("k_"),
+        draw=draw,
+        drawn=drawn,
+        meet=meet,
+        sums=sums,
+        images=build.images,
+    )
     arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store, words", *more])
     name = f"neighbours{build.mark}"
     build.stage(name, arguments, made.once, made.body, made.answer, apart=plan.topology is None)
 
 
-def decide(build: Builder) -> None:
+def add_decide(build: Builder) -> None:
     """Function decide: the law's rule for the command of each agent, and those that its percept is bound to."""
     plan, model = build.plan, build.plan.model
-    summed = live(model.Sums, plan.dimensions) if model.neighbour is not None else []
+    summed = nonzero_fields(model.Sums, plan.dimensions) if model.neighbour is not None else []
     made = specialise(
-        build, deciding.decide, decision=argument("k_"), percept_of=argument(f"PERCEPT{build.mark}"),
-        summed=_asked(build, summed) if deciding.asks(model, "sums") else [],
-        walled=live(model.Walls, plan.dimensions) if model.boundary is not None else [],
+        build, deciding.decide, decision=driver_argument("k_"), percept_of=driver_argument(f"PERCEPT{build.mark}"),
+        summed=_asked(build, summed) if deciding.law_asks(model, "sums") else [],
+        walled=nonzero_fields(model.Walls, plan.dimensions) if model.boundary is not None else [],
     )  # fmt: skip
-    if deciding.asks(model, "percept"):
-        percept.record(build)
-    percept.bind(build)
+    if deciding.law_asks(model, "percept"):
+        percept.add_record(build)
+    percept.add_methods(build)
     arguments = "k_, n, time, row, whole, work, mem, edges, spans, scene"
     build.stage(f"decide{build.mark}", arguments, made.once, made.body, made.answer)
 
 
 def _asked(build: Builder, sums: list[int]) -> list[int]:
-    """Of these fields of Sums those that `decide` can read, with its choices made: the others are never summed."""
+    """Of these fields of Sums those that `add_decide` can read, with its choices made: the others are never summed."""
     model = build.plan.model
     build.source.name(model.decide)
     text = "\n".join(build.source.blocks)

@@ -3,15 +3,15 @@
 from collections.abc import Callable
 from functools import partial
 
-from airflock.core.contract.declared import CLOCKS
+from airflock.core import CLOCKS
 from airflock.engine import vectors
 from airflock.engine.passes import approach, decide, flock, measure, move, perceive, slots
-from airflock.engine.passes.build import Builder, columns
-from airflock.engine.passes.plain import plain
+from airflock.engine.passes.build import Builder, sampled_columns
+from airflock.engine.passes.plain import add_plain_stage
 from airflock.engine.plan import Plan
-from airflock.engine.primitives import DECLARED, primitives
-from airflock.engine.replace import must_replace
-from airflock.engine.schedule import BY_LAW, in_turn, order
+from airflock.engine.primitives import DECLARED, random_primitives
+from airflock.engine.replace import checked_replace
+from airflock.engine.schedule import STAGES_PER_LAW, sequential_stages, stages_of_events
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.stages import flight as flight_
 from airflock.engine.stages.words import BLOCK
@@ -38,35 +38,37 @@ ONCE = JIT | dict(forceinline=False)
 HEAD += DECLARED + "\n{primitives}\n"
 
 
-MADE: dict[str, Callable[[Builder], None]] = {  # what makes the function of each stage; rows are numbered in this order
-    "snapshot": perceive.snapshot,
-    "perceive": partial(plain, name="perceive"),
-    "tune": partial(plain, name="tune"),
-    "receive": perceive.receive,
-    "meet": perceive.meet,
-    "neighbours": decide.neighbours,
-    "boundaries": partial(plain, name="boundaries"),
-    "flock": flock.flock,
-    "decide": decide.decide,
-    "stop": partial(plain, name="stop"),
-    "overrule": partial(plain, name="overrule"),
-    "move": move.move,
-    "measure_sample": partial(measure.measure, clock="sample"),
-    "measure_collision": partial(measure.measure, clock="collision"),
-    "aim_": partial(plain, name="aim_"),
-    "glide_": partial(plain, name="glide_"),
-    "appear_": partial(plain, name="appear_"),
-    "rearrange": slots.rearrange,
+STAGE_MAKERS: dict[
+    str, Callable[[Builder], None]
+] = {  # what makes the function of each stage; rows are numbered in this order
+    "snapshot": perceive.add_snapshot,
+    "perceive": partial(add_plain_stage, name="perceive"),
+    "tune": partial(add_plain_stage, name="tune"),
+    "receive": perceive.add_receive,
+    "meet": perceive.add_meet,
+    "neighbours": decide.add_neighbours,
+    "boundaries": partial(add_plain_stage, name="boundaries"),
+    "flock": flock.add_flock,
+    "decide": decide.add_decide,
+    "stop": partial(add_plain_stage, name="stop"),
+    "overrule": partial(add_plain_stage, name="overrule"),
+    "move": move.add_move,
+    "measure_sample": partial(measure.add_measure, clock="sample"),
+    "measure_collision": partial(measure.add_measure, clock="collision"),
+    "aim_": partial(add_plain_stage, name="aim_"),
+    "glide_": partial(add_plain_stage, name="glide_"),
+    "appear_": partial(add_plain_stage, name="appear_"),
+    "rearrange": slots.add_rearrange,
 }
 CALLED = ("snapshot", "receive", "meet")  # made whatever is due: others call them, or a kernel holds them
 
 
 # Loops over agents take 32 at a time (four vectors of eight); the rest runs one by one, at three times the cost each. A
 # short rest is left as it is (5 % of a flight of 100), a long one is filled up with agents that are far away.
-SPAN = "m = n if n % 32 <= 10 else work.shape[1]"
+LANE_COUNT_LINE = "m = n if n % 32 <= 10 else work.shape[1]"
 
 
-def flight(plan: Plan) -> str:
+def flight_driver_text(plan: Plan) -> str:
     """Text of the driver that flies one world: function `advance(first, last, half, held, ...)`.
 
     It flies the steps first to last - 1 and returns the next one, or minus the first agent (from 1) that found no room.
@@ -77,34 +79,44 @@ def flight(plan: Plan) -> str:
            their places (each 1 or 0); the drift of the flock then (m/s, three numbers) and its speed (m/s), and how
            far from the origin agents may be (m)
     """
-    return _text(stages(plan), plan.model.name)
+    return _text(flight_stages(plan), plan.model.name)
 
 
-def stages(plan: Plan, lenient: bool = False) -> Builder:
-    """Stages of the driver that flies one world; the last one is `advance`. lenient : as for `generate.Source`."""
+def flight_stages(plan: Plan, lenient: bool = False) -> Builder:
+    """Stages of the driver that flies one world; the last one is `advance`.
+
+    lenient : as for `generate.DriverSource`
+    """
     build = Builder(plan)
-    build.source.lenient = lenient
-    build.slots = slots.slotted(plan)
-    events = order(plan)
-    make(build)
-    move.begin(build)
+    build.source.allow_builtins = lenient
+    build.slots = slots.uses_slots(plan)
+    events = stages_of_events(plan)
+    make_stages(build)
+    move.add_begin(build)
     if plan.sequential:
         _turns(build)
-    approach.nearest(build)
+    approach.add_nearest(build)
     _keep(build)
-    names = [name for name, _, _ in columns(plan.metrics)]
+    names = [name for name, _, _ in sampled_columns(plan.metrics)]
     made = specialise(
-        build, flight_.advance, stages=build.stages, order=events, sampled=_sampled(plan), slots=build.slots,
-        watched=approach.watched(plan), drifts=approach.drifts(build), foretold=approach.foretold(build),
+        build,
+        flight_.advance,
+        stages=build.stages,
+        order=events,
+        sampled=_sampled(plan),
+        slots=build.slots,
+        watched=approach.skippable_metrics(plan),
+        drifts=approach.uses_drift(build),
+        foretold=approach.uses_nearest_pair(build),
         collided=names.index("n_coll") if plan.stop else 0,
-    )  # fmt: skip
+    )
     arguments = "row, whole, faces, edges, spans, scene, start, work, words, past, store, gust, mem, memory, labels"
     arguments += (
-        ", values, sums, frames" + (", scratch" if flock.owners(plan) else "") + (", cells" if plan.grid else "")
+        ", values, sums, frames" + (", scratch" if flock.flock_rules(plan) else "") + (", cells" if plan.grid else "")
     )
     build.function(
         f"advance(first, last, half, held, {arguments})",
-        _agents(build, span(plan)),
+        _agents(build, lane_count_line(plan)),
         made.lines,
         f"return {made.answer}",
     )
@@ -117,13 +129,13 @@ def _keep(build: Builder) -> None:
     build.function("keep(frame, n, work, frames)", "apart()", made.lines, once=True)
 
 
-def make(build: Builder) -> None:
+def make_stages(build: Builder) -> None:
     """Functions of all stages that a plan has; of one that asks a law, one for every law."""
-    due = dict.fromkeys([*CALLED, *(stage for event in order(build.plan).values() for stage in event)])
-    found = [(stage, "0") if stage in MADE else stage.rpartition("_")[::2] for stage in due]
-    for name, one in MADE.items():
+    due = dict.fromkeys([*CALLED, *(stage for event in stages_of_events(build.plan).values() for stage in event)])
+    found = [(stage, "0") if stage in STAGE_MAKERS else stage.rpartition("_")[::2] for stage in due]
+    for name, one in STAGE_MAKERS.items():
         for law in [law for stage, law in found if stage == name]:
-            one(build.laws[int(law)] if name in BY_LAW else build)
+            one(build.laws[int(law)] if name in STAGES_PER_LAW else build)
 
 
 def _agents(build: Builder, lanes: str) -> list[str]:
@@ -131,18 +143,18 @@ def _agents(build: Builder, lanes: str) -> list[str]:
     return [*build.whole("agents"), "n = agents", lanes]
 
 
-def span(plan: Plan) -> str:
+def lane_count_line(plan: Plan) -> str:
     """Line of a flight that counts lanes: any rest is filled up where numbers differ among agents.
 
     Else each number would be spread over another vector before the rest, for each agent that meets the others.
     """
     varied = any(letter for each in plan.every for letter, _ in each.varied)
-    return "m = work.shape[1]" if varied and not plan.sequential else SPAN
+    return "m = work.shape[1]" if varied and not plan.sequential else LANE_COUNT_LINE
 
 
 def _sampled(plan: Plan) -> dict[str, tuple[list[tuple[int, str]], int]]:
     """Of each stage that measures: values that it samples and how they add up, and which sum counts its instants."""
-    values = list(enumerate(columns(plan.metrics)))
+    values = list(enumerate(sampled_columns(plan.metrics)))
     return {
         f"measure_{clock}": ([(c, how) for c, (_, how, when) in values if when == clock], len(values) + number)
         for number, clock in enumerate(CLOCKS)
@@ -151,7 +163,7 @@ def _sampled(plan: Plan) -> dict[str, tuple[list[tuple[int, str]], int]]:
 
 def _turns(build: Builder) -> None:
     """Function turns: each agent in turn meets its neighbours, decides and moves."""
-    due = in_turn(build.plan)
+    due = sequential_stages(build.plan)
     read = list(dict.fromkeys(line for name in due for line in build.turns[name][0]))
     called = {name: build.turns[name][1] for name in due}
     made = specialise(build, flight_.turns, stages=called, order=due)
@@ -170,15 +182,15 @@ def replay_stages(plan: Plan) -> Builder:
     It measures frames of which the first one has the number `first`, so that a recording may come in parts.
     """
     build = Builder(plan)
-    events = order(plan)
+    events = stages_of_events(plan)
     for event in ("world", "watch", "sample"):
         for name in events[event]:
-            MADE[name](build)
+            STAGE_MAKERS[name](build)
     made = specialise(build, flight_.measure_frames, stages=build.stages, order=events, sampled=_sampled(plan))
     build.function(
         "measure_frames(first, row, whole, edges, spans, scene, work, memory, labels, values, sums, frames, series,"
-        " frame_period" + (", scratch" if flock.owners(plan) else "") + (", cells)" if plan.grid else ")"),
-        _agents(build, SPAN),
+        " frame_period" + (", scratch" if flock.flock_rules(plan) else "") + (", cells)" if plan.grid else ")"),
+        _agents(build, LANE_COUNT_LINE),
         made.lines,
         f"return {made.answer}",
     )
@@ -186,10 +198,10 @@ def replay_stages(plan: Plan) -> Builder:
 
 
 def _text(build: Builder, label: str) -> str:
-    blocks = must_replace(vectors.BLOCKS, "{block}", str(BLOCK)) if build.plan.grid else ""
-    head = HEAD.format(label=label, bits=build.plan.bits, primitives=primitives(build.plan.bits) + blocks)
+    blocks = checked_replace(vectors.BLOCK_TEXT, "{block}", str(BLOCK)) if build.plan.grid else ""
+    head = HEAD.format(label=label, bits=build.plan.bits, primitives=random_primitives(build.plan.bits) + blocks)
     if not build.plan.grid:  # which sorts cells into arrays of its own
-        head = must_replace(head, "COUNTED = True", "COUNTED = False")
-    last = must_replace(build.functions[-1], "@njit(**JIT)", "@njit(cache=True, **JIT | CALLED)", 1)
+        head = checked_replace(head, "COUNTED = True", "COUNTED = False")
+    last = checked_replace(build.functions[-1], "@njit(**JIT)", "@njit(cache=True, **JIT | CALLED)", 1)
     parts = [head, *build.source.blocks, *build.functions[:-1], last, f"ROWS = {build.rows!r}"]
     return "\n\n".join(parts) + "\n"

@@ -1,4 +1,4 @@
-"""Flock: rules that see all agents at once, a model's `flock` and a metric's `survey`, and the scratch they work in."""
+"""Rules that see all agents at once: a model's `flock` and a metric's `survey`, with the scratch that they work in."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -8,15 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.contract import Metric
-from airflock.core.vectors import names_of, vectors_of
-from airflock.core.vocabulary import asks
+from airflock.core import Metric, argument_names, component_names, vector_sizes
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import Plan
-from airflock.engine.text.probe import shapes_of
+from airflock.engine.text.probe import scratch_shapes
 
 
-class Owner(NamedTuple):
+class FlockRule(NamedTuple):
     """Who has a rule of the whole flock: the model or a metric, its rule, Shared and workspace, its parameters."""
 
     name: str
@@ -27,46 +25,46 @@ class Owner(NamedTuple):
     letter: str
 
 
-def owners(plan: Plan) -> list[Owner]:
+def flock_rules(plan: Plan) -> list[FlockRule]:
     """All rules of the whole flock in a plan, in the order of their scratch."""
     model = plan.model
     first = []
     if model.flock is not None and model.workspace is not None:
-        first = [Owner("model", "flock", model.flock, model.Shared, model.workspace, "p")]
-    return first + surveys(plan)
+        first = [FlockRule("model", "flock", model.flock, model.Shared, model.workspace, "p")]
+    return first + survey_rules(plan)
 
 
-def surveys(plan: Plan) -> list[Owner]:
+def survey_rules(plan: Plan) -> list[FlockRule]:
     """Those of them that measure."""
     return [
-        Owner(metric.name, "survey", metric.survey, metric.Shared, metric.workspace, "q")
+        FlockRule(metric.name, "survey", metric.survey, metric.Shared, metric.workspace, "q")
         for metric in plan.metrics
         if metric.survey is not None and metric.workspace is not None
     ]
 
 
-def flock(build: Builder) -> None:
+def add_flock(build: Builder) -> None:
     """Function flock: the model's rule, once per decision, on the true states."""
-    owner = owners(build.plan)[0]
-    records = "p wing aero" if "aero" in asks(owner.rule, owner.kind, owner.name) else "p wing"
+    owner = flock_rules(build.plan)[0]
+    records = "p wing aero" if "aero" in argument_names(owner.rule, owner.kind, owner.name) else "p wing"
     build.function("flock(n, row, work, scratch)", build.records(records), _call(build, owner), "return 0")
 
 
-def survey(build: Builder, metric: Metric) -> list[str]:
+def survey_lines(build: Builder, metric: Metric) -> list[str]:
     """Lines that run a metric's rule; `scratch` is at hand."""
-    (owner,) = (owner for owner in surveys(build.plan) if owner.name == metric.name)
+    (owner,) = (owner for owner in survey_rules(build.plan) if owner.name == metric.name)
     return [*build.records("q wing"), *_call(build, owner), "return 0"]
 
 
-def _call(build: Builder, owner: Owner) -> list[str]:
+def _call(build: Builder, owner: FlockRule) -> list[str]:
     plan = build.plan
-    number = [each.name for each in owners(plan)].index(owner.name)
+    number = [each.name for each in flock_rules(plan)].index(owner.name)
     work = build.source.name(_record(owner, plan))
     fields = _record(owner, plan)._fields
     given = {"work": f"scratch_{owner.name}", "shared": f"shared_{owner.name}"}
     flown = plan.motion
-    used = asks(owner.rule, owner.kind, owner.name)
-    lines = build.bind([name for name in flown if name in used])
+    used = argument_names(owner.rule, owner.kind, owner.name)
+    lines = build.bind_rows([name for name in flown if name in used])
     for name in ("x", "y", "z", "vx", "vy", "vz"):
         if name not in flown and name in used:
             lines += [f"{name} = work[{build.row('level_')}]"]
@@ -78,36 +76,38 @@ def _call(build: Builder, owner: Owner) -> list[str]:
     return [*lines, *build.once([build.call(owner.rule, owner.kind, given, owner.name)])]
 
 
-def _record(owner: Owner, plan: Plan) -> Any:
+def _record(owner: FlockRule, plan: Plan) -> Any:
     """NamedTuple class of the scratch: what `workspace` returns, whatever its shapes."""
-    return type(shapes_of(owner.workspace, 1, _parameters(plan, owner, None)))
+    return type(scratch_shapes(owner.workspace, 1, _parameters(plan, owner, None)))
 
 
-def _parameters(plan: Plan, owner: Owner, row: NDArray[Any] | None) -> dict[str, Any]:
+def _parameters(plan: Plan, owner: FlockRule, row: NDArray[Any] | None) -> dict[str, Any]:
     """Parameters of an owner, of the wing and of drag descent as plain records by name, from a row of numbers."""
     found = {}
     for letter in (owner.letter, "wing", "aero"):
         names = plan.records[letter]
         values = [0.0] * len(names) if row is None else row[plan.spans[letter]].tolist()
         numbers = dict(zip(names, values, strict=True))
-        whole = {key: tuple(numbers[part] for part in names_of(key, n)) for key, n in vectors_of(names).items()}
+        whole = {
+            key: tuple(numbers[part] for part in component_names(key, n)) for key, n in vector_sizes(names).items()
+        }
         found[letter] = SimpleNamespace(**{**numbers, **plan.constants.get(letter, {}), **whole})
     return found
 
 
-Named = tuple[tuple[tuple[str, tuple[int, int], bool], ...], ...]
+NamedScratch = tuple[tuple[tuple[str, tuple[int, int], bool], ...], ...]
 
 
-def scratch_of(plan: Plan, row: NDArray[Any], agents: int) -> Named:
+def scratch_arrays(plan: Plan, row: NDArray[Any], agents: int) -> NamedScratch:
     """Scratch of every rule of the whole flock: a name, rows and columns, and whether nothing in it outlasts a call."""
-    return _scratch(plan, row.dtype, row.tobytes(), agents) if owners(plan) else ()
+    return _scratch(plan, row.dtype, row.tobytes(), agents) if flock_rules(plan) else ()
 
 
 @lru_cache(maxsize=64)
-def _scratch(plan: Plan, real: Any, numbers: bytes, agents: int) -> Named:
+def _scratch(plan: Plan, real: Any, numbers: bytes, agents: int) -> NamedScratch:
     made = []
     sizes_of = scratch_sizes(plan, np.frombuffer(numbers, real), agents)
-    for owner, sizes in zip(owners(plan), sizes_of, strict=True):
+    for owner, sizes in zip(flock_rules(plan), sizes_of, strict=True):
         record = _record(owner, plan)
         within = getattr(record, "WITHIN", ())
         fields = zip(record._fields, sizes, strict=True)
@@ -117,4 +117,4 @@ def _scratch(plan: Plan, real: Any, numbers: bytes, agents: int) -> Named:
 
 def scratch_sizes(plan: Plan, row: NDArray[Any] | None, agents: int) -> list[list[tuple[int, int]]]:
     """Rows and columns of the scratch arrays of every rule of the whole flock; without a row of numbers, with zeros."""
-    return [list(shapes_of(owner.workspace, agents, _parameters(plan, owner, row))) for owner in owners(plan)]
+    return [list(scratch_shapes(owner.workspace, agents, _parameters(plan, owner, row))) for owner in flock_rules(plan)]

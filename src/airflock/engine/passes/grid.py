@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import Plan
 from airflock.engine.specialise.stage import specialise
-from airflock.engine.specialise.values import Call, Function, argument
+from airflock.engine.specialise.values import StageCall, StageFunction, driver_argument
 from airflock.engine.stages import cells
-from airflock.engine.stages.cells import CELLS, CHUNKS, SPARE
-from airflock.engine.stages.neighbours import widest
+from airflock.engine.stages.cells import CHUNKS, MAX_CELLS_PER_AGENT, SPARE
+from airflock.engine.stages.neighbours import widest_reach
 from airflock.engine.stages.neighbours_by_cells import neighbours_by_cells
 from airflock.engine.stages.words import BLOCK
 
-SORT = Function("sort", ("n", "near", "most_cells", "row", "work", "cells"))
+SORT = StageFunction("sort", ("n", "near", "most_cells", "row", "work", "cells"))
 KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
 
 
-def memory(
+def grid_memory(
     plan: Plan, agents: int, rows: Callable[[tuple[int, ...], Any], Any]
 ) -> tuple[tuple[NDArray[Any], ...], ...]:
     """What the grid keeps of n agents during a flight, as one argument or none; `rows` makes zeros on cache lines.
@@ -39,7 +39,7 @@ def memory(
     if not plan.grid:
         return ()
     real, whole = (np.float32, np.int32) if plan.bits == 32 else (np.float64, np.int64)
-    components, most = 2 * plan.dimensions, CELLS * agents + SPARE
+    components, most = 2 * plan.dimensions, MAX_CELLS_PER_AGENT * agents + SPARE
     fields = max(len(getattr(own.model.Sums, "_fields", ())) for own in plan.every)
     shapes = (
         ((most + 1,), np.int64), ((CHUNKS * most,), np.int32), ((agents,), np.int32),
@@ -55,37 +55,37 @@ def _width(plan: Plan) -> int:
     return 1 << (2 * plan.dimensions).bit_length()
 
 
-def opened(build: Builder) -> list[str]:
+def bind_lines(build: Builder) -> list[str]:
     """Lines that bind what lasts for a flight, and `whose`, the slot of the agent at each place."""
     return [f"{KEPT} = cells", f"whose = packed.view(np.int{build.plan.bits})[:, {_width(build.plan) - 1}]"]
 
 
-def neighbours(build: Builder, sums: tuple[tuple[int, str], ...]) -> None:
-    """Function `neighbours` over a grid; function `widest` where agents differ in how far they see."""
+def add_neighbours(build: Builder, sums: tuple[tuple[int, str], ...]) -> None:
+    """Function `add_neighbours` over a grid; function `widest` where agents differ in how far they see."""
     called = f"widest{build.mark}(n, row, work)"
     made = specialise(
-        build, neighbours_by_cells, decision=argument("k_"), sort=SORT, widest=Call(called), sums=sums
+        build, neighbours_by_cells, decision=driver_argument("k_"), sort=SORT, widest=StageCall(called), sums=sums
     )  # fmt: skip
     if build.plan.varies("p"):
-        wide = specialise(build, widest)
+        wide = specialise(build, widest_reach)
         build.function(called, wide.lines, f"return {wide.answer}")
-    sort(build)
+    add_sort(build)
     arguments = "k_, n, m, time, late, row, whole, work, store, words, cells"
-    build.function(f"neighbours{build.mark}({arguments})", opened(build), made.lines, "return 0", parallel=True)
+    build.function(f"neighbours{build.mark}({arguments})", bind_lines(build), made.lines, "return 0", parallel=True)
 
 
-def sort(build: Builder) -> None:
-    """Function `sort`: sorts agents into about `most_cells` cells no smaller than `near` (m)."""
+def add_sort(build: Builder) -> None:
+    """Function `add_sort`: sorts agents into about `most_cells` cells no smaller than `near` (m)."""
     if "sort" not in build.stages:
         called = "cells_of(n, near, most_cells, row, work)"
-        made = specialise(build, cells.box)
+        made = specialise(build, cells.cell_box)
         build.function(called, made.lines, f"return {made.answer}")
-        made = specialise(build, cells.sort, boxed=Call(called))
-        lines = [*opened(build), *made.lines]
+        made = specialise(build, cells.sort_by_cells, boxed=StageCall(called))
+        lines = [*bind_lines(build), *made.lines]
         build.function(f"sort({', '.join(SORT.parameters)})", lines, f"return {made.answer}", parallel=True)
 
 
-def sorting(build: Builder, near: str, most: str) -> list[str]:
+def sort_lines(build: Builder, min_width: str, max_cells: str) -> list[str]:
     """Lines that sort agents into about `most` cells no smaller than `near` (m)."""
-    sort(build)
-    return [*opened(build), f"sides, count = sort(n, {near}, {most}, row, work, cells)"]
+    add_sort(build)
+    return [*bind_lines(build), f"sides, count = sort(n, {min_width}, {max_cells}, row, work, cells)"]

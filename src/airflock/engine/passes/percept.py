@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from airflock.core.vocabulary import BOUND, Percept
+from airflock.core import PERCEPT_METHODS, Percept
 from airflock.engine.passes.build import Builder
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.stages import percept as perceiving
@@ -18,16 +18,16 @@ METHODS: dict[str, tuple[Callable[..., Any], str]] = {
 }
 
 
-def record(build: Builder) -> str:
+def add_record(build: Builder) -> str:
     """Record that a driver hands to `decide`: the public fields, then what the bound methods need."""
     casts = CASTS if build.plan.model.sight is not None else CASTS[:3] if build.plan.scene else ()
     return build.source.record(f"PERCEPT{build.mark}", (*Percept._fields, *FIELDS, "edges", "spans", *casts))
 
 
-def bind(build: Builder) -> None:
+def add_methods(build: Builder) -> None:
     """Functions percept_ray, percept_cast, percept_normal and percept_uniform, those of them that a rule calls."""
-    marked = {name: f"percept_{name}{build.mark}" for name in BOUND}
-    called = [name for name in BOUND if any(f"{marked[name]}(" in text for text in build.source.blocks)]
+    marked = {name: f"percept_{name}{build.mark}" for name in PERCEPT_METHODS}
+    called = [name for name in PERCEPT_METHODS if any(f"{marked[name]}(" in text for text in build.source.blocks)]
     for name in called:
         method, arguments = METHODS[name]
         made = specialise(build, method)

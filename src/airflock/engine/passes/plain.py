@@ -4,14 +4,14 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from airflock.engine.passes.build import Builder
-from airflock.engine.passes.noise import draw
-from airflock.engine.passes.perceive import shared
+from airflock.engine.passes.noise import add_draw
+from airflock.engine.passes.perceive import add_error_functions
 from airflock.engine.specialise.stage import specialise
-from airflock.engine.specialise.values import argument
+from airflock.engine.specialise.values import driver_argument
 from airflock.engine.stages import faults, perceive, scene, silence, surfaces
 
 
-class Plain(NamedTuple):
+class PlainStage(NamedTuple):
     """A stage, and what its function in a driver is called with.
 
     decision : the argument that is the number of the decision
@@ -23,26 +23,30 @@ class Plain(NamedTuple):
     arguments: str
     decision: str = "k_"
     own: bool = False
-    draws: bool = False
+    needs_random: bool = False
 
 
 PLAIN = {
-    "perceive": Plain(perceive.perceive, "k, slot, m, row, whole, work, ring, words", "k", draws=True),
-    "tune": Plain(faults.tune, "k_, m, row, whole, work"),
-    "boundaries": Plain(surfaces.boundaries, "n, row, whole, work, faces, edges, spans, scene", own=True),
-    "stop": Plain(silence.stop, "n, time, row, work, store", own=True),
-    "overrule": Plain(faults.overrule, "n, time, row, work", own=True),
-    "aim_": Plain(scene.aim, "time, elapsed, n, work, row, scene"),
-    "glide_": Plain(scene.glide, "time, n, work, row, scene"),
-    "appear_": Plain(scene.appear, "time, n, work, row, scene"),
+    "perceive": PlainStage(perceive.perceive, "k, slot, m, row, whole, work, ring, words", "k", needs_random=True),
+    "tune": PlainStage(faults.tune, "k_, m, row, whole, work"),
+    "boundaries": PlainStage(surfaces.boundaries, "n, row, whole, work, faces, edges, spans, scene", own=True),
+    "stop": PlainStage(silence.stop, "n, time, row, work, store", own=True),
+    "overrule": PlainStage(faults.overrule, "n, time, row, work", own=True),
+    "aim_": PlainStage(scene.move_goal, "time, elapsed, n, work, row, scene"),
+    "glide_": PlainStage(scene.move_own_goals, "time, n, work, row, scene"),
+    "appear_": PlainStage(scene.let_appear, "time, n, work, row, scene"),
 }
 
 
-def plain(build: Builder, name: str) -> None:
+def add_plain_stage(build: Builder, name: str) -> None:
     """The function of one of these stages; of a stage that asks a law, that for the law of the builder."""
     one = PLAIN[name]
-    known = {"drawn": draw(build) if build.plan.noisy else None, "shared": shared(build)} if one.draws else {}
-    made = specialise(build, one.stage, decision=argument(one.decision), **known)
+    known = (
+        {"drawn": add_draw(build) if build.plan.has_sensor_error else None, "shared": add_error_functions(build)}
+        if one.needs_random
+        else {}
+    )
+    made = specialise(build, one.stage, decision=driver_argument(one.decision), **known)
     if one.own:
         build.stage(f"{name}{build.mark}", one.arguments, made.once, made.body, made.answer)
     else:

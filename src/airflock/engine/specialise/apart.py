@@ -10,43 +10,45 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from airflock.core.rules.nodes import walk
-from airflock.engine.specialise.values import Text, kind_of
+from airflock.core import walk_tree
+from airflock.engine.specialise.values import FunctionSyntax, name_kind
 
 TABLES = frozenset({"work", "row", "whole", "words", "store", "scene", "scratch"})  # what bindings of a driver read
 MARK = re.compile(r"@(\d+)")
-Written = dict[str, set[str]]  # of each name in the driver, who may have written it last: locals with their marks
+LastWriters = dict[str, set[str]]  # of each name in the driver, who may have written it last: locals with their marks
 
 
-class Owners:
+class LocalOwners:
     """Whose the locals of a stage are: the stage's, or those of a helper by its number."""
 
-    def __init__(self, stage: Text):
+    def __init__(self, stage: FunctionSyntax):
         self.texts = [stage]
         self.returned: dict[str, str] = {}
 
-    def spelled(self, name: str, text: Text) -> str:
+    def marked_name(self, name: str, text: FunctionSyntax) -> str:
         """A local as it is spelled while statements are made: the stage's as it is, a helper's with its mark."""
         if text not in self.texts:
             self.texts.append(text)
         number = self.texts.index(text)
         return f"{name}@{number}" if number else name
 
-    def taken(self, vector: str, target: str) -> bool:
+    def is_taken(self, vector: str, target: str) -> bool:
         """Whether a vector that a helper returns has another name in its caller already, which it would overwrite."""
         return self.returned.setdefault(vector, target) != target
 
-    def part(self, statements: list[ast.stmt], answer: ast.expr | None, fault: Callable[[str], Exception]) -> None:
+    def assign_names(
+        self, statements: list[ast.stmt], answer: ast.expr | None, make_error: Callable[[str], Exception]
+    ) -> None:
         """Give each marked local a name of the driver.
 
         Raises what `fault` makes of a local of the stage that has a name which the driver itself binds.
         """
         parts: list[ast.AST] = [*statements, *([] if answer is None else [answer])]
-        names = [item for part in parts for item in walk(part) if isinstance(item, ast.Name)]
-        bound = {item.id for item in names if kind_of(item) not in (None, "rule")} | TABLES
+        names = [item for part in parts for item in walk_tree(part) if isinstance(item, ast.Name)]
+        bound = {item.id for item in names if name_kind(item) not in (None, "rule")} | TABLES
         clash = sorted(bound.intersection(item.id for item in names if isinstance(item.ctx, ast.Store)))
         if clash:
-            raise fault(f"{clash[0]} is what the driver itself calls here; give the local another name")
+            raise make_error(f"{clash[0]} is what the driver itself calls here; give the local another name")
         marked = dict.fromkeys(item.id for item in names if MARK.search(item.id))
         found = {name: MARK.sub("", name) for name in marked}
         taken = {item.id for item in names if item.id not in marked} | set(found.values())
@@ -75,18 +77,18 @@ class _Order:
         self.found = found
         self.shared = {*found.values()}
         self.clash: set[str] = set()
-        self.left: list[Written] = []
+        self.left: list[LastWriters] = []
         self.names: dict[int, tuple[list[str], list[str]]] = {}  # of a node, by its identity
 
     def overwritten(self, statements: list[ast.stmt], answer: ast.expr | None) -> set[str]:
         """Locals of one name of which one would be read where another has been written; nothing if there are none."""
         if self.found:
-            written: Written = {}
+            written: LastWriters = {}
             self._block(statements, written)
             self._read(answer, written)
         return self.clash
 
-    def _block(self, statements: Iterable[ast.stmt], written: Written) -> None:
+    def _block(self, statements: Iterable[ast.stmt], written: LastWriters) -> None:
         for statement in statements:
             if isinstance(statement, (ast.For, ast.While)):
                 self._loop(statement, written)
@@ -102,7 +104,7 @@ class _Order:
                 self._read(statement, written)
                 self._write(statement, written)
 
-    def _loop(self, loop: ast.For | ast.While, written: Written) -> None:
+    def _loop(self, loop: ast.For | ast.While, written: LastWriters) -> None:
         """A loop, done never, once, or again after itself."""
         outside, self.left = self.left, []
         for _ in range(2):
@@ -117,19 +119,19 @@ class _Order:
                 _join(written, state)
         self.left = outside
 
-    def _read(self, node: ast.AST | None, written: Written) -> None:
+    def _read(self, node: ast.AST | None, written: LastWriters) -> None:
         for name in () if node is None else self._names(node)[0]:
             others = written.get(self.found.get(name, name), set()) - {name}
             self.clash |= {*others, name} if others else set()
 
-    def _write(self, node: ast.AST, written: Written) -> None:
+    def _write(self, node: ast.AST, written: LastWriters) -> None:
         for name in self._names(node)[1]:
             written[self.found.get(name, name)] = {name}
 
     def _names(self, node: ast.AST) -> tuple[list[str], list[str]]:
         """What a statement or an expression reads, and which shared names it writes; looked for once."""
         if id(node) not in self.names:
-            items = walk(node)
+            items = walk_tree(node)
             named = [item for item in items if isinstance(item, ast.Name)]
             reads = [item.id for item in named if isinstance(item.ctx, ast.Load)]
             reads += [item.target.id for item in items if _adds(item)]  # type: ignore[attr-defined]
@@ -143,13 +145,13 @@ def _adds(node: ast.AST) -> bool:
     return isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name)
 
 
-def _join(written: Written, other: Written) -> None:
+def _join(written: LastWriters, other: LastWriters) -> None:
     """After either of two ways."""
     for name, who in other.items():
         written.setdefault(name, set()).update(who)
 
 
-def shares(statements: list[ast.stmt], marked: Any, name: str) -> bool:
+def can_share_name(statements: list[ast.stmt], marked: Any, name: str) -> bool:
     """Whether what a helper returns can be called what its caller calls it.
 
     So it is where both use one word, and the helper reads nothing else by that name, but to begin with.
@@ -157,13 +159,13 @@ def shares(statements: list[ast.stmt], marked: Any, name: str) -> bool:
     if not isinstance(marked, ast.Name) or MARK.sub("", marked.id) != MARK.sub("", name):
         return False
     rest = [s for s in statements if not _copies(s, marked.id, name)]
-    return all(item.id != name for s in rest for item in walk(s) if isinstance(item, ast.Name))
+    return all(item.id != name for s in rest for item in walk_tree(s) if isinstance(item, ast.Name))
 
 
-def renamed(statements: list[ast.stmt], old: str, new: str) -> list[ast.stmt]:
+def rename_local(statements: list[ast.stmt], old: str, new: str) -> list[ast.stmt]:
     """The statements with another name for a local, but those that would then do nothing."""
     for statement in statements:
-        for item in walk(statement):
+        for item in walk_tree(statement):
             if isinstance(item, ast.Name) and item.id == old:
                 item.id = new
     return [statement for statement in statements if not _copies(statement, new, new)]

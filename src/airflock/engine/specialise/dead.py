@@ -3,21 +3,21 @@
 import ast
 from collections.abc import Iterable
 
-from airflock.core.rules.nodes import walk
+from airflock.core import walk_tree
 
 
-def read(nodes: Iterable[ast.AST]) -> set[str]:
+def read_names(nodes: Iterable[ast.AST]) -> set[str]:
     """Names that are read."""
     return _names(nodes, ast.Load)
 
 
-def written(nodes: Iterable[ast.AST]) -> set[str]:
+def written_names(nodes: Iterable[ast.AST]) -> set[str]:
     """Names that are written."""
     return _names(nodes, ast.Store)
 
 
 def _names(nodes: Iterable[ast.AST], context: type[ast.expr_context]) -> set[str]:
-    found = (item for node in nodes for item in walk(node) if isinstance(item, ast.Name))
+    found = (item for node in nodes for item in walk_tree(node) if isinstance(item, ast.Name))
     return {item.id for item in found if isinstance(item.ctx, context)}
 
 
@@ -29,7 +29,7 @@ def without_dead(statements: list[ast.stmt], kept: set[str]) -> list[ast.stmt]:
     kept : names that are read elsewhere
     """
     while True:
-        needed, count = read(statements) | kept, [0]
+        needed, count = read_names(statements) | kept, [0]
         statements = _without(statements, needed, count)
         if not count[0]:
             return statements

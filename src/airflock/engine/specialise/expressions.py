@@ -12,27 +12,27 @@ from typing import Any
 
 import numpy as np
 
-from airflock.engine.specialise.apart import Owners
+from airflock.engine.specialise.apart import LocalOwners
 from airflock.engine.specialise.values import (
     LOAD,
     STORE,
-    Bundle,
-    Call,
-    Components,
-    Function,
+    ArrayBundle,
+    LocalVector,
     Scope,
-    given,
-    residual,
-    text_of,
+    StageCall,
+    StageFunction,
+    driver_name,
+    function_syntax,
+    is_syntax,
 )
 from airflock.engine.stages import records, words
-from airflock.engine.stages.words import Itself, Named, Nothing
+from airflock.engine.stages.words import IdentityRow, NamedConstant, ZeroRow
 
 # of the driver, whatever they are called with
 KEPT: dict[Any, str] = {
     word: word.__name__ for word in (words.real, words.integer, words.least, words.most, words.choose, words.copy_block)
-} | {words.place: "u64", words.repeat: "range", words.side_by_side: "prange"}
-LOCALS: dict[Any, str] = {word: word.__name__ for word in (words.vector, words.totals, words.aliases)}
+} | {words.row_index: "u64", words.repeat: "range", words.parallel: "prange"}
+LOCAL_KINDS: dict[Any, str] = {word: word.__name__ for word in (words.vector, words.totals, words.aliases)}
 STAGES = words.__name__.rpartition(".")[0]
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -46,10 +46,10 @@ MODULES = {math: "math", np: "np"}  # that drivers import
 MISSING = object()
 
 
-class Expressions:
+class ExpressionSpecialiser:
     """Values of expressions, by the type of their node."""
 
-    owners: Owners
+    owners: LocalOwners
 
     def value(self, node: ast.expr, scope: Scope) -> Any:
         """A known Python object, or syntax of the driver."""
@@ -58,18 +58,18 @@ class Expressions:
             raise scope.fault(node, f"{type(node).__name__} is not specialised")
         return method(self, node, scope)
 
-    def expr(self, node: ast.expr, scope: Scope) -> ast.expr:
+    def driver_syntax(self, node: ast.expr, scope: Scope) -> ast.expr:
         """Syntax of the driver for an expression."""
-        return self.printed(self.value(node, scope), node, scope)
+        return self.to_syntax(self.value(node, scope), node, scope)
 
-    def printed(self, value: object, node: ast.AST, scope: Scope) -> ast.expr:
+    def to_syntax(self, value: object, node: ast.AST, scope: Scope) -> ast.expr:
         """A value as syntax of the driver."""
         if isinstance(value, ast.expr):
             return value
-        if isinstance(value, Named):
+        if isinstance(value, NamedConstant):
             name = ast.Name(value.spelled.lstrip("-"), LOAD)
             return ast.UnaryOp(ast.USub(), name) if value.spelled[0] == "-" else name
-        if isinstance(value, Bundle):
+        if isinstance(value, ArrayBundle):
             return ast.Name(value.name, LOAD)
         if isinstance(value, float):
             return ast.Call(ast.Name("real", LOAD), [ast.Constant(value)], [])
@@ -77,17 +77,18 @@ class Expressions:
             return ast.Constant(value)
         if isinstance(value, slice):
             ends = (
-                None if end is None else self.printed(end, node, scope) for end in (value.start, value.stop, value.step)
+                None if end is None else self.to_syntax(end, node, scope)
+                for end in (value.start, value.stop, value.step)
             )
             return ast.Slice(*ends)
         if isinstance(value, (tuple, list)):
-            return ast.Tuple([self.printed(part, node, scope) for part in value], LOAD)
+            return ast.Tuple([self.to_syntax(part, node, scope) for part in value], LOAD)
         if isinstance(value, types.BuiltinFunctionType) or value in (range, abs, min, max, int):
             return ast.Name(value.__name__, LOAD)
         if isinstance(value, types.FunctionType) and value in KEPT:
             return ast.Name(KEPT[value], LOAD)
         if isinstance(value, (types.FunctionType, type)):
-            return given(value.__name__, "rule", value)
+            return driver_name(value.__name__, "rule", value)
         raise scope.fault(node, f"{value!r} has no text in a driver")
 
     def _Constant(self, node: ast.Constant, scope: Scope) -> object:
@@ -97,7 +98,7 @@ class Expressions:
         if node.id in scope.known:
             return scope.known[node.id]
         if node.id in scope.text.local:
-            return ast.Name(self.owners.spelled(node.id, scope.text), LOAD)
+            return ast.Name(self.owners.marked_name(node.id, scope.text), LOAD)
         value = scope.text.names.get(node.id, getattr(builtins, node.id, MISSING))
         if value is MISSING:
             raise scope.fault(node, f"{node.id} is not defined")
@@ -107,7 +108,7 @@ class Expressions:
         value = self.value(node.value, scope)
         if isinstance(value, types.ModuleType) and value in MODULES:
             return ast.Attribute(ast.Name(MODULES[value], LOAD), node.attr, LOAD)
-        if residual(value):
+        if is_syntax(value):
             return ast.Attribute(value, node.attr, LOAD)
         try:
             return getattr(value, node.attr)
@@ -116,9 +117,9 @@ class Expressions:
 
     def _Subscript(self, node: ast.Subscript, scope: Scope) -> object:
         value, at = self.value(node.value, scope), self.value(node.slice, scope)
-        if residual(value):
-            return ast.Subscript(value, self.printed(at, node, scope), LOAD)
-        if residual(at) and not isinstance(value, (Nothing, Itself)):
+        if is_syntax(value):
+            return ast.Subscript(value, self.to_syntax(at, node, scope), LOAD)
+        if is_syntax(at) and not isinstance(value, (ZeroRow, IdentityRow)):
             raise scope.fault(node, f"{ast.unparse(node)} is asked of what is known, by what is not")
         return value[at]
 
@@ -129,22 +130,22 @@ class Expressions:
 
     def _BinOp(self, node: ast.BinOp, scope: Scope) -> object:
         left, right = self.value(node.left, scope), self.value(node.right, scope)
-        if not residual(left) and not residual(right):
+        if not is_syntax(left) and not is_syntax(right):
             return OPERATORS[type(node.op)](left, right)
-        return ast.BinOp(self.printed(left, node, scope), node.op, self.printed(right, node, scope))
+        return ast.BinOp(self.to_syntax(left, node, scope), node.op, self.to_syntax(right, node, scope))
 
     def _UnaryOp(self, node: ast.UnaryOp, scope: Scope) -> object:
         value = self.value(node.operand, scope)
-        return ast.UnaryOp(node.op, value) if residual(value) else OPERATORS[type(node.op)](value)
+        return ast.UnaryOp(node.op, value) if is_syntax(value) else OPERATORS[type(node.op)](value)
 
     def _Compare(self, node: ast.Compare, scope: Scope) -> object:
         values = [self.value(part, scope) for part in (node.left, *node.comparators)]
         if len(values) == 2 and isinstance(node.ops[0], (ast.Is, ast.IsNot)):
             return OPERATORS[type(node.ops[0])](*values)
-        if not any(residual(value) for value in values):
+        if not any(is_syntax(value) for value in values):
             pairs = zip(node.ops, values, values[1:], strict=False)
             return all(OPERATORS[type(operation)](a, b) for operation, a, b in pairs)
-        left, *others = [self.printed(value, node, scope) for value in values]
+        left, *others = [self.to_syntax(value, node, scope) for value in values]
         return ast.Compare(left, node.ops, others)
 
     def _BoolOp(self, node: ast.BoolOp, scope: Scope) -> object:
@@ -153,7 +154,7 @@ class Expressions:
         value: object = not ends
         for part in node.values:
             value = self.value(part, scope)
-            if residual(value):
+            if is_syntax(value):
                 left.append(value)  # type: ignore[arg-type]
             elif bool(value) is ends:
                 if left:
@@ -161,15 +162,15 @@ class Expressions:
                 return value
         if not left:
             return value
-        if not residual(value) and bool(value) is ends:
-            left.append(self.printed(value, node, scope))
+        if not is_syntax(value) and bool(value) is ends:
+            left.append(self.to_syntax(value, node, scope))
         return left[0] if len(left) == 1 else ast.BoolOp(node.op, left)
 
     def _IfExp(self, node: ast.IfExp, scope: Scope) -> object:
         test = self.value(node.test, scope)
-        if not residual(test):
+        if not is_syntax(test):
             return self.value(node.body if test else node.orelse, scope)
-        return ast.IfExp(test, self.expr(node.body, scope), self.expr(node.orelse, scope))
+        return ast.IfExp(test, self.driver_syntax(node.body, scope), self.driver_syntax(node.orelse, scope))
 
     def _Tuple(self, node: ast.Tuple, scope: Scope) -> object:
         return tuple(self._items(node.elts, scope))
@@ -213,34 +214,34 @@ class Expressions:
 
     def _Call(self, node: ast.Call, scope: Scope) -> object:
         called = self.value(node.func, scope)
-        if called is words.ask:
+        if called is words.call_rule:
             return self._asked(node, scope)
         arguments = self._items(node.args, scope)
-        if called is words.between:
+        if called is words.lanes_between:
             return replace(arguments[0], within=tuple(arguments[1:]))
         if called is sum:
-            total, *terms = [self.printed(term, node, scope) for term in arguments[0]]
+            total, *terms = [self.to_syntax(term, node, scope) for term in arguments[0]]
             for term in terms:
                 total = ast.BinOp(total, ast.Add(), term)
             return total
-        if called is getattr and residual(arguments[0]):
+        if called is getattr and is_syntax(arguments[0]):
             return ast.Attribute(arguments[0], arguments[1], LOAD)
-        if isinstance(called, Call):
+        if isinstance(called, StageCall):
             return ast.parse(called.text, mode="eval").body
         if isinstance(called, types.FunctionType) and called.__module__.startswith(STAGES) and called not in KEPT:
-            if called.__module__ == words.__name__ and not any(residual(a) for a in arguments):
+            if called.__module__ == words.__name__ and not any(is_syntax(a) for a in arguments):
                 return called(*arguments)
-            return self.helper(called, node, arguments, scope)
+            return self.inline_expression(called, node, arguments, scope)
         keywords = {k.arg: self.value(k.value, scope) for k in node.keywords if k.arg}
         if isinstance(called, type) and called.__module__ == records.__name__:
             return called(*arguments, **keywords)  # taken apart again wherever a field is read
-        late = residual(called) or isinstance(called, types.FunctionType) or _record(called)
-        if not late and not any(residual(a) for a in (*arguments, *keywords.values())):
+        late = is_syntax(called) or isinstance(called, types.FunctionType) or _record(called)
+        if not late and not any(is_syntax(a) for a in (*arguments, *keywords.values())):
             return called(*arguments, **keywords)
         return ast.Call(
-            self.printed(called, node, scope),
-            [self.printed(argument, node, scope) for argument in arguments],
-            [ast.keyword(name, self.printed(value, node, scope)) for name, value in keywords.items()],
+            self.to_syntax(called, node, scope),
+            [self.to_syntax(argument, node, scope) for argument in arguments],
+            [ast.keyword(name, self.to_syntax(value, node, scope)) for name, value in keywords.items()],
         )
 
     def _asked(self, node: ast.Call, scope: Scope) -> ast.expr:
@@ -250,27 +251,34 @@ class Expressions:
         known: dict[str, Any] = {}
         for keyword in node.keywords:
             known |= self.value(keyword.value, scope) if keyword.arg is None else {}
-        if isinstance(rule, Function):
-            taken = [self.expr(offered[n], scope) if n in offered else ast.Name(n, LOAD) for n in rule.parameters]
+        if isinstance(rule, StageFunction):
+            taken = [
+                self.driver_syntax(offered[n], scope) if n in offered else ast.Name(n, LOAD) for n in rule.parameters
+            ]
             return ast.Call(ast.Name(rule.name, LOAD), taken, [])
         names = inspect.signature(rule).parameters
         for name in names:
             if name not in offered and name not in known:
                 raise scope.fault(node, f"{rule.__name__} asks for {name}, which is not offered")
-        handed = [self.printed(known[n], node, scope) if n in known else self.expr(offered[n], scope) for n in names]
-        return ast.Call(given(rule.__name__, "rule", rule), handed, [])
+        handed = [
+            self.to_syntax(known[n], node, scope) if n in known else self.driver_syntax(offered[n], scope)
+            for n in names
+        ]
+        return ast.Call(driver_name(rule.__name__, "rule", rule), handed, [])
 
-    def helper(self, called: Callable[..., Any], node: ast.Call, arguments: list[Any], scope: Scope) -> object:
+    def inline_expression(
+        self, called: Callable[..., Any], node: ast.Call, arguments: list[Any], scope: Scope
+    ) -> object:
         """Value of a helper that consists of one expression, in place of its call."""
-        inner = self.entered(called, node, arguments, scope)
+        inner = self.helper_scope(called, node, arguments, scope)
         last = inner.text.body[-1]
         if len(inner.text.body) > 1 or not isinstance(last, ast.Return) or last.value is None:
             raise scope.fault(node, f"{called.__name__} is more than one expression")
         return self.value(last.value, inner)
 
-    def entered(self, called: Callable[..., Any], node: ast.Call, arguments: list[Any], scope: Scope) -> Scope:
+    def helper_scope(self, called: Callable[..., Any], node: ast.Call, arguments: list[Any], scope: Scope) -> Scope:
         """Scope of a helper: what it is handed stands wherever it names it."""
-        text = text_of(called)
+        text = function_syntax(called)
         names = [a.arg for a in (*text.node.args.args, *text.node.args.kwonlyargs)]
         handed = dict(zip(names, arguments, strict=False))
         return Scope(text, handed | {k.arg: self.value(k.value, scope) for k in node.keywords if k.arg})
@@ -289,19 +297,21 @@ class Expressions:
         """Syntax of the driver for what is assigned to."""
         if isinstance(node, ast.Name):
             scope.known.pop(node.id, None)
-            return ast.Name(self.owners.spelled(node.id, scope.text), STORE)
+            return ast.Name(self.owners.marked_name(node.id, scope.text), STORE)
         if isinstance(node, ast.Tuple):
             return ast.Tuple([self.target(part, scope) for part in node.elts], STORE)
         if isinstance(node, ast.Subscript):
             value, at = self.value(node.value, scope), self.value(node.slice, scope)
-            if isinstance(value, Components):
+            if isinstance(value, LocalVector):
                 return value.store(at)
-            return ast.Subscript(self.printed(value, node, scope), self.printed(at, node, scope), STORE)
+            return ast.Subscript(self.to_syntax(value, node, scope), self.to_syntax(at, node, scope), STORE)
         raise scope.fault(node, f"{ast.unparse(node)} cannot be assigned to")
 
 
 BY_TYPE: dict[type, Callable[..., Any]] = {
-    getattr(ast, name[1:]): method for name, method in vars(Expressions).items() if name[0] == "_" and name[1].isupper()
+    getattr(ast, name[1:]): method
+    for name, method in vars(ExpressionSpecialiser).items()
+    if name[0] == "_" and name[1].isupper()
 }
 
 

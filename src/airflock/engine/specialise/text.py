@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Specialised:
+class SpecialisedText:
     """Text of a stage for one plan.
 
     bindings : lines that bind rows, records and integers
@@ -16,7 +16,7 @@ class Specialised:
 
     bindings: list[str]
     first: list[ast.stmt]
-    rest: list[ast.stmt]
+    agent_statements: list[ast.stmt]
     answer: str
 
     @property
@@ -27,7 +27,7 @@ class Specialised:
     @property
     def body(self) -> list[str]:
         """Lines of what is done for agents."""
-        return lines_of(self.rest)
+        return lines_of(self.agent_statements)
 
     @property
     def lines(self) -> list[str]:

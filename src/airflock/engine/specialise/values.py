@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import Any
 
-from airflock.core.rules.nodes import walk
-from airflock.engine.stages.words import NOTHING, ZERO
+from airflock.core import walk_tree
+from airflock.engine.stages.words import ZERO, ZERO_ROW
 
 LOAD, STORE = ast.Load(), ast.Store()
 
@@ -19,7 +19,7 @@ class StageError(Exception):
 
 
 @dataclass(frozen=True)
-class Loop:
+class AgentLoop:
     """A loop over all agents (`agents`, `lanes`: in turn the one agent that is due) or over the others of one.
 
     law    : the loop is only over those who fly by this law
@@ -33,30 +33,30 @@ class Loop:
 
 
 @dataclass(frozen=True)
-class Call:
+class StageCall:
     """Another stage that a stage is handed: the driver's call of it, whatever differs from call to call."""
 
     text: str
 
 
 @dataclass(frozen=True)
-class Function:
+class StageFunction:
     """Another stage as a function of the driver, to be asked: what it is not given it takes under the name it has."""
 
     name: str
     parameters: tuple[str, ...]
 
 
-class Bundle:
+class ArrayBundle:
     """A tuple of arrays: it is handed on whole under its own name, and its parts are bound to names of theirs."""
 
     def __init__(self, name: str, parts: tuple[str, ...]):
         self.name = name
-        self.__dict__ |= {part: given(part, name) for part in parts}
+        self.__dict__ |= {part: driver_name(part, name) for part in parts}
 
 
 @dataclass
-class Components:
+class LocalVector:
     """A local vector, totals or aliases: one variable of the driver for each component that is set."""
 
     name: str
@@ -71,15 +71,15 @@ class Components:
     def __getitem__(self, at: int) -> object:
         if at in self.set:
             return ast.Name(self.set[at], LOAD)
-        return NOTHING if self.kind == "aliases" else ZERO
+        return ZERO_ROW if self.kind == "aliases" else ZERO
 
 
-def argument(name: str) -> ast.Name:
+def driver_argument(name: str) -> ast.Name:
     """A parameter of a stage under the name that the driver's function has for it."""
     return ast.Name(name, LOAD)
 
 
-def given(name: str, kind: str, item: object = None) -> ast.Name:
+def driver_name(name: str, kind: str, item: object = None) -> ast.Name:
     """A name that the driver binds for a stage.
 
     kind : row, number, record, whole or scene; argument, of the driver's function; or rule, the plain function or class
@@ -90,13 +90,13 @@ def given(name: str, kind: str, item: object = None) -> ast.Name:
     return made
 
 
-def kind_of(value: object) -> str | None:
+def name_kind(value: object) -> str | None:
     """Which kind of name a driver binds for a stage this is, if it is one."""
     return getattr(value, "kind", None) if isinstance(value, ast.Name) else None
 
 
 @dataclass(frozen=True)
-class Text:
+class FunctionSyntax:
     """Syntax of a stage or of a helper.
 
     local : names that it binds, parameters among them
@@ -125,41 +125,43 @@ def _module(path: str) -> dict[tuple[str, int], ast.FunctionDef]:
 
 
 @cache
-def text_of(function: Callable[..., Any]) -> Text:
+def function_syntax(function: Callable[..., Any]) -> FunctionSyntax:
     """Syntax of a function of a module, read once."""
     code = function.__code__
     node = _module(code.co_filename)[code.co_name, code.co_firstlineno]
-    loops = [item for item in walk(node) if isinstance(item, ast.comprehension)]
-    inner = {id(name) for loop in loops for name in walk(loop.target)}
+    loops = [item for item in walk_tree(node) if isinstance(item, ast.comprehension)]
+    inner = {id(name) for loop in loops for name in walk_tree(loop.target)}
     bound = Counter(
         item.id
-        for item in walk(node)
+        for item in walk_tree(node)
         if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store) and id(item) not in inner
     )
     parameters = {a.arg for a in (*node.args.args, *node.args.kwonlyargs)}
     once = frozenset(name for name, count in bound.items() if count == 1 and name not in parameters)
     again = frozenset(bound) & parameters
-    return Text(node, frozenset(bound) | parameters, once, again, function.__globals__, function.__code__.co_filename)
+    return FunctionSyntax(
+        node, frozenset(bound) | parameters, once, again, function.__globals__, function.__code__.co_filename
+    )
 
 
 @dataclass
 class Scope:
     """What the names of a stage, or of a helper in it, stand for."""
 
-    text: Text
+    text: FunctionSyntax
     known: dict[str, object] = field(default_factory=dict)
 
-    def fault(self, node: ast.AST, what: str) -> StageError:
+    def fault(self, node: ast.AST, message: str) -> StageError:
         """An error that names the line of the stage."""
         line = getattr(node, "lineno", self.text.node.lineno)
-        return StageError(f"{self.text.where}:{line}: {self.text.node.name}: {what}")
+        return StageError(f"{self.text.where}:{line}: {self.text.node.name}: {message}")
 
 
-def residual(value: object) -> bool:
+def is_syntax(value: object) -> bool:
     """Whether a value is syntax of the driver."""
     return isinstance(value, ast.expr)
 
 
-def settled(value: object) -> bool:
+def needs_no_variable(value: object) -> bool:
     """Whether a local of this value needs no variable: it is known, or a name that the driver binds anyway."""
-    return not residual(value) or kind_of(value) not in (None, "rule")
+    return not is_syntax(value) or name_kind(value) not in (None, "rule")

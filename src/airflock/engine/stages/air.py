@@ -5,14 +5,14 @@ from collections.abc import Iterable
 from typing import Any
 
 from airflock.engine.plan import Plan
-from airflock.engine.stages.meet import free_way
-from airflock.engine.stages.records import Surroundings
-from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import ONE, SIDES, TINY, ZERO, X, Y, Z, choose, integer, least, vector
-from airflock.world.edges import nearest_image
+from airflock.engine.stages.meet import free_distance
+from airflock.engine.stages.records import WorldArrays
+from airflock.engine.stages.state import FlockRows
+from airflock.engine.stages.words import HALF_SIZES, ONE, TINY, ZERO, X, Y, Z, choose, integer, least, vector
+from airflock.world import nearest_image
 
 
-def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
+def squared_range(i: int, j: int, range2: Any, flock: FlockRows, *, plan: Plan) -> Any:
     """Square of how far packets of agent j carry to agent i, m²; who is seen need not send."""
     return (
         range2
@@ -25,10 +25,10 @@ def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
 
 def apart(there: Any, here: Any, a: int, w: Any, *, plan: Plan) -> Any:
     """Offset between two coordinates along one axis, to the nearest image, m."""
-    return nearest_image(there - here, getattr(w, SIDES[a])) if plan.periodic else there - here
+    return nearest_image(there - here, getattr(w, HALF_SIZES[a])) if plan.periodic else there - here
 
 
-def crowd(i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, *, plan: Plan) -> Any:
+def talkers_in_range(i: int, others: Iterable[int], range2: Any, flock: FlockRows, w: Any, *, plan: Plan) -> Any:
     """How many others are truly within the range of the radio of agent i."""
     talkers = ZERO
     for j in others:
@@ -40,16 +40,18 @@ def crowd(i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, *, p
     return talkers
 
 
-def shade(
-    i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, whole: Any, around: Surroundings, *, plan: Plan
+def fill_clear(
+    i: int, others: Iterable[int], range2: Any, flock: FlockRows, w: Any, whole: Any, around: WorldArrays, *, plan: Plan
 ) -> None:
     """Between agent i and whom obstacles or the scene stand, as both truly are: row `clear`."""
     for j in others:
-        open_way = unshaded(i, j, range2, flock, w, whole, around, plan=plan)
+        open_way = is_clear(i, j, range2, flock, w, whole, around, plan=plan)
         flock.clear[j] = open_way
 
 
-def unshaded(i: int, j: int, range2: Any, flock: Flock, w: Any, whole: Any, around: Surroundings, *, plan: Plan) -> Any:
+def is_clear(
+    i: int, j: int, range2: Any, flock: FlockRows, w: Any, whole: Any, around: WorldArrays, *, plan: Plan
+) -> Any:
     """Whether nothing stands between two agents in range of each other, as both truly are, 1 or 0."""
     x = flock.position
     open_way = ONE
@@ -62,6 +64,6 @@ def unshaded(i: int, j: int, range2: Any, flock: Flock, w: Any, whole: Any, arou
         ux = o[X] / r
         uy = o[Y] / r
         uz = o[Z] / r
-        free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, around, plan=plan)
+        free = free_distance(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, around, plan=plan)
         open_way = ZERO if free < r else ONE
     return open_way

@@ -11,18 +11,18 @@ from typing import Any
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.measure import offset
-from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import FAR, ONE, ZERO, between, choose, integer, least, most, real, vector
+from airflock.engine.stages.state import FlockRows
+from airflock.engine.stages.words import FAR, ONE, ZERO, choose, integer, lanes_between, least, most, real, vector
 
 # places in `held` (`passes.driver.flight` says what each is); DRIFT is the first of three
 TRAVELLED, GAP, CALM, ENDED, BEGUN, DRIFT, PACE, REACH = 0, 1, 2, 3, 4, 5, 8, 9
-HELD = 10
+HELD_SIZE = 10
 BLOCK = 32  # lanes that loops take at a time (`passes.driver.SPAN`)
 SLACK = 0.01  # m
 ROUNDING = 5e-7  # how much nearer two agents come in a step by rounding in single precision, for each m from the origin
 
 
-def set_out(held: Any, flock: Flock, n: int, *, plan: Plan) -> None:
+def start_drift(held: Any, flock: FlockRows, n: int, *, plan: Plan) -> None:
     """Keep the velocity with which the flock drifts, and how far from the origin agents are, m."""
     mean = vector()
     for a in range(plan.dimensions):
@@ -38,7 +38,7 @@ def set_out(held: Any, flock: Flock, n: int, *, plan: Plan) -> None:
     held[REACH] = math.sqrt(far2)
 
 
-def approached(held: Any, fastest: Any, dt: Any) -> Any:
+def approach_bound(held: Any, fastest: Any, dt: Any) -> Any:
     """How much nearer two agents may have come in a step, m.
 
     fastest : largest squared speed beside the drift, m²/s²
@@ -47,12 +47,12 @@ def approached(held: Any, fastest: Any, dt: Any) -> Any:
     return 2.0 * math.sqrt(fastest) * dt + ROUNDING * held[REACH]
 
 
-def beside(i: int, a: int, held: Any, flock: Flock) -> Any:
+def velocity_beside_drift(i: int, a: int, held: Any, flock: FlockRows) -> Any:
     """Velocity of agent i along one axis beside the drift, m/s."""
     return flock.velocity[a][i] - held[DRIFT + a]
 
 
-def nearest(lanes: Iterable[int], flock: Flock, numbers: Any, n: int, m: int, *, plan: Plan) -> Any:
+def nearest(lanes: Iterable[int], flock: FlockRows, numbers: Any, n: int, m: int, *, plan: Plan) -> Any:
     """Least distance of a pair, m."""
     own, d = vector(), vector()
     nn = integer(n)
@@ -61,7 +61,7 @@ def nearest(lanes: Iterable[int], flock: Flock, numbers: Any, n: int, m: int, *,
         for a in range(plan.dimensions):
             own[a] = flock.position[a][i]
         near2 = FAR
-        for j in between(lanes, i // BLOCK * BLOCK, m):
+        for j in lanes_between(lanes, i // BLOCK * BLOCK, m):
             r2 = offset(d, own, flock.position, j, numbers.w, plan=plan)
             near2 = least(near2, choose((integer(j) > integer(i)) & (integer(j) < nn), r2, FAR))
         least2 = least(least2, near2)

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import (
     AWAY,
     BLOCK,
     FAR,
+    HALF_SIZES,
     ONE,
-    SIDES,
-    START,
+    REDUCTION_START,
     ZERO,
     X,
     Y,
@@ -26,20 +26,20 @@ from airflock.engine.stages.words import (
     integer,
     least,
     most,
+    parallel,
     real,
     repeat,
-    side_by_side,
     vector,
 )  # fmt: skip
 
-CELLS = 4  # at most so many cells per agent: a flock that has dispersed widely does not fill the memory
+MAX_CELLS_PER_AGENT = 4  # at most so many cells per agent: a flock that has dispersed widely does not fill the memory
 SPARE = 8  # cells of the smallest periodic box
 CHUNKS = 8  # parts of the flock that are counted side by side; their order is that of the agents
 STRIP = 16  # lines side by side before those above them: three layers of so many stay in the second-level cache
 WHO, GROUP = "who", "group_of"  # what else of candidates is laid side by side: their numbers, their groups
 
 
-def box(n: int, near: Any, most_cells: int, flock: Flock, numbers: Any, work: Any, *, plan: Plan) -> Any:
+def cell_box(n: int, near: Any, most_cells: int, flock: FlockRows, numbers: Any, work: Any, *, plan: Plan) -> Any:
     """Lower corner (m), cell size (m) and number of cells per axis: of the periodic box, or around the flock.
 
     Cells are no smaller than `near` (m), and about `most_cells` at most; never more than there is memory for.
@@ -52,11 +52,11 @@ def box(n: int, near: Any, most_cells: int, flock: Flock, numbers: Any, work: An
     volume = ONE
     for a in range(plan.dimensions):
         if plan.periodic:
-            low[a] = -getattr(w, SIDES[a])
-            width[a] = getattr(w, SIDES[a]) + getattr(w, SIDES[a])
+            low[a] = -getattr(w, HALF_SIZES[a])
+            width[a] = getattr(w, HALF_SIZES[a]) + getattr(w, HALF_SIZES[a])
         else:
             lowest = FAR
-            highest = START["max"]
+            highest = REDUCTION_START["max"]
             for i in range(n):
                 lowest = least(lowest, x[a][i])
                 highest = most(highest, x[a][i])
@@ -69,7 +69,7 @@ def box(n: int, near: Any, most_cells: int, flock: Flock, numbers: Any, work: An
         for a in range(plan.dimensions):
             count[a] = max(fewest, int(width[a] / side))
         # a flock that has dispersed along a line or in a plane still has too many
-        if count[X] * count[Y] * count[Z] <= CELLS * n + SPARE:
+        if count[X] * count[Y] * count[Z] <= MAX_CELLS_PER_AGENT * n + SPARE:
             break
         side *= 1.25
     for a in range(plan.dimensions):
@@ -77,13 +77,13 @@ def box(n: int, near: Any, most_cells: int, flock: Flock, numbers: Any, work: An
     return low, size, count
 
 
-def along(a: int, i: int, flock: Flock, first: Any, per: Any, last: Any) -> Any:
+def cell_along(a: int, i: int, flock: FlockRows, first: Any, per: Any, last: Any) -> Any:
     """Number of the cell of agent i along one axis."""
     return min(max(int((flock.position[a][i] - first[a]) * per[a]), 0), last[a])
 
 
-def sort(
-    n: int, flock: Flock, starts: Any, tally: Any, cell_of: Any, packed: Any, flat: Any, whose: Any,
+def sort_by_cells(
+    n: int, flock: FlockRows, starts: Any, tally: Any, cell_of: Any, packed: Any, flat: Any, whose: Any,
     boxed: Callable[[], Any], *, plan: Plan,
 ) -> Any:  # fmt: skip
     """Sort agents by cell; returns cell size (m) and number of cells per axis.
@@ -93,13 +93,13 @@ def sort(
     starts, tally   : first place of each cell; agents by chunk and cell, in one row
     cell_of, whose  : cell of each agent, agent at each place
     packed, flat    : states by place and component, and by component and place
-    boxed           : the stage `box`
+    boxed           : the stage `cell_box`
     """
     axes = range(plan.dimensions)
     states = [*[flock.position[a] for a in axes], *[flock.velocity[a] for a in axes]]
     low, size, count = boxed()
     total = count[X] * count[Y] * count[Z]
-    for chunk in side_by_side(CHUNKS):
+    for chunk in parallel(CHUNKS):
         head = chunk * total
         for cell in range(total):
             tally[head + cell] = 0
@@ -110,10 +110,10 @@ def sort(
             last[a] = count[a] - 1
         for i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS):
             cell = (
-                along(Z, i, flock, first, per, last) * count[Y] + along(Y, i, flock, first, per, last)
+                cell_along(Z, i, flock, first, per, last) * count[Y] + cell_along(Y, i, flock, first, per, last)
                 if plan.dimensions == 3
-                else along(Y, i, flock, first, per, last)
-            ) * count[X] + along(X, i, flock, first, per, last)
+                else cell_along(Y, i, flock, first, per, last)
+            ) * count[X] + cell_along(X, i, flock, first, per, last)
             cell_of[i] = cell
             tally[head + cell] += 1
     before = 0
@@ -124,7 +124,7 @@ def sort(
             tally[share * total + cell] = before
             before += held
     starts[total] = before
-    for chunk in side_by_side(CHUNKS):
+    for chunk in parallel(CHUNKS):
         head = chunk * total
         for i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS):
             place = tally[head + cell_of[i]]
@@ -132,14 +132,14 @@ def sort(
             whose[place] = i
             for c, row in enumerate(states):
                 packed[place, c] = row[i]
-    for chunk in side_by_side(CHUNKS):
+    for chunk in parallel(CHUNKS):
         for e in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS):
             for c in range(2 * plan.dimensions):
                 flat[c, e] = packed[e, c]
     return size, count
 
 
-def place_of_line(line: int, count: Any) -> Any:
+def line_position(line: int, count: Any) -> Any:
     """Where a line of cells lies along y and z; lines come strip by strip."""
     wide = STRIP * count[Z]
     strip = line // wide
@@ -149,45 +149,45 @@ def place_of_line(line: int, count: Any) -> Any:
     return oy, oz
 
 
-def beside(o: Any, count: Any, *, plan: Plan) -> Any:
+def cells_beside(o: Any, count: Any, *, plan: Plan) -> Any:
     """The cell o along an axis and those beside it; of a periodic box also beyond its ends."""
     return range(o - 1, o + 2) if plan.periodic else range(max(o - 1, 0), min(o + 2, count))
 
 
-def within(q: Any, count: Any, *, plan: Plan) -> Any:
+def wrap_cell(q: Any, count: Any, *, plan: Plan) -> Any:
     """Number of a cell along an axis, of a periodic box that goes on at its other end."""
     return (q + count) % count if plan.periodic else q
 
 
-def row_of(cy: Any, cz: Any, count: Any, *, plan: Plan) -> Any:
+def first_cell_of_row(cy: Any, cz: Any, count: Any, *, plan: Plan) -> Any:
     """Number of the first cell of a row along x."""
     return (cz * count[Y] + cy if plan.dimensions == 3 else cy) * count[X]
 
 
-def room_around(oy: int, oz: int, starts: Any, count: Any, *, plan: Plan) -> Any:
+def agents_around(oy: int, oz: int, starts: Any, count: Any, *, plan: Plan) -> Any:
     """How many agents lie in and around a line of cells."""
     room = 0
-    for qz in beside(oz, count[Z], plan=plan) if plan.dimensions == 3 else (0,):
-        cz = within(qz, count[Z], plan=plan)
-        for qy in beside(oy, count[Y], plan=plan):
-            cy = within(qy, count[Y], plan=plan)
-            base = row_of(cy, cz, count, plan=plan)
+    for qz in cells_beside(oz, count[Z], plan=plan) if plan.dimensions == 3 else (0,):
+        cz = wrap_cell(qz, count[Z], plan=plan)
+        for qy in cells_beside(oy, count[Y], plan=plan):
+            cy = wrap_cell(qy, count[Y], plan=plan)
+            base = first_cell_of_row(cy, cz, count, plan=plan)
             room += starts[base + count[X]] - starts[base]
             if plan.periodic:  # its ends are met beyond its other ends, too
                 room += starts[base + 1] - starts[base] + starts[base + count[X]] - starts[base + count[X] - 1]
     return room
 
 
-def image(q: Any, c: Any, count: Any, width: Any) -> Any:
+def image_shift(q: Any, c: Any, count: Any, width: Any) -> Any:
     """How far the image q of cell c of a periodic box of this width (m) is shifted along an axis, m."""
     return real((q - c) // count) * width
 
 
 def copy_cell(
-    origin: int, inside: int, found: int, shift: Any, flat: Any, ident: Any, whose: Any, box: Any, flock: Flock,
+    origin: int, inside: int, found: int, shift: Any, flat: Any, ident: Any, whose: Any, box: Any, flock: FlockRows,
     *, plan: Plan, carried: tuple[tuple[str, Any], ...],
 ) -> None:  # fmt: skip
-    """Copy the agents at places from `origin` on to `box`, behind those found so far, shifted to their image."""
+    """Copy the agents at places from `origin` on to `cell_box`, behind those found so far, shifted to their image."""
     for s in range(0, inside, BLOCK):  # past the end of a cell, where the next ones overwrite it
         for a in range(plan.dimensions):
             copy_block(box, a, found + s, flat, origin + s, shift[a])
@@ -199,11 +199,22 @@ def copy_cell(
                 row[found + s] = ident[origin + s] if what == WHO else flock.own("", "group")[whose[origin + s]]
 
 
-def copied(
-    oy: int, oz: int, starts: Any, flat: Any, ident: Any, whose: Any, box: Any, count: Any, flock: Flock, numbers: Any,
-    *, plan: Plan, carried: tuple[tuple[str, Any], ...],
-) -> Any:  # fmt: skip
-    """Copy the agents in and around a line of cells to `box`, slab by slab, at the images that they are met at.
+def copy_line(
+    oy: int,
+    oz: int,
+    starts: Any,
+    flat: Any,
+    ident: Any,
+    whose: Any,
+    box: Any,
+    count: Any,
+    flock: FlockRows,
+    numbers: Any,
+    *,
+    plan: Plan,
+    carried: tuple[tuple[str, Any], ...],
+) -> Any:
+    """Copy the agents in and around a line of cells to `cell_box`, slab by slab, at the images that they are met at.
 
     Returns where each slab begins, where in it the own cell begins, and how many were copied.
 
@@ -219,18 +230,18 @@ def copied(
         width_x = w.half_x + w.half_x
     for qx in range(-1, count[X] + 1) if plan.periodic else range(0, count[X]):
         slab[qx + 1] = found
-        cx = within(qx, count[X], plan=plan)
+        cx = wrap_cell(qx, count[X], plan=plan)
         if plan.periodic:
-            shift[X] = image(qx, cx, count[X], width_x)
-        for qz in beside(oz, count[Z], plan=plan) if plan.dimensions == 3 else (0,):
-            cz = within(qz, count[Z], plan=plan)
+            shift[X] = image_shift(qx, cx, count[X], width_x)
+        for qz in cells_beside(oz, count[Z], plan=plan) if plan.dimensions == 3 else (0,):
+            cz = wrap_cell(qz, count[Z], plan=plan)
             if plan.periodic and plan.dimensions == 3:
-                shift[Z] = image(qz, cz, count[Z], w.half_z + w.half_z)
-            for qy in beside(oy, count[Y], plan=plan):
-                cy = within(qy, count[Y], plan=plan)
+                shift[Z] = image_shift(qz, cz, count[Z], w.half_z + w.half_z)
+            for qy in cells_beside(oy, count[Y], plan=plan):
+                cy = wrap_cell(qy, count[Y], plan=plan)
                 if plan.periodic:
-                    shift[Y] = image(qy, cy, count[Y], w.half_y + w.half_y)
-                base = row_of(cy, cz, count, plan=plan)
+                    shift[Y] = image_shift(qy, cy, count[Y], w.half_y + w.half_y)
+                base = first_cell_of_row(cy, cz, count, plan=plan)
                 if (qy == oy) & (qz == oz) if plan.dimensions == 3 else qy == oy:
                     middle[min(max(qx, 0), count[X])] = found
                 origin = starts[base + cx]
@@ -243,7 +254,7 @@ def copied(
     return slab, middle, found
 
 
-def filled_up(found: int, h: Any, hv: Any, *, plan: Plan, carried: tuple[tuple[str, Any], ...]) -> None:
+def pad_candidates(found: int, h: Any, hv: Any, *, plan: Plan, carried: tuple[tuple[str, Any], ...]) -> None:
     """Nobody, behind the last candidate: loops take them in whole blocks. h, hv : rows of positions and velocities."""
     for s in range(found, found + BLOCK):
         for a in range(plan.dimensions):

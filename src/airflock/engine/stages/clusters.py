@@ -8,27 +8,36 @@ those whose links have been looked at.
 import math
 from typing import Any
 
-from airflock.core.contract import Metric
-from airflock.core.vocabulary import Mean
+from airflock.core import Mean, Metric
 from airflock.engine.plan import Plan
-from airflock.engine.stages.measure import add, clear, filled, found, means, moving, offset
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.measure import (
+    add_terms,
+    agent_arguments,
+    clear_totals,
+    mean_of_sum,
+    offset,
+    record_of_totals,
+    shared_record,
+)
+from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import (
     ONE,
     ZERO,
     X,
     Y,
     Z,
-    ask,
+    call_rule,
     integer,
     real,
+    rule_asks,
     totals,
     vector,
-    wants,
 )  # fmt: skip
 
 
-def expand(e: int, state: Any, expanded: Any, flock: Flock, numbers: Any, n: int, *, plan: Plan, metric: Metric) -> Any:
+def expand_agent(
+    e: int, state: Any, expanded: Any, flock: FlockRows, numbers: Any, n: int, *, plan: Plan, metric: Metric
+) -> Any:
     """Take whoever is linked to agent e, and in no cluster yet, into the cluster that grows; returns how many."""
     own = vector()
     for a in range(plan.dimensions):
@@ -39,13 +48,13 @@ def expand(e: int, state: Any, expanded: Any, flock: Flock, numbers: Any, n: int
         d = vector()
         r2 = offset(d, own, flock.position, j, numbers.w, plan=plan)
         r = math.sqrt(r2)
-        joins = integer(ask(metric.linked, r=r, r2=r2, q=numbers.q) & (state[j] == 0))
+        joins = integer(call_rule(metric.linked, r=r, r2=r2, q=numbers.q) & (state[j] == 0))
         state[j] |= joins
         fresh += joins
     return fresh
 
 
-def unexpanded(state: Any, expanded: Any, n: int) -> Any:
+def first_unexpanded(state: Any, expanded: Any, n: int) -> Any:
     """The first member of the cluster that grows whose links have not been looked at; -1 if there is none."""
     e = -1
     for j in range(n):
@@ -55,38 +64,52 @@ def unexpanded(state: Any, expanded: Any, n: int) -> Any:
     return e
 
 
-def grown(
-    first: int, done: int, state: Any, expanded: Any, flock: Flock, numbers: Any, n: int, *, plan: Plan, metric: Metric
+def grow_cluster(
+    first: int,
+    done: int,
+    state: Any,
+    expanded: Any,
+    flock: FlockRows,
+    numbers: Any,
+    n: int,
+    *,
+    plan: Plan,
+    metric: Metric,
 ) -> Any:
     """Let the cluster of agent `first` grow, where earlier ones hold `done` agents; returns how many it holds."""
     state[first] = 1
     size = 1
     e = first
     while e >= 0:
-        fresh = expand(e, state, expanded, flock, numbers, n, plan=plan, metric=metric)
+        fresh = expand_agent(e, state, expanded, flock, numbers, n, plan=plan, metric=metric)
         size += fresh
         if done + size == n:
             break
-        e = unexpanded(state, expanded, n)
+        e = first_unexpanded(state, expanded, n)
     return size
 
 
-def member(i: int, mean: Any, flock: Flock, numbers: Any, *, metric: Metric) -> Any:
+def call_member(i: int, mean: Any, flock: FlockRows, numbers: Any, *, metric: Metric) -> Any:
     """What the member rule of a metric says of agent i; mean : over its cluster."""
-    pair = found(metric.Pair, flock.pair, i, metric) if wants(metric.member, "pair") else None
-    return ask(metric.member, **moving(i, flock), pair=pair, mean=mean, q=numbers.q)
+    pair = shared_record(metric.Pair, flock.pair, i, metric) if rule_asks(metric.member, "pair") else None
+    return call_rule(metric.member, **agent_arguments(i, flock), pair=pair, mean=mean, q=numbers.q)
 
 
-def mean_over(size: int, s: Any, v: Any, h: Any, mean: Any, *, plan: Plan, metric: Metric) -> Any:
+def mean_from_sums(size: int, s: Any, v: Any, h: Any, mean: Any, *, plan: Plan, metric: Metric) -> Any:
     """Means of a cluster of so many members, from sums, where a rule for members asks for them; else of the flock."""
     return (
-        Mean(*means(s, size, plan=plan), *means(v, size, plan=plan), *means(h, size, plan=plan), real(size))  # type: ignore[call-arg]
+        Mean(
+            *mean_of_sum(s, size, plan=plan),
+            *mean_of_sum(v, size, plan=plan),
+            *mean_of_sum(h, size, plan=plan),
+            real(size),
+        )  # type: ignore[call-arg]
         if metric.member is not None
         else mean
     )
 
 
-def mean_of(size: int, mean: Any, state: Any, flock: Flock, n: int, *, plan: Plan, metric: Metric) -> Any:
+def cluster_mean(size: int, mean: Any, state: Any, flock: FlockRows, n: int, *, plan: Plan, metric: Metric) -> Any:
     """Means of the cluster that has grown, which has so many members; those of the flock where no rule is for them."""
     cx, cv, ch = vector(), vector(), vector()
     if metric.member is not None:
@@ -98,23 +121,23 @@ def mean_of(size: int, mean: Any, state: Any, flock: Flock, n: int, *, plan: Pla
                 for total, row in ((cx, flock.position), (cv, flock.velocity), (ch, flock.heading)):
                     for a in range(plan.dimensions):
                         total[a] = total[a] + row[a][j]
-    return mean_over(size, cx, cv, ch, mean, plan=plan, metric=metric)
+    return mean_from_sums(size, cx, cv, ch, mean, plan=plan, metric=metric)
 
 
-def members_of(mean: Any, state: Any, flock: Flock, numbers: Any, n: int, *, metric: Metric) -> Any:
+def sum_members(mean: Any, state: Any, flock: FlockRows, numbers: Any, n: int, *, metric: Metric) -> Any:
     """Sum the member rule of a metric over the cluster that has grown."""
     k = totals()
     if metric.member is not None:
-        clear(k, metric.Member, metric)
+        clear_totals(k, metric.Member, metric)
         for j in range(n):
             if state[j] == 1:
-                t = member(j, mean, flock, numbers, metric=metric)
-                add(k, t, metric.Member, metric)
-    return filled(metric.Member, k) if metric.member is not None else None
+                t = call_member(j, mean, flock, numbers, metric=metric)
+                add_terms(k, t, metric.Member, metric)
+    return record_of_totals(metric.Member, k) if metric.member is not None else None
 
 
-def clusters_of(
-    metric: Metric, mean: Any, flock: Flock, numbers: Any, n: int, m: int, labels: Any, *, plan: Plan
+def sum_clusters(
+    metric: Metric, mean: Any, flock: FlockRows, numbers: Any, n: int, m: int, labels: Any, *, plan: Plan
 ) -> Any:
     """Sum the cluster rule of a metric over all clusters.
 
@@ -125,7 +148,7 @@ def clusters_of(
     if metric.cluster is not None:
         state = labels[0]
         expanded = labels[1]
-        clear(u, metric.Cluster, metric)
+        clear_totals(u, metric.Cluster, metric)
         for i in range(m):
             state[i] = 0
             expanded[i] = 0
@@ -134,7 +157,7 @@ def clusters_of(
         while done < n:
             while state[first] != 0:
                 first += 1
-            size = grown(first, done, state, expanded, flock, numbers, n, plan=plan, metric=metric)
+            size = grow_cluster(first, done, state, expanded, flock, numbers, n, plan=plan, metric=metric)
             s = vector()
             for a in axes:
                 s[a] = ZERO
@@ -146,15 +169,15 @@ def clusters_of(
                 hh += inside * sum(h[a][j] * h[a][j] for a in axes)
                 if metric.member is None:
                     state[j] = integer(2) if state[j] != 0 else integer(0)
-            own_mean = mean_of(size, mean, state, flock, n, plan=plan, metric=metric)
-            members = members_of(own_mean, state, flock, numbers, n, metric=metric)
+            own_mean = cluster_mean(size, mean, state, flock, n, plan=plan, metric=metric)
+            members = sum_members(own_mean, state, flock, numbers, n, metric=metric)
             if metric.member is not None:
                 for j in range(n):
                     state[j] = integer(2) if state[j] != 0 else integer(0)
             done += size
-            t = ask(
+            t = call_rule(
                 metric.cluster, n=real(size), hx=s[X], hy=s[Y], hz=s[Z], hh=hh, members=members,
                 mean=own_mean, q=numbers.q,
             )  # fmt: skip
-            add(u, t, metric.Cluster, metric)
-    return filled(metric.Cluster, u) if metric.cluster is not None else None
+            add_terms(u, t, metric.Cluster, metric)
+    return record_of_totals(metric.Cluster, u) if metric.cluster is not None else None

@@ -7,20 +7,22 @@ rules want to know of that moment. Columns are written between two steps (`engin
 from collections.abc import Iterable
 from typing import Any
 
-from airflock.core.fault import ASKED, Fault
+from airflock.core import DISTURBED_STATES, Fault
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Axes, Flock
-from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, ask, choose, least, most, real
+from airflock.engine.stages.state import Axes, FlockRows
+from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, call_rule, choose, least, most, real
 
 
-def lasts(i: int, kind: Fault, time: Any, flock: Flock, numbers: Any) -> Any:
+def has_fault(i: int, kind: Fault, time: Any, flock: FlockRows, numbers: Any) -> Any:
     """Whether agent i suffers from a kind of fault at a time (s); half a step is as good as none."""
     return (time - flock.fault(kind.name, "onset")[i] > -HALF * numbers.c.dt) & (
         time - flock.fault(kind.name, "onset")[i] < flock.fault(kind.name, "lasts")[i] - HALF * numbers.c.dt
     )
 
 
-def struck(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan: Plan, kept: bool) -> tuple[int, int]:
+def struck(
+    lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, *, plan: Plan, kept: bool
+) -> tuple[int, int]:
     """Lanes among which all lie who suffer from a fault of motion at a time (s) or later: the first, and the end.
 
     There may be more of them than need be: who suffers no longer by a step, whatever the rounding, or lies between two
@@ -48,22 +50,22 @@ def struck(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan:
     return first, end
 
 
-def about(i: int, kind: Fault, time: Any, flock: Flock, *, plan: Plan) -> Any:
+def fault_arguments(i: int, kind: Fault, time: Any, flock: FlockRows, *, plan: Plan) -> Any:
     """What every rule of a fault may ask for: `since`, its numbers `f`, and what was so when it began."""
     return {
         "since": most(time - flock.fault(kind.name, "onset")[i], ZERO),
         "f": kind.record(*[flock.fault(kind.name, name)[i] for name in kind.fields]),
         **{
             name: flock.fault(kind.name, name)[i] if name[-1] in plan.axes else ZERO
-            for name in kind.onset
+            for name in kind.onset_names
             if not flock.then
         },
     }
 
 
-def mislead(
-    lanes: Iterable[int], kind: Fault, asked: str, decision: int, time: Any, position: Axes, velocity: Axes,
-    flock: Flock, numbers: Any, *, plan: Plan,
+def apply_state_faults(
+    lanes: Iterable[int], kind: Fault, state: str, decision: int, time: Any, position: Axes, velocity: Axes,
+    flock: FlockRows, numbers: Any, *, plan: Plan,
 ) -> None:  # fmt: skip
     """Disturb states by the rule `sense` or `tell` of a kind of fault; before it begins, keep what it may repeat.
 
@@ -71,27 +73,33 @@ def mislead(
     time  : at which these states were taken, s
     """
     for i in lanes:
-        on = lasts(i, kind, time, flock, numbers)
+        on = has_fault(i, kind, time, flock, numbers)
         for rows, at in ((position, "at_"), (velocity, "at_v")):
-            for a in [a for a in range(plan.dimensions) if at + "xyz"[a] in kind.kept(asked)]:
-                flock.kept(kind.name, asked, at + "xyz"[a])[i] = choose(
-                    on & (decision > 0), flock.kept(kind.name, asked, at + "xyz"[a])[i], rows[a][i]
+            for a in [a for a in range(plan.dimensions) if at + "xyz"[a] in kind.kept(state)]:
+                flock.kept(kind.name, state, at + "xyz"[a])[i] = choose(
+                    on & (decision > 0), flock.kept(kind.name, state, at + "xyz"[a])[i], rows[a][i]
                 )
-        t = ask(
-            kind.rules[ASKED[asked]], x=position[X][i], y=position[Y][i], z=position[Z][i], vx=velocity[X][i],
-            vy=velocity[Y][i], vz=velocity[Z][i], **about(i, kind, time, flock, plan=plan),
+        t = call_rule(
+            kind.rules[DISTURBED_STATES[state]],
+            x=position[X][i],
+            y=position[Y][i],
+            z=position[Z][i],
+            vx=velocity[X][i],
+            vy=velocity[Y][i],
+            vz=velocity[Z][i],
+            **fault_arguments(i, kind, time, flock, plan=plan),
             **{
-                name: flock.kept(kind.name, asked, name)[i] if name[-1] in plan.axes else ZERO
-                for name in kind.kept(asked)
+                name: flock.kept(kind.name, state, name)[i] if name[-1] in plan.axes else ZERO
+                for name in kind.kept(state)
             },
-        )  # fmt: skip
+        )
         for a in range(plan.dimensions):
             position[a][i] = choose(on, t[a], position[a][i])
         for a in range(plan.dimensions):
             velocity[a][i] = choose(on, t[a + 3], velocity[a][i])
 
 
-def tune(lanes: Iterable[int], decision: int, flock: Flock, numbers: Any, whole: Any, *, plan: Plan) -> None:
+def tune(lanes: Iterable[int], decision: int, flock: FlockRows, numbers: Any, whole: Any, *, plan: Plan) -> None:
     """Find how far each agent is heard and hears at a decision, and how far its clock is ahead, or was as it sent."""
     time = real(decision) * numbers.c.period
     if plan.suffers("radio"):
@@ -100,8 +108,8 @@ def tune(lanes: Iterable[int], decision: int, flock: Flock, numbers: Any, whole:
             out = reach
             into = reach
             for kind in plan.suffers("radio"):
-                on = lasts(i, kind, time, flock, numbers)
-                t = ask(kind.radio, reach=reach, **about(i, kind, time, flock, plan=plan))
+                on = has_fault(i, kind, time, flock, numbers)
+                t = call_rule(kind.radio, reach=reach, **fault_arguments(i, kind, time, flock, plan=plan))
                 out = least(out, choose(on, t[0], reach))
                 into = least(into, choose(on, t[1], reach))
             flock.reach_out[i] = choose(out < ZERO, -ONE, out * out)
@@ -113,33 +121,37 @@ def tune(lanes: Iterable[int], decision: int, flock: Flock, numbers: Any, whole:
             set_clocks(lanes, flock.sent_clock, then, flock.as_sent, numbers, plan=plan)
 
 
-def set_clocks(lanes: Iterable[int], clock: Any, time: Any, flock: Flock, numbers: Any, *, plan: Plan) -> None:
+def set_clocks(lanes: Iterable[int], clock: Any, time: Any, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
     """Fill a row with how far the clocks of agents are ahead at a time (s), by their faults."""
     for i in lanes:
         ahead = ZERO
         for kind in plan.suffers("clock"):
-            on = lasts(i, kind, time, flock, numbers)
-            t = ask(kind.clock, **about(i, kind, time, flock, plan=plan))
+            on = has_fault(i, kind, time, flock, numbers)
+            t = call_rule(kind.clock, **fault_arguments(i, kind, time, flock, plan=plan))
             ahead = ahead + choose(on, t, ZERO)
         clock[i] = ahead
 
 
-def overrule(agents: Iterable[int], flock: Flock, numbers: Any, time: float, *, plan: Plan) -> None:
+def overrule(agents: Iterable[int], flock: FlockRows, numbers: Any, time: float, *, plan: Plan) -> None:
     """Disturb the commands that laws have just given."""
     c = flock.command
     for i in agents:
         for kind in plan.suffers("overrule"):
-            t = ask(kind.overrule, cx=c[X][i], cy=c[Y][i], cz=c[Z][i], **about(i, kind, time, flock, plan=plan))
-            on = lasts(i, kind, time, flock, numbers)
+            t = call_rule(
+                kind.overrule, cx=c[X][i], cy=c[Y][i], cz=c[Z][i], **fault_arguments(i, kind, time, flock, plan=plan)
+            )
+            on = has_fault(i, kind, time, flock, numbers)
             for a in range(plan.dimensions):
                 c[a][i] = choose(on, t[a], c[a][i])
 
 
-def hinder(i: int, moved: Any, kind: Fault, time: Any, flock: Flock, numbers: Any, *, plan: Plan) -> Any:
+def apply_motion_fault(
+    i: int, moved: Any, kind: Fault, time: Any, flock: FlockRows, numbers: Any, *, plan: Plan
+) -> Any:
     """What the rule `motion` of a kind of fault makes of a motion step, m/s."""
     before = flock.before_step
-    return ask(
+    return call_rule(
         kind.motion, vx=before[X][i], vy=before[Y][i], vz=before[Z][i],
         cx=flock.command[X][i], cy=flock.command[Y][i], cz=flock.command[Z][i],
-        nx=moved[X], ny=moved[Y], nz=moved[Z], dt=numbers.c.dt, **about(i, kind, time, flock, plan=plan),
+        nx=moved[X], ny=moved[Y], nz=moved[Z], dt=numbers.c.dt, **fault_arguments(i, kind, time, flock, plan=plan),
     )  # fmt: skip

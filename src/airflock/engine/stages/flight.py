@@ -4,12 +4,12 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from airflock.core.contract import Metric
+from airflock.core import Metric
 from airflock.engine.plan import Plan
-from airflock.engine.stages.approach import BEGUN, CALM, ENDED, GAP, SLACK, TRAVELLED, approached, set_out
-from airflock.engine.stages.measure import Measured
-from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import HALF, ONE, ZERO, ask, most, place, real
+from airflock.engine.stages.approach import BEGUN, CALM, ENDED, GAP, SLACK, TRAVELLED, approach_bound, start_drift
+from airflock.engine.stages.measure import MeasuredMetric
+from airflock.engine.stages.state import FlockRows
+from airflock.engine.stages.words import HALF, ONE, ZERO, call_rule, most, real, row_index
 
 Stages = Mapping[str, Callable[..., Any]]  # by name: each takes what it asks for, of the rest it knows
 Order = Mapping[str, tuple[str, ...]]  # stages of each event that a plan has (`engine.schedule`)
@@ -27,12 +27,12 @@ def add_up(sums: Any, values: Any, sampled: Sampled, count: int) -> None:
     sums[count] += 1
 
 
-def width(metrics: tuple[Metric, ...], q: Any) -> Any:
+def metric_range(metrics: tuple[Metric, ...], q: Any) -> Any:
     """Distance beyond which no metric has anything to say of a pair, m."""
-    return most(width(metrics[:-1], q), ask(metrics[-1].within, q=q)) if metrics else ZERO
+    return most(metric_range(metrics[:-1], q), call_rule(metrics[-1].within, q=q)) if metrics else ZERO
 
 
-def forget(metrics: tuple[Measured, ...], memory: Any, n: int) -> None:
+def reset_metric_memory(metrics: tuple[MeasuredMetric, ...], memory: Any, n: int) -> None:
     """Put what metrics remember back to its start."""
     for one in metrics:
         for c, start in enumerate(getattr(one.metric.Memory, "_field_defaults", {}).values()):
@@ -40,16 +40,16 @@ def forget(metrics: tuple[Measured, ...], memory: Any, n: int) -> None:
                 memory[one.row + c, i] = float(start)
 
 
-def keep(frame: int, flock: Flock, frames: Any, n: int, *, plan: Plan, slots: bool) -> None:
+def keep(frame: int, flock: FlockRows, frames: Any, n: int, *, plan: Plan, slots: bool) -> None:
     """Keep positions, velocities and commands as a frame: frames[frame, component, agent]."""
     for i in range(n):
         for part, row in enumerate((flock.position, flock.velocity, flock.command)):
             for a in range(plan.dimensions):
                 c = part * plan.dimensions + a
-                frames[frame, c, place(flock.number[i]) if slots else i] = row[a][i]
+                frames[frame, c, row_index(flock.number[i]) if slots else i] = row[a][i]
 
 
-def record(step: int, first: int, frames: Any, whole: Any, *, stages: Stages) -> None:
+def keep_frame(step: int, first: int, frames: Any, whole: Any, *, stages: Stages) -> None:
     """Keep a frame, where there are any.
 
     The first frame is that of the first sample at or after the step `first`. Whether a flight is recorded is asked of
@@ -57,7 +57,7 @@ def record(step: int, first: int, frames: Any, whole: Any, *, stages: Stages) ->
     """
     if frames.shape[0] > 0:
         frame = step // whole.sample_every - (first + whole.sample_every - 1) // whole.sample_every
-        ask(stages["keep"], frame=frame)
+        call_rule(stages["keep"], frame=frame)
 
 
 def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
@@ -68,21 +68,21 @@ def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
     fastest = ZERO
     for i in range(n):
         for name in order[:-1]:
-            ask(stages[name], i=i)
-        fastest = most(fastest, ask(stages[order[-1]], i=i))
+            call_rule(stages[name], i=i)
+        fastest = most(fastest, call_rule(stages[order[-1]], i=i))
     return fastest
 
 
-def take(
+def sample_stage(
     name: str, time: Any, values: Any, sums: Any, *, stages: Stages, sampled: Mapping[str, tuple[Sampled, int]]
 ) -> None:
     """Let a stage measure, and add up what it found."""
-    ask(stages[name], time=time)
+    call_rule(stages[name], time=time)
     add_up(sums, values, *sampled[name])
 
 
 def prepare(
-    held: Any, flock: Flock, whole: Any, m: int, past: Any, *, stages: Stages, order: Order, slots: bool
+    held: Any, flock: FlockRows, whole: Any, m: int, past: Any, *, stages: Stages, order: Order, slots: bool
 ) -> None:
     """Once agents have their places: who lies in which slot, and what was sent before the first step."""
     if slots:
@@ -90,7 +90,7 @@ def prepare(
             flock.number[i] = i
     if order["send"]:
         for slot in range(whole.ring):
-            ask(stages["snapshot"], slot=slot, ring=past)
+            call_rule(stages["snapshot"], slot=slot, ring=past)
     held[BEGUN] = ONE
 
 
@@ -100,21 +100,21 @@ def sense(
     """What comes before anybody moves: what is sent, what changes in the world and, unless in turn, decisions."""
     for name in order["send"]:
         if (step + whole.delay) % whole.decide_every == 0:
-            ask(stages[name], slot=((step + whole.delay) // whole.decide_every) % whole.ring, ring=past)
+            call_rule(stages[name], slot=((step + whole.delay) // whole.decide_every) % whole.ring, ring=past)
     for name in order["world"]:
-        ask(stages[name], time=time, elapsed=numbers.c.dt)
+        call_rule(stages[name], time=time, elapsed=numbers.c.dt)
     if not plan.sequential and step % whole.decide_every == 0:
         k = step // whole.decide_every
         for name in order["decide"]:
             if name != "rearrange" or k % EVERY == 0:
-                ask(stages[name], k=k, k_=k, slot=k % whole.ring, ring=past, time=time, late=late)
+                call_rule(stages[name], k=k, k_=k, slot=k % whole.ring, ring=past, time=time, late=late)
 
 
 def advance(  # noqa: C901 - tests of the plan leave one way through
-    first: int, last: int, half: int, held: Any, flock: Flock, numbers: Any, whole: Any, n: int, m: int, past: Any,
+    first: int, last: int, half: int, held: Any, flock: FlockRows, numbers: Any, whole: Any, n: int, m: int, past: Any,
     memory: Any, values: Any, sums: Any, frames: Any,
     *, plan: Plan, stages: Stages, order: Order, sampled: Mapping[str, tuple[Sampled, int]],
-    watched: tuple[Measured, ...], drifts: bool, foretold: bool, collided: int, slots: bool,
+    watched: tuple[MeasuredMetric, ...], drifts: bool, foretold: bool, collided: int, slots: bool,
 ) -> int:  # fmt: skip
     """Fly the steps first to last - 1; returns the next one, or minus the first agent (from 1) that found no room.
 
@@ -129,7 +129,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
     """
     late = real(whole.delay) * numbers.c.dt
     if held[BEGUN] < HALF:
-        status = ask(stages["begin"])
+        status = call_rule(stages["begin"])
         if status < 0:
             return status  # type: ignore[no-any-return]
         prepare(held, flock, whole, m, past, stages=stages, order=order, slots=slots)
@@ -150,37 +150,41 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
         for name in order["watch"]:
             if step % whole.collide_every == 0:
                 if drifts and travelled >= gap:
-                    set_out(held, flock, n, plan=plan)
+                    start_drift(held, flock, n, plan=plan)
                 if foretold and calm and travelled >= gap:
-                    gap = ask(stages["nearest"]) - width(tuple(one.metric for one in watched), numbers.q) - SLACK
+                    gap = (
+                        call_rule(stages["nearest"])
+                        - metric_range(tuple(one.metric for one in watched), numbers.q)
+                        - SLACK
+                    )
                     travelled = ZERO
                 if watched and travelled < gap:  # nobody can have come near enough since pairs were last looked at
                     sums[sampled[name][1]] += 1
                     if not calm:
-                        forget(watched, memory, n)
+                        reset_metric_memory(watched, memory, n)
                         calm = True
                 elif watched:
-                    near = ask(stages[name], time=time)
+                    near = call_rule(stages[name], time=time)
                     add_up(sums, values, *sampled[name])
-                    gap = near - width(tuple(one.metric for one in watched), numbers.q) - SLACK
+                    gap = near - metric_range(tuple(one.metric for one in watched), numbers.q) - SLACK
                     travelled = ZERO
                     calm = False
                 else:
-                    take(name, time, values, sums, stages=stages, sampled=sampled)
+                    sample_stage(name, time, values, sums, stages=stages, sampled=sampled)
         if plan.stop and values[collided] > HALF:
             held[ENDED] = ONE
             following = step
             break
         if step % whole.sample_every == 0:
             for name in order["sample"]:
-                take(name, time, values, sums, stages=stages, sampled=sampled)
-            record(step, first, frames, whole, stages=stages)
+                sample_stage(name, time, values, sums, stages=stages, sampled=sampled)
+            keep_frame(step, first, frames, whole, stages=stages)
         if step < whole.steps:
             if plan.struck and (step == first or step % whole.decide_every == 0):  # between, nobody changes places
-                hurt_first, hurt_end = ask(stages["struck"], time=time)
-            fastest = ask(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
+                hurt_first, hurt_end = call_rule(stages["struck"], time=time)
+            fastest = call_rule(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
             if drifts:  # noqa: SIM108 - a helper of several lines stands where it is assigned
-                nearer = approached(held, fastest, numbers.c.dt)
+                nearer = approach_bound(held, fastest, numbers.c.dt)
             else:
                 nearer = 2.0 * math.sqrt(fastest) * numbers.c.dt
             travelled += nearer
@@ -191,9 +195,21 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
 
 
 def measure_frames(
-    first: int, flock: Flock, whole: Any, n: int, values: Any, sums: Any, frames: Any, series: Any, frame_period: float,
-    *, plan: Plan, stages: Stages, order: Order, sampled: Mapping[str, tuple[Sampled, int]],
-) -> int:  # fmt: skip
+    first: int,
+    flock: FlockRows,
+    whole: Any,
+    n: int,
+    values: Any,
+    sums: Any,
+    frames: Any,
+    series: Any,
+    frame_period: float,
+    *,
+    plan: Plan,
+    stages: Stages,
+    order: Order,
+    sampled: Mapping[str, tuple[Sampled, int]],
+) -> int:
     """Measure a recording, whose first frame has the number `first`: the values of each frame to `series`.
 
     frame_period : s
@@ -206,13 +222,13 @@ def measure_frames(
             for a in range(plan.dimensions):
                 flock.velocity[a][i] = frames[step - first, plan.dimensions + a, i]
         for name in order["world"]:
-            ask(stages[name], time=time, elapsed=frame_period)
+            call_rule(stages[name], time=time, elapsed=frame_period)
         for name in order["watch"]:
             if step % whole.collide_every == 0:
-                take(name, time, values, sums, stages=stages, sampled=sampled)
+                sample_stage(name, time, values, sums, stages=stages, sampled=sampled)
         for name in order["sample"]:
             if step % whole.sample_every == 0:
-                take(name, time, values, sums, stages=stages, sampled=sampled)
+                sample_stage(name, time, values, sums, stages=stages, sampled=sampled)
         for c in range(len(values)):
             series[step, c] = values[c]
     return 0

@@ -22,7 +22,7 @@ def gusts(numbers: Any, whole: Any, step: int, gust: Any, *, plan: Plan) -> Any:
     if plan.dryden:
         w4, w5, _, _ = random.draw(0, step, MORE, whole.world, whole.seed_low, whole.seed_high)
         ge, _ = random.normal_pair(w4, w5)
-        air = numbers.air
+        air = numbers.in_air
         gust[0] = dryden.along(gust[0], ga, numbers.c.dt, air.length, air.sigma, air.airspeed)
         side = dryden.across(gust[1], gust[2], gb, gc, numbers.c.dt, air.length, air.airspeed)
         rise = dryden.across(gust[3], gust[4], gd, ge, numbers.c.dt, air.length_up, air.airspeed)

@@ -4,38 +4,36 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from airflock.core.contract import Metric
-from airflock.core.maths import norm
-from airflock.core.vocabulary import Mean
+from airflock.core import Mean, Metric, norm
 from airflock.engine.plan import Plan
-from airflock.engine.stages.records import Surroundings
-from airflock.engine.stages.scene import contacts
-from airflock.engine.stages.state import Axes, Flock, entry_of
+from airflock.engine.stages.records import WorldArrays
+from airflock.engine.stages.scene import find_contacts
+from airflock.engine.stages.state import Axes, FlockRows, record_from_table
 from airflock.engine.stages.words import (
     FAR,
+    HALF_SIZES,
     ONE,
-    SIDES,
-    START,
+    REDUCTION_START,
     TINY,
     ZERO,
     X,
     Y,
     Z,
-    ask,
+    call_rule,
     choose,
-    fields,
+    field_indices,
     integer,
     least,
     real,
-    reduced,
+    reduce_term,
+    rule_asks,
     totals,
     vector,
-    wants,
 )  # fmt: skip
-from airflock.world.edges import nearest_image
+from airflock.world import nearest_image
 
 
-class Measured(NamedTuple):
+class MeasuredMetric(NamedTuple):
     """An order parameter that is measured, and where its numbers lie.
 
     value : the first of its values among those of all
@@ -49,24 +47,24 @@ class Measured(NamedTuple):
     total: int
 
 
-def measured(plan: Plan, clock: str) -> tuple[Measured, ...]:
+def measured_metrics(plan: Plan, clock: str) -> tuple[MeasuredMetric, ...]:
     """Metrics of a clock, and where their numbers lie."""
     found, value, row, total = [], 0, 0, 0
     for metric in plan.metrics:
         if metric.clock == clock:
-            found.append(Measured(metric, value, row, total))
-            total += len(fields(metric.Pair))
-        value += len(fields(metric.Sample))
-        row += len(fields(metric.Memory))
+            found.append(MeasuredMetric(metric, value, row, total))
+            total += len(field_indices(metric.Pair))
+        value += len(field_indices(metric.Sample))
+        row += len(field_indices(metric.Memory))
     return tuple(found)
 
 
-def means(total: Any, n: int, *, plan: Plan) -> Any:
+def mean_of_sum(total: Any, n: int, *, plan: Plan) -> Any:
     """Mean of a vector over n agents, from its sum."""
     return [total[a] / real(n) if a < plan.dimensions else ZERO for a in (X, Y, Z)]
 
 
-def headings(flock: Flock, n: int, *, plan: Plan, summed: str) -> Any:
+def fill_headings(flock: FlockRows, n: int, *, plan: Plan, summed: str) -> Any:
     """Speed and heading of each agent; returns the means of the flock.
 
     summed : of what a mean is taken: position x, velocity v, heading h
@@ -86,43 +84,43 @@ def headings(flock: Flock, n: int, *, plan: Plan, summed: str) -> Any:
             for a in axes:
                 total[a] = total[a] + row[a][i]
     return Mean(  # type: ignore[call-arg]
-        *(means(sx, n, plan=plan) if "x" in summed else (ZERO, ZERO, ZERO)),
-        *(means(sv, n, plan=plan) if "v" in summed else (ZERO, ZERO, ZERO)),
-        *(means(sh, n, plan=plan) if "h" in summed else (ZERO, ZERO, ZERO)),
+        *(mean_of_sum(sx, n, plan=plan) if "x" in summed else (ZERO, ZERO, ZERO)),
+        *(mean_of_sum(sv, n, plan=plan) if "v" in summed else (ZERO, ZERO, ZERO)),
+        *(mean_of_sum(sh, n, plan=plan) if "h" in summed else (ZERO, ZERO, ZERO)),
         real(n),
     )
 
 
-def names_of(record: Any) -> tuple[str, ...]:
+def field_names(record: Any) -> tuple[str, ...]:
     """Names of the fields of a record."""
     return tuple(record._fields)
 
 
-def ways(record: Any, metric: Metric) -> list[str]:
+def reductions(record: Any, metric: Metric) -> list[str]:
     """How each field of a record of a metric adds up: sum, min or max."""
-    return [metric.reduce.get(name, "sum") for name in names_of(record)]
+    return [metric.reduce.get(name, "sum") for name in field_names(record)]
 
 
-def clear(total: Any, record: Any, metric: Metric) -> None:
+def clear_totals(total: Any, record: Any, metric: Metric) -> None:
     """Totals of a record before its first term."""
-    for c, way in enumerate(ways(record, metric)):
-        total[c] = START[way]
+    for c, way in enumerate(reductions(record, metric)):
+        total[c] = REDUCTION_START[way]
 
 
-def add(total: Any, t: Any, record: Any, metric: Metric) -> None:
+def add_terms(total: Any, t: Any, record: Any, metric: Metric) -> None:
     """Add what a rule returns to the totals of a record."""
-    for c, way in enumerate(ways(record, metric)):
-        total[c] = reduced(way, total[c], t[c])
+    for c, way in enumerate(reductions(record, metric)):
+        total[c] = reduce_term(way, total[c], t[c])
 
 
-def filled(record: Any, total: Any) -> Any:
+def record_of_totals(record: Any, total: Any) -> Any:
     """A record of totals."""
-    return record(*[total[c] for c in fields(record)])
+    return record(*[total[c] for c in field_indices(record)])
 
 
-def found(record: Any, columns: Callable[[str, str], Any], i: int, metric: Metric) -> Any:
+def shared_record(record: Any, columns: Callable[[str, str], Any], i: int, metric: Metric) -> Any:
     """A record of agent i from columns that a rule of a metric has filled."""
-    return record(*[columns(metric.name, name)[i] for name in names_of(record)])
+    return record(*[columns(metric.name, name)[i] for name in field_names(record)])
 
 
 def offset(d: Any, own: Any, x: Axes, j: int, w: Any, *, plan: Plan) -> Any:
@@ -131,12 +129,12 @@ def offset(d: Any, own: Any, x: Axes, j: int, w: Any, *, plan: Plan) -> Any:
         d[a] = x[a][j] - own[a]
     if plan.periodic:
         for a in range(plan.dimensions):
-            d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
+            d[a] = nearest_image(d[a], getattr(w, HALF_SIZES[a]))
     return sum(d[a] * d[a] for a in range(plan.dimensions)) + TINY
 
 
-def pairs(
-    flock: Flock, numbers: Any, n: int, m: int, *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool,
+def sum_pairs(
+    flock: FlockRows, numbers: Any, n: int, m: int, *, plan: Plan, metrics: tuple[MeasuredMetric, ...], nearest: bool,
     abreast: bool,
 ) -> Any:  # fmt: skip
     """Sum the pair rules of all metrics over the others of each agent; returns the least squared distance, m².
@@ -152,18 +150,18 @@ def pairs(
             for h in range((n + 1) // 2):
                 i = 2 * h
                 last = min(i + 1, n - 1)  # of an odd flock the last one goes with itself
-                near2 = pairs_of((i, last), flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest)
+                near2 = sum_pairs_of((i, last), flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest)
         else:
             for i in range(n):
-                near2 = pairs_of((i,), flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest)
+                near2 = sum_pairs_of((i,), flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest)
                 if nearest:
                     least2 = least(least2, near2)
     return least2
 
 
-def pairs_of(
-    agents: tuple[int, ...], flock: Flock, numbers: Any, n: int, m: int,
-    *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool,
+def sum_pairs_of(
+    agents: tuple[int, ...], flock: FlockRows, numbers: Any, n: int, m: int,
+    *, plan: Plan, metrics: tuple[MeasuredMetric, ...], nearest: bool,
 ) -> Any:  # fmt: skip
     """The same of these agents, one or two."""
     axes, x = range(plan.dimensions), flock.position
@@ -176,8 +174,8 @@ def pairs_of(
         for a in axes:
             at[a] = x[a][e]
         for metric, _, _, first in paired:
-            for c, way in enumerate(ways(metric.Pair, metric)):
-                total[first + c] = START[way]
+            for c, way in enumerate(reductions(metric.Pair, metric)):
+                total[first + c] = REDUCTION_START[way]
     for j in range(m):
         for e, at, total in sides:
             d = vector()
@@ -185,22 +183,22 @@ def pairs_of(
             r = math.sqrt(r2)
             ok = (integer(j) != integer(e)) & (integer(j) < nn)
             for metric, _, _, first in paired:
-                t = ask(
+                t = call_rule(
                     metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=numbers.q,
                     lower=(ONE if integer(j) < integer(e) else ZERO),
                 )  # fmt: skip
-                for c, way in enumerate(ways(metric.Pair, metric)):
-                    total[first + c] = reduced(way, total[first + c], choose(ok, t[c], START[way]))
+                for c, way in enumerate(reductions(metric.Pair, metric)):
+                    total[first + c] = reduce_term(way, total[first + c], choose(ok, t[c], REDUCTION_START[way]))
             if nearest:
                 near2 = least(near2, choose(ok, r2, FAR))
     for e, _, total in sides:
         for metric, _, _, first in paired:
-            for c, name in enumerate(names_of(metric.Pair)):
+            for c, name in enumerate(field_names(metric.Pair)):
                 flock.pair(metric.name, name)[e] = total[first + c]
     return near2
 
 
-def moving(i: int, flock: Flock) -> Any:
+def agent_arguments(i: int, flock: FlockRows) -> Any:
     """Of agent i what every rule may ask for: position, velocity, heading and speed."""
     return {
         "x": flock.position[X][i], "y": flock.position[Y][i], "z": flock.position[Z][i], "speed": flock.speed[i],
@@ -209,17 +207,26 @@ def moving(i: int, flock: Flock) -> Any:
     }  # fmt: skip
 
 
-def judged(
-    i: int, pair: Any, shared: Any, kept: Any, mean: Any, flock: Flock, numbers: Any, *, metric: Metric
+def call_agent_rule(
+    i: int, pair: Any, shared: Any, kept: Any, mean: Any, flock: FlockRows, numbers: Any, *, metric: Metric
 ) -> Any:  # fmt: skip
     """What the agent rule of a metric says of agent i; and, where it remembers, what it is to remember."""
-    return ask(
-        metric.agent, **moving(i, flock), excursion=flock.excursion[i], touches=flock.touches[i], rays=flock.rays[i],
-        pair=pair, shared=shared, memory=kept, mean=mean, wing=numbers.wing, q=numbers.q,
-    )  # fmt: skip
+    return call_rule(
+        metric.agent,
+        **agent_arguments(i, flock),
+        excursion=flock.excursion[i],
+        touches=flock.touches[i],
+        rays=flock.rays[i],
+        pair=pair,
+        shared=shared,
+        memory=kept,
+        mean=mean,
+        wing=numbers.wing,
+        q=numbers.q,
+    )
 
 
-def agents_of(metric: Metric, row: int, mean: Any, flock: Flock, numbers: Any, n: int, memory: Any) -> Any:
+def sum_agents(metric: Metric, row: int, mean: Any, flock: FlockRows, numbers: Any, n: int, memory: Any) -> Any:
     """Sum the agent rule of a metric over all agents.
 
     mean        : over the flock
@@ -227,29 +234,46 @@ def agents_of(metric: Metric, row: int, mean: Any, flock: Flock, numbers: Any, n
     """
     total = totals()
     if metric.agent is not None:
-        clear(total, metric.Agent, metric)
+        clear_totals(total, metric.Agent, metric)
         for i in range(n):
-            pair = found(metric.Pair, flock.pair, i, metric) if wants(metric.agent, "pair") else None
-            shared = found(metric.Shared, flock.shared, i, metric) if wants(metric.agent, "shared") else None
-            if wants(metric.agent, "memory"):
-                before = entry_of(i, metric.Memory, memory, row)
-                t, kept = judged(i, pair, shared, before, mean, flock, numbers, metric=metric)
-                for c in fields(metric.Memory):
+            pair = shared_record(metric.Pair, flock.pair, i, metric) if rule_asks(metric.agent, "pair") else None
+            shared = (
+                shared_record(metric.Shared, flock.shared, i, metric) if rule_asks(metric.agent, "shared") else None
+            )
+            if rule_asks(metric.agent, "memory"):
+                before = record_from_table(i, metric.Memory, memory, row)
+                t, kept = call_agent_rule(i, pair, shared, before, mean, flock, numbers, metric=metric)
+                for c in field_indices(metric.Memory):
                     memory[row + c, i] = kept[c]
             else:
-                t = judged(i, pair, shared, None, mean, flock, numbers, metric=metric)
-            add(total, t, metric.Agent, metric)
-    return filled(metric.Agent, total) if metric.agent is not None else None
+                t = call_agent_rule(i, pair, shared, None, mean, flock, numbers, metric=metric)
+            add_terms(total, t, metric.Agent, metric)
+    return record_of_totals(metric.Agent, total) if metric.agent is not None else None
 
 
 def measure(
-    flock: Flock, numbers: Any, whole: Any, around: Surroundings, time: float, n: int, m: int, memory: Any, labels: Any,
+    flock: FlockRows,
+    numbers: Any,
+    whole: Any,
+    around: WorldArrays,
+    time: float,
+    n: int,
+    m: int,
+    memory: Any,
+    labels: Any,
     values: Any,
-    excursion: Callable[..., Any], survey: Mapping[str, Callable[[], None]],
+    excursion: Callable[..., Any],
+    survey: Mapping[str, Callable[[], None]],
     clustered: Mapping[str, Callable[..., Any]],
-    *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool, over: Callable[[], Any] | None,
-    abreast: bool, headed: bool, summed: str,
-) -> Any:  # fmt: skip
+    *,
+    plan: Plan,
+    metrics: tuple[MeasuredMetric, ...],
+    nearest: bool,
+    over: Callable[[], Any] | None,
+    abreast: bool,
+    headed: bool,
+    summed: str,
+) -> Any:
     """Write what metrics sample at one instant into `values`; returns the least distance of a pair, m.
 
     memory, labels : what metrics remember, by row and agent; two rows of integers, scratch
@@ -264,31 +288,31 @@ def measure(
     """
     x = flock.position
     if headed:  # noqa: SIM108 - a helper of several lines stands where it is assigned
-        mean = headings(flock, n, plan=plan, summed=summed)
+        mean = fill_headings(flock, n, plan=plan, summed=summed)
     else:
         mean = ()
     if over is not None:  # noqa: SIM108 - a helper of several lines stands where it is assigned
         least2 = over()
     else:
-        least2 = pairs(flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest, abreast=abreast)
-    if any(wants(one.metric.agent, "excursion") for one in metrics):
+        least2 = sum_pairs(flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest, abreast=abreast)
+    if any(rule_asks(one.metric.agent, "excursion") for one in metrics):
         for i in range(n):
             flock.excursion[i] = excursion(
                 x[X][i], x[Y][i], x[Z][i], numbers.w, around.edges, around.spans, whole.corners, whole.obstacles,
                 around.scene,
             )  # fmt: skip
-    if any(wants(one.metric.agent, "touches") for one in metrics):
-        contacts(flock, numbers, n, around.scene, plan=plan)
+    if any(rule_asks(one.metric.agent, "touches") for one in metrics):
+        find_contacts(flock, numbers, n, around.scene, plan=plan)
     for one in metrics:
         if one.metric.survey is not None:
             survey[one.metric.name]()
     for metric, value, row, _ in metrics:
-        agents = agents_of(metric, row, mean, flock, numbers, n, memory)
+        agents = sum_agents(metric, row, mean, flock, numbers, n, memory)
         clusters = clustered[metric.name](metric, mean, flock, numbers, n, m, labels, plan=plan)
-        t = ask(
+        t = call_rule(
             metric.sample, n=real(n), mean=mean, agents=agents, clusters=clusters, dimensions=real(plan.dimensions),
             time=time, q=numbers.q,
         )  # fmt: skip
-        for c in fields(metric.Sample):
+        for c in field_indices(metric.Sample):
             values[value + c] = t[c]
     return math.sqrt(least2)

@@ -4,49 +4,53 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from airflock.engine.plan import Plan
-from airflock.engine.stages.approach import beside
-from airflock.engine.stages.faults import hinder, lasts
-from airflock.engine.stages.state import Flock, column_of, numbers_of
+from airflock.engine.stages.approach import velocity_beside_drift
+from airflock.engine.stages.faults import apply_motion_fault, has_fault
+from airflock.engine.stages.state import FlockRows, agent_numbers, record_from_rows
 from airflock.engine.stages.words import (
-    SIDES,
+    HALF_SIZES,
     ZERO,
     X,
     Y,
     Z,
     aliases,
-    ask,
-    between,
+    call_rule,
     choose,
-    fields,
+    field_indices,
     integer,
+    lanes_between,
     most,
     real,
-    wants,
+    rule_asks,
 )
 
 
-def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
+def measured_velocity(i: int, a: int, flock: FlockRows, *, plan: Plan) -> Any:
     """Own velocity as agent i measures it along one axis, m/s."""
-    return flock.velocity[a][i] + flock.own_drift[a][i] if plan.noisy and a < plan.dimensions else flock.velocity[a][i]
+    return (
+        flock.velocity[a][i] + flock.own_drift[a][i]
+        if plan.has_sensor_error and a < plan.dimensions
+        else flock.velocity[a][i]
+    )
 
 
-def respond(
-    lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
+def apply_body_and_faults(
+    lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
     hurt_first: int, hurt_end: int, *, plan: Plan, kept: bool,
 ) -> None:  # fmt: skip
     """Velocities by the rule of the body and then, among those of whom anybody suffers from any, by its faults."""
     v = flock.velocity
     faults = plan.suffers("motion")
-    hurt = () if not faults else lanes if plan.sequential else between(lanes, hurt_first, hurt_end)
+    hurt = () if not faults else lanes if plan.sequential else lanes_between(lanes, hurt_first, hurt_end)
     for i in () if kept else hurt:
         for a in range(plan.dimensions):
             flock.before_step[a][i] = v[a][i]
-    accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
+    apply_body(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
     for i in hurt:
         t = (v[X][i], v[Y][i], v[Z][i])
         for kind in faults:
-            on = lasts(i, kind, time, flock, numbers)
-            s = hinder(i, t, kind, time, flock, numbers, plan=plan)
+            on = has_fault(i, kind, time, flock, numbers)
+            s = apply_motion_fault(i, t, kind, time, flock, numbers, plan=plan)
             t = (choose(on, s[X], t[X]), choose(on, s[Y], t[Y]), choose(on, s[Z], t[Z]))
         for a in range(plan.dimensions):
             v[a][i] = t[a]
@@ -54,27 +58,42 @@ def respond(
             flock.before_step[a][i] = t[a]
 
 
-def accelerate(
-    lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
+def apply_body(
+    lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
 ) -> None:
     """Velocities by the rule of the body."""
     v, command = flock.velocity, flock.command
     for i in lanes:
-        t = ask(
-            plan.body.move, vx=v[X][i], vy=v[Y][i], vz=v[Z][i], cx=command[X][i], cy=command[Y][i], cz=command[Z][i],
-            mx=felt(i, X, flock, plan=plan), my=felt(i, Y, flock, plan=plan), mz=felt(i, Z, flock, plan=plan),
-            gx=g[X][i], gy=g[Y][i], gz=g[Z][i], wx=wx, wy=wy, wz=wz if plan.dimensions == 3 else ZERO,
-            memory=column_of(i, plan.body.Memory, flock.body), dt=numbers.c.dt, wing=numbers.wing,
-            b=numbers_of(i, "b", flock, numbers, plan=plan),
-        )  # fmt: skip
+        t = call_rule(
+            plan.body.move,
+            vx=v[X][i],
+            vy=v[Y][i],
+            vz=v[Z][i],
+            cx=command[X][i],
+            cy=command[Y][i],
+            cz=command[Z][i],
+            mx=measured_velocity(i, X, flock, plan=plan),
+            my=measured_velocity(i, Y, flock, plan=plan),
+            mz=measured_velocity(i, Z, flock, plan=plan),
+            gx=g[X][i],
+            gy=g[Y][i],
+            gz=g[Z][i],
+            wx=wx,
+            wy=wy,
+            wz=wz if plan.dimensions == 3 else ZERO,
+            memory=record_from_rows(i, plan.body.Memory, flock.body),
+            dt=numbers.c.dt,
+            wing=numbers.wing,
+            b=agent_numbers(i, "b", flock, numbers, plan=plan),
+        )
         for a in range(plan.dimensions):
             v[a][i] = t[a]
-        for c in fields(plan.body.Memory):
+        for c in field_indices(plan.body.Memory):
             flock.body[c][i] = t[3][c]
 
 
 def move(
-    agents: Iterable[int], lanes: Iterable[int], flock: Flock, numbers: Any, step: int, n: int,
+    agents: Iterable[int], lanes: Iterable[int], flock: FlockRows, numbers: Any, step: int, n: int,
     noise: Callable[[], None], gusts: Callable[[], Any], held: Any, hurt_first: int, hurt_end: int,
     *, plan: Plan, watched: bool, drifts: bool, kept: bool,
 ) -> Any:  # fmt: skip
@@ -88,7 +107,7 @@ def move(
     """
     x, v = flock.position, flock.velocity
     g = aliases()
-    if wants(plan.body.move, "gx", "gy", "gz"):
+    if rule_asks(plan.body.move, "gx", "gy", "gz"):
         noise()
         for a in range(plan.dimensions):
             g[a] = flock.outer[a] if plan.dimensions == 3 or step % 2 == 0 else flock.outer[a + 2]
@@ -99,11 +118,14 @@ def move(
     if plan.windy:
         wx, wy, wz = gusts()
     if plan.integration != "old":
-        respond(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
+        apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
     fastest = ZERO
     for i in lanes if watched else ():  # whole vectors, of which some lanes have no agent
         if drifts:
-            speed2 = sum(beside(i, a, held, flock) * beside(i, a, held, flock) for a in range(plan.dimensions))
+            speed2 = sum(
+                velocity_beside_drift(i, a, held, flock) * velocity_beside_drift(i, a, held, flock)
+                for a in range(plan.dimensions)
+            )
         else:
             speed2 = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
         fastest = most(fastest, choose(integer(i) < integer(n), speed2, ZERO))
@@ -111,9 +133,9 @@ def move(
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
     if plan.integration == "old":
-        respond(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
-    if plan.edge:
+        apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
+    if plan.edge_rule:
         for i in agents:
             for a in range(plan.dimensions):
-                x[a][i], v[a][i] = plan.edge(x[a][i], v[a][i], getattr(numbers.w, SIDES[a]))
+                x[a][i], v[a][i] = plan.edge_rule(x[a][i], v[a][i], getattr(numbers.w, HALF_SIZES[a]))
     return fastest if watched else ZERO

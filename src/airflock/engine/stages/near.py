@@ -10,45 +10,47 @@ from typing import Any
 import numpy as np
 
 from airflock.engine.plan import Plan
-from airflock.engine.stages.measure import Measured, names_of, ways
-from airflock.engine.stages.records import Cells, Home
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.measure import MeasuredMetric, field_names, reductions
+from airflock.engine.stages.records import HomeCell, SortedCells
+from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import (
     FAR,
+    HALF_SIZES,
     ONE,
-    SIDES,
-    START,
+    REDUCTION_START,
     TINY,
     ZERO,
     X,
     Y,
     Z,
-    ask,
+    call_rule,
     choose,
-    fields,
+    field_indices,
     integer,
     least,
+    parallel,
     real,
-    reduced,
+    reduce_term,
     repeat,
-    side_by_side,
     totals,
     vector,
 )  # fmt: skip
-from airflock.world.edges import nearest_image
+from airflock.world import nearest_image
 
-SURE = 0.999  # of what rings are wide: the cell of an agent at its cell's edge may be that beside it, by rounding
+ROUNDING_MARGIN = (
+    0.999  # of what rings are wide: the cell of an agent at its cell's edge may be that beside it, by rounding
+)
 PARTS = 64  # of the flock, whatever the number of threads
 
 
-def placed(at: Any, cell: Any, count: Any) -> None:
+def cell_position(at: Any, cell: Any, count: Any) -> None:
     """Put the place of a cell along each axis into the vector `at`."""
     at[X] = cell % count[X]
     at[Y] = cell // count[X] % count[Y]
     at[Z] = cell // (count[X] * count[Y])
 
 
-def wrapped(c: Any, count: Any, *, plan: Plan) -> Any:
+def wrap_cell(c: Any, count: Any, *, plan: Plan) -> Any:
     """Number of a cell along an axis, where a periodic box goes on at its other end."""
     return c + (count if c < 0 else 0) - (count if c >= count else 0) if plan.periodic else c
 
@@ -59,14 +61,26 @@ def apart(d: Any, own: Any, flat: Any, f: int, w: Any, *, plan: Plan) -> Any:
         d[a] = flat[a, f] - own[a]
     if plan.periodic:
         for a in range(plan.dimensions):
-            d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
+            d[a] = nearest_image(d[a], getattr(w, HALF_SIZES[a]))
     return sum(d[a] * d[a] for a in range(plan.dimensions)) + TINY
 
 
-def in_run(
-    first: Any, last: Any, e: int, ii: Any, near2: Any, own: Any, sums: Any, flock: Flock, numbers: Any, cells: Cells,
-    *, plan: Plan, paired: list[Measured], nearest: bool,
-) -> Any:  # fmt: skip
+def sum_run(
+    first: Any,
+    last: Any,
+    e: int,
+    ii: Any,
+    near2: Any,
+    own: Any,
+    sums: Any,
+    flock: FlockRows,
+    numbers: Any,
+    cells: SortedCells,
+    *,
+    plan: Plan,
+    paired: list[MeasuredMetric],
+    nearest: bool,
+) -> Any:
     """Add all pairs with those at places first to last - 1 to the sums of the agent at place e; its least square."""
     for f in range(first, last):
         d = vector()
@@ -74,21 +88,33 @@ def in_run(
         r = math.sqrt(r2)
         ok = f != e
         for metric, _, _, start in paired:
-            t = ask(
+            t = call_rule(
                 metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=numbers.q,
                 lower=(ONE if integer(flock.number[cells.whose[f]]) < ii else ZERO),
             )  # fmt: skip
-            for c, way in enumerate(ways(metric.Pair, metric)):
-                sums[start + c] = reduced(way, sums[start + c], choose(ok, t[c], START[way]))
+            for c, way in enumerate(reductions(metric.Pair, metric)):
+                sums[start + c] = reduce_term(way, sums[start + c], choose(ok, t[c], REDUCTION_START[way]))
         if nearest:
             near2 = least(near2, choose(ok, r2, FAR))
     return near2
 
 
 def in_ring(
-    ring: int, home: Home, e: int, ii: Any, near2: Any, own: Any, sums: Any, flock: Flock, numbers: Any, cells: Cells,
-    *, plan: Plan, paired: list[Measured], nearest: bool,
-) -> Any:  # fmt: skip
+    ring: int,
+    home: HomeCell,
+    e: int,
+    ii: Any,
+    near2: Any,
+    own: Any,
+    sums: Any,
+    flock: FlockRows,
+    numbers: Any,
+    cells: SortedCells,
+    *,
+    plan: Plan,
+    paired: list[MeasuredMetric],
+    nearest: bool,
+) -> Any:
     """The same of all cells of a ring around the cell of the agent, of the first ring with what is inside of it.
 
     Cells side by side along x are one run of places; a run that goes over the ends of a periodic box is cut there.
@@ -96,7 +122,7 @@ def in_ring(
     at, low, high, count, starts = home.at, home.low, home.high, cells.count, cells.starts
     for oz in range(max(-ring, low[Z]), min(ring, high[Z]) + 1):
         for oy in range(max(-ring, low[Y]), min(ring, high[Y]) + 1):
-            row = wrapped(at[Z] + oz, count[Z], plan=plan) * count[Y] + wrapped(at[Y] + oy, count[Y], plan=plan)
+            row = wrap_cell(at[Z] + oz, count[Z], plan=plan) * count[Y] + wrap_cell(at[Y] + oy, count[Y], plan=plan)
             full = (ring == 1) | (abs(oz) == ring) | (abs(oy) == ring)
             for end in range(1 if full else 2):  # of a row that passes through the ring its two ends
                 west = at[X] + max(-ring if end == 0 else ring, low[X])
@@ -107,19 +133,19 @@ def in_ring(
                     begin = max(west - turn * count[X], 0)
                     stop = min(east - turn * count[X], count[X] - 1) + 1
                     if begin < stop:
-                        near2 = in_run(
+                        near2 = sum_run(
                             starts[row * count[X] + begin], starts[row * count[X] + stop], e, ii, near2, own, sums,
                             flock, numbers, cells, plan=plan, paired=paired, nearest=nearest,
                         )  # fmt: skip
     return near2
 
 
-def unsettled(beyond: Any, near2: Any, sums: Any, numbers: Any, *, paired: list[Measured], nearest: bool) -> Any:
+def unsettled(beyond: Any, near2: Any, sums: Any, numbers: Any, *, paired: list[MeasuredMetric], nearest: bool) -> Any:
     """Whether somebody farther than `beyond` could still change what is summed, 1 or 0."""
     open_ = 0
     for metric, _, _, first in paired:
-        pair = metric.Pair(*[sums[first + c] for c in fields(metric.Pair)])  # type: ignore[misc]
-        if not ask(metric.settled, pair=pair, beyond=beyond, q=numbers.q):
+        pair = metric.Pair(*[sums[first + c] for c in field_indices(metric.Pair)])  # type: ignore[misc]
+        if not call_rule(metric.settled, pair=pair, beyond=beyond, q=numbers.q):
             open_ = 1
     if nearest:  # noqa: SIM102 - the outer one is of the plan
         if near2 > beyond * beyond:
@@ -127,9 +153,9 @@ def unsettled(beyond: Any, near2: Any, sums: Any, numbers: Any, *, paired: list[
     return open_
 
 
-def pairs_of_place(
-    e: int, home: Home, flock: Flock, numbers: Any, cells: Cells, side: Any, rings: int,
-    *, plan: Plan, paired: list[Measured], nearest: bool,
+def sum_pairs_of_place(
+    e: int, home: HomeCell, flock: FlockRows, numbers: Any, cells: SortedCells, side: Any, rings: int,
+    *, plan: Plan, paired: list[MeasuredMetric], nearest: bool,
 ) -> Any:  # fmt: skip
     """Sum the pair rules for the agent at place e, ring by ring; returns the square of its least distance, m²."""
     i = cells.whose[e]
@@ -138,8 +164,8 @@ def pairs_of_place(
     for a in range(plan.dimensions):
         own[a] = cells.flat[a, e]
     for metric, _, _, first in paired:
-        for c, way in enumerate(ways(metric.Pair, metric)):
-            sums[first + c] = START[way]
+        for c, way in enumerate(reductions(metric.Pair, metric)):
+            sums[first + c] = REDUCTION_START[way]
     near2 = FAR
     ring = 1
     going = 1
@@ -147,19 +173,19 @@ def pairs_of_place(
         near2 = in_ring(
             ring, home, e, ii, near2, own, sums, flock, numbers, cells, plan=plan, paired=paired, nearest=nearest
         )  # fmt: skip
-        beyond = real(SURE) * real(ring) * side
+        beyond = real(ROUNDING_MARGIN) * real(ring) * side
         open_ = unsettled(beyond, near2, sums, numbers, paired=paired, nearest=nearest)
         going = open_ if ring < rings else 0
         ring += 1
     for metric, _, _, first in paired:
-        for c, name in enumerate(names_of(metric.Pair)):
+        for c, name in enumerate(field_names(metric.Pair)):
             flock.pair(metric.name, name)[i] = sums[first + c]
     return near2
 
 
 def pairs_by_cells(
-    flock: Flock, numbers: Any, cells: Cells, sides: Any,
-    *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool,
+    flock: FlockRows, numbers: Any, cells: SortedCells, sides: Any,
+    *, plan: Plan, metrics: tuple[MeasuredMetric, ...], nearest: bool,
 ) -> Any:  # fmt: skip
     """What `pairs` finds, for metrics that say when their pairs are `settled`.
 
@@ -174,18 +200,18 @@ def pairs_by_cells(
         side = least(side, sides[a])
         rings = max(rings, count[a])
     nearest2 = np.empty(PARTS, np.float64)
-    for part in side_by_side(PARTS):
+    for part in parallel(PARTS):
         part2 = FAR
         at, low, high = vector(), vector(), vector()
-        home = Home(at, low, high)
+        home = HomeCell(at, low, high)
         for here in range(total * part // PARTS, total * (part + 1) // PARTS):
             if starts[here] < starts[here + 1]:
-                placed(at, here, count)
+                cell_position(at, here, count)
                 for a in (X, Y, Z):  # a periodic box has no ends: half of its cells lie on either side
                     low[a] = -((count[a] - 1) // 2) if plan.periodic else -at[a]
                     high[a] = count[a] // 2 if plan.periodic else count[a] - 1 - at[a]
                 for e in range(starts[here], starts[here + 1]):
-                    near2 = pairs_of_place(
+                    near2 = sum_pairs_of_place(
                         e, home, flock, numbers, cells, side, rings, plan=plan, paired=paired, nearest=nearest
                     )  # fmt: skip
                     if nearest:

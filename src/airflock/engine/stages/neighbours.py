@@ -3,24 +3,23 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from airflock.core.contract import Model
-from airflock.core.maths import norm
+from airflock.core import Model, norm
 from airflock.engine.plan import Plan
-from airflock.engine.stages.air import crowd, shade
-from airflock.engine.stages.pair import ADD, BOTH, HEAR, pair
-from airflock.engine.stages.receive import first_of_four, sent
-from airflock.engine.stages.records import Decision, Hearer, Reach, Surroundings
-from airflock.engine.stages.state import Flock, everybody, numbers_of
+from airflock.engine.stages.air import fill_clear, talkers_in_range
+from airflock.engine.stages.pair import ADD, HEAR, HEAR_AND_ADD, pair
+from airflock.engine.stages.receive import first_of_four, packet_count
+from airflock.engine.stages.records import Decision, PairLoopAgent, SquaredRanges, WorldArrays
+from airflock.engine.stages.state import FlockRows, agent_numbers, all_agents
 from airflock.engine.stages.words import (
     LIMIT,
     ONE,
-    START,
+    REDUCTION_START,
     TINY,
     ZERO,
     X,
     Y,
     Z,
-    ask,
+    call_rule,
     integer,
     least,
     most,
@@ -32,7 +31,7 @@ from airflock.engine.stages.words import (
 SMALLEST = 1e-3  # m; width of the cells of a law that nobody flies by
 
 
-def oneself(i: int, own: Any, v: Any, h: Any, true: Any, flock: Flock, *, plan: Plan) -> None:
+def own_state(i: int, own: Any, v: Any, h: Any, true: Any, flock: FlockRows, *, plan: Plan) -> None:
     """Where agent i believes that it is (own), how it moves (v) and heads (h), and where it is (true)."""
     axes = range(plan.dimensions)
     for a in axes:
@@ -41,10 +40,10 @@ def oneself(i: int, own: Any, v: Any, h: Any, true: Any, flock: Flock, *, plan: 
     if plan.perturbed or plan.packets:
         for a in axes:
             true[a] = flock.position[a][i]
-    headed(v, h, plan=plan)
+    fill_heading(v, h, plan=plan)
 
 
-def headed(v: Any, h: Any, *, plan: Plan) -> None:
+def fill_heading(v: Any, h: Any, *, plan: Plan) -> None:
     """Put the direction of the velocity v into the vector h; in a plane neither has a height."""
     if plan.dimensions == 2:
         v[Z] = ZERO
@@ -55,20 +54,20 @@ def headed(v: Any, h: Any, *, plan: Plan) -> None:
 
 def squared_reach(p: Any, *, plan: Plan, model: Model) -> Any:
     """Square of the law's reach with these numbers, m², as squares of distances are compared with it."""
-    near = least(ask(model.reach, p=p), LIMIT)
+    near = least(call_rule(model.reach, p=p), LIMIT)
     return near * near + TINY if plan.bits == 64 else near * near
 
 
-def widest(agents: Iterable[int], flock: Flock, numbers: Any, *, plan: Plan, model: Model) -> Any:
+def widest_reach(agents: Iterable[int], flock: FlockRows, numbers: Any, *, plan: Plan, model: Model) -> Any:
     """The widest reach of those who fly by a law whose numbers differ among them, m."""
     near = real(SMALLEST)
     for i in agents:
-        own_p = numbers_of(i, "p", flock, numbers, plan=plan)
-        near = most(near, least(ask(model.reach, p=own_p), LIMIT))
+        own_p = agent_numbers(i, "p", flock, numbers, plan=plan)
+        near = most(near, least(call_rule(model.reach, p=own_p), LIMIT))
     return near
 
 
-def draw_words(i: int, flock: Flock, draw: Callable[[int], None], *, plan: Plan) -> None:
+def draw_words(i: int, flock: FlockRows, draw: Callable[[int], None], *, plan: Plan) -> None:
     """Have the random words of agent i and the others of its four drawn, once for all of them."""
     if plan.sequential or plan.laws:
         draw(i)
@@ -78,11 +77,26 @@ def draw_words(i: int, flock: Flock, draw: Callable[[int], None], *, plan: Plan)
 
 
 def neighbours(
-    agents: Iterable[int], others: Iterable[int], flock: Flock, numbers: Any, whole: Any, around: Surroundings, n: int,
-    decision: int, time: float, late: float, words: Any, draw: Callable[[int], None] | None,
-    drawn: Callable[[int, int], Any] | None, meet: Callable[[int], None],
-    *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...], images: bool,
-) -> None:  # fmt: skip
+    agents: Iterable[int],
+    others: Iterable[int],
+    flock: FlockRows,
+    numbers: Any,
+    whole: Any,
+    around: WorldArrays,
+    n: int,
+    decision: int,
+    time: float,
+    late: float,
+    words: Any,
+    draw: Callable[[int], None] | None,
+    drawn: Callable[[int, int], Any] | None,
+    meet: Callable[[int], None],
+    *,
+    plan: Plan,
+    model: Model,
+    sums: tuple[tuple[int, str], ...],
+    images: bool,
+) -> None:
     """Sum the neighbour rule over all others in range of each agent, or over those that its topology lets it meet.
 
     late   : how old is what is heard on arrival, s
@@ -103,12 +117,12 @@ def neighbours(
         near2 = squared_reach(numbers.p, plan=plan, model=model)
     else:
         near2 = LIMIT
-    fast = sent(decision, getattr(k, plan.radio.rates[0]), numbers) if len(plan.radio.rates) > 0 else ZERO
-    slow = sent(decision, getattr(k, plan.radio.rates[1]), numbers) if len(plan.radio.rates) > 1 else ZERO
+    fast = packet_count(decision, getattr(k, plan.radio.rates[0]), numbers) if len(plan.radio.rates) > 0 else ZERO
+    slow = packet_count(decision, getattr(k, plan.radio.rates[1]), numbers) if len(plan.radio.rates) > 1 else ZERO
     at = Decision(decision, n, time, late, fast, slow, drawn)
     for i in agents:
         ii = integer(i)
-        own_p = numbers_of(i, "p", flock, numbers, plan=plan)
+        own_p = agent_numbers(i, "p", flock, numbers, plan=plan)
         if model.reach is not None and plan.varies("p"):
             near2 = squared_reach(own_p, plan=plan, model=model)
         if plan.draws and draw is not None:
@@ -117,21 +131,21 @@ def neighbours(
         else:
             lot = ZERO  # nobody asks for it
         own, v, true, h, total = vector(), vector(), vector(), vector(), totals()
-        oneself(i, own, v, h, true, flock, plan=plan)
+        own_state(i, own, v, h, true, flock, plan=plan)
         for c, how in sums:
-            total[c] = START[how]
-        if plan.radio.asks("talkers"):  # noqa: SIM108 - as above
-            talkers = crowd(i, others, range_ * range_, flock, w, plan=plan)
+            total[c] = REDUCTION_START[how]
+        if plan.radio.asks_for("talkers"):  # noqa: SIM108 - as above
+            talkers = talkers_in_range(i, others, range_ * range_, flock, w, plan=plan)
         else:
             talkers = ZERO
         if plan.shades and drawn is None:
-            shade(i, others, range_ * range_, flock, w, whole, around, plan=plan)
-        me = Hearer(i, ii, ii, None, own, v, h, true, own_p, talkers, lot)
-        reach = Reach(range_ * range_, range2, near2)
-        for part in (BOTH,) if plan.topology is None else (HEAR, ADD):
+            fill_clear(i, others, range_ * range_, flock, w, whole, around, plan=plan)
+        me = PairLoopAgent(i, ii, ii, None, own, v, h, true, own_p, talkers, lot)
+        reach = SquaredRanges(range_ * range_, range2, near2)
+        for part in (HEAR_AND_ADD,) if plan.topology is None else (HEAR, ADD):
             for j in others:
                 pair(
-                    me, j, j, part, total, reach, at, flock, everybody(flock), numbers, whole, around, plan=plan,
+                    me, j, j, part, total, reach, at, flock, all_agents(flock), numbers, whole, around, plan=plan,
                     model=model, sums=sums, images=images,
                 )  # fmt: skip
             if part == HEAR:

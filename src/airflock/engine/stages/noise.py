@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 
 from airflock.core import random
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Columns, Flock, Row
-from airflock.engine.stages.words import ask
+from airflock.engine.stages.state import Columns, FlockRows, Row
+from airflock.engine.stages.words import call_rule
 
 OUTER = random.OUTER
 
 
-class Drawn(NamedTuple):
+class DrawFunctions(NamedTuple):
     """`draw` and `normal` as functions of the driver, each once, whoever asks.
 
     words     : draws for agents that lie at their own numbers, or for all by their numbers where they are sorted
@@ -23,7 +23,7 @@ class Drawn(NamedTuple):
     normal: Callable[..., Any]
 
 
-Draw = Drawn | None  # None: their loops stand where they are asked for
+Draw = DrawFunctions | None  # None: their loops stand where they are asked for
 
 
 def draw(
@@ -35,7 +35,7 @@ def draw(
         u0[i], u1[i], u2[i], u3[i] = random.philox(order[i], step, stream, world, seed_low, seed_high)
 
 
-def fill(u: Columns, flock: Flock, whole: Any, step: Any, stream: int, m: int, drawn: Draw) -> None:
+def fill_words(u: Columns, flock: FlockRows, whole: Any, step: Any, stream: int, m: int, drawn: Draw) -> None:
     """The same of this world.
 
     Until somebody leaves each agent lies at its own number, and a loop that counts takes a tenth less than one that
@@ -46,14 +46,16 @@ def fill(u: Columns, flock: Flock, whole: Any, step: Any, stream: int, m: int, d
             m, flock.number, step, stream, whole.world, whole.seed_low, whole.seed_high, u[0], u[1], u[2], u[3]
         )  # fmt: skip
     elif drawn.by_number is not None and flock.number[whole.agents - 1] != whole.agents - 1:
-        call(drawn.by_number, u, flock, whole, step, stream, m)
+        call_draw(drawn.by_number, u, flock, whole, step, stream, m)
     else:
-        call(drawn.words, u, flock, whole, step, stream, m)
+        call_draw(drawn.words, u, flock, whole, step, stream, m)
 
 
-def call(function: Callable[..., Any], u: Columns, flock: Flock, whole: Any, step: Any, stream: int, m: int) -> None:
+def call_draw(
+    function: Callable[..., Any], u: Columns, flock: FlockRows, whole: Any, step: Any, stream: int, m: int
+) -> None:
     """Call a function of the driver that draws."""
-    ask(
+    call_rule(
         function, m=m, order=flock.number, step=step, stream=stream, world=whole.world, seed_low=whole.seed_low,
         seed_high=whole.seed_high, u0=u[0], u1=u[1], u2=u[2], u3=u[3],
     )  # fmt: skip
@@ -65,27 +67,29 @@ def normal(m: int, a: Row, b: Row, g: Row, h: Row) -> None:
         g[i], h[i] = random.normal_pair(a[i], b[i])
 
 
-def normals(flock: Flock, rows: Columns, whole: Any, step: Any, stream: int, m: int, first: int, drawn: Draw) -> None:
+def normals(
+    flock: FlockRows, rows: Columns, whole: Any, step: Any, stream: int, m: int, first: int, drawn: Draw
+) -> None:
     """Four normal numbers of a stream per agent, in four rows from the first on."""
     u = flock.words
-    fill(u, flock, whole, step, stream, m, drawn)
+    fill_words(u, flock, whole, step, stream, m, drawn)
     for c in (0, 2):
         if drawn is None:
             normal(m, u[c], u[c + 1], rows[first + c], rows[first + c + 1])
         else:
-            ask(drawn.normal, m=m, a=u[c], b=u[c + 1], g=rows[first + c], h=rows[first + c + 1])
+            call_rule(drawn.normal, m=m, a=u[c], b=u[c + 1], g=rows[first + c], h=rows[first + c + 1])
 
 
-def uniforms(flock: Flock, rows: Columns, whole: Any, step: Any, stream: int, m: int, drawn: Draw) -> None:
+def uniforms(flock: FlockRows, rows: Columns, whole: Any, step: Any, stream: int, m: int, drawn: Draw) -> None:
     """Four uniform numbers of a stream per agent, between 0 and 1, in four rows."""
     u = flock.words
-    fill(u, flock, whole, step, stream, m, drawn)
+    fill_words(u, flock, whole, step, stream, m, drawn)
     for c in range(4):
         for i in range(m):
             rows[c][i] = random.uniform(u[c][i])
 
 
-def noise(flock: Flock, whole: Any, step: int, m: int, *, plan: Plan, drawn: Draw = None) -> None:
+def noise(flock: FlockRows, whole: Any, step: int, m: int, *, plan: Plan, drawn: Draw = None) -> None:
     """Outer noise of this step; in a plane four numbers per agent serve two steps of two axes."""
     if plan.dimensions == 3:
         normals(flock, flock.outer, whole, step, OUTER, m, 0, drawn)

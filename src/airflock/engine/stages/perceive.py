@@ -7,30 +7,29 @@ other measures once: what an agent sends is its state with the errors of its las
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
-from airflock.core import random
-from airflock.core.sensor import FIRST
+from airflock.core import FIRST_DRAW, random
 from airflock.engine.plan import Plan
 from airflock.engine.stages import faults
 from airflock.engine.stages.noise import Draw, normals, uniforms
-from airflock.engine.stages.state import Flock, Row, column_of, numbers_of
-from airflock.engine.stages.words import X, Y, Z, ask, fields, real, wants
+from airflock.engine.stages.state import FlockRows, Row, agent_numbers, record_from_rows
+from airflock.engine.stages.words import X, Y, Z, call_rule, field_indices, real, rule_asks
 
 SENSOR = random.SENSOR
 
 
-class Shared(NamedTuple):
+class ErrorFunctions(NamedTuple):
     """`wander` and `err` as functions of the driver, each once for all rows."""
 
     wander: Callable[..., Any]
     err: Callable[..., Any]
 
 
-def wander(m: int, q: Row, u: Row, g: Row, flock: Flock, numbers: Any, *, plan: Plan) -> None:
+def wander(m: int, q: Row, u: Row, g: Row, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
     """Errors along one axis after one more measurement: of the position, and of the velocity."""
     for i in range(m):
-        q[i], u[i] = ask(
+        q[i], u[i] = call_rule(
             plan.sensor.error, dx=q[i], dv=u[i], g=g[i], period=numbers.c.period,
-            s=numbers_of(i, "s", flock, numbers, plan=plan),
+            s=agent_numbers(i, "s", flock, numbers, plan=plan),
         )  # fmt: skip
 
 
@@ -41,7 +40,7 @@ def err(m: int, place: Row, rate: Row, x: Row, v: Row, q: Row, u: Row) -> None:
         rate[i] = v[i] + u[i]
 
 
-def snapshot(flock: Flock, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
+def snapshot(flock: FlockRows, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
     """Put the state that is sent, and the faults by which, into the slot of the ring from which it will be heard."""
     for i in range(m):
         for a in range(plan.dimensions):
@@ -57,27 +56,27 @@ def snapshot(flock: Flock, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
             ring[slot, c, i] = flock.fault(name, what)[i]
 
 
-def chance(flock: Flock, whole: Any, decision: int, m: int, *, plan: Plan, drawn: Draw) -> None:
+def draw_sensor_numbers(flock: FlockRows, whole: Any, decision: int, m: int, *, plan: Plan, drawn: Draw) -> None:
     """Random numbers that a sensor asks for: g0 to g11, u0 to u3."""
-    if wants(plan.sensor.measure, "g0", "g1", "g2", "g3"):
-        normals(flock, flock.errors, whole, decision, SENSOR + 256 * FIRST, m, 0, drawn)
-    if wants(plan.sensor.measure, "g4", "g5", "g6", "g7"):
-        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST + 1), m, 4, drawn)
-    if wants(plan.sensor.measure, "g8", "g9", "g10", "g11"):
-        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST + 2), m, 8, drawn)
-    if wants(plan.sensor.measure, "u0", "u1", "u2", "u3"):
-        uniforms(flock, flock.chances, whole, decision, SENSOR + 256 * (FIRST + 3), m, drawn)
+    if rule_asks(plan.sensor.measure, "g0", "g1", "g2", "g3"):
+        normals(flock, flock.errors, whole, decision, SENSOR + 256 * FIRST_DRAW, m, 0, drawn)
+    if rule_asks(plan.sensor.measure, "g4", "g5", "g6", "g7"):
+        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST_DRAW + 1), m, 4, drawn)
+    if rule_asks(plan.sensor.measure, "g8", "g9", "g10", "g11"):
+        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST_DRAW + 2), m, 8, drawn)
+    if rule_asks(plan.sensor.measure, "u0", "u1", "u2", "u3"):
+        uniforms(flock, flock.chances, whole, decision, SENSOR + 256 * (FIRST_DRAW + 3), m, drawn)
 
 
-def measure(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan: Plan) -> None:
+def measure(lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, *, plan: Plan) -> None:
     """Own states by the rule of the sensor, and how far they are off."""
     x, v, g, u = flock.position, flock.velocity, flock.errors, flock.chances
     for i in lanes:
-        t = ask(
+        t = call_rule(
             plan.sensor.measure, x=x[X][i], y=x[Y][i], z=x[Z][i], vx=v[X][i], vy=v[Y][i], vz=v[Z][i],
-            memory=column_of(i, plan.sensor.Memory, flock.sense), **{"g" + str(c): g[c][i] for c in range(12)},
+            memory=record_from_rows(i, plan.sensor.Memory, flock.sense), **{"g" + str(c): g[c][i] for c in range(12)},
             **{"u" + str(c): u[c][i] for c in range(4)}, time=time, period=numbers.c.period,
-            s=numbers_of(i, "s", flock, numbers, plan=plan),
+            s=agent_numbers(i, "s", flock, numbers, plan=plan),
         )  # fmt: skip
         for a in range(plan.dimensions):
             flock.measured_position[a][i] = t[a]
@@ -85,29 +84,29 @@ def measure(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan
         for a in range(plan.dimensions):
             flock.measured_velocity[a][i] = t[a + 3]
             flock.own_drift[a][i] = t[a + 3] - v[a][i]
-        for c in fields(plan.sensor.Memory):
+        for c in field_indices(plan.sensor.Memory):
             flock.sense[c][i] = t[6][c]
 
 
 def perceive(  # noqa: C901 - tests of the plan leave one way through
-    flock: Flock, numbers: Any, whole: Any, decision: int, slot: int, m: int, ring: Any, *, plan: Plan,
-    drawn: Draw = None, shared: Shared | None = None,
+    flock: FlockRows, numbers: Any, whole: Any, decision: int, slot: int, m: int, ring: Any, *, plan: Plan,
+    drawn: Draw = None, shared: ErrorFunctions | None = None,
 ) -> None:  # fmt: skip
     """Advance the errors of what is measured and of what is sent, then measure and hear, with the faults of both."""
     axes, dims = range(plan.dimensions), plan.dimensions
     own, sent = (flock.own_error, flock.own_drift), (flock.sent_error, flock.sent_drift)
     errors = (((own, X), (own, Y), (sent, X), (sent, Y)), ((own, Z), (sent, Z)))
     if plan.senses:
-        chance(flock, whole, decision, m, plan=plan, drawn=drawn)
+        draw_sensor_numbers(flock, whole, decision, m, plan=plan, drawn=drawn)
         measure(range(m), flock, numbers, real(decision) * numbers.c.period, plan=plan)
-    elif plan.noisy:
+    elif plan.has_sensor_error:
         for draw, kinds in enumerate(errors[: dims - 1]):
             normals(flock, flock.errors, whole, decision, SENSOR + 256 * draw, m, 0, drawn)
             for g, ((error, drift), a) in enumerate(kinds):
                 if shared is None:
                     wander(m, error[a], drift[a], flock.errors[g], flock, numbers, plan=plan)
                 else:
-                    ask(shared.wander, q=error[a], u=drift[a], g=flock.errors[g])
+                    call_rule(shared.wander, q=error[a], u=drift[a], g=flock.errors[g])
         for a in axes:
             if shared is None:
                 err(
@@ -115,7 +114,7 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
                     flock.own_error[a], flock.own_drift[a],
                 )  # fmt: skip
             else:
-                ask(
+                call_rule(
                     shared.err, place=flock.measured_position[a], rate=flock.measured_velocity[a],
                     x=flock.position[a], v=flock.velocity[a], q=flock.own_error[a], u=flock.own_drift[a],
                 )  # fmt: skip
@@ -124,10 +123,10 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
             for i in range(m):
                 flock.measured_position[a][i] = flock.position[a][i]
                 flock.measured_velocity[a][i] = flock.velocity[a][i]
-    if plan.noisy and not plan.senses and not plan.sees:
+    if plan.has_sensor_error and not plan.senses and not plan.sees:
         for a in axes:
             if shared is not None:
-                ask(
+                call_rule(
                     shared.err, place=flock.heard_position[a], rate=flock.heard_velocity[a], x=ring[slot, a],
                     v=ring[slot, a + dims], q=flock.sent_error[a], u=flock.sent_drift[a],
                 )  # fmt: skip
@@ -153,8 +152,8 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
     x, v, hx, hv = flock.measured_position, flock.measured_velocity, flock.heard_position, flock.heard_velocity
     as_sent = flock.as_sent if plan.late else flock
     for kind in plan.suffers("sense"):
-        faults.mislead(range(m), kind, "believed", decision, now, x, v, flock, numbers, plan=plan)
+        faults.apply_state_faults(range(m), kind, "believed", decision, now, x, v, flock, numbers, plan=plan)
         if not plan.sees:
-            faults.mislead(range(m), kind, "sent", decision, then, hx, hv, as_sent, numbers, plan=plan)
+            faults.apply_state_faults(range(m), kind, "sent", decision, then, hx, hv, as_sent, numbers, plan=plan)
     for kind in plan.suffers("tell") if not plan.sees else ():
-        faults.mislead(range(m), kind, "told", decision, then, hx, hv, as_sent, numbers, plan=plan)
+        faults.apply_state_faults(range(m), kind, "told", decision, then, hx, hv, as_sent, numbers, plan=plan)

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from airflock.core import random
-from airflock.core.contract import Model
+from airflock.core import Model, random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.words import LIMIT, ZERO, least
 from airflock.world import bvh, polygon, rays
@@ -11,12 +10,12 @@ from airflock.world import bvh, polygon, rays
 MODEL = random.MODEL
 
 
-def level(z: Any, edges: Any, corners: int, *, plan: Plan) -> Any:
+def height_above_middle(z: Any, edges: Any, corners: int, *, plan: Plan) -> Any:
     """Height above the middle of the arena, m, which edges and corners tell where it is not 0."""
-    return z - edges[corners, 0] if plan.raised else z
+    return z - edges[corners, 0] if plan.off_centre_height else z
 
 
-def to_obstacle(
+def ray_to_obstacle(
     x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any, edges: Any, spans: Any, o: Any, *, plan: Plan
 ) -> Any:  # fmt: skip
     """Free distance along a ray to obstacle number o, m."""
@@ -35,13 +34,22 @@ def ray(percept: Any, ux: float, uy: float, uz: float, length: float, *, plan: P
     t = least(
         length,
         plan.ray(
-            x, y, level(z, percept.edges, percept.corners, plan=plan), ux, uy, uz, percept.half_x, percept.half_y,
-            percept.half_z, percept.edges, percept.corners,
+            x,
+            y,
+            height_above_middle(z, percept.edges, percept.corners, plan=plan),
+            ux,
+            uy,
+            uz,
+            percept.half_x,
+            percept.half_y,
+            percept.half_z,
+            percept.edges,
+            percept.corners,
         ),
-    )  # fmt: skip
+    )
     if plan.obstacles:
         for o in range(percept.obstacles):
-            free = to_obstacle(x, y, z, ux, uy, uz, percept.edges, percept.spans, o, plan=plan)
+            free = ray_to_obstacle(x, y, z, ux, uy, uz, percept.edges, percept.spans, o, plan=plan)
             t = least(t, free)
     if plan.scene:
         t = least(t, bvh.cast(x, y, z, ux, uy, uz, t, ZERO, percept.shapes, percept.nodes, percept.links))
@@ -63,7 +71,7 @@ def cast(
         t = least(
             t,
             rule(
-                x, y, level(z, percept.edges, percept.corners, plan=plan), ux, uy, uz,
+                x, y, height_above_middle(z, percept.edges, percept.corners, plan=plan), ux, uy, uz,
                 LIMIT if sides else percept.half_x - radius, LIMIT if sides else percept.half_y - radius,
                 percept.half_z - radius if plan.dimensions == 3 else LIMIT, percept.edges, 0,
             ),
@@ -76,7 +84,7 @@ def cast(
     return t
 
 
-def drawn(percept: Any, draw: int) -> Any:
+def percept_words(percept: Any, draw: int) -> Any:
     """Random words of this agent and decision."""
     return random.draw(
         percept.agent, percept.step, MODEL + 256 * draw, percept.world, percept.seed_low, percept.seed_high
@@ -85,12 +93,12 @@ def drawn(percept: Any, draw: int) -> Any:
 
 def normal(percept: Any, draw: int) -> Any:
     """Normal random number N(0, 1) of this agent and decision."""
-    w0, w1, w2, w3 = drawn(percept, draw)
+    w0, w1, w2, w3 = percept_words(percept, draw)
     a, b = random.normal_pair(w0, w1)
     return a
 
 
 def uniform(percept: Any, draw: int) -> Any:
     """Uniform random number between 0 and 1."""
-    w0, w1, w2, w3 = drawn(percept, draw)
+    w0, w1, w2, w3 = percept_words(percept, draw)
     return random.uniform(w0)

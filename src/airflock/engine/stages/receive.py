@@ -7,8 +7,8 @@ from airflock.core import radio, random, silence
 from airflock.engine.plan import Plan
 from airflock.engine.stages.air import apart
 from airflock.engine.stages.meet import pair_number
-from airflock.engine.stages.records import Decision, Hearer
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.records import Decision, PairLoopAgent
+from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import (
     GONE,
     HALF,
@@ -16,9 +16,9 @@ from airflock.engine.stages.words import (
     X,
     Y,
     Z,
-    ask,
+    call_rule,
     choose,
-    fields,
+    field_indices,
     integer,
     most,
     real,
@@ -32,13 +32,13 @@ MORE = random.AIR + 256  # a second draw of the same pair
 UNIFORM, NORMAL = ("u0", "u1", "u2", "u3"), ("g0", "g1", "g2", "g3")  # random numbers that a rule may ask for
 
 
-def first_of_four(i: int, flock: Flock) -> Any:
+def first_of_four(i: int, flock: FlockRows) -> Any:
     """Whether agent i is the first at hand of the four receivers that share random words."""
     return (i == 0) | (flock.number[i] >> 2 != flock.number[i - 1] >> 2)
 
 
 def draw(
-    others: Iterable[int], flock: Flock, whole: Any, i: int, decision: int, n: int, *, plan: Plan
+    others: Iterable[int], flock: FlockRows, whole: Any, i: int, decision: int, n: int, *, plan: Plan
 ) -> None:  # fmt: skip
     """Random words of all that is sent to agent i and to the others of its four, in four rows, one for each of them."""
     u = flock.words
@@ -57,44 +57,46 @@ def word(i: int, j: int, decision: int, n: int, whole: Any) -> Any:
     return choose(i & 2 == 0, choose(i & 1 == 0, w0, w1), choose(i & 1 == 0, w2, w3))
 
 
-def word_of(me: Hearer, j: int, at: Decision) -> Any:
+def drawn_pair_word(me: PairLoopAgent, j: int, at: Decision) -> Any:
     """Random word of what agent j sends an agent: of the row that was drawn for it, or drawn here."""
     return me.words[j] if at.drawn is None else at.drawn(me.i, j)
 
 
-def by_clock(time: Any, i: int, flock: Flock, *, plan: Plan) -> Any:
+def clock_time(time: Any, i: int, flock: FlockRows, *, plan: Plan) -> Any:
     """A time (s) as the clock of agent i tells it."""
     return time + flock.clock[i] if plan.suffers("clock") else time
 
 
-def sending_clock(j: int, flock: Flock, *, plan: Plan) -> Any:
+def sending_clock(j: int, flock: FlockRows, *, plan: Plan) -> Any:
     """How far the clock of agent j was ahead when it sent what comes in now, s."""
     return flock.sent_clock[j] if plan.late else flock.clock[j]
 
 
-def sent_at(j: int, at: Decision, flock: Flock, *, plan: Plan) -> Any:
+def sent_time(j: int, at: Decision, flock: FlockRows, *, plan: Plan) -> Any:
     """When what comes in at a decision was sent by agent j, by its own clock, s."""
     return at.time - at.late + sending_clock(j, flock, plan=plan) if plan.suffers("clock") else at.time - at.late
 
 
-def sent(decision: int, rate: Any, numbers: Any) -> Any:
+def packet_count(decision: int, rate: Any, numbers: Any) -> Any:
     """Packets that a link of this rate (1/s) sends in a decision."""
     return integer(radio.packets(real(decision), rate, numbers.c.period))
 
 
-def unheard(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
+def loss_probability(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
     """Probability that nothing of what one agent sends another arrives, in range.
 
     about : what a rule may ask for of the two and of the decision
     """
     return (
-        radio.either(radio.lost(about["distance"], k), ask(plan.missed, **about, k=k))
+        radio.either(radio.lost(about["distance"], k), call_rule(plan.missed, **about, k=k))
         if plan.lossy and plan.missed is not None
-        else (ask(plan.missed, **about, k=k) if plan.missed is not None else radio.lost(about["distance"], k))
+        else (call_rule(plan.missed, **about, k=k) if plan.missed is not None else radio.lost(about["distance"], k))
     )
 
 
-def chances(me: Hearer, j: int, flock: Flock, whole: Any, at: Decision, *, plan: Plan) -> dict[str, Any]:
+def pair_numbers(
+    me: PairLoopAgent, j: int, flock: FlockRows, whole: Any, at: Decision, *, plan: Plan
+) -> dict[str, Any]:
     """Random numbers of one pair and decision that rules of the radio may ask for, by name."""
     pair = pair_number(me.i, j, at.agents, flock, whole, plan=plan)
     u, g = totals(), totals()
@@ -110,10 +112,20 @@ def chances(me: Hearer, j: int, flock: Flock, whole: Any, at: Decision, *, plan:
     }
 
 
-def hear(
-    me: Hearer, j: int, apart2: Any, carried2: Any, about: dict[str, Any], at: Decision, packet: Any, flock: Flock,
-    numbers: Any, whole: Any, *, plan: Plan,
-) -> None:  # fmt: skip
+def update_packet(
+    me: PairLoopAgent,
+    j: int,
+    apart2: Any,
+    carried2: Any,
+    about: dict[str, Any],
+    at: Decision,
+    packet: Any,
+    flock: FlockRows,
+    numbers: Any,
+    whole: Any,
+    *,
+    plan: Plan,
+) -> None:
     """Where packets are kept: `packet` is then the newest that an agent has of agent j.
 
     apart2, carried2 : squares of how far the two are apart, and of how far packets carry, m²
@@ -122,29 +134,29 @@ def hear(
     dims = plan.dimensions
     got = apart2 <= carried2
     if plan.draws:
-        miss = unheard(about, numbers.k, plan=plan)
-    rolled = chances(me, j, flock, whole, at, plan=plan)
+        miss = loss_probability(about, numbers.k, plan=plan)
+    rolled = pair_numbers(me, j, flock, whole, at, plan=plan)
     if plan.radio.receive is not None:
-        passed = received(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
+        passed = call_receive(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
         got = got & passed
     if plan.draws:
-        got = got & (random.uniform(word_of(me, j, at)) >= miss)
+        got = got & (random.uniform(drawn_pair_word(me, j, at)) >= miss)
     if plan.radio.late is not None:
-        send(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
-        deliver(me.i, j, at, packet, flock, numbers, plan=plan)
+        queue_packet(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
+        deliver_due(me.i, j, at, packet, flock, numbers, plan=plan)
     elif plan.sees:
         glimpse(me.i, j, got, rolled, at, packet, flock, numbers, plan=plan)
     else:
         for a in range(dims):
             packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][me.i, j])
             packet[a + dims] = choose(got, flock.heard_velocity[a][j], flock.packet[a + dims][me.i, j])
-        packet[2 * dims] = choose(got, sent_at(j, at, flock, plan=plan), flock.packet[2 * dims][me.i, j])
+        packet[2 * dims] = choose(got, sent_time(j, at, flock, plan=plan), flock.packet[2 * dims][me.i, j])
     for c in range(2 * dims + 1):
         flock.packet[c][me.i, j] = packet[c]
 
 
 def glimpse(
-    i: int, j: int, got: Any, rolled: dict[str, Any], at: Decision, packet: Any, flock: Flock, numbers: Any,
+    i: int, j: int, got: Any, rolled: dict[str, Any], at: Decision, packet: Any, flock: FlockRows, numbers: Any,
     *, plan: Plan,
 ) -> None:  # fmt: skip
     """`packet` is then where agent i believes agent j by the newest picture that shows it.
@@ -153,7 +165,7 @@ def glimpse(
     """
     dims, w = plan.dimensions, numbers.w
     then, off, expected, v, ev = vector(), vector(), vector(), vector(), vector()
-    since = sent_at(i, at, flock, plan=plan) - flock.packet[2 * dims][i, j]
+    since = sent_time(i, at, flock, plan=plan) - flock.packet[2 * dims][i, j]
     for a in range(dims):
         moved = apart(flock.position[a][i], flock.heard_position[a][i], a, w, plan=plan)
         then[a] = flock.measured_position[a][i] - moved
@@ -161,7 +173,7 @@ def glimpse(
         ev[a] = flock.packet[a + dims][i, j]
         expected[a] = apart(flock.packet[a][i, j] + ev[a] * since, then[a], a, w, plan=plan)
         v[a] = flock.measured_velocity[a][i]
-    t = ask(
+    t = call_rule(
         plan.radio.see, dx=off[X], dy=off[Y], dz=off[Z], ex=expected[X], ey=expected[Y], ez=expected[Z],
         evx=ev[X], evy=ev[Y], evz=ev[Z], vx=v[X], vy=v[Y], vz=v[Z], since=since, period=numbers.c.period, **rolled,
         k=numbers.k,
@@ -169,43 +181,43 @@ def glimpse(
     for a in range(dims):
         packet[a] = choose(got, then[a] + t[a], flock.packet[a][i, j])
         packet[a + dims] = choose(got, t[a + 3], flock.packet[a + dims][i, j])
-    packet[2 * dims] = choose(got, sent_at(i, at, flock, plan=plan), flock.packet[2 * dims][i, j])
+    packet[2 * dims] = choose(got, sent_time(i, at, flock, plan=plan), flock.packet[2 * dims][i, j])
 
 
-def received(
-    i: int, j: int, near: Any, about: dict[str, Any], at: Decision, flock: Flock, numbers: Any, *, plan: Plan
+def call_receive(
+    i: int, j: int, near: Any, about: dict[str, Any], at: Decision, flock: FlockRows, numbers: Any, *, plan: Plan
 ) -> Any:
     """Whether a packet arrives by the radio's own rule; its Packet is then the new one, where packets carry so far."""
-    age = by_clock(at.time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
+    age = clock_time(at.time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
     if plan.radio.Packet is not None:
-        kept = plan.radio.Packet(*[flock.packet[plan.pocket + c][i, j] for c in fields(plan.radio.Packet)])
-        hit = ask(plan.radio.receive, **about, age=age, packet=kept, k=numbers.k)
-        for c in fields(plan.radio.Packet):
+        kept = plan.radio.Packet(*[flock.packet[plan.pocket + c][i, j] for c in field_indices(plan.radio.Packet)])
+        hit = call_rule(plan.radio.receive, **about, age=age, packet=kept, k=numbers.k)
+        for c in field_indices(plan.radio.Packet):
             flock.packet[plan.pocket + c][i, j] = choose(near, hit[1][c], flock.packet[plan.pocket + c][i, j])
     else:
-        hit = ask(plan.radio.receive, **about, age=age, k=numbers.k)
+        hit = call_rule(plan.radio.receive, **about, age=age, k=numbers.k)
     return (hit[0] if plan.radio.Packet is not None else hit) > HALF
 
 
-def send(
-    i: int, j: int, got: Any, about: dict[str, Any], at: Decision, flock: Flock, numbers: Any, *, plan: Plan
+def queue_packet(
+    i: int, j: int, got: Any, about: dict[str, Any], at: Decision, flock: FlockRows, numbers: Any, *, plan: Plan
 ) -> None:
     """What agent j sends agent i and is not lost goes under way, unless another packet of this pair is."""
     dims, first, due = plan.dimensions, plan.waiting, 2 * plan.waiting
     goes = got & (flock.packet[due][i, j] < HALF * GONE)
-    wait = ask(plan.radio.late, **about, k=numbers.k)
+    wait = call_rule(plan.radio.late, **about, k=numbers.k)
     for a in range(dims):
         flock.packet[first + a][i, j] = choose(goes, flock.heard_position[a][j], flock.packet[first + a][i, j])
         flock.packet[first + a + dims][i, j] = choose(
             goes, flock.heard_velocity[a][j], flock.packet[first + a + dims][i, j]
         )
     flock.packet[first + 2 * dims][i, j] = choose(
-        goes, sent_at(j, at, flock, plan=plan), flock.packet[first + 2 * dims][i, j]
+        goes, sent_time(j, at, flock, plan=plan), flock.packet[first + 2 * dims][i, j]
     )
     flock.packet[due][i, j] = choose(goes, at.time + most(wait, ZERO), flock.packet[due][i, j])
 
 
-def deliver(i: int, j: int, at: Decision, packet: Any, flock: Flock, numbers: Any, *, plan: Plan) -> None:
+def deliver_due(i: int, j: int, at: Decision, packet: Any, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
     """What is due by now has come; half a step is as good as none."""
     first, due = plan.waiting, 2 * plan.waiting
     come = (flock.packet[due][i, j] > HALF * GONE) & (flock.packet[due][i, j] <= at.time + HALF * numbers.c.dt)
@@ -214,7 +226,7 @@ def deliver(i: int, j: int, at: Decision, packet: Any, flock: Flock, numbers: An
     flock.packet[due][i, j] = choose(come, GONE, flock.packet[due][i, j])
 
 
-def carried(a: int, age: Any, packet: Any, *, plan: Plan) -> Any:
+def extrapolated(a: int, age: Any, packet: Any, *, plan: Plan) -> Any:
     """Where the sender of a packet is believed to be along one axis, m: where it was, or carried forward.
 
     Written out what `core.radio.forward` says: as a call, compilers add up in another order, and flights differ by it.
@@ -222,31 +234,31 @@ def carried(a: int, age: Any, packet: Any, *, plan: Plan) -> Any:
     return packet[a] + packet[a + plan.dimensions] * age if plan.radio.carry is radio.forward else packet[a]
 
 
-def believed(age: Any, packet: Any, k: Any, *, plan: Plan) -> Any:
+def carried_by_rule(age: Any, packet: Any, k: Any, *, plan: Plan) -> Any:
     """The same by any other rule of the radio, of all axes at once."""
-    return ask(
+    return call_rule(
         plan.radio.carry, x=packet[X], y=packet[Y], z=packet[Z] if plan.dimensions == 3 else ZERO,
         vx=packet[plan.dimensions + X], vy=packet[plan.dimensions + Y],
         vz=packet[plan.dimensions + Z] if plan.dimensions == 3 else ZERO, age=age, k=k,
     )  # fmt: skip
 
 
-def on_record(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
+def packet_is_valid(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
     """Whether the newest packet that an agent has of another one, of this age (s), says something.
 
     Over a radio that keeps it, it does until the next one comes; where lost neighbours stop an agent, until they count
     as lost.
     """
     return (
-        (packet[2 * plan.dimensions] > -1e8) & (ask(plan.radio.lasts, age=age, k=numbers.k) > HALF)
+        (packet[2 * plan.dimensions] > -1e8) & (call_rule(plan.radio.lasts, age=age, k=numbers.k) > HALF)
         if plan.radio.lasts is not None
         else packet[2 * plan.dimensions] > -1e8
-        if plan.radio.keeps
+        if plan.radio.keeps_packets
         else silence.counts(age, numbers.silence) > HALF
     )
 
 
-def newest(i: int, j: int, packet: Any, flock: Flock, *, plan: Plan) -> None:
+def load_packet(i: int, j: int, packet: Any, flock: FlockRows, *, plan: Plan) -> None:
     """Where packets are kept: `packet` is then the newest that agent i has of agent j."""
     for c in range(2 * plan.dimensions + 1):
         packet[c] = flock.packet[c][i, j]

@@ -6,7 +6,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class WorldArrays:
     """What stands in the world: ends of all walls, which of them are of each obstacle, and the scene."""
 
     edges: Any
@@ -34,7 +34,7 @@ class Decision:
 
 
 @dataclass(frozen=True)
-class Hearer:
+class PairLoopAgent:
     """An agent that goes through the others.
 
     i           : its place in the rows
@@ -61,7 +61,7 @@ class Hearer:
 
 
 @dataclass(frozen=True)
-class Others:
+class CandidateRows:
     """Rows of those whom an agent goes through: all of a flock, or the candidates around a line of cells.
 
     number, group : of each, and what it is heard to do
@@ -82,7 +82,7 @@ class Others:
 
 
 @dataclass(frozen=True)
-class Reach:
+class SquaredRanges:
     """How far an agent hears and heeds others, m².
 
     radio, radio_ : square of the radio's range, and as squares that carry the guard TINY are compared with it
@@ -95,7 +95,7 @@ class Reach:
 
 
 @dataclass(frozen=True)
-class Other:
+class NeighbourEstimate:
     """What an agent makes of another one: offset (m) and relative velocity (m/s) with their lengths, heading, age (s).
 
     r2 : square of the offset's length, m²
@@ -111,7 +111,7 @@ class Other:
 
 
 @dataclass(frozen=True)
-class Cells:
+class SortedCells:
     """A flock sorted by cells.
 
     starts       : first place of each cell
@@ -128,7 +128,7 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class Home:
+class HomeCell:
     """The cell of an agent: where it is along each axis, and how many cells there are below and above it."""
 
     at: Any
@@ -137,7 +137,7 @@ class Home:
 
 
 @dataclass(frozen=True)
-class Growing:
+class GrowingClusters:
     """Clusters that grow, one after another.
 
     left, places  : how many of a cell are in none yet, and at which places
@@ -151,7 +151,7 @@ class Growing:
 
 
 @dataclass(frozen=True)
-class Line:
+class CellLine:
     """All who lie in and around a line of cells.
 
     others : their rows, side by side
@@ -159,6 +159,6 @@ class Line:
     middle : where in a slab those of the line's own cell begin
     """
 
-    others: Others
+    others: CandidateRows
     slab: Any
     middle: Any

@@ -4,17 +4,17 @@ import math
 from typing import Any
 
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Flock, tree
+from airflock.engine.stages.state import FlockRows, scene_tree
 from airflock.engine.stages.words import FAR, GONE, HALF, ONE, ZERO, X, Y, Z, most, real, repeat, vector
 from airflock.world import bvh, goals
 
 
-def apart(i: int, centre: Any, flock: Flock, *, plan: Plan) -> Any:
+def apart(i: int, centre: Any, flock: FlockRows, *, plan: Plan) -> Any:
     """Squared distance of agent i from the centre of the flock, m²."""
     return sum((flock.position[a][i] - centre[a]) * (flock.position[a][i] - centre[a]) for a in range(plan.dimensions))
 
 
-def aim(flock: Flock, numbers: Any, time: float, elapsed: float, n: int, scene: Any, *, plan: Plan) -> int:
+def move_goal(flock: FlockRows, numbers: Any, time: float, elapsed: float, n: int, scene: Any, *, plan: Plan) -> int:
     """Send the goal on its way, for the flock's centre as it is.
 
     time, elapsed : since the start, and since the goal last moved, s
@@ -31,7 +31,7 @@ def aim(flock: Flock, numbers: Any, time: float, elapsed: float, n: int, scene: 
             s[a] = s[a] + x[a][i]
     centre = (s[X] / real(n), s[Y] / real(n), s[Z] / real(n))
     target = (scene.goals[number, X], scene.goals[number, Y], scene.goals[number, Z])
-    if plan.herd:
+    if plan.is_shepherd:
         c, f = vector(), vector()
         c[X], c[Y], c[Z] = centre
         stray = GONE
@@ -59,7 +59,7 @@ def aim(flock: Flock, numbers: Any, time: float, elapsed: float, n: int, scene: 
     return 0
 
 
-def glide(flock: Flock, numbers: Any, time: float, n: int, scene: Any, *, plan: Plan) -> int:
+def move_own_goals(flock: FlockRows, numbers: Any, time: float, n: int, scene: Any, *, plan: Plan) -> int:
     """Send each agent's own goal on its way from where the agent was when all set out.
 
     aim[0] keeps when they set out, s. aim[3] keeps how long all are under way, s: the longest way at goals.speed, which
@@ -81,7 +81,7 @@ def glide(flock: Flock, numbers: Any, time: float, n: int, scene: Any, *, plan: 
     return 0
 
 
-def appear(flock: Flock, numbers: Any, time: float, n: int, scene: Any) -> int:
+def let_appear(flock: FlockRows, numbers: Any, time: float, n: int, scene: Any) -> int:
     """Let stand what is due, as soon as nobody is in its place.
 
     A shape waits until every agent is at start.clearance from its bounds, as nobody builds onto a drone in flight.
@@ -101,7 +101,7 @@ def appear(flock: Flock, numbers: Any, time: float, n: int, scene: Any) -> int:
     return 0
 
 
-def contacts(flock: Flock, numbers: Any, n: int, scene: Any, *, plan: Plan) -> None:
+def find_contacts(flock: FlockRows, numbers: Any, n: int, scene: Any, *, plan: Plan) -> None:
     """Find which agents have touched the scene since the positions were last looked at."""
     x, before, axes = flock.position, flock.before, range(plan.dimensions)
     if plan.scene:
@@ -113,7 +113,14 @@ def contacts(flock: Flock, numbers: Any, n: int, scene: Any, *, plan: Plan) -> N
     for i in range(n):
         if plan.scene:
             flock.touches[i] = bvh.touches(
-                before[X][i], before[Y][i], before[Z][i], x[X][i], x[Y][i], x[Z][i], numbers.q.r_body, *tree(scene)
+                before[X][i],
+                before[Y][i],
+                before[Z][i],
+                x[X][i],
+                x[Y][i],
+                x[Z][i],
+                numbers.q.r_body,
+                *scene_tree(scene),
             )
             for a in axes:
                 before[a][i] = x[a][i]

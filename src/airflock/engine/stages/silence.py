@@ -6,24 +6,24 @@ from typing import Any
 
 from airflock.core import silence
 from airflock.engine.plan import Plan
-from airflock.engine.stages.receive import by_clock
-from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import HALF, ONE, SIDES, TINY, ZERO, X, Y, Z, choose, integer, most, vector
-from airflock.world.edges import nearest_image
+from airflock.engine.stages.receive import clock_time
+from airflock.engine.stages.state import FlockRows
+from airflock.engine.stages.words import HALF, HALF_SIZES, ONE, TINY, ZERO, X, Y, Z, choose, integer, most, vector
+from airflock.world import nearest_image
 
 
-def stop(agents: Iterable[int], flock: Flock, numbers: Any, n: int, time: float, *, plan: Plan) -> None:
+def stop(agents: Iterable[int], flock: FlockRows, numbers: Any, n: int, time: float, *, plan: Plan) -> None:
     """Let stand still who has lost somebody that could be near by now."""
     axes, w, c = range(plan.dimensions), numbers.w, flock.command
     for i in agents:
-        somebody, now = ZERO, by_clock(time, i, flock, plan=plan)
+        somebody, now = ZERO, clock_time(time, i, flock, plan=plan)
         for j in range(n):
             d = vector()
             for a in axes:
                 d[a] = flock.packet[a][i, j] - flock.measured_position[a][i]
             if plan.periodic:
                 for a in axes:
-                    d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
+                    d[a] = nearest_image(d[a], getattr(w, HALF_SIZES[a]))
             distance = math.sqrt(sum(d[a] * d[a] for a in axes) + TINY)
             age = now - flock.packet[2 * plan.dimensions][i, j]
             near = silence.could_be_near(distance, age, numbers.silence)

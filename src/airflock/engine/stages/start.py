@@ -5,14 +5,12 @@ from typing import Any
 
 from airflock.core import random
 from airflock.engine.plan import Plan
-from airflock.engine.stages.percept import level
-from airflock.engine.stages.records import Surroundings
-from airflock.engine.stages.state import Flock, tree
+from airflock.engine.stages.percept import height_above_middle
+from airflock.engine.stages.records import WorldArrays
+from airflock.engine.stages.state import FlockRows, scene_tree
 from airflock.engine.stages.words import AWAY, HALF, LIMIT, ZERO, X, Y, Z, most, repeat, vector
-from airflock.scenarios.wings import FORMATIONS
-from airflock.world import bvh
-from airflock.world import start as places
-from airflock.world.inside import inside
+from airflock.scenarios import FORMATIONS
+from airflock.world import bvh, inside, start as places
 
 START = random.START
 SPEEDS, OFFSETS = START + 256, START + 512  # further draws of the same agent
@@ -24,17 +22,19 @@ def excursion(
     x: Any, y: Any, z: Any, w: Any, edges: Any, spans: Any, corners: int, obstacles: int, scene: Any, *, plan: Plan
 ) -> Any:
     """How far a position is outside the arena, or inside of what stands in it, m; negative elsewhere."""
-    e = plan.excursion(x, y, level(z, edges, corners, plan=plan), w.half_x, w.half_y, w.half_z, edges, corners)
+    e = plan.excursion(
+        x, y, height_above_middle(z, edges, corners, plan=plan), w.half_x, w.half_y, w.half_z, edges, corners
+    )
     if plan.obstacles:
         for o in range(obstacles):
             e = most(e, -plan.obstacle(x, y, z, edges, spans[o, 0], spans[o, 1]).distance)
     if plan.scene:
-        e = most(e, -bvh.nearest(x, y, z, LIMIT, *tree(scene)).distance)
+        e = most(e, -bvh.nearest(x, y, z, LIMIT, *scene_tree(scene)).distance)
     return e
 
 
-def tried(
-    i: int, attempt: int, s: Any, w: Any, whole: Any, around: Surroundings, excursion: Callable[..., Any], *, plan: Plan
+def try_place(
+    i: int, attempt: int, s: Any, w: Any, whole: Any, around: WorldArrays, excursion: Callable[..., Any], *, plan: Plan
 ) -> Any:
     """Put a random place of agent i into the vector s, m; returns whether it lies in the region of the start."""
     w0, w1, w2, w3 = random.draw(i, attempt, START, whole.world, whole.seed_low, whole.seed_high)
@@ -51,13 +51,13 @@ def tried(
     return free
 
 
-def roomy(free: Any, s: Any, w: Any, scene: Any, *, plan: Plan) -> Any:
+def is_free(free: Any, s: Any, w: Any, scene: Any, *, plan: Plan) -> Any:
     """Whether a place that is free so far is at `start.clearance` from the scene, and no mesh closes around it."""
     if plan.scene:
         if free:
-            free = bvh.nearest(s[X], s[Y], s[Z], w.clearance, *tree(scene)).distance >= w.clearance
-        if plan.meshed and free:
-            free = inside(s[X], s[Y], s[Z], *tree(scene)) < HALF
+            free = bvh.nearest(s[X], s[Y], s[Z], w.clearance, *scene_tree(scene)).distance >= w.clearance
+        if plan.has_mesh and free:
+            free = inside(s[X], s[Y], s[Z], *scene_tree(scene)) < HALF
     return free
 
 
@@ -69,7 +69,7 @@ def heading_off(i: int, w: Any, whole: Any, *, plan: Plan) -> Any:
     return places.heading_off(gx, gy, gz if plan.dimensions == 3 else ZERO, w.speed)
 
 
-def in_formation(i: int, s: Any, w: Any, whole: Any, *, plan: Plan) -> None:
+def place_in_formation(i: int, s: Any, w: Any, whole: Any, *, plan: Plan) -> None:
     """Put the place of agent i in a formation into the vector s, off it by `start.jitter`, m."""
     f, g = vector(), vector()
     f[X], f[Y], f[Z] = FORMATIONS[plan.start](i, w.spacing_x, w.spacing_y, w.spacing_z)
@@ -81,7 +81,7 @@ def in_formation(i: int, s: Any, w: Any, whole: Any, *, plan: Plan) -> None:
 
 
 def begin(  # noqa: C901 - tests of the plan leave one way through
-    flock: Flock, numbers: Any, whole: Any, around: Surroundings, n: int, m: int, start: Any,
+    flock: FlockRows, numbers: Any, whole: Any, around: WorldArrays, n: int, m: int, start: Any,
     excursion: Callable[..., Any], *, plan: Plan,
 ) -> int:  # fmt: skip
     """Place all agents at rest or at start speed; returns minus the first agent (from 1) that found no room.
@@ -104,7 +104,7 @@ def begin(  # noqa: C901 - tests of the plan leave one way through
     if plan.start in FORMATIONS:
         for i in range(n):
             s = vector()
-            in_formation(i, s, w, whole, plan=plan)
+            place_in_formation(i, s, w, whole, plan=plan)
             for a in axes:
                 x[a][i] = s[a]
             v[X][i] = w.speed
@@ -113,10 +113,10 @@ def begin(  # noqa: C901 - tests of the plan leave one way through
         placed = False
         for attempt in repeat(ATTEMPTS):
             s = vector()
-            free = tried(i, attempt, s, w, whole, around, excursion, plan=plan)
+            free = try_place(i, attempt, s, w, whole, around, excursion, plan=plan)
             for j in range(i if w.separation > ZERO else 0):
                 free = free & (sum((s[a] - x[a][j]) * (s[a] - x[a][j]) for a in axes) >= w.separation * w.separation)
-            free = roomy(free, s, w, around.scene, plan=plan)
+            free = is_free(free, s, w, around.scene, plan=plan)
             if free:
                 for a in axes:
                     x[a][i] = s[a]

@@ -3,38 +3,38 @@
 from collections.abc import Iterable
 from typing import Any
 
-from airflock.core.contract import Model
+from airflock.core import Model
 from airflock.engine.plan import Plan
-from airflock.engine.stages.records import Surroundings
-from airflock.engine.stages.state import Flock, numbers_of, tree
-from airflock.engine.stages.words import LIMIT, ONE, ZERO, X, Y, Z, ask, least, live, vector
+from airflock.engine.stages.records import WorldArrays
+from airflock.engine.stages.state import FlockRows, agent_numbers, scene_tree
+from airflock.engine.stages.words import LIMIT, ONE, ZERO, X, Y, Z, call_rule, least, nonzero_fields, vector
 from airflock.world import bvh, polygon
 
 
-def feel(i: int, surface: Any, flock: Flock, numbers: Any, *, plan: Plan, model: Model) -> None:
+def add_surface(i: int, surface: Any, flock: FlockRows, numbers: Any, *, plan: Plan, model: Model) -> None:
     """Add what agent i feels of one surface."""
     v = vector()
     for a in range(plan.dimensions):
         v[a] = flock.measured_velocity[a][i]
-    t = ask(
+    t = call_rule(
         model.boundary, distance=surface.distance, nx=surface.nx, ny=surface.ny, nz=surface.nz,
-        vx=v[X], vy=v[Y], vz=v[Z], p=numbers_of(i, "p", flock, numbers, plan=plan),
+        vx=v[X], vy=v[Y], vz=v[Z], p=agent_numbers(i, "p", flock, numbers, plan=plan),
     )  # fmt: skip
-    for c in live(model.Walls, plan.dimensions):
+    for c in nonzero_fields(model.Walls, plan.dimensions):
         flock.walls[c][i] += t[c]
 
 
-def reach_of(i: int, look: Any, flock: Flock, numbers: Any, *, plan: Plan, model: Model) -> Any:
+def wall_reach_of(i: int, look: Any, flock: FlockRows, numbers: Any, *, plan: Plan, model: Model) -> Any:
     """How far agent i feels surfaces, m: as far as all, or by its own numbers."""
     return (
-        least(ask(model.wall_reach, p=numbers_of(i, "p", flock, numbers, plan=plan)), LIMIT)
+        least(call_rule(model.wall_reach, p=agent_numbers(i, "p", flock, numbers, plan=plan)), LIMIT)
         if plan.varies("p") and model.wall_reach is not None
         else look
     )
 
 
-def faced(
-    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, faces: Any, *, plan: Plan, model: Model
+def sum_walls(
+    agents: Iterable[int], flock: FlockRows, numbers: Any, whole: Any, faces: Any, *, plan: Plan, model: Model
 ) -> None:
     """Walls whose surface is a function of four numbers, by family."""
     x = flock.measured_position
@@ -47,11 +47,19 @@ def faced(
             ed = faces[e, 3]
             for i in agents:
                 f = distance_to(x[X][i], x[Y][i], x[Z][i], ea, eb, ec, ed)
-                feel(i, f, flock, numbers, plan=plan, model=model)
+                add_surface(i, f, flock, numbers, plan=plan, model=model)
 
 
-def sides(
-    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, edges: Any, look: Any, *, plan: Plan, model: Model
+def sum_edges(
+    agents: Iterable[int],
+    flock: FlockRows,
+    numbers: Any,
+    whole: Any,
+    edges: Any,
+    look: Any,
+    *,
+    plan: Plan,
+    model: Model,
 ) -> None:
     """Edges of a polygonal arena: those that an agent can see and, for an agent outside, the nearest point."""
     x = flock.measured_position
@@ -59,18 +67,18 @@ def sides(
         for i in agents:
             f = polygon.wall(
                 x[X][i], x[Y][i], x[Z][i], edges, e, whole.corners,
-                reach_of(i, look, flock, numbers, plan=plan, model=model),
+                wall_reach_of(i, look, flock, numbers, plan=plan, model=model),
             )  # fmt: skip
-            if f.distance < reach_of(i, look, flock, numbers, plan=plan, model=model):
-                feel(i, f, flock, numbers, plan=plan, model=model)
+            if f.distance < wall_reach_of(i, look, flock, numbers, plan=plan, model=model):
+                add_surface(i, f, flock, numbers, plan=plan, model=model)
     for i in agents:
         f = polygon.outside(x[X][i], x[Y][i], x[Z][i], edges, whole.corners)
         if f.distance < ZERO:
-            feel(i, f, flock, numbers, plan=plan, model=model)
+            add_surface(i, f, flock, numbers, plan=plan, model=model)
 
 
 def boundaries(
-    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, faces: Any, around: Surroundings,
+    agents: Iterable[int], flock: FlockRows, numbers: Any, whole: Any, faces: Any, around: WorldArrays,
     *, plan: Plan, model: Model,
 ) -> None:  # fmt: skip
     """Sum the boundary rule over all surfaces: walls outside, agents inside the loop nest.
@@ -78,25 +86,25 @@ def boundaries(
     Of the scene two surfaces are felt: the ground, and the nearest point of what stands on it.
     """
     x = flock.measured_position
-    if plan.polygon or plan.scene:
-        look = least(LIMIT if model.wall_reach is None else ask(model.wall_reach, p=numbers.p), LIMIT)
+    if plan.polygonal or plan.scene:
+        look = least(LIMIT if model.wall_reach is None else call_rule(model.wall_reach, p=numbers.p), LIMIT)
     for i in agents:
-        for c in live(model.Walls, plan.dimensions):
+        for c in nonzero_fields(model.Walls, plan.dimensions):
             flock.walls[c][i] = ZERO
-    faced(agents, flock, numbers, whole, faces, plan=plan, model=model)
-    if plan.polygon:
-        sides(agents, flock, numbers, whole, around.edges, look, plan=plan, model=model)
+    sum_walls(agents, flock, numbers, whole, faces, plan=plan, model=model)
+    if plan.polygonal:
+        sum_edges(agents, flock, numbers, whole, around.edges, look, plan=plan, model=model)
     if plan.obstacles and model.sight is None:  # who casts meets them in the scene
         for o in range(whole.obstacles):
             for i in agents:
                 f = plan.obstacle(x[X][i], x[Y][i], x[Z][i], around.edges, around.spans[o, 0], around.spans[o, 1])
-                feel(i, f, flock, numbers, plan=plan, model=model)
+                add_surface(i, f, flock, numbers, plan=plan, model=model)
     if plan.scene:
         for ground in (ZERO, ONE)[: plan.dimensions - 1]:
             for i in agents:
                 f = bvh.nearest_of(
-                    x[X][i], x[Y][i], x[Z][i], reach_of(i, look, flock, numbers, plan=plan, model=model), ground,
-                    *tree(around.scene),
+                    x[X][i], x[Y][i], x[Z][i], wall_reach_of(i, look, flock, numbers, plan=plan, model=model), ground,
+                    *scene_tree(around.scene),
                 )  # fmt: skip
-                if f.distance < reach_of(i, look, flock, numbers, plan=plan, model=model):
-                    feel(i, f, flock, numbers, plan=plan, model=model)
+                if f.distance < wall_reach_of(i, look, flock, numbers, plan=plan, model=model):
+                    add_surface(i, f, flock, numbers, plan=plan, model=model)

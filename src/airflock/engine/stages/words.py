@@ -10,45 +10,45 @@ from collections.abc import Callable
 from typing import Any
 
 X, Y, Z = 0, 1, 2
-SIDES = ("half_x", "half_y", "half_z")
+HALF_SIZES = ("half_x", "half_y", "half_z")
 BLOCK = 8  # numbers that are copied at once, candidates that are looked at at once
 
 
-class Named(float):
+class NamedConstant(float):
     """A number that a driver calls by a name, in its own precision."""
 
     spelled: str
 
-    def __new__(cls, value: float, spelled: str) -> "Named":
+    def __new__(cls, value: float, spelled: str) -> "NamedConstant":
         """A number and its name."""
         made = super().__new__(cls, value)
         made.spelled = spelled
         return made
 
 
-ZERO, HALF, ONE = Named(0.0, "ZERO"), Named(0.5, "HALF"), Named(1.0, "ONE")
-TINY, FAR, LIMIT = Named(1e-12, "TINY"), Named(1e30, "FAR"), Named(1e8, "LIMIT")
-AWAY = Named(1e9, "AWAY")  # m, along each axis: where agents are that only fill up vectors
+ZERO, HALF, ONE = NamedConstant(0.0, "ZERO"), NamedConstant(0.5, "HALF"), NamedConstant(1.0, "ONE")
+TINY, FAR, LIMIT = NamedConstant(1e-12, "TINY"), NamedConstant(1e30, "FAR"), NamedConstant(1e8, "LIMIT")
+AWAY = NamedConstant(1e9, "AWAY")  # m, along each axis: where agents are that only fill up vectors
 CONSTANTS = (ZERO, HALF, ONE, TINY, FAR, LIMIT, AWAY)  # of every driver
-GONE = Named(-1.0, "-ONE")  # a time, or a square: not there
-START = {"sum": ZERO, "min": FAR, "max": Named(-1e30, "-FAR")}  # a total before its first term
+GONE = NamedConstant(-1.0, "-ONE")  # a time, or a square: not there
+REDUCTION_START = {"sum": ZERO, "min": FAR, "max": NamedConstant(-1e30, "-FAR")}  # a total before its first term
 
 
-class Nothing:
+class ZeroRow:
     """A row along an axis that is not flown: zero for every agent."""
 
-    def __getitem__(self, i: Any) -> Named:
+    def __getitem__(self, i: Any) -> NamedConstant:
         return ZERO
 
 
-class Itself:
+class IdentityRow:
     """The number of an agent, where agents lie in the order of their numbers."""
 
     def __getitem__(self, i: Any) -> Any:
         return i
 
 
-NOTHING = Nothing()
+ZERO_ROW = ZeroRow()
 
 
 def real(value: Any) -> Any:
@@ -61,7 +61,7 @@ def integer(value: Any) -> Any:
     return int(value)
 
 
-def place(value: Any) -> Any:
+def row_index(value: Any) -> Any:
     """A whole number that is a place in a row: a driver need not ask whether it counts from the row's end."""
     return int(value)
 
@@ -86,7 +86,7 @@ def repeat(count: int) -> range:
     return range(count)
 
 
-def side_by_side(count: int) -> range:
+def parallel(count: int) -> range:
     """Turns of a loop that threads share; each writes for itself."""
     return range(count)
 
@@ -96,7 +96,7 @@ def copy_block(to: Any, row: int, at: int, source: Any, first: int, shift: Any) 
     to[row][at : at + BLOCK] = source[row][first : first + BLOCK] + shift
 
 
-def between(lanes: Any, first: Any, end: Any) -> Any:
+def lanes_between(lanes: Any, first: Any, end: Any) -> Any:
     """Those of the lanes from `first` up to `end`, without it."""
     return [i for i in lanes if first <= i < end]
 
@@ -113,30 +113,30 @@ def totals() -> Any:
 
 def aliases() -> Any:
     """Rows under another name, by axis; zero along each axis that is not set."""
-    return [NOTHING, NOTHING, NOTHING]
+    return [ZERO_ROW, ZERO_ROW, ZERO_ROW]
 
 
-def ask(rule: Callable[..., Any] | None, **offered: Any) -> Any:
+def call_rule(rule: Callable[..., Any] | None, **offered: Any) -> Any:
     """Call a rule with what it asks for by name. A driver computes only that."""
     assert rule is not None
     return rule(*(offered[name] for name in inspect.signature(rule).parameters))
 
 
-def wants(rule: Callable[..., Any] | None, *names: str) -> bool:
+def rule_asks(rule: Callable[..., Any] | None, *names: str) -> bool:
     """Whether a rule asks for any of these names."""
     return rule is not None and bool(set(names) & set(inspect.signature(rule).parameters))
 
 
-def reduced(how: str, total: Any, term: Any) -> Any:
+def reduce_term(how: str, total: Any, term: Any) -> Any:
     """A total with one more term: their sum, the lesser or the greater."""
     return total + term if how == "sum" else least(total, term) if how == "min" else most(total, term)
 
 
-def fields(record: Any) -> range:
+def field_indices(record: Any) -> range:
     """Numbers of the fields of a record; none where there is no record."""
     return range(len(getattr(record, "_fields", ())))
 
 
-def live(record: Any, dimensions: int) -> list[int]:
+def nonzero_fields(record: Any, dimensions: int) -> list[int]:
     """Fields of a record that can differ from zero: in a plane, a field that ends in z cannot."""
     return [c for c, name in enumerate(getattr(record, "_fields", ())) if dimensions == 3 or not name.endswith("z")]

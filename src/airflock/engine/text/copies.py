@@ -10,11 +10,11 @@ from collections.abc import Callable, Hashable, Mapping
 from threading import Lock
 from typing import Any, NamedTuple, Protocol
 
-from airflock.core.rules.integers import free
+from airflock.core import resolve_global
 
 
-class Asked(Protocol):
-    """What a rule's text is written for: a `generate.Source`."""
+class TextSource(Protocol):
+    """What a rule's text is written for: a `generate.DriverSource`."""
 
     constants: Mapping[str, Mapping[str, str | float]]
     vectors: Mapping[str, Mapping[str, int]]
@@ -23,7 +23,7 @@ class Asked(Protocol):
         """Name in the driver of what a rule calls."""
 
 
-class Question(NamedTuple):
+class Dependency(NamedTuple):
     """One question about a rule: its kind, what it is about, and the answer."""
 
     kind: str
@@ -31,12 +31,12 @@ class Question(NamedTuple):
     answer: Any
 
 
-class Notes:
+class DependencyRecorder:
     """What is asked about one rule while it is copied; all of it is kept."""
 
-    def __init__(self, rule: Callable[..., Any], source: Asked):
+    def __init__(self, rule: Callable[..., Any], source: TextSource):
         self.rule, self.source = rule, source
-        self.asked: list[Question] = []
+        self.asked: list[Dependency] = []
 
     def choice(self, record: str, field: str) -> Any:
         """The choice or the usual number that a field of a record is; None if it is neither."""
@@ -54,13 +54,13 @@ class Notes:
         """Name in the driver of what the rule calls."""
         return str(self._kept("name", item, tuple(chosen.items())))
 
-    def hold(self, copied: list[Question]) -> bool:
+    def hold(self, dependencies: list[Dependency]) -> bool:
         """Whether all answers of another time are those of now; what the rule calls comes along."""
-        return all(_same(each.answer, self._answer(each.kind, *each.about)) for each in copied)
+        return all(_same(each.answer, self._answer(each.kind, *each.about)) for each in dependencies)
 
     def _kept(self, kind: str, *about: Any) -> Any:
         answer = self._answer(kind, *about)
-        self.asked.append(Question(kind, about, answer))
+        self.asked.append(Dependency(kind, about, answer))
         return answer
 
     def _answer(self, kind: str, *about: Any) -> Any:
@@ -69,7 +69,7 @@ class Notes:
         if kind == "size":
             return self.source.vectors.get(about[0], {}).get(about[1], 0)
         if kind == "free":
-            return free(about[0], self.rule)
+            return resolve_global(about[0], self.rule)
         return self.source.name(about[0], dict(about[1]))
 
 
@@ -78,28 +78,28 @@ def _same(known: Any, found: Any) -> bool:
     return known is found or (type(known) is type(found) and isinstance(known, (str, int, float)) and known == found)
 
 
-class Copies:
+class TextCache:
     """Texts that were written for rules, each with the questions that it depends on; the last that were asked for.
 
     most : rules, each under one name and under all else that its text depends on; each : texts of one of them
     """
 
-    def __init__(self, most: int = 4096, each: int = 256):
-        self._most, self._each, self._lock = most, each, Lock()
-        self._kept: OrderedDict[Hashable, tuple[tuple[list[Question], str], ...]] = OrderedDict()
+    def __init__(self, max_rules: int = 4096, max_texts: int = 256):
+        self._most, self._each, self._lock = max_rules, max_texts, Lock()
+        self._kept: OrderedDict[Hashable, tuple[tuple[list[Dependency], str], ...]] = OrderedDict()
 
-    def text(self, of: Hashable, notes: Notes) -> str | None:
+    def text(self, key: Hashable, recorder: DependencyRecorder) -> str | None:
         """The text that was written where all answers were those of now; None if none was."""
         with self._lock:
-            known = self._kept.get(of, ())
+            known = self._kept.get(key, ())
             if known:
-                self._kept.move_to_end(of)
-        return next((text for asked, text in known if notes.hold(asked)), None)
+                self._kept.move_to_end(key)
+        return next((text for asked, text in known if recorder.hold(asked)), None)
 
-    def keep(self, of: Hashable, notes: Notes, text: str) -> None:
+    def keep(self, key: Hashable, recorder: DependencyRecorder, text: str) -> None:
         """Keep a text, with what was asked while it was written."""
         with self._lock:
-            self._kept[of] = (*self._kept.get(of, ())[-self._each + 1 :], (notes.asked, text))
-            self._kept.move_to_end(of)
+            self._kept[key] = (*self._kept.get(key, ())[-self._each + 1 :], (recorder.asked, text))
+            self._kept.move_to_end(key)
             while len(self._kept) > self._most:
                 self._kept.popitem(last=False)

@@ -12,22 +12,19 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from typing import Any
 
-from airflock.core import random as random_streams
-from airflock.core.rules import law
-from airflock.core.rules.integers import tree_of
-from airflock.core.rules.nodes import walk
-from airflock.engine.text.copies import Copies, Notes
-from airflock.engine.text.rewrite import NOTHING, Rewrite
-from airflock.support.spelling import as_name
+from airflock.core import law, random as random_streams, tree_of, walk_tree
+from airflock.engine.text.copies import DependencyRecorder, TextCache
+from airflock.engine.text.rewrite import NO_CHOICES, RuleRewriter
+from airflock.support import to_identifier
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
 ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True, **INNER)'
 NONE: Mapping[str, Mapping[str, int]] = {}
-COPIES = Copies()  # of this process
+COPIES = TextCache()  # of this process
 INLINED = '@njit(inline="always", **JIT)'
 
 
-class Source:
+class DriverSource:
     """Collects functions and records, each once, as text in the order in which they are needed.
 
     decorator : line put above each function
@@ -37,7 +34,7 @@ class Source:
     lenient   : whether rules may call what only plain Python has, such as breakpoint() and print()
     """
 
-    lenient = False
+    allow_builtins = False
 
     def __init__(
         self,
@@ -58,13 +55,13 @@ class Source:
 
     def of(
         self, law: int, constants: Mapping[str, Mapping[str, str | float]], vectors: Mapping[str, Mapping[str, int]]
-    ) -> "Source":
+    ) -> "DriverSource":
         """The same text, for rules of another law of the flock: what they read of its records is its own."""
         other = copy(self)
         other.constants, other.vectors, other.law = constants, vectors, law
         return other
 
-    def name(self, item: Any, chosen: Mapping[str, str] = NOTHING) -> str:
+    def name(self, item: Any, chosen: Mapping[str, str] = NO_CHOICES) -> str:
         """Name in the driver of a plain function or a NamedTuple class; adds its text on first use.
 
         chosen : arguments of the function that are choices, by name; they become constants of its text
@@ -79,7 +76,7 @@ class Source:
             return str(item.__name__)  # bound by the device
         module = str(getattr(item, "__module__", "")).rpartition(".")[2].strip("_")
         said = [text for text in chosen.values() if text.isidentifier()]
-        name = base = as_name("_".join([module, item.__name__, *said]))
+        name = base = to_identifier("_".join([module, item.__name__, *said]))
         count = 1
         while name in self._taken:
             count += 1
@@ -119,16 +116,16 @@ class Source:
         return name
 
     def _function(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str]) -> str:
-        law.check(rule)
-        notes = Notes(rule, self)
-        of = rule, name, *chosen.items(), self.decorator, self.law, self.lenient, self._apart
+        law.check_rule(rule)
+        notes = DependencyRecorder(rule, self)
+        of = rule, name, *chosen.items(), self.decorator, self.law, self.allow_builtins, self._apart
         text = COPIES.text(of, notes)
         if text is None:
             text = self._copied(rule, name, chosen, notes)
             COPIES.keep(of, notes, text)
         return text
 
-    def _copied(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str], notes: Notes) -> str:
+    def _copied(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str], notes: DependencyRecorder) -> str:
         node = tree_of(rule)
         node.name = name
         node.returns = None
@@ -138,11 +135,11 @@ class Source:
             argument.annotation = None
         if isinstance(node.body[0], ast.Expr) and isinstance(node.body[0].value, ast.Constant):
             node.body.pop(0)
-        rewritten = Rewrite(rule, self, chosen, notes).visit(node)
+        rewritten = RuleRewriter(rule, self, chosen, notes).visit(node)
         _end_at_return(rewritten)
         # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
         # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
-        loops = any(isinstance(item, (ast.For, ast.While)) for item in walk(node))
+        loops = any(isinstance(item, (ast.For, ast.While)) for item in walk_tree(node))
         decorator = INLINED if loops and self.decorator and not self._apart else self.decorator
         if self._apart and (_depth(node) > 2 or "work" in {argument.arg for argument in node.args.args}):
             decorator = ALONE

@@ -8,18 +8,26 @@ from functools import cache
 from inspect import signature
 from typing import Any
 
-from airflock.core.contract import Body, Model
-from airflock.core.fault import RULES, Fault
-from airflock.core.radio import Radio
-from airflock.core.rules import law
-from airflock.core.sensor import COMPONENTS, Sensor
-from airflock.core.topology import Topology
-from airflock.core.vocabulary import VOCABULARY, Own, Percept, asks, radios
-from airflock.core.vocabulary.laws import PAIR, SURFACE
-from airflock.parts.aero import descent
-from airflock.parts.aero import wing as wings
-from airflock.support.errors import RuleError
-from airflock.support.spelling import raised
+from airflock.core import (
+    COMPONENTS,
+    FAULT_RULES,
+    PAIR,
+    SURFACE,
+    VOCABULARY,
+    Body,
+    Fault,
+    Model,
+    Own,
+    Percept,
+    Radio,
+    Sensor,
+    Topology,
+    argument_names,
+    law,
+    radios,
+)
+from airflock.parts.aero import descent, wing as wings
+from airflock.support import RuleError, describe_error
 
 VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
     3.0, -4.0, 0.0, 5.0, 25.0, 0.6, 0.8, 0.0, 1.0, 1.0, 2.0, 0.0, 0.6, 0.8, 0.0, 0.8, 0.6, 0.0, 0.2, 1.0, 0.0, 1.0,
@@ -27,14 +35,14 @@ VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
 ), strict=True))  # fmt: skip
 
 
-def probe(model: Model, parameters: Any) -> None:
+def probe_model(model: Model, parameters: Any) -> None:
     """Raise a RuleError that names file, line and fault, if a rule fails or returns something else than it declares."""
     given: dict[str, Any] = {**VALUES, "p": parameters, "period": 0.2, "percept": Percept(1.0, 10.0, 20.0, 0.0)}
     given["wing"], given["aero"] = wings.Parameters(segments="5"), descent.Parameters()
     given["own"] = Own(1.0, 2.0, 0.0, 0.4472, 0.8944, 0.0)
     for kind, rule in (("reach", model.reach), ("neighbour", model.neighbour), ("boundary", model.boundary)):
         if rule is not None:
-            law.check(rule)
+            law.check_rule(rule)
             answer = _call(rule, kind, given, model.name)
             if kind != "reach":
                 record: Any = model.Sums if kind == "neighbour" else model.Walls
@@ -50,10 +58,10 @@ def probe(model: Model, parameters: Any) -> None:
     if model.Memory is not None:
         given["memory"] = model.Memory()
     if model.flock is not None:
-        law.check(model.flock)
+        law.check_rule(model.flock)
         given["shared"] = _shared(model, given)
     if model.added is not None:
-        law.check(model.added.decide)
+        law.check_rule(model.added.decide)
         _call(model.added.decide, "decide", given, model.added.name)
     _answer(model.decide, "decide", given, model.name, "x", "y", "z", *["Memory(...)"] * (model.Memory is not None))
 
@@ -65,9 +73,9 @@ def probe_fault(kind: Fault) -> None:
     given: dict[str, Any] = {name: 0.5 + 0.1 * k for k, name in enumerate(sorted(names))}
     given["f"] = kind.Parameters()
     for name, rule in kind.rules.items():
-        law.check(rule)
+        law.check_rule(rule)
         answer = _call(rule, name, given, kind.name)
-        count, what = RULES[name]
+        count, what = FAULT_RULES[name]
         found = len(answer) if isinstance(answer, tuple) else 1
         if found != count:
             raise RuleError(f"{_place(rule)}: {kind.name}.{name} returns {found} of {count} numbers: {what}")
@@ -119,7 +127,7 @@ def probe_radio(radio: Radio) -> None:
 @cache
 def probe_topology(kind: Topology) -> None:
     """The same for the rule of a topology: it says of each of two others, by 1.0 or 0.0, whether it is met."""
-    law.check(kind.meet)
+    law.check_rule(kind.meet)
     rows = {name: [0.5, 2.0] for name in VOCABULARY["meet"]}
     rows |= {"hidden": [0.0, 1.0], "met": [2.0, 2.0], "heap": [1e30] * 2, "weak": [1e30] * 2}
     given: dict[str, Any] = {**rows, "n": 2, "t": kind.Parameters() if kind.Parameters is not None else None}
@@ -132,7 +140,7 @@ def probe_topology(kind: Topology) -> None:
 def _shared(model: Model, given: dict[str, Any]) -> Any:
     """What the rule of the whole flock finds for the first of three agents."""
     assert model.flock is not None and model.workspace is not None and model.Shared is not None
-    shapes = shapes_of(model.workspace, 3, given)
+    shapes = scratch_shapes(model.workspace, 3, given)
     work = type(shapes)(*[[[0.0] * columns for _ in range(rows)] for rows, columns in shapes])
     fields = model.Shared._fields
     shared = model.Shared(*[[0.0] * 3 for _ in fields])
@@ -142,7 +150,7 @@ def _shared(model: Model, given: dict[str, Any]) -> Any:
     return model.Shared(*[column[0] for column in shared])
 
 
-def shapes_of(workspace: Callable[..., Any], agents: int, records: Mapping[str, Any]) -> Any:
+def scratch_shapes(workspace: Callable[..., Any], agents: int, records: Mapping[str, Any]) -> Any:
     """Shapes of the scratch for so many agents: what `workspace` returns for those of n and the records it asks for."""
     given = {**records, "n": agents}
     return workspace(*(given[name] for name in signature(workspace).parameters))
@@ -150,7 +158,7 @@ def shapes_of(workspace: Callable[..., Any], agents: int, records: Mapping[str, 
 
 def _answer(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str, *parts: str) -> Any:
     """What a rule says on a probe; it must be of these parts, of which a single one is no tuple."""
-    law.check(rule)
+    law.check_rule(rule)
     answer = _call(rule, kind, given, owner)
     if (len(answer) if isinstance(answer, tuple) else 1) != len(parts):
         raise RuleError(f"{_place(rule)}: {owner}.{kind} must return {', '.join(parts)}")
@@ -158,7 +166,7 @@ def _answer(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: s
 
 
 def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str) -> Any:
-    names = asks(rule, kind, owner)
+    names = argument_names(rule, kind, owner)
     missing = [name for name in names if name not in given]
     if missing:
         raise RuleError(f"{_place(rule)}: {owner}.{kind} asks for {missing[0]}, which this model does not provide")
@@ -173,7 +181,7 @@ def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str
             if "airflock/rules/probe" not in frame.filename and frame.filename != "<string>"  # text of a dataclass
         ]
         spot = f"{frames[-1].filename}:{frames[-1].lineno}" if frames else _place(rule)
-        raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {raised(fault)}") from fault
+        raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {describe_error(fault)}") from fault
     numbers = answer if isinstance(answer, tuple) else (answer,)
     for number in numbers:
         if isinstance(number, (int, float)) and not math.isfinite(number):

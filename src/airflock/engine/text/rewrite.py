@@ -11,39 +11,41 @@ import types
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from airflock.core.rules import law
-from airflock.engine.text.copies import Notes
-from airflock.engine.text.unrolled import Unrolled
-from airflock.support.errors import RuleError
+from airflock.core import law
+from airflock.engine.text.copies import DependencyRecorder
+from airflock.engine.text.unrolled import VectorUnroller
+from airflock.support import RuleError
 
-GIVEN = law.ALLOWED_CALLS | {law.TAKEN, *law.RESERVED.values()}  # what every driver has
-NOTHING: Mapping[str, str] = {}
+GIVEN = law.ALLOWED_CALLS | {law.CAST_NAME, *law.RENAMED_BUILTINS.values()}  # what every driver has
+NO_CHOICES: Mapping[str, str] = {}
 
 
-class Driver(Protocol):
-    """What a rule is written for: a `generate.Source`."""
+class RewriteTarget(Protocol):
+    """What a rule is written for: a `generate.DriverSource`."""
 
     law: int
-    lenient: bool
+    allow_builtins: bool
     vectors: Mapping[str, Mapping[str, int]]
 
     def names(self) -> set[str]:
         """Names in the driver of all that has come so far."""
 
 
-def law_mark(law: int | None) -> str:
+def law_suffix(law: int | None) -> str:
     """What names of a driver end in that are of one law of several."""
     return f"_{law}" if law else ""
 
 
-class Rewrite(Unrolled):
+class RuleRewriter(VectorUnroller):
     """Bind the free names of one rule and cast its literals; arguments that are chosen become constants."""
 
-    def __init__(self, rule: Callable[..., Any], source: Driver, chosen: Mapping[str, str], notes: Notes):
+    def __init__(
+        self, rule: Callable[..., Any], source: RewriteTarget, chosen: Mapping[str, str], recorder: DependencyRecorder
+    ):
         self.rule = rule
         self.source = source
         self.chosen = chosen
-        self.notes = notes
+        self.notes = recorder
         self.local = set(rule.__code__.co_varnames) - set(chosen)
         super().__init__(rule, source.vectors)
 
@@ -59,7 +61,7 @@ class Rewrite(Unrolled):
         return self._real(node) if type(node.value) is float else node
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.expr:
-        if self.source.lenient:
+        if self.source.allow_builtins:
             return node
         place = law.place_of(self.rule, node.lineno - 1)
         raise RuleError(
@@ -113,7 +115,9 @@ class Rewrite(Unrolled):
         self.generic_visit(node)
         method = node.func
         if isinstance(method, ast.Attribute) and isinstance(method.value, ast.Name) and method.value.id == "percept":
-            node.func = ast.Name(f"percept_{method.attr}{law_mark(self.source.law)}", ast.Load())  # bound by the driver
+            node.func = ast.Name(
+                f"percept_{method.attr}{law_suffix(self.source.law)}", ast.Load()
+            )  # bound by the driver
             node.args.insert(0, method.value)
         if isinstance(node.func, ast.Name) and node.func.id == "float":
             node.func.id = "real"
@@ -180,8 +184,8 @@ class Rewrite(Unrolled):
         if isinstance(value, int):
             return ast.Constant(value)
         if isinstance(value, types.FunctionType) or (isinstance(value, type) and issubclass(value, tuple)):
-            return ast.Name(self.notes.name(value, NOTHING), node.ctx)
-        if isinstance(value, types.ModuleType) or (self.source.lenient and hasattr(builtins, node.id)):
+            return ast.Name(self.notes.name(value, NO_CHOICES), node.ctx)
+        if isinstance(value, types.ModuleType) or (self.source.allow_builtins and hasattr(builtins, node.id)):
             return node
         why = (
             "; it does not compile; the device python flies it" if hasattr(builtins, node.id) else "; it is not defined"

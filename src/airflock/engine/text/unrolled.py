@@ -9,12 +9,11 @@ from collections.abc import Callable, Mapping
 from copy import deepcopy
 from typing import Any
 
-from airflock.core.rules.nodes import walk
-from airflock.core.vectors import names_of
-from airflock.support.errors import RuleError
+from airflock.core import component_names, walk_tree
+from airflock.support import RuleError
 
 
-class Unrolled(ast.NodeTransformer):
+class VectorUnroller(ast.NodeTransformer):
     """What is known of vectors in one rule.
 
     vectors : for each record name its vectors, with how many components each has
@@ -31,7 +30,7 @@ class Unrolled(ast.NodeTransformer):
 
     def components(self, node: ast.Attribute) -> list[ast.expr]:
         """Components of a vector, one after another."""
-        return [ast.Attribute(node.value, name, ast.Load()) for name in names_of(node.attr, self.size(node))]
+        return [ast.Attribute(node.value, name, ast.Load()) for name in component_names(node.attr, self.size(node))]
 
     def counts(self, node: ast.Call) -> bool:
         """Whether a call asks for the number of components of a vector."""
@@ -77,7 +76,7 @@ class Unrolled(ast.NodeTransformer):
         if not isinstance(called, ast.Name) or called.id != "range" or not isinstance(node.target, ast.Name):
             return None
         index = node.target.id
-        picks = [item for item in walk(node) if isinstance(item, ast.Subscript) and self.size(item.value)]
+        picks = [item for item in walk_tree(node) if isinstance(item, ast.Subscript) and self.size(item.value)]
         if not any(_reads(item.slice, index) for item in picks) or _sets(node.body, index):
             return None
         ends = [self._whole(argument) for argument in node.iter.args]  # type: ignore[attr-defined]
@@ -116,14 +115,14 @@ class _Put(ast.NodeTransformer):
 
 
 def _reads(node: ast.AST, name: str) -> bool:
-    return any(isinstance(item, ast.Name) and item.id == name for item in walk(node))
+    return any(isinstance(item, ast.Name) and item.id == name for item in walk_tree(node))
 
 
 def _sets(statements: list[ast.stmt], name: str) -> bool:
-    named = (item for s in statements for item in walk(s) if isinstance(item, ast.Name) and item.id == name)
+    named = (item for s in statements for item in walk_tree(s) if isinstance(item, ast.Name) and item.id == name)
     return any(isinstance(item.ctx, ast.Store) for item in named)
 
 
 def _left(node: ast.For) -> bool:
     """Whether a loop may be left early, skip the rest of a turn, or do something at its end."""
-    return bool(node.orelse) or any(isinstance(item, (ast.Break, ast.Continue)) for item in walk(node))
+    return bool(node.orelse) or any(isinstance(item, (ast.Break, ast.Continue)) for item in walk_tree(node))

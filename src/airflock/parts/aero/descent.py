@@ -8,9 +8,7 @@ look for each other's upwash. Its forward is the wing's (wing.frame): along x, o
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, choice, quantity, shorten
 from airflock.parts.aero.formation import forward, place_wings
 from airflock.parts.aero.gradients import slopes
 from airflock.parts.aero.lifting_line import shapes, solve

@@ -8,7 +8,7 @@ frozen        : derivative with the circulations of all other wings held
 A wing's drag is a quadratic form in the wash of the others, so its derivative with that wash is known in closed form.
 """
 
-from airflock.core.maths import FAR
+from airflock.core import FAR
 from airflock.parts.aero.elimination import factorise, substitute_transposed
 from airflock.parts.aero.filaments import add_product, add_wash, influence_slopes, influences
 from airflock.parts.aero.lifting_line import SWEEPS, assemble, carry, induced_drag, meet, settle, wash_on

@@ -11,7 +11,7 @@ Dimock & Selig 2003, Eqs 5-7; theory after Katz and Plotkin, Low-Speed Aerodynam
 
 from typing import NamedTuple
 
-from airflock.core.maths import FAR
+from airflock.core import FAR
 from airflock.parts.aero.elimination import factorise, invert_definite, substitute
 from airflock.parts.aero.filaments import add_product, add_wash, influences
 from airflock.parts.aero.wing import apart, circulation_sum, lanes, pitch, segments_of, shift, stiffness

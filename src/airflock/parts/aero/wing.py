@@ -6,8 +6,7 @@ Axes of a formation: x forward, y across, z up; the wake goes to -x. All wings o
 import math
 from dataclasses import dataclass
 
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, choice, quantity
 
 PAPER = "Dimock & Selig 2003"
 OURS = "our choice"

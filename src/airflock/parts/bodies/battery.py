@@ -11,8 +11,7 @@ falls linearly with the energy that was drawn, and is zero once the battery is e
 import math
 from typing import Any
 
-from airflock.core.maths import FAR
-from airflock.core.parameters import choice, quantity
+from airflock.core import FAR, choice, quantity
 
 
 def battery_kind() -> Any:

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-from airflock.core.maths import shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, quantity, shorten
 
 ACCEPTS = "velocity"  # the COMMAND that this body takes
 INTEGRATION = "new"  # positions move by the velocity that has just been commanded

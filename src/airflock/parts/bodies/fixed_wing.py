@@ -24,9 +24,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import arc_cosine, clamp, norm
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, arc_cosine, clamp, norm, quantity
 from airflock.parts.bodies.battery import battery_end, battery_energy, battery_kind, lasting, left
 
 ACCEPTS = "velocity"

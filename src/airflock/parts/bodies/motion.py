@@ -3,9 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from airflock.core.maths import shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, quantity, shorten
 
 ACCEPTS = "velocity"  # the COMMAND that this body takes
 INTEGRATION = "old"  # positions move by the velocity before the step (authors' program)

@@ -20,9 +20,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import norm, shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, norm, quantity, shorten
 from airflock.parts.bodies.battery import battery_end, battery_energy, battery_kind, hovering, lasting, left
 
 ACCEPTS = "velocity"

@@ -1,6 +1,6 @@
 """The bodies that a scenario can name: the key body.kind."""
 
-from airflock.core.contract import Body, body
+from airflock.core import Body, body
 from airflock.parts.bodies import direct, fixed_wing, jostled, motion, quadrotor, steered, turning
 
 BODIES: dict[str, Body] = {
@@ -14,6 +14,6 @@ BODIES: dict[str, Body] = {
 }
 
 
-def body_for(command: str) -> str:
+def default_body(command: str) -> str:
     """Name of the first body that accepts a COMMAND: what a scenario without body.kind flies."""
     return next(name for name, found in BODIES.items() if found.accepts == command)

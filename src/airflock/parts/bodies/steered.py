@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-from airflock.core.maths import norm, shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, norm, quantity, shorten
 
 ACCEPTS = "acceleration"
 INTEGRATION = "new"  # Eq. 12: positions move by the velocity after the step

@@ -3,9 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from airflock.core.maths import arc_cosine, norm
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, arc_cosine, choice, norm, quantity
 
 ACCEPTS = "heading"
 INTEGRATION = "new"  # unless the key body.integration says otherwise

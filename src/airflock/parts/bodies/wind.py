@@ -4,8 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, choice, quantity
 
 LIGHT = (-10.0, 10.0)  # m/s; winds in which small drones fly
 

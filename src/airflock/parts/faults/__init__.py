@@ -3,3 +3,7 @@
 All kinds are our own definitions; sources of their numbers stand beside them.
 Copy the shape of `motor.py` for a kind of your own; docs/faults.md shows one.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

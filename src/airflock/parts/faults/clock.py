@@ -5,8 +5,7 @@ Only who asks for ages can tell: extrapolation over two links (radio.kind = "lin
 
 from dataclasses import dataclass
 
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, quantity
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, quantity
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """The kinds of fault that a scenario can name: the key `kind` of an entry of [[faults]]."""
 
-from airflock.core.fault import Fault, fault
+from airflock.core import Fault, fault
 from airflock.parts.faults import (
     battery,
     clock,

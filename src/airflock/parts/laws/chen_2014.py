@@ -18,9 +18,7 @@ them. Nobody flies faster than `v_max`, which the paper does not limit.
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, choice, quantity, shorten
 
 COMMAND = "velocity"
 TERMS = {"t": ("pull of its kind and prey", "m/s"), "f": ("flight from predators", "m/s")}

@@ -19,9 +19,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import unit
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, quantity, unit
 
 COMMAND = "heading"
 TERMS = {"r": ("avoidance", ""), "o": ("alignment", ""), "a": ("attraction", "")}

@@ -24,13 +24,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import norm, shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
-from airflock.parts.aero.formation import forward, place_wings
-from airflock.parts.aero.gradients import slopes
-from airflock.parts.aero.lifting_line import induced_drag, shapes, solve
-from airflock.parts.aero.wing import pitch, rounded, segments_of
+from airflock.core import Parameters as Record, choice, norm, quantity, shorten
+from airflock.parts.aero import forward, induced_drag, pitch, place_wings, rounded, segments_of, shapes, slopes, solve
 
 COMMAND = "velocity"
 TERMS = {"c": ("cohesion", "m"), "a": ("avoidance", "m; pairwise: m/s")}

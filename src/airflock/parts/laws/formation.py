@@ -10,9 +10,7 @@ side, so that nobody waits behind them.
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import braking_curve, braking_distance, excess, norm, shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, braking_curve, braking_distance, excess, norm, quantity, shorten
 
 COMMAND = "velocity"
 VIOLATES = {

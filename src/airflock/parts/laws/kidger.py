@@ -25,9 +25,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import TINY, norm
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import TINY, Parameters as Record, choice, norm, quantity
 
 COMMAND = "velocity"
 TERMS = {"s": ("separation", ""), "a": ("alignment", "m/s"), "c": ("cohesion", "m")}

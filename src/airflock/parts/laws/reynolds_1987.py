@@ -23,9 +23,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import clamp, norm, shorten, unit
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, choice, clamp, norm, quantity, shorten, unit
 
 COMMAND = "acceleration"
 TERMS = {"c": ("cohesion", "m"), "s": ("separation", "1/m; printed: m"), "a": ("alignment", "m/s")}

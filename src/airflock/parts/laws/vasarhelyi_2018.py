@@ -21,9 +21,7 @@ ours: nothing else. A sum that is exactly zero stays zero, as in the program.
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import braking_curve, braking_distance, excess, norm
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, braking_curve, braking_distance, choice, excess, norm, quantity
 
 COMMAND = "velocity"
 S1 = "Table S1, column 4 m/s"

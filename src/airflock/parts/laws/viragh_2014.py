@@ -18,9 +18,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.maths import clamp, shorten
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core import Parameters as Record, clamp, quantity, shorten
 
 COMMAND = "velocity"
 FIG1 = "Vásárhelyi et al. 2018, Fig. 1, caption"

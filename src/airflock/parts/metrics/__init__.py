@@ -1,1 +1,5 @@
 """Layer 2: order parameters and fitness, one notion per file."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

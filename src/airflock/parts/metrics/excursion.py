@@ -7,7 +7,7 @@ smallest clearance tells how near the nearest of them came; it is below 0 where 
 import math
 from typing import NamedTuple
 
-from airflock.core.maths import FAR
+from airflock.core import FAR
 
 REPORTS = {
     "phi_wall": ("m", "mean excursion of agents that are outside"),

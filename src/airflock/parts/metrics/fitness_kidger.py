@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.core.maths import peak
+from airflock.core import peak
 
 COLLISIONS = 3.0  # per agent and minute, at which f_coll is a quarter
 CRASHES = 0.1  # the same with the environment

@@ -5,7 +5,7 @@ F_cluster is printed with three arguments in F3; F1 takes three and fits the def
 
 from collections.abc import Mapping
 
-from airflock.core.maths import bell, peak, rising
+from airflock.core import bell, peak, rising
 from airflock.parts.metrics.parameters import Parameters
 
 REPORTS = {

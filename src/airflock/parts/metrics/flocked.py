@@ -6,7 +6,7 @@ Flocked means within q.r_flock of the centre of mass; the thesis halves a diamet
 import math
 from typing import NamedTuple
 
-from airflock.core.maths import FAR
+from airflock.core import FAR
 
 REPORTS = {
     "flocked": ("", "share of agents within metrics.r_flock of the flock's centre"),

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from airflock.core.maths import norm
+from airflock.core import norm
 
 REPORTS = {"milling": ("", "rotation about the group's own centre, 1 is a mill")}
 

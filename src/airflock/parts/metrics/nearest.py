@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from airflock.core.maths import FAR
+from airflock.core import FAR
 
 REPORTS = {
     "r_min_mean": ("m", "mean distance to the nearest neighbour"),

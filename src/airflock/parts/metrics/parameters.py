@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity, text
+from airflock.core import Parameters as Record, choice, quantity, text
 
 ZAPOTECATL = "Zapotecatl et al. 2016"
 METHODS = "Vásárhelyi et al. 2018, Methods"

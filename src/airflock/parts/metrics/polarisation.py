@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from airflock.core.maths import norm
+from airflock.core import norm
 
 REPORTS = {"polarisation": ("", "length of the mean heading, 1 is aligned")}
 

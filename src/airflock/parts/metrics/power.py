@@ -6,9 +6,7 @@ flock, another model's flock or a flight log. The saving is against a lone wing 
 
 from typing import NamedTuple
 
-from airflock.parts.aero.formation import forward, place_wings
-from airflock.parts.aero.lifting_line import induced_drag, shapes, solo_drag, solve
-from airflock.parts.aero.wing import profile_drag, segments_of
+from airflock.parts.aero import forward, induced_drag, place_wings, profile_drag, segments_of, shapes, solo_drag, solve
 
 REPORTS = {
     "power": ("W", "mean power per bird"),

@@ -8,7 +8,7 @@ body, yet compares the distance of two centres with it; so does the program, and
 import math
 from typing import NamedTuple
 
-from airflock.core.maths import angle_between, norm
+from airflock.core import angle_between, norm
 
 REPORTS = {
     "extension_cm": ("cm", "mean distance to the centre"),

@@ -5,8 +5,7 @@ from dataclasses import is_dataclass, make_dataclass
 from types import ModuleType
 from typing import Any
 
-from airflock.core.contract import Metric, MetricSet, metric, names_of
-from airflock.core.parameters import Parameters as Record
+from airflock.core import Metric, MetricSet, Parameters as Record, metric, namespace_names
 from airflock.parts.metrics import (
     avoidance,
     collisions,
@@ -32,7 +31,7 @@ from airflock.parts.metrics import (
     steadiness,
     swarms,
 )
-from airflock.support.errors import RuleError
+from airflock.support import RuleError
 
 METRICS: dict[str, Metric] = {
     found.name: found
@@ -110,8 +109,8 @@ SETS: dict[str, MetricSet] = {
         ),
     )
 }  # fmt: skip
-USUAL = "vasarhelyi"  # the set of a scenario without metrics.kind
-POWER = {"metrics.kind": "dimock", "metrics.fitness": "sound"}  # settings that measure the power of wings
+DEFAULT_SET = "vasarhelyi"  # the set of a scenario without metrics.kind
+POWER_SETTINGS = {"metrics.kind": "dimock", "metrics.fitness": "sound"}  # settings that measure the power of wings
 
 # what the engine itself keeps of a flight with goals
 GOALS = {
@@ -153,7 +152,7 @@ def metric_set(namespace: Any, name: str = "") -> MetricSet:
     >>> airflock.metric_set(Fast).best
     'fitness'
     """
-    found, name = names_of(namespace, name)
+    found, name = namespace_names(namespace, name)
     metrics = [_metric(item, name) for item in found.get("METRICS", ())]
     if "sample" in found:
         metrics.append(metric(found, name))
@@ -170,20 +169,20 @@ def metric_set(namespace: Any, name: str = "") -> MetricSet:
     return MetricSet(name, tuple(metrics), record, None, fitness, reports, best, found.get("faults"), violates)
 
 
-def as_set(what: Any) -> MetricSet:
+def to_metric_set(source: Any) -> MetricSet:
     """A metric set from a set, its name, a metric, several of them, or a namespace."""
-    if isinstance(what, MetricSet):
-        return what
-    if isinstance(what, Metric):
-        return MetricSet(what.name, (what,), parameters.Parameters)
-    if isinstance(what, str) and what in SETS:
-        return SETS[what]
-    if isinstance(what, Sequence) and not isinstance(what, str):
-        return metric_set({"METRICS": what}, "own")
-    if isinstance(what, Mapping) or hasattr(what, "__dict__"):
-        return metric_set(what)
+    if isinstance(source, MetricSet):
+        return source
+    if isinstance(source, Metric):
+        return MetricSet(source.name, (source,), parameters.Parameters)
+    if isinstance(source, str) and source in SETS:
+        return SETS[source]
+    if isinstance(source, Sequence) and not isinstance(source, str):
+        return metric_set({"METRICS": source}, "own")
+    if isinstance(source, Mapping) or hasattr(source, "__dict__"):
+        return metric_set(source)
     raise RuleError(
-        f"metrics = {what!r} is not a metric set; give a metric, a list of them, or one of {', '.join(SETS)}"
+        f"metrics = {source!r} is not a metric set; give a metric, a list of them, or one of {', '.join(SETS)}"
     )
 
 
@@ -208,20 +207,20 @@ def _parameters(record: Any, owner: str) -> type:
     return make_dataclass("Parameters", [], bases=(parameters.Parameters, record), frozen=True, kw_only=True)
 
 
-def numbers_of(found: MetricSet, q: Any, goals: bool = False) -> tuple[str, ...]:
+def scalar_names(metric_set_: MetricSet, q: Any, goals: bool = False) -> tuple[str, ...]:
     """Names of the order parameters that are one number, of flights scored by a set, with goals or not.
 
     Partial fitnesses and fitness come last; time_to_goal, one number for each goal, is left out.
     """
-    own = [name for each in found.of(q) for name in each.reports]
+    own = [name for each in metric_set_.of(q) for name in each.reports]
     own += [name for name in GOALS if goals and name != "time_to_goal"]
-    return tuple(dict.fromkeys((*own, *found.reports)))
+    return tuple(dict.fromkeys((*own, *metric_set_.reports)))
 
 
 PRESENCE = {"present": ("", "share of all individuals and instants for which the recording has data")}
 
 
-def reports(found: MetricSet) -> dict[str, tuple[str, str]]:
+def reported_values(metric_set_: MetricSet) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every order parameter that flights scored by a set report."""
-    own = {name: about for each in found.metrics for name, about in each.reports.items()}
-    return own | dict(found.reports) | GOALS | PRESENCE
+    own = {name: about for each in metric_set_.metrics for name, about in each.reports.items()}
+    return own | dict(metric_set_.reports) | GOALS | PRESENCE

@@ -5,7 +5,7 @@ The centre is the point metrics.centre_x, centre_y, the origin unless it is give
 
 from typing import NamedTuple
 
-from airflock.core.maths import norm
+from airflock.core import norm
 
 REPORTS = {
     "phi_lap": ("", "rotation about metrics.centre_x, centre_y; counter-clockwise positive"),

@@ -3,3 +3,7 @@
 Copy the shape of `congestion.py` or, for links that remember, of `bursts.py` for a kind of your own; docs/radios.md
 shows one.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,14 +4,13 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.parameters import quantity
-from airflock.core.radio import Packets, forward
+from airflock.core import PacketParameters, forward, quantity
 
 OURS = "our choice"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Packets):
+class Parameters(PacketParameters):
     """A link of two states, apart for each receiver and sender. Its share of bad time is outage_rate · outage_time
     / (1 + outage_rate · outage_time).
     """

@@ -7,8 +7,7 @@ its vulnerable time, which of independent senders has the probability exp(-time 
 import math
 from dataclasses import dataclass
 
-from airflock.core.parameters import quantity
-from airflock.core.radio import Packets, forward
+from airflock.core import PacketParameters, forward, quantity
 from airflock.parts.radios.links import power, thrice
 
 ABRAMSON = "Abramson 1970"
@@ -17,7 +16,7 @@ RATES = ("rate",)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Packets):
+class Parameters(PacketParameters):
     """A channel that all agents share. All within `range` of a receiver disturb it, including the one it hears."""
 
     rate: float = quantity(10.0, "1/s", low=0.01, high=1000.0, source=OURS, meaning="packets that each agent sends")

@@ -4,7 +4,7 @@ A packet counts at the decision that it comes at, and is held as it came. The nu
 scenario changes from one to the other by its kind alone.
 """
 
-from airflock.core.radio import Radio
+from airflock.core import Radio
 from airflock.parts.radios.links import Parameters
 
 CONSTANT = Radio("constant", Parameters)

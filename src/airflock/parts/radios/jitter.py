@@ -7,14 +7,13 @@ until it is acknowledged. So data grow older than the delay and its jitter alone
 import math
 from dataclasses import dataclass
 
-from airflock.core.parameters import quantity
-from airflock.core.radio import Packets, forward
+from airflock.core import PacketParameters, forward, quantity
 
 OURS = "our choice"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Packets):
+class Parameters(PacketParameters):
     """A delay with an exponential part. A decision acts on what has come by then."""
 
     jitter: float = quantity(0.1, "s", low=0.0, high=30.0, source=OURS, meaning="mean of the extra delay")

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.core.parameters import choice, quantity
-from airflock.core.radio import Packets, forward
+from airflock.core import PacketParameters, choice, forward, quantity
 
 SETUP = "Vásárhelyi et al. 2018, Drone setup and Fig. 8"
 FIG8 = "our choice in the spirit of Fig. 8"
@@ -35,7 +34,7 @@ def far_share() -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Packets):
+class Parameters(PacketParameters):
     """Status packets between agents: constant delay and range, optional loss, or two unreliable links."""
 
     kind: str = choice(

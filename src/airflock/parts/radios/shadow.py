@@ -6,15 +6,14 @@ stands in the way costs so many decibels, which is the same as a distance so man
 
 from dataclasses import dataclass
 
-from airflock.core.parameters import quantity
-from airflock.core.radio import Packets, forward
+from airflock.core import PacketParameters, forward, quantity
 from airflock.parts.radios.links import far_distance, far_share, near_distance, near_share, share
 
 OURS = "our choice: a house"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Packets):
+class Parameters(PacketParameters):
     """One link whose reception depends on the true distance of both agents and on what stands between them."""
 
     near: float = near_distance()

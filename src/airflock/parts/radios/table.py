@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.core.parameters import quantity
-from airflock.core.radio import Packets, forward
+from airflock.core import PacketParameters, forward, quantity
 
 ENTRIES = 16
 USUAL = "short link of Vásárhelyi et al. 2018, Fig. 8"
@@ -17,7 +16,7 @@ def share(received: float, number: int) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Packets):
+class Parameters(PacketParameters):
     """A measured table of reception. Between two entries it is linear; beyond the last it falls to 0 in a spacing."""
 
     spacing: float = quantity(

@@ -9,8 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.parameters import quantity
-from airflock.core.radio import Packets, forward
+from airflock.core import PacketParameters, forward, quantity
 
 OURS = "our choice: cameras on all sides of a drone"
 TURN = math.pi
@@ -19,7 +18,7 @@ EARLY = 1e-4  # s; what is as old as `hold` up to this still counts
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Packets):
+class Parameters(PacketParameters):
     """Cameras that know the direction to a neighbour well, and its distance less well, by its size in the picture."""
 
     delay: float = quantity(

@@ -3,3 +3,7 @@
 Copy the shape of `gnss.py` or, for errors alike along each axis, of `langevin.py` for a kind of your own;
 docs/sensors.md shows one.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.parameters import quantity
-from airflock.core.sensor import Sampled
+from airflock.core import SensorParameters, quantity
 
 LONGEST = 4.0  # periods that the Memory reaches back
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Sampled):
+class Parameters(SensorParameters):
     """A constant delay of the own state, at most four periods."""
 
     lag: float = quantity(

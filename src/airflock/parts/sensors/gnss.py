@@ -4,14 +4,13 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.core.parameters import quantity
-from airflock.core.sensor import Sampled
+from airflock.core import SensorParameters, quantity
 
 OURS = "our choice"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Sampled):
+class Parameters(SensorParameters):
     """A satellite receiver. All standard deviations (SD) are per axis, and those of a stationary error.
 
     The SD of a horizontal axis is sqrt(sd² + white² + bias²), apart from multipath and outages. A data sheet's CEP,

@@ -3,15 +3,14 @@
 import math
 from dataclasses import dataclass
 
-from airflock.core.parameters import quantity
-from airflock.core.sensor import Sampled
+from airflock.core import SensorParameters, quantity
 
 S5 = "Vásárhelyi et al. 2018, Table S5"
 PROGRAM = "authors' program of Vásárhelyi et al. 2018"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Sampled):
+class Parameters(SensorParameters):
     """Satellite navigation with a slowly wandering error. Stationary per axis: SD of the velocity error sqrt(noise),
     of the position error sqrt(scale · sqrt(noise / (2 damping))), 0.69 m with the defaults.
     """

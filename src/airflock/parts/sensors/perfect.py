@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-from airflock.core.sensor import Sampled
+from airflock.core import SensorParameters
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Sampled):
+class Parameters(SensorParameters):
     """A sensor without errors; it only sets how often an agent measures, and thus decides."""
 
 

@@ -1,6 +1,6 @@
 """The sensors that a scenario can name: the key sensors.kind."""
 
-from airflock.core.sensor import Sensor, sensor
+from airflock.core import Sensor, sensor
 from airflock.parts.sensors import delayed, gnss, langevin, perfect
 
 SENSORS: dict[str, Sensor] = {
@@ -9,4 +9,4 @@ SENSORS: dict[str, Sensor] = {
     "delayed": sensor(delayed, "delayed"),
     "perfect": sensor(perfect, "perfect"),
 }
-USUAL = "langevin"  # the sensor of a scenario without sensors.kind
+DEFAULT_SENSOR = "langevin"  # the sensor of a scenario without sensors.kind

@@ -5,3 +5,7 @@ of whom it does not hear; it fills a row with 1.0 for whom it meets. All is judg
 place as measured, the others' as heard. So a neighbour that was near a second ago, and is heard of only now, is near.
 Whom a kind lets through the law may still leave aside, by its own reach.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core import Parameters as Record, choice, quantity
 
 STARLINGS = "Ballerini et al. 2008: 6.5 ± 0.9 in flocks of starlings"
 

@@ -1,8 +1,8 @@
 """Ranking: the k-th least of many numbers, by a heap of the k least so far."""
 
-from airflock.core.maths import FAR
+from airflock.core import FAR
 
-HEARD = 0.5 * FAR  # what lies beyond belongs to nobody who is heard
+HEARD_LIMIT = 0.5 * FAR  # what lies beyond belongs to nobody who is heard
 
 
 def kth_least(n, values, heap, k):
@@ -11,7 +11,7 @@ def kth_least(n, values, heap, k):
     heap : scratch of n numbers; the greatest of the k least lies in front
     """
     size = 0
-    worst = HEARD
+    worst = HEARD_LIMIT
     for j in range(n):
         value = values[j]
         if value < worst:

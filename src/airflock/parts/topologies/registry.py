@@ -1,6 +1,6 @@
 """The topologies that a scenario can name: the key topology.kind. Whoever meets all whom it hears has none."""
 
-from airflock.core.topology import Topology
+from airflock.core import Topology
 from airflock.parts.topologies import nearest, strongest, visible, voronoi
 
 TOPOLOGIES: dict[str, Topology | None] = {
@@ -10,4 +10,4 @@ TOPOLOGIES: dict[str, Topology | None] = {
     "visible": Topology("visible", visible.meet, near=True),
     "strongest": Topology("strongest", strongest.meet),
 }
-USUAL = "range"  # the topology of a scenario without topology.kind
+DEFAULT_TOPOLOGY = "range"  # the topology of a scenario without topology.kind

@@ -8,7 +8,7 @@ Our definition.
 
 import math
 
-from airflock.parts.topologies.ranking import HEARD, kth_least
+from airflock.parts.topologies.ranking import HEARD_LIMIT, kth_least
 
 DECIBELS = 10.0 / math.log(10.0)
 
@@ -27,7 +27,7 @@ def meet(n, r2, hidden, fade, met, weak, heap, t):
     weak, heap : scratch
     """
     for j in range(n):
-        weak[j] = loss(r2[j], hidden[j], fade[j], t) if r2[j] < HEARD else 2.0 * HEARD
+        weak[j] = loss(r2[j], hidden[j], fade[j], t) if r2[j] < HEARD_LIMIT else 2.0 * HEARD_LIMIT
     limit = kth_least(n, weak, heap, int(t.k))
     for j in range(n):
-        met[j] = 1.0 if weak[j] <= limit and r2[j] < HEARD else 0.0
+        met[j] = 1.0 if weak[j] <= limit and r2[j] < HEARD_LIMIT else 0.0

@@ -4,7 +4,7 @@ Bodies are balls of one radius at the places where they are believed to be. One 
 and the way to the other's centre passes through it; a way that only touches is free. Our definition.
 """
 
-from airflock.parts.topologies.ranking import HEARD
+from airflock.parts.topologies.ranking import HEARD_LIMIT
 
 
 def meet(n, dx, dy, dz, r2, hidden, met, t):
@@ -15,7 +15,7 @@ def meet(n, dx, dy, dz, r2, hidden, met, t):
     size = t.radius * t.radius
     for j in range(n):
         met[j] = 0.0
-        if r2[j] < HEARD and hidden[j] < 0.5:
+        if r2[j] < HEARD_LIMIT and hidden[j] < 0.5:
             free = 1.0
             for k in range(n):
                 if r2[k] < r2[j] and free > 0.5:

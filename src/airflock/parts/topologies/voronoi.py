@@ -9,7 +9,7 @@ Who shares but a corner of a cell, as four on one circle do, is not met: an inve
 side of the hull is no corner. Those at the very same place are met together. Each is taken at its nearest image.
 """
 
-from airflock.parts.topologies.ranking import HEARD
+from airflock.parts.topologies.ranking import HEARD_LIMIT
 
 STRAIGHT = 1e-5  # rad; what single precision can tell
 SAME = 1e-9  # m²; so near that no cell divides the two
@@ -32,7 +32,7 @@ def following(at, n, dx, dy, r2, met):
     qy = 0.0
     q2 = 0.0
     for j in range(n + 1):
-        if j == n or (r2[j] < HEARD and r2[j] > SAME):
+        if j == n or (r2[j] < HEARD_LIMIT and r2[j] > SAME):
             x, y = corner(j, n, dx, dy, r2)
             x = x - px
             y = y - py
@@ -59,7 +59,7 @@ def meet(n, dx, dy, r2, met):
     first = n
     for j in range(n):
         met[j] = 1.0 if r2[j] <= SAME else 0.0
-        if r2[j] > SAME and r2[j] < HEARD and (first == n or r2[j] < r2[first]):
+        if r2[j] > SAME and r2[j] < HEARD_LIMIT and (first == n or r2[j] < r2[first]):
             first = j
     if first < n:
         ax, ay = corner(first, n, dx, dy, r2)

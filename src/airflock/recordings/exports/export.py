@@ -7,11 +7,9 @@ import xarray as xr
 
 from airflock.recordings.exports.movement import write_movement
 from airflock.recordings.exports.tables import write_csv, write_parquet
-from airflock.support.errors import RecordingError
-from airflock.support.suffixes import suffix_fault
-from airflock.support.untrusted import path_of
+from airflock.support import RecordingError, suffix_error, to_path
 
-ENDINGS = (".csv", ".parquet", ".nc")
+SUFFIXES = (".csv", ".parquet", ".nc")
 LAYOUTS = ("movement", "movement-0.16", "px4")
 
 
@@ -45,16 +43,16 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
     >>> airflock.export(airflock.simulate(short), "flight.csv").name
     'flight.csv'
     """
-    target = path_of(path)
-    wrong = suffix_fault(target, ENDINGS)
+    target = to_path(path)
+    wrong = suffix_error(target, SUFFIXES)
     if wrong:
         raise RecordingError(wrong)
     if layout not in LAYOUTS:
         raise RecordingError(f"layout = {layout!r} is none of {', '.join(LAYOUTS)}")
     if target.suffix.lower() == ".nc" and layout != "px4":
-        return write_movement(recording, target, old=layout == "movement-0.16")
+        return write_movement(recording, target, plural_dimensions=layout == "movement-0.16")
     if layout == "px4" and target.suffix.lower() != ".csv":
         raise RecordingError(f"layout = 'px4' is a table; {target.name} ends in {target.suffix}: write .csv")
     if target.suffix.lower() == ".csv":
-        return write_csv(recording, target, log=layout == "px4")
+        return write_csv(recording, target, px4_columns=layout == "px4")
     return write_parquet(recording, target)

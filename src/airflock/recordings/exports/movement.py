@@ -5,19 +5,19 @@ from pathlib import Path
 
 import xarray as xr
 
-from airflock.recordings.layout import DIMENSIONS, check
+from airflock.recordings.layout import DIMENSIONS, check_recording
 from airflock.support import atomic
 
 STATES = ("position", "velocity", "command")
 PLURAL = {"keypoint": "keypoints", "individual": "individuals"}
 
 
-def to_movement(recording: xr.Dataset, *, old: bool = False) -> xr.Dataset:
+def to_movement(recording: xr.Dataset, *, plural_dimensions: bool = False) -> xr.Dataset:
     """Dataset with position, confidence and the attributes of poses; velocity and command beside, where there are any.
 
-    old : the dimensions keypoints and individuals, as `movement` up to 0.16 asks for
+    plural_dimensions : the dimensions keypoints and individuals, as `movement` up to 0.16 asks for
     """
-    check(recording)
+    check_recording(recording)
     found = recording[[name for name in STATES if name in recording]].transpose(*DIMENSIONS)
     if "confidence" in recording:
         found["confidence"] = recording["confidence"].transpose("time", "keypoint", "individual")
@@ -28,10 +28,12 @@ def to_movement(recording: xr.Dataset, *, old: bool = False) -> xr.Dataset:
         "ds_type": "poses", "source_software": "airflock", "time_unit": "seconds",
         **{name: recording.attrs[name] for name in kept if name in recording.attrs},
     }  # fmt: skip
-    return found.rename(PLURAL) if old else found
+    return found.rename(PLURAL) if plural_dimensions else found
 
 
-def write_movement(recording: xr.Dataset, path: str | os.PathLike[str], *, old: bool = False) -> Path:
+def write_movement(recording: xr.Dataset, path: str | os.PathLike[str], *, plural_dimensions: bool = False) -> Path:
     """Write such a dataset as netCDF."""
-    atomic.write(path, to_movement(recording, old=old).to_netcdf(None, engine="h5netcdf"))
+    atomic.write_file(
+        path, to_movement(recording, plural_dimensions=plural_dimensions).to_netcdf(None, engine="h5netcdf")
+    )
     return Path(path)

@@ -8,16 +8,15 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.layout import check
-from airflock.support import atomic
-from airflock.support.errors import RecordingError
+from airflock.recordings.layout import check_recording
+from airflock.support import RecordingError, atomic
 
 COLUMNS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "command": ("cx", "cy", "cz")}
 
 
 def to_table(recording: xr.Dataset) -> pd.DataFrame:
     """Long table: id, t [s], x [m], ..., vx [m/s], ..., cx [m/s], ...; no rows where one is absent."""
-    check(recording)
+    check_recording(recording)
     order = ("individual", "time", "space", "keypoint")
     count, times = recording.sizes["individual"], recording["time"].values.astype(float)
     columns: dict[str, object] = {
@@ -58,11 +57,11 @@ def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
-def write_csv(recording: xr.Dataset, path: str | os.PathLike[str], *, log: bool = False) -> Path:
-    """Write a long CSV table, with as many digits as the numbers have; `log` : as a log of PX4 has it."""
+def write_csv(recording: xr.Dataset, path: str | os.PathLike[str], *, px4_columns: bool = False) -> Path:
+    """Write a long CSV table, with as many digits as the numbers have; `px4_columns` : as a log of PX4 has it."""
     text = io.StringIO()
-    (to_log_table if log else to_table)(recording).to_csv(text, index=False)
-    atomic.write(path, text.getvalue())
+    (to_log_table if px4_columns else to_table)(recording).to_csv(text, index=False)
+    atomic.write_file(path, text.getvalue())
     return Path(path)
 
 
@@ -72,6 +71,6 @@ def write_parquet(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         import pyarrow  # noqa: F401
     except ImportError as fault:
         raise RecordingError(f"{path}: Parquet needs pyarrow: pip install 'airflock[logs]'") from fault
-    with atomic.atomic(path) as temporary:
+    with atomic.atomic_path(path) as temporary:
         to_table(recording).to_parquet(temporary, index=False, engine="pyarrow")
     return Path(path)

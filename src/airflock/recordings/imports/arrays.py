@@ -8,16 +8,16 @@ import numpy as np
 import xarray as xr
 
 from airflock.recordings.imports import headers
-from airflock.recordings.imports.track import POSITION, Findings, Options, Track
-from airflock.support.errors import RecordingError, gathering
+from airflock.recordings.imports.track import POSITION_TARGETS, ImportedTrack, ImportOptions, ImportReport
+from airflock.support import RecordingError, collect_errors
 
 PLAIN = "idtrackerai_format SESSION --formats h5 writes plain numbers; or, if you trust the file, python -c "
 COMMAND = "\"import numpy as np; np.save('plain.npy', np.load('FILE', allow_pickle=True).item()['trajectories'])\""
 
 
 def read_array(
-    array: Any, options: Options, where: str = "array", names: list[str] | None = None, fps: float | None = None
-) -> list[Track]:
+    array: Any, options: ImportOptions, where: str = "array", names: list[str] | None = None, fps: float | None = None
+) -> list[ImportedTrack]:
     """Tracks of an array (frame, individual, 2 or 3); nan where an individual is not there."""
     values = _numbers(array, where)
     if values.ndim == 2 and values.shape[1] in (2, 3):
@@ -26,17 +26,17 @@ def read_array(
         raise RecordingError(f"{where}: has shape {values.shape}; give (frame, individual, 2 or 3)")
     rate, scale = options.fps or fps, math.nan
     faults = [] if rate else [f"{where}: counts frames; say how many a second: --fps 25"]
-    with gathering(faults):
-        scale = headers.length("", where, "array", options)
+    with collect_errors(faults):
+        scale = headers.unit_in_metres("", where, "array", options)
     if faults or rate is None:
         raise RecordingError("\n".join(faults))
     frames = np.arange(len(values))
     found = []
     for number in range(values.shape[1]):
         own = values[:, number].astype(float) * scale
-        columns = {axis: own[:, c] for c, axis in enumerate(POSITION[: own.shape[1]])}
+        columns = {axis: own[:, c] for c, axis in enumerate(POSITION_TARGETS[: own.shape[1]])}
         name = names[number] if names else str(number + 1)
-        found.append(Track(name, where, frames / rate, columns, frames))
+        found.append(ImportedTrack(name, where, frames / rate, columns, frames))
     return found
 
 
@@ -53,9 +53,9 @@ def _numbers(array: Any, where: str) -> Any:
     return values if hidden is None else np.where(hidden, np.nan, values)
 
 
-def read_npy(path: Path, options: Options, findings: Findings) -> list[Track]:
+def read_npy(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Tracks of a .npy or .npz file of plain numbers."""
-    refuse_pickle(path)
+    refuse_pickled_arrays(path)
     with path.open("rb") as file:
         start = file.read(6)
     if start != b"\x93NUMPY" and start[:2] != b"PK":
@@ -78,7 +78,7 @@ def read_npy(path: Path, options: Options, findings: Findings) -> list[Track]:
     return read_array(loaded, options, str(path))
 
 
-def refuse_pickle(path: Path) -> None:
+def refuse_pickled_arrays(path: Path) -> None:
     """Raise a RecordingError for a file of pickled objects."""
     with path.open("rb") as file:
         start = file.read(2)
@@ -92,7 +92,7 @@ def _pickled(path: Path) -> str:
     )
 
 
-def read_idtracker(file: xr.Dataset, path: Path, options: Options, findings: Findings) -> list[Track]:
+def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Tracks of trajectories.h5 of idtracker.ai (its documented keys), or of any HDF5 file with such a dataset.
 
     file : its arrays and attributes, as `recordings.isolated` hands them over

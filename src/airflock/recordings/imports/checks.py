@@ -3,10 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.recordings.imports.absent import by_source
-from airflock.recordings.imports.expressions import quoted
-from airflock.recordings.imports.headers import split
-from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Track
+from airflock.recordings.imports.absent import tracks_by_source
+from airflock.recordings.imports.expressions import quote_column
+from airflock.recordings.imports.headers import split_header
+from airflock.recordings.imports.track import (
+    COMMAND_TARGETS,
+    POSITION_TARGETS,
+    VELOCITY_TARGETS,
+    ImportedTrack,
+    ImportReport,
+)
 
 STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
 SLOW = 5.0  # s between rows: a unit of thousandths would be odd for so slow a log
@@ -14,15 +20,15 @@ SINCE_1970 = 1e8  # s; times beyond are dates, and their unit is plain
 LEAST = 0.2  # share of the common span below which an individual is worth a question
 
 
-def period_of(track: Track) -> float:
+def median_period(track: ImportedTrack) -> float:
     """Usual time between rows, s; 0 for a single row."""
     steps = np.diff(track.time)
     return float(np.median(steps)) if steps.size else 0.0
 
 
-def check_times(tracks: list[Track], findings: Findings) -> None:
+def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Rule 1: sort by time, tell of repeated instants and of steps that no log has, each once for a file."""
-    for source, own in by_source(tracks).items():
+    for source, own in tracks_by_source(tracks).items():
         late = [_sorted(track) for track in own]
         _tell_order(source, [rows for rows in late if rows.size], findings)
         _repeated(source, own, findings)
@@ -33,7 +39,7 @@ def check_times(tracks: list[Track], findings: Findings) -> None:
             findings.notes += [line for line in map(_unsaid_step, own) if line][:1]
 
 
-def _sorted(track: Track) -> NDArray[np.int64]:
+def _sorted(track: ImportedTrack) -> NDArray[np.int64]:
     """Sort a track by time; the rows that came before an earlier one."""
     late = np.flatnonzero(np.diff(track.time) < 0.0) + 1
     rows = track.rows[late]
@@ -42,29 +48,37 @@ def _sorted(track: Track) -> NDArray[np.int64]:
     return rows
 
 
-def _tell_order(source: str, late: list[NDArray[np.int64]], findings: Findings) -> None:
+def _tell_order(source: str, late: list[NDArray[np.int64]], findings: ImportReport) -> None:
     if late:
         count, first = sum(len(rows) for rows in late), min(int(rows[0]) for rows in late)
         findings.notes.append(f"{source}: {count} rows out of order (first row {first}): sorted")
 
 
-def _wrong_step(track: Track) -> str:
+def _wrong_step(track: ImportedTrack) -> str:
     """What is wrong with the time between rows; empty if nothing is."""
-    step, name = period_of(track), track.label("t")
+    step, name = median_period(track), track.label("t")
     where = f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}"
     if step and not STEPS[0] <= step <= STEPS[1]:
-        return f'{where}; the unit is another one: write --map "t:={quoted(name)}*1e-6" (for us) or *1e-3 (for ms)'
-    unit, finer = split(name)[1], {"ms": ("us", 1e-6), "us": ("ns", 1e-9), "µs": ("ns", 1e-9)}
-    if unit in finer and step >= SLOW and track.time[0] < SINCE_1970 and not track.has(VELOCITY):
+        return (
+            f'{where}; the unit is another one: write --map "t:={quote_column(name)}*1e-6" (for us) or *1e-3 (for ms)'
+        )
+    unit, finer = split_header(name)[1], {"ms": ("us", 1e-6), "us": ("ns", 1e-9), "µs": ("ns", 1e-9)}
+    if unit in finer and step >= SLOW and track.time[0] < SINCE_1970 and not track.has(VELOCITY_TARGETS):
         other, factor = finer[unit]
-        return f'{where}: {other} named {unit}? Write --map "t:={quoted(name)}*{factor:g}"'
+        return f'{where}: {other} named {unit}? Write --map "t:={quote_column(name)}*{factor:g}"'
     return ""
 
 
-def _unsaid_step(track: Track) -> str:
+def _unsaid_step(track: ImportedTrack) -> str:
     """What is told of times without a unit that would be far apart in seconds; empty if there are none."""
-    step, name = period_of(track), track.labels.get("t", "")
-    if not name.isidentifier() or split(name)[1] or step < SLOW or track.time[0] >= SINCE_1970 or track.has(VELOCITY):
+    step, name = median_period(track), track.user_labels.get("t", "")
+    if (
+        not name.isidentifier()
+        or split_header(name)[1]
+        or step < SLOW
+        or track.time[0] >= SINCE_1970
+        or track.has(VELOCITY_TARGETS)
+    ):
         return ""
     return (
         f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart; if it does not count seconds, "
@@ -72,14 +86,14 @@ def _unsaid_step(track: Track) -> str:
     )
 
 
-def _repeated(source: str, own: list[Track], findings: Findings) -> None:
+def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> None:
     """Rows with the time of the row before: the same row again, or another individual. The first of them is kept."""
-    again: list[tuple[Track, NDArray[np.int64]]] = []
+    again: list[tuple[ImportedTrack, NDArray[np.int64]]] = []
     for track in own:
         same = np.flatnonzero(np.diff(track.time) == 0.0)
         if not same.size:
             continue
-        place = track.stack(POSITION, 2)
+        place = track.stack(POSITION_TARGETS, 2)
         apart = np.hypot(*(place[same + 1] - place[same]).T)
         other = np.flatnonzero(apart > 1e-9)
         if len(other) > 0.5 * len(same):
@@ -102,9 +116,9 @@ def _repeated(source: str, own: list[Track], findings: Findings) -> None:
         )
 
 
-def check_names(tracks: list[Track], findings: Findings) -> None:
+def check_names(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """No two individuals with one name."""
-    known: dict[str, Track] = {}
+    known: dict[str, ImportedTrack] = {}
     for track in tracks:
         if track.name in known:
             findings.fault(
@@ -113,10 +127,10 @@ def check_names(tracks: list[Track], findings: Findings) -> None:
         known.setdefault(track.name, track)
 
 
-def check_columns(tracks: list[Track], findings: Findings) -> None:
+def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """A column without a number says nothing, so it is none; a row without a height that others have is no place."""
     for track in tracks:
-        for name in (*VELOCITY, *COMMAND):
+        for name in (*VELOCITY_TARGETS, *COMMAND_TARGETS):
             if name in track.columns and not np.isfinite(track.columns[name]).any():
                 del track.columns[name]
     for name in ("z", "alt"):
@@ -141,13 +155,13 @@ def check_columns(tracks: list[Track], findings: Findings) -> None:
                 track.keep(known)
 
 
-def check_heights(tracks: list[Track], axes: str, findings: Findings) -> None:
+def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport) -> None:
     """Rule 4: heights of all individuals are above the same level; z points up, if `axes` (enu, ned) are the file's."""
     levels = {track.datum: track for track in tracks if "z" in track.columns or "alt" in track.columns}
     if len(levels) > 1:
         told = ", ".join(f"{t.name}: {level or 'not said'}" for level, t in levels.items())
         findings.fault(f"heights are above different levels ({told}); convert them to one", "height")
-    for source, own in by_source(tracks).items():
+    for source, own in tracks_by_source(tracks).items():
         heights = [(track, track.columns["z"]) for track in own if "z" in track.columns]
         rows = sum(len(z) for _, z in heights)
         deep = [(track, np.flatnonzero(z < -1.0)) for track, z in heights]
@@ -155,7 +169,7 @@ def check_heights(tracks: list[Track], axes: str, findings: Findings) -> None:
             continue
         track, low = next((track, low) for track, low in deep if len(low))
         name = track.label("z")
-        turn = f'--map "z:=-{quoted(name)}"'
+        turn = f'--map "z:=-{quote_column(name)}"'
         if axes == "ned":
             told = f"it points up, where --axes ned has it down; leave --axes ned out, or add {turn} if x is north"
         else:
@@ -167,9 +181,9 @@ def check_heights(tracks: list[Track], axes: str, findings: Findings) -> None:
         return
 
 
-def note_steps(track: Track, findings: Findings) -> None:
+def note_resolution(track: ImportedTrack, findings: ImportReport) -> None:
     """Rule 7: resolution of positions that repeat, the floor of their noise."""
-    for axis in POSITION[:2]:
+    for axis in POSITION_TARGETS[:2]:
         values = track.columns[axis]
         steps = np.abs(np.diff(values))
         moved = steps[steps > 0.0]
@@ -184,13 +198,13 @@ def note_steps(track: Track, findings: Findings) -> None:
             return
 
 
-def check_presence(tracks: list[Track], findings: Findings) -> None:
+def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     """Individuals that are hardly there: kept only if that is meant."""
     first, last = min(t.time[0] for t in tracks), max(t.time[-1] for t in tracks)
     if last <= first:
         return
-    for source, own in by_source(tracks).items():
-        shares = [min(1.0, len(track.time) * period_of(track) / (last - first)) for track in own]
+    for source, own in tracks_by_source(tracks).items():
+        shares = [min(1.0, len(track.time) * median_period(track) / (last - first)) for track in own]
         rare = [number for number, share in enumerate(shares) if share < LEAST]
         if not rare:
             continue

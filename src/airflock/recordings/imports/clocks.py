@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from airflock.recordings.imports.track import Findings, Track
+from airflock.recordings.imports.track import ImportedTrack, ImportReport
 
 
-def align(tracks: list[Track], same: bool, findings: Findings) -> bool:
+def align_clocks(tracks: list[ImportedTrack], same_clock: bool, findings: ImportReport) -> bool:
     """Put all times on one clock, in place; returns whether quantities between individuals mean something.
 
     same : the user says that the clocks agree
@@ -14,7 +14,7 @@ def align(tracks: list[Track], same: bool, findings: Findings) -> bool:
     if len(files) < 2 and len(tracks) == 1:
         return True
     own = [track for track in tracks if track.clock in ("boot", "own")]
-    if not own or same:
+    if not own or same_clock:
         return True
     lacking = [track for track in own if track.utc is None]
     if lacking and len({track.source for track in tracks}) > 1:
@@ -31,7 +31,7 @@ def align(tracks: list[Track], same: bool, findings: Findings) -> bool:
     return True
 
 
-def to_utc(track: Track) -> float:
+def to_utc(track: ImportedTrack) -> float:
     """Replace own time by UTC, by a straight line through the pairs; returns the largest residual, s."""
     assert track.utc is not None
     own, utc = track.utc.T

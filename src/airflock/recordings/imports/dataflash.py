@@ -11,9 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
-from airflock.recordings.isolated import Contents, Opening, Share
-from airflock.support.errors import RecordingError
+from airflock.recordings.imports.track import (
+    COMMAND_TARGETS,
+    POSITION_TARGETS,
+    VELOCITY_TARGETS,
+    ImportedTrack,
+    ImportOptions,
+    ImportReport,
+)
+from airflock.recordings.isolated import Contents, OnShare, ReaderProcess
+from airflock.support import RecordingError
 
 PARTS = ("PSCN", "PSCE", "PSCD")  # position control: north, east, down
 PACE = 1e5  # bytes per second; read by Python, row by row
@@ -22,13 +29,13 @@ GPS_EPOCH = 315964800.0  # 6 January 1980 in seconds since 1970
 LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so that it cannot part them
 
 
-def read_dataflash(path: Path, options: Options, findings: Findings) -> list[Track]:
+def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Track of a DataFlash log: PSCN, PSCE, PSCD (position, velocity, commanded velocity), ORGN and GPS."""
     _need_pymavlink(path)
     with path.open("rb") as file:
         if file.read(len(HEAD)) != HEAD:
             raise RecordingError(f"{path}: is no DataFlash log of ArduPilot: it does not begin with its mark, A3 95")
-    told = Opening(path, dataflash, "a DataFlash log", pace=PACE).answer(options.done)
+    told = ReaderProcess(path, read_dataflash_arrays, "a DataFlash log", pace=PACE).answer(options.done)
     rows = {part: told[part].values for part in PARTS if part in told}
     if "PSCN" not in rows or "PSCE" not in rows:
         raise RecordingError(
@@ -51,7 +58,7 @@ def _gps_times(table: Any) -> Any:
     return np.stack([known[:, 0] * 1e-6, utc], axis=1) if len(known) >= 2 else None
 
 
-def _joined(rows: dict[str, Any], path: Path) -> Track:
+def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
     """One table on the times of the north axis; the other axes are written within the same loop."""
     north, east, down = rows["PSCN"], rows["PSCE"], rows.get("PSCD")
     time = north[:, 0] * 1e-6
@@ -68,19 +75,21 @@ def _joined(rows: dict[str, Any], path: Path) -> Track:
     if down is not None:
         columns |= {"z": -at(down, 1), "vz": -at(down, 2), "cz": -held(down)}
     columns = {
-        k: columns[k] for k in (*POSITION, *VELOCITY, *COMMAND) if k in columns and np.isfinite(columns[k]).any()
+        k: columns[k]
+        for k in (*POSITION_TARGETS, *VELOCITY_TARGETS, *COMMAND_TARGETS)
+        if k in columns and np.isfinite(columns[k]).any()
     }
     labels = {"x": "PSCE.PE", "y": "PSCN.PN", "z": "-PSCD.PD", "vx": "PSCE.VE", "vy": "PSCN.VN", "vz": "-PSCD.VD"}
-    return Track(path.stem, str(path), time, columns, np.arange(len(time)), labels)
+    return ImportedTrack(path.stem, str(path), time, columns, np.arange(len(time)), labels)
 
 
-def read_tlog(path: Path, options: Options, findings: Findings) -> list[Track]:
+def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Tracks of a telemetry log: LOCAL_POSITION_NED of each vehicle, POSITION_TARGET_LOCAL_NED as its command.
 
     All vehicles are stamped by the receiver's clock, so they share it; their positions are about their own origins.
     """
     _need_pymavlink(path)
-    told = Opening(path, telemetry, "telemetry", pace=PACE).answer(options.done)
+    told = ReaderProcess(path, read_telemetry_arrays, "telemetry", pace=PACE).answer(options.done)
     if "LOCAL_POSITION_NED" not in told:
         raise RecordingError(f"{path}: has no LOCAL_POSITION_NED; import the vehicles' own logs instead")
     states = _by_vehicle(told, "LOCAL_POSITION_NED", (0, 2, 1, 3, 5, 4, 6), (1, 1, 1, -1, 1, 1, -1))
@@ -88,12 +97,16 @@ def read_tlog(path: Path, options: Options, findings: Findings) -> list[Track]:
     origins = _by_vehicle(told, "GPS_GLOBAL_ORIGIN", (1, 2, 3), (1e-7, 1e-7, 1e-3))
     found = []
     for who, table in sorted(states.items()):
-        columns = dict(zip((*POSITION, *VELOCITY), table.T[1:].copy(), strict=True))
+        columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), table.T[1:].copy(), strict=True))
         if who in wishes:
             ask = wishes[who]
             at = np.searchsorted(ask[:, 0], table[:, 0], side="right") - 1
-            columns |= {n: np.where(at >= 0, ask[np.maximum(at, 0), c + 1], np.nan) for c, n in enumerate(COMMAND)}
-        track = Track(f"vehicle_{who}", str(path), table[:, 0], columns, np.arange(len(table)), {}, "utc", datum="amsl")
+            columns |= {
+                n: np.where(at >= 0, ask[np.maximum(at, 0), c + 1], np.nan) for c, n in enumerate(COMMAND_TARGETS)
+            }
+        track = ImportedTrack(
+            f"vehicle_{who}", str(path), table[:, 0], columns, np.arange(len(table)), {}, "utc", datum="amsl"
+        )
         if who in origins:
             latitude, longitude, height = (float(value) for value in origins[who][-1])
             track.origin = (latitude, longitude, height)
@@ -109,7 +122,7 @@ def _by_vehicle(told: Any, kind: str, columns: tuple[int, ...], factors: tuple[f
     return {int(who): table[table[:, 0] == who][:, 1:][:, columns] * factors for who in np.unique(table[:, 0])}
 
 
-def dataflash(path: str, _: int, share: Share) -> Contents:
+def read_dataflash_arrays(path: str, _: int, share: OnShare) -> Contents:
     """Read tables of time (µs), position, velocity, commanded velocity of each axis; of origins; of GPS times."""
     from pymavlink import DFReader
 
@@ -120,7 +133,7 @@ def dataflash(path: str, _: int, share: Share) -> Contents:
     return _tables(DFReader.DFReader_binary(path), fields, lambda message: [], share)
 
 
-def telemetry(path: str, _: int, share: Share) -> Contents:
+def read_telemetry_arrays(path: str, _: int, share: OnShare) -> Contents:
     """Read tables of vehicle, time (s) and six numbers of states, three of commands and of origins."""
     from pymavlink import mavutil
 
@@ -137,7 +150,7 @@ def telemetry(path: str, _: int, share: Share) -> Contents:
 
 
 def _tables(
-    log: Any, fields: Mapping[str, tuple[str, ...]], source: Callable[[Any], list[float]], share: Share
+    log: Any, fields: Mapping[str, tuple[str, ...]], source: Callable[[Any], list[float]], share: OnShare
 ) -> Contents:
     """Read one table of float64 for each kind of message, a row each: its source, then its fields."""
     rows: dict[str, list[list[float]]] = {kind: [] for kind in fields}

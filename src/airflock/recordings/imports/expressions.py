@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.support.errors import RecordingError
-from airflock.support.spelling import meant
+from airflock.support import RecordingError, suggest
 
 LONGEST = 300  # characters; nothing that a column needs is longer
 OPERATIONS = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
 ALLOWED = "column names, numbers, + - * / and parentheses; a name with blanks stands in quotes"
 
 
-def parsed(text: str, target: str) -> ast.expr:
+def parse_expression(text: str, target: str) -> ast.expr:
     """Tree of an expression; raises RecordingError for anything but arithmetic of columns."""
     if len(text) > LONGEST:
         raise RecordingError(f"--map {target}:=...: has {len(text)} characters, more than {LONGEST}")
@@ -32,37 +31,37 @@ def parsed(text: str, target: str) -> ast.expr:
     return tree
 
 
-def names(tree: ast.expr) -> list[str]:
+def column_names(tree: ast.expr) -> list[str]:
     """Columns that an expression asks for."""
     found = [node.id for node in ast.walk(tree) if isinstance(node, ast.Name)]
     return found + [n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
 
 
-def bare(tree: ast.expr) -> str:
+def single_column(tree: ast.expr) -> str:
     """The column, if an expression is nothing but one; else empty."""
-    return names(tree)[0] if isinstance(tree, ast.Name) or _text(tree) else ""
+    return column_names(tree)[0] if isinstance(tree, ast.Name) or _text(tree) else ""
 
 
 def _text(tree: ast.expr) -> bool:
     return isinstance(tree, ast.Constant) and isinstance(tree.value, str)
 
 
-def known(tree: ast.expr, columns: Any, where: str, target: str) -> None:
+def check_columns(tree: ast.expr, columns: Any, where: str, target: str) -> None:
     """Raise a RecordingError if an expression asks for a column that is not there."""
-    for name in names(tree):
+    for name in column_names(tree):
         if name not in columns:
             shown = ", ".join(str(c) for c in list(columns)[:12])
-            hint = meant(name, map(str, columns), f"it has {shown}", cutoff=0.4)
+            hint = suggest(name, map(str, columns), f"it has {shown}", cutoff=0.4)
             raise RecordingError(f"{where}: --map {target}: no column {name}; {hint}")
 
 
-def value(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
+def evaluate(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
     """An expression with arrays in the place of names."""
     if isinstance(tree, ast.BinOp):
         with np.errstate(divide="ignore", invalid="ignore"):
-            return OPERATIONS[type(tree.op)](value(tree.left, columns), value(tree.right, columns))
+            return OPERATIONS[type(tree.op)](evaluate(tree.left, columns), evaluate(tree.right, columns))
     if isinstance(tree, ast.UnaryOp):
-        inner = value(tree.operand, columns)
+        inner = evaluate(tree.operand, columns)
         return -inner if isinstance(tree.op, ast.USub) else inner
     if isinstance(tree, ast.Name):
         return columns[tree.id]
@@ -70,6 +69,6 @@ def value(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
     return columns[tree.value] if isinstance(tree.value, str) else float(tree.value)  # type: ignore[arg-type]
 
 
-def quoted(column: str) -> str:
+def quote_column(column: str) -> str:
     """A column as it stands in an expression of --map."""
     return column if column.isidentifier() else f"'{column}'"

@@ -10,7 +10,7 @@ FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)
 
 
-def ecef(lat: Any, lon: Any, height: Any) -> NDArray[np.float64]:
+def to_ecef(lat: Any, lon: Any, height: Any) -> NDArray[np.float64]:
     """Earth-centred, earth-fixed coordinates (..., 3), m, of latitude and longitude (degrees) and height (m)."""
     phi, lam, h = np.radians(lat), np.radians(lon), np.asarray(height, float)
     normal = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY2 * np.sin(phi) ** 2)
@@ -19,7 +19,7 @@ def ecef(lat: Any, lon: Any, height: Any) -> NDArray[np.float64]:
     return np.stack(np.broadcast_arrays(across * np.cos(lam), across * np.sin(lam), up), axis=-1)
 
 
-def axes(lat: float, lon: float) -> NDArray[np.float64]:
+def enu_axes(lat: float, lon: float) -> NDArray[np.float64]:
     """Unit vectors east, north and up at a place, as rows, in earth-centred coordinates."""
     phi, lam = np.radians(lat), np.radians(lon)
     east = [-np.sin(lam), np.cos(lam), 0.0]
@@ -27,23 +27,23 @@ def axes(lat: float, lon: float) -> NDArray[np.float64]:
     return np.array([east, north, np.cross(east, north)])
 
 
-def enu(lat: Any, lon: Any, height: Any, origin: tuple[float, float, float]) -> NDArray[np.float64]:
+def to_enu(lat: Any, lon: Any, height: Any, origin: tuple[float, float, float]) -> NDArray[np.float64]:
     """East, north, up (..., 3), m, about an origin of latitude, longitude (degrees) and height (m)."""
-    offset: NDArray[np.float64] = (ecef(lat, lon, height) - ecef(*origin)) @ axes(*origin[:2]).T
+    offset: NDArray[np.float64] = (to_ecef(lat, lon, height) - to_ecef(*origin)) @ enu_axes(*origin[:2]).T
     return offset
 
 
-def moved(
-    local: NDArray[np.float64], own: tuple[float, float, float], common: tuple[float, float, float]
+def points_to_origin(
+    local: NDArray[np.float64], from_origin: tuple[float, float, float], to_origin: tuple[float, float, float]
 ) -> NDArray[np.float64]:
     """Points (row, 3) of the frame about one origin in the frame about another, m."""
-    centred = local @ axes(*own[:2]) + (ecef(*own) - ecef(*common))
-    return centred @ axes(*common[:2]).T
+    centred = local @ enu_axes(*from_origin[:2]) + (to_ecef(*from_origin) - to_ecef(*to_origin))
+    return centred @ enu_axes(*to_origin[:2]).T
 
 
-def turned(
-    vectors: NDArray[np.float64], own: tuple[float, float, float], common: tuple[float, float, float]
+def vectors_to_origin(
+    vectors: NDArray[np.float64], from_origin: tuple[float, float, float], to_origin: tuple[float, float, float]
 ) -> NDArray[np.float64]:
     """Vectors (row, 3), such as velocities, from the axes at one origin to those at another."""
-    rotated: NDArray[np.float64] = vectors @ axes(*own[:2]) @ axes(*common[:2]).T
+    rotated: NDArray[np.float64] = vectors @ enu_axes(*from_origin[:2]) @ enu_axes(*to_origin[:2]).T
     return rotated

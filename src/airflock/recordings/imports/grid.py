@@ -6,12 +6,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.recordings.differences import gradient
-from airflock.recordings.imports.checks import period_of
-from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Track
-from airflock.recordings.layout import DIMENSIONS, UNITS
-from airflock.support.errors import RecordingError
-from airflock.support.memory import give_back_memory
+from airflock.recordings.differences import central_difference
+from airflock.recordings.imports.checks import median_period
+from airflock.recordings.imports.track import COMMAND_TARGETS, POSITION_TARGETS, VELOCITY_TARGETS, ImportedTrack
+from airflock.recordings.layout import DIMENSIONS, VARIABLE_UNITS
+from airflock.support import RecordingError, trim_heap
 
 MOST = 2_000_000_000  # numbers of one recording
 NORMAL = 1.5  # times the usual step: longer is a gap
@@ -21,23 +20,25 @@ FARTHEST = 1e9  # m from the origin; our choice: no animal and no drone has been
 COARSE = 0.01  # m; where places are farther apart in single precision, they are kept in double
 
 
-def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: float | None) -> tuple[Any, float]:
+def time_grid(
+    tracks: list[ImportedTrack], rate: float | None, begin: float | None, end: float | None
+) -> tuple[Any, float]:
     """Times (s) from the first to the last row, and their distance; the tracks' own rate unless one is given.
 
     A window that begins between two rows of the tracks' own rate begins at the later one, so that its times are theirs.
     """
-    usual = [period_of(track) for track in tracks if len(track.time) > 1]
+    usual = [median_period(track) for track in tracks if len(track.time) > 1]
     period = 1.0 / rate if rate else (float(np.median(usual)) if usual else 1.0)
     if not rate:
         period = _round(period)
     first = float(min(track.time[0] for track in tracks))
     if begin is not None:
-        early = np.floor((first - begin + slack(period, first, begin)) / period)
+        early = np.floor((first - begin + grid_tolerance(period, first, begin)) / period)
         first = begin if rate else first - float(early) * period
     last = max(track.time[-1] for track in tracks) if end is None else end
     if last < first:
         raise RecordingError(f"no rows between {first:g} and {last:g} s")
-    count = int(np.floor((last - first + slack(period, first, last)) / period)) + 1
+    count = int(np.floor((last - first + grid_tolerance(period, first, last)) / period)) + 1
     if count * len(tracks) * 6 > MOST:
         raise RecordingError(
             f"{count} times of {len(tracks)} individuals do not fit; write --rate or --begin and --end"
@@ -45,7 +46,7 @@ def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: f
     return first + np.arange(count) * period, period
 
 
-def slack(period: float, *instants: float) -> float:
+def grid_tolerance(period: float, *instants: float) -> float:
     """Time (s) by which rows may miss the grid: 1e-6 of a period, and what doubles of these instants do not tell.
 
     Seconds since 1970 are told to 2.4e-7 s.
@@ -63,12 +64,12 @@ def _round(period: float) -> float:
     return 1.0 / rate if abs(rate * period - 1.0) < SAME_RATE else float(f"{period:.4g}")
 
 
-def bits(tracks: list[Track], asked: int) -> tuple[int, float]:
+def needed_bits(tracks: list[ImportedTrack], min_bits: int) -> tuple[int, float]:
     """Bits per number that tracks need, at least those asked for; and the step of places in single precision, m.
 
     Raises RecordingError for places that nobody flies at.
     """
-    far = [float(np.nanmax(np.abs(track.stack(POSITION, 3)), initial=0.0)) for track in tracks]
+    far = [float(np.nanmax(np.abs(track.stack(POSITION_TARGETS, 3)), initial=0.0)) for track in tracks]
     farthest = max(far)
     if farthest > FARTHEST:
         track = tracks[far.index(farthest)]
@@ -77,11 +78,11 @@ def bits(tracks: list[Track], asked: int) -> tuple[int, float]:
             "check the unit and which columns are read"
         )
     step = float(np.spacing(np.float32(farthest)))
-    return (64 if step > COARSE else asked), step
+    return (64 if step > COARSE else min_bits), step
 
 
-def recording(
-    tracks: list[Track], times: NDArray[np.float64], period: float, bridge: float, precision: int
+def resample(
+    tracks: list[ImportedTrack], times: NDArray[np.float64], period: float, bridge: float, precision: int
 ) -> tuple[xr.Dataset, dict[str, float]]:
     """Dataset of the tracks at the given times, and shares: presence, bridged.
 
@@ -89,7 +90,7 @@ def recording(
     """
     axes = 3 if any("z" in track.columns for track in tracks) else 2
     kind = np.float32 if precision == 32 else np.float64
-    names = ["position", "velocity", *(["command"] if any(track.has(COMMAND) for track in tracks) else [])]
+    names = ["position", "velocity", *(["command"] if any(track.has(COMMAND_TARGETS) for track in tracks) else [])]
     # one individual after another, so that memory is taken for each as its rows are given back
     filled = {name: np.empty((len(tracks), axes, len(times)), kind) for name in names}
     sure = np.empty((len(times), len(tracks)), np.float32)
@@ -97,11 +98,11 @@ def recording(
         _fill(track, who, times, period, bridge, {name: array[who].T for name, array in filled.items()}, sure)
         if len(tracks) > 1:
             track.columns, track.time, track.rows = {}, track.time[:0], track.rows[:0]  # a long log is in memory once
-            give_back_memory()
+            trim_heap()
     variables: dict[str, Any] = {}
     for name in names:
         whole = np.ascontiguousarray(filled.pop(name).transpose(2, 1, 0))
-        variables[name] = (DIMENSIONS, whole[:, :, None, :], {"units": UNITS.get(name, "m/s")})
+        variables[name] = (DIMENSIONS, whole[:, :, None, :], {"units": VARIABLE_UNITS.get(name, "m/s")})
     variables["confidence"] = (("time", "keypoint", "individual"), sure[:, None, :])
     coordinates = {
         "time": ("time", np.arange(len(times)) * period, {"units": "s"}),
@@ -114,12 +115,14 @@ def recording(
     return xr.Dataset(variables, coordinates, attributes), shares
 
 
-def _fill(track: Track, who: int, times: Any, period: float, bridge: float, filled: dict[str, Any], sure: Any) -> None:
+def _fill(
+    track: ImportedTrack, who: int, times: Any, period: float, bridge: float, filled: dict[str, Any], sure: Any
+) -> None:
     """Fill in an individual's confidence (time, individual) and its arrays by name, each (time, axis)."""
     axes = filled["position"].shape[1]
-    own, usual = track.time, period_of(track) or period
-    rows = track.stack(POSITION, axes)
-    late = slack(period, times[0], times[-1])
+    own, usual = track.time, median_period(track) or period
+    rows = track.stack(POSITION_TARGETS, axes)
+    late = grid_tolerance(period, times[0], times[-1])
     at = np.searchsorted(own, times + late, side="right") - 1
     inside = (at >= 0) & (times <= own[-1] + late)
     before = np.clip(at, 0, max(len(own) - 2, 0))
@@ -131,11 +134,11 @@ def _fill(track: Track, who: int, times: Any, period: float, bridge: float, fill
     normal = inside & (step <= NORMAL * usual) & ~broken
     bridged = inside & (step <= max(bridge, NORMAL * usual)) & ~broken
     good = on_row | bridged
-    if track.air is not None:
-        good &= track.air[before] & track.air[after]
-    logged = track.has(VELOCITY)
+    if track.in_air is not None:
+        good &= track.in_air[before] & track.in_air[after]
+    logged = track.has(VELOCITY_TARGETS)
     slopes = _slopes(own, rows, track.breaks, usual)
-    for c, name in enumerate(VELOCITY[:axes] if logged else ()):
+    for c, name in enumerate(VELOCITY_TARGETS[:axes] if logged else ()):
         told = track.columns.get(name, slopes[:, c])
         slopes[:, c] = np.where(np.isfinite(told), told, slopes[:, c])  # what is not logged is differentiated
     p, v = _hermite(rows, slopes, before, after, step, part)
@@ -148,7 +151,7 @@ def _fill(track: Track, who: int, times: Any, period: float, bridge: float, fill
     sure[:, who] = np.where(good, np.where(on_row | normal, 1.0, 0.5), 0.0)
     if "command" in filled:
         unsaid = np.full(len(own), np.nan)
-        ask = np.stack([track.columns.get(name, unsaid) for name in COMMAND[:axes]], axis=1)
+        ask = np.stack([track.columns.get(name, unsaid) for name in COMMAND_TARGETS[:axes]], axis=1)
         held = ask[same]  # a command holds until the next one
         filled["command"][:] = np.where((on_row | normal)[:, None] & good[:, None], held, np.nan)
 
@@ -160,7 +163,7 @@ def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:
     edges = np.unique(np.concatenate([[0], breaks, gaps, [len(times)]])).astype(int)
     for begin, end in zip(edges[:-1], edges[1:], strict=True):
         if end - begin > 1:
-            found[begin:end] = gradient(rows[begin:end], times[begin:end])
+            found[begin:end] = central_difference(rows[begin:end], times[begin:end])
         else:
             found[begin:end] = np.nan
     return found

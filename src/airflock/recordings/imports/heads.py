@@ -5,9 +5,9 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-from airflock.recordings.imports.columns import MOST_COLUMNS, layout
-from airflock.recordings.imports.track import Options
-from airflock.support.errors import RecordingError
+from airflock.recordings.imports.columns import MAX_COLUMNS, column_layout
+from airflock.recordings.imports.track import ImportOptions
+from airflock.support import RecordingError
 
 DELIMITERS = (",", ";", "\t", "|")
 BLANKS = r"\s+"  # where nothing else separates columns, as NumPy writes tables
@@ -16,7 +16,7 @@ REMARK = "#"  # begins a line above a table
 SEPARATOR = re.compile(r'"?sep=.?"?', re.IGNORECASE)  # such a line, which spreadsheets write and read
 
 
-class Head(NamedTuple):
+class TableHead(NamedTuple):
     """The beginning of a text table.
 
     above  : number of lines above it; first : number of its first row of data, as an editor counts
@@ -35,7 +35,7 @@ class Head(NamedTuple):
         return self.above + (1 if self.hidden else 2)
 
 
-def head_of(path: Path, options: Options) -> Head:
+def read_head(path: Path, options: ImportOptions) -> TableHead:
     """How a text table begins; raises RecordingError for what is none, and where columns have no names."""
     encoding, lines = _lines(path)
     above = next((i for i, line in enumerate(lines) if line.strip() and not _remark(line)), len(lines))
@@ -45,8 +45,8 @@ def head_of(path: Path, options: Options) -> Head:
     given = {"tab": "\t", "\\t": "\t"}.get(options.delimiter, options.delimiter)
     delimiter = given or _delimiter(lines[above], body)
     names = _cells(lines[above], delimiter)
-    if len(names) > MOST_COLUMNS:
-        layout(str(path), names, options)
+    if len(names) > MAX_COLUMNS:
+        column_layout(str(path), names, options)
     hidden = False
     if all(_numeric(name) for name in names):
         over = _cells(lines[above - 1].strip().lstrip(REMARK), delimiter) if above else []
@@ -54,7 +54,7 @@ def head_of(path: Path, options: Options) -> Head:
             raise RecordingError(f"{path}: the first row holds numbers; add a row of names, for instance t,id,x,y")
         body, names, hidden = [lines[above], *body], over, True
     _decimals(path, body, len(names), delimiter, options, above + (1 if hidden else 2))
-    return Head(encoding, delimiter, names, above, hidden)
+    return TableHead(encoding, delimiter, names, above, hidden)
 
 
 def _lines(path: Path) -> tuple[str, list[str]]:
@@ -97,7 +97,7 @@ def _numeric(text: str) -> bool:
     return bool(re.fullmatch(r"[-+]?[\d.,]+([eE][-+]?\d+)?", text))
 
 
-def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: Options, at: int) -> None:
+def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: ImportOptions, at: int) -> None:
     """Refuse decimal commas that nobody has announced; at: number of the first row."""
     if options.decimal != ".":
         return

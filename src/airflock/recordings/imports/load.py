@@ -21,24 +21,23 @@ from airflock.recordings.imports import (
     registry,
     tables,
 )
-from airflock.recordings.imports.local_frame import to_metres
+from airflock.recordings.imports.local_frame import to_local_frame
 from airflock.recordings.imports.sound_options import check_options
 from airflock.recordings.imports.track import (
-    GEODETIC,
-    POSITION,
-    VELOCITY,
-    Findings,
-    Options,
-    Track,
-    nothing,
+    GEODETIC_TARGETS,
+    POSITION_TARGETS,
+    VELOCITY_TARGETS,
+    ImportedTrack,
+    ImportOptions,
+    ImportReport,
+    ignore_progress,
 )
-from airflock.recordings.layout import EAST_NORTH_UP, FRAME
-from airflock.support.errors import RecordingError
-from airflock.support.untrusted import own_path
+from airflock.recordings.layout import EAST_NORTH_UP, FRAME_ATTRIBUTE
+from airflock.support import RecordingError, expand_path
 
 
 def load_tracks(
-    what: Any,
+    source: Any,
     *,
     map: Mapping[str, str] | None = None,
     unit: str = "",
@@ -58,13 +57,13 @@ def load_tracks(
     delimiter: str = "",
     precision: int = 32,
     say: Callable[[str], None] | None = None,
-    done: Callable[[float], None] = nothing,
+    done: Callable[[float], None] = ignore_progress,
 ) -> xr.Dataset:
     """Recording made of tracks of others: flight logs and animals.
 
     Parameters
     ----------
-    what : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array
+    source : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array
         A file or several (.csv, .parquet, .ulg, .bin, .tlog, .log, .nc, .h5, .npy), a table, such as {"t": [...], "id":
         [...], "x": [...]}, a Dataset of `movement`, or an array (frame, individual, 2 or 3).
     map : mapping, optional
@@ -125,32 +124,32 @@ def load_tracks(
     >>> dict(recording.position.sizes)
     {'time': 20, 'space': 2, 'keypoint': 1, 'individual': 2}
     """
-    options = Options(
+    options = ImportOptions(
         map={} if map is None else map, unit=unit, scale=scale, time_unit=time_unit, fps=fps, keypoint=keypoint,
         axes=axes, decimal=decimal, delimiter=delimiter, done=done,
     )  # fmt: skip
     numbers = {"rate": rate, "bridge": bridge, "begin": begin, "end": end}
-    findings = Findings()
+    findings = ImportReport()
     check_options(options, findings, numbers, precision, accept, origin)
-    findings.accept = frozenset([accept] if isinstance(accept, str) else accept)
+    findings.accepted_kinds = frozenset([accept] if isinstance(accept, str) else accept)
     tracks, comparable = read_tracks(
-        what, options, findings, origin=origin, same_clock=same_clock, begin=begin, end=end
+        source, options, findings, origin=origin, same_clock=same_clock, begin=begin, end=end
     )
     checks.check_presence(tracks, findings)
-    findings.refuse()
-    if not all(track.has(VELOCITY) for track in tracks):
+    findings.raise_errors()
+    if not all(track.has(VELOCITY_TARGETS) for track in tracks):
         findings.notes.append(
             "no velocity: differentiated from positions, one-sided at both ends of a track and of gaps; axes and units "
             "could not be checked against them"
         )
-    times, period = grid.grid_of(tracks, rate, begin, end)
+    times, period = grid.time_grid(tracks, rate, begin, end)
     sources = sorted({track.source for track in tracks})
-    kept, step = grid.bits(tracks, precision)
+    kept, step = grid.needed_bits(tracks, precision)
     if kept != precision:
         findings.notes.append(
             f"far from the origin: kept with 64 bits; 32 bits resolve positions there only to {step:.2g} m"
         )
-    found, shares = grid.recording(tracks, times, period, bridge, kept)
+    found, shares = grid.resample(tracks, times, period, bridge, kept)
     gone = 1.0 - shares["present"]
     findings.notes.append(
         f"{found.sizes['individual']} individuals, {times[-1] - times[0]:.4g} s at {1 / period:.4g} Hz; "
@@ -163,61 +162,61 @@ def load_tracks(
         "airflock_import": json.dumps({"notes": findings.notes}),
     }  # fmt: skip
     if _on_ground(tracks, options):
-        found.attrs[FRAME] = EAST_NORTH_UP
+        found.attrs[FRAME_ATTRIBUTE] = EAST_NORTH_UP
     if say is not None:
         for note in findings.notes:
             say(note)
     return found
 
 
-def _on_ground(tracks: list[Track], options: Options) -> bool:
+def _on_ground(tracks: list[ImportedTrack], options: ImportOptions) -> bool:
     """Whether the axes are known to point east and north: of a site or an autopilot, or because the user says so."""
     first = tracks[0]
-    autopilot = Path(first.source).suffix.lower() in registry.OF_AUTOPILOTS
+    autopilot = Path(first.source).suffix.lower() in registry.AUTOPILOT_SUFFIXES
     return first.origin is not None or first.ground or bool(options.axes) or autopilot
 
 
 def read_tracks(
-    what: Any,
-    options: Options,
-    findings: Findings,
+    source: Any,
+    options: ImportOptions,
+    findings: ImportReport,
     *,
     origin: tuple[float, float, float] | None = None,
     same_clock: bool = False,
     begin: float | None = None,
     end: float | None = None,
-) -> tuple[list[Track], bool]:
+) -> tuple[list[ImportedTrack], bool]:
     """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault.
 
     begin, end : window of time, s; what lies outside is not checked for jumps
     """
-    tracks = _read(what, options, findings)
-    findings.refuse()
-    tracks = absent.leave_out(tracks, findings)
+    tracks = _read(source, options, findings)
+    findings.raise_errors()
+    tracks = absent.drop_incomplete_rows(tracks, findings)
     checks.check_columns(tracks, findings)
-    absent.tell_speeds(tracks, findings)
+    absent.note_missing_velocities(tracks, findings)
     checks.check_times(tracks, findings)
     checks.check_names(tracks, findings)
     checks.check_heights(tracks, options.axes, findings)
-    to_metres(tracks, origin, findings)
-    findings.refuse()
+    to_local_frame(tracks, origin, findings)
+    findings.raise_errors()
     motion.check_axes(tracks, findings)
-    findings.refuse()
-    comparable = clocks.align(tracks, same_clock, findings)
+    findings.raise_errors()
+    comparable = clocks.align_clocks(tracks, same_clock, findings)
     if begin is not None or end is not None:
-        tracks = cut(tracks, begin, end)
+        tracks = cut_window(tracks, begin, end)
     for track in tracks:
         motion.check_jumps(track, findings)
-        checks.note_steps(track, findings)
-    findings.refuse()
+        checks.note_resolution(track, findings)
+    findings.raise_errors()
     return tracks, comparable
 
 
-def cut(tracks: list[Track], begin: float | None, end: float | None) -> list[Track]:
+def cut_window(tracks: list[ImportedTrack], begin: float | None, end: float | None) -> list[ImportedTrack]:
     """Tracks between two times, s; those that have none of it are left out."""
     low, high = -np.inf if begin is None else begin, np.inf if end is None else end
     for track in tracks:
-        late = grid.slack(checks.period_of(track), *track.time[[0, -1]])
+        late = grid.grid_tolerance(checks.median_period(track), *track.time[[0, -1]])
         track.keep((track.time >= low - late) & (track.time <= high + late))
     there = [track for track in tracks if len(track.time)]
     if not there:
@@ -225,11 +224,11 @@ def cut(tracks: list[Track], begin: float | None, end: float | None) -> list[Tra
     return there
 
 
-def _read(what: Any, options: Options, findings: Findings) -> list[Track]:
+def _read(what: Any, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     if isinstance(what, xr.Dataset):  # which is a mapping, too
         return movement.read_dataset(what, options)
     if isinstance(what, Mapping):
-        what = tables.table_of(what)
+        what = tables.table_from_columns(what)
     if isinstance(what, pd.DataFrame):
         return tables.read_frame(what, options, findings)
     if isinstance(what, np.ndarray):
@@ -237,7 +236,7 @@ def _read(what: Any, options: Options, findings: Findings) -> list[Track]:
     if isinstance(what, (str, os.PathLike)):
         what = [what]
     try:
-        files = [own_path(name) for name in what]
+        files = [expand_path(name) for name in what]
     except TypeError as fault:
         raise RecordingError(
             f"{type(what).__name__} holds no tracks; give files, a DataFrame, a Dataset or an array"
@@ -247,16 +246,16 @@ def _read(what: Any, options: Options, findings: Findings) -> list[Track]:
     tracks = []
     for path in files:
         try:
-            tracks += _placed(path, registry.read(path, options, findings))
+            tracks += _placed(path, registry.read_file(path, options, findings))
         except RecordingError as fault:
             findings.faults += str(fault).splitlines()
         options.done(1.0)
     return tracks
 
 
-def _placed(path: Path, tracks: list[Track]) -> list[Track]:
+def _placed(path: Path, tracks: list[ImportedTrack]) -> list[ImportedTrack]:
     """Tracks that have a place at every time; raises RecordingError for one without."""
     for track in tracks:
-        if not any(set(names) <= set(track.columns) for names in (POSITION[:2], GEODETIC[:2])):
+        if not any(set(names) <= set(track.columns) for names in (POSITION_TARGETS[:2], GEODETIC_TARGETS[:2])):
             raise RecordingError(f"{path}: {track.name} has no positions")
     return tracks

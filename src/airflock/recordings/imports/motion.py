@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.recordings.imports.checks import period_of
-from airflock.recordings.imports.expressions import quoted
-from airflock.recordings.imports.headers import LENGTHS, SPEEDS, TIMES, meaning, split
-from airflock.recordings.imports.track import POSITION, VELOCITY, Findings, Track
+from airflock.recordings.imports.checks import median_period
+from airflock.recordings.imports.expressions import quote_column
+from airflock.recordings.imports.headers import LENGTH_UNITS, SPEED_UNITS, TIME_UNITS, header_meaning, split_header
+from airflock.recordings.imports.track import POSITION_TARGETS, VELOCITY_TARGETS, ImportedTrack, ImportReport
 
 Array = NDArray[np.float64]
 LAG = 0.5  # s over which velocities are summed up, so that resolution does not hide the slope
@@ -27,11 +27,11 @@ REASONS = {  # how many times too fast → why, and what to write: targets and t
 }
 
 
-def check_axes(tracks: Iterable[Track], findings: Findings) -> None:
+def check_axes(tracks: Iterable[ImportedTrack], findings: ImportReport) -> None:
     """Rule 2: along each axis positions change as the velocities say; else name what is swapped, turned or scaled."""
-    by_file: dict[str, list[Track]] = {}
+    by_file: dict[str, list[ImportedTrack]] = {}
     for track in tracks:
-        if track.has(VELOCITY):
+        if track.has(VELOCITY_TARGETS):
             by_file.setdefault(track.source, []).append(track)
     for source, own in by_file.items():
         axes = 3 if all("z" in t.columns and "vz" in t.columns for t in own) else 2
@@ -44,10 +44,10 @@ def check_axes(tracks: Iterable[Track], findings: Findings) -> None:
         _compare(source, own[0], moved, summed, findings)
 
 
-def _displacements(track: Track, axes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Displacements over about LAG, and the same from the velocities, (pair, axis), m."""
-    step = period_of(track)
-    place, speed = track.stack(POSITION, axes), track.stack(VELOCITY, axes)
+    step = median_period(track)
+    place, speed = track.stack(POSITION_TARGETS, axes), track.stack(VELOCITY_TARGETS, axes)
     steps = np.diff(track.time)
     if not step:
         return np.empty((0, axes)), np.empty((0, axes))
@@ -62,7 +62,7 @@ def _displacements(track: Track, axes: int) -> tuple[NDArray[np.float64], NDArra
     return place[rows + k] - place[rows], path[rows + k] - path[rows]
 
 
-class Likeness(NamedTuple):
+class AxisCorrelation(NamedTuple):
     """How displacements (rows) go with velocities (columns), by axis.
 
     lively : (axis,) whether the velocity along it varies enough to compare
@@ -75,16 +75,16 @@ class Likeness(NamedTuple):
     slopes: Array
 
 
-def _likeness(moved: Array, summed: Array) -> Likeness:
+def _likeness(moved: Array, summed: Array) -> AxisCorrelation:
     """Compare displacements with the same from velocities, both (pair, axis), m; some velocity must vary."""
     strength, spread = summed.std(axis=0), moved.std(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         cross = (moved - moved.mean(0)).T @ (summed - summed.mean(0)) / len(moved)
         r, slopes = np.nan_to_num(cross / np.outer(spread, strength)), np.diag(cross) / strength**2
-    return Likeness(strength > 0.05 * strength.max(), r, slopes)
+    return AxisCorrelation(strength > 0.05 * strength.max(), r, slopes)
 
 
-def _compare(source: str, track: Track, moved: Array, summed: Array, findings: Findings) -> None:
+def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, findings: ImportReport) -> None:
     """Find where velocities contradict positions: axes that are swapped or turned round, units that differ.
 
     track : the first of its file, for names in messages
@@ -102,17 +102,18 @@ def _compare(source: str, track: Track, moved: Array, summed: Array, findings: F
     axes = range(len(slopes))
     turned = [i for i in axes if lively[i] and r[i, i] < -0.5]
     for i in turned:
-        speed = track.label(VELOCITY[i])
+        speed = track.label(VELOCITY_TARGETS[i])
         findings.fault(
-            f"{source}: column {track.label(POSITION[i])}, row {track.rows[0]} on: {POSITION[i]} grows where "
+            f"{source}: column {track.label(POSITION_TARGETS[i])}, "
+            f"row {track.rows[0]} on: {POSITION_TARGETS[i]} grows where "
             f"{speed} is negative (slope {slopes[i]:.2f}): one of them points the other way; "
-            f'write --map "{VELOCITY[i]}:=-{quoted(speed)}"',
+            f'write --map "{VELOCITY_TARGETS[i]}:=-{quote_column(speed)}"',
             "axes",
         )
     wrong = [i for i in axes if lively[i] and i not in turned and abs(slopes[i] - 1.0) > TOLERANCE]
     wrong = [i for i in wrong if abs(r[i, i]) > 0.5]
     if wrong:
-        columns, slope = ", ".join(track.label(POSITION[i]) for i in wrong), float(np.median(slopes[wrong]))
+        columns, slope = ", ".join(track.label(POSITION_TARGETS[i]) for i in wrong), float(np.median(slopes[wrong]))
         findings.fault(
             f"{source}: column {columns}, row {track.rows[0]} on: positions change {slope:.3g} times as fast "
             f"as the velocities say: {_scale_reason(track, slope)}",
@@ -120,19 +121,21 @@ def _compare(source: str, track: Track, moved: Array, summed: Array, findings: F
         )
 
 
-def _swap_fault(source: str, track: Track, likeness: Likeness) -> str:
+def _swap_fault(source: str, track: ImportedTrack, likeness: AxisCorrelation) -> str:
     """The first axis of the positions that goes with another axis of the velocities; empty if none does."""
     for i, row in enumerate(likeness.r):
         j = int(np.abs(row).argmax())
         if likeness.lively[i] and i != j and abs(row[i]) < 0.5 and abs(row[j]) > 0.8:
             return (
-                f"{source}: column {track.label(POSITION[i])} ({POSITION[i]}), row {track.rows[0]} on: moves like "
-                f"{track.label(VELOCITY[j])} ({VELOCITY[j]}; r = {row[j]:.2f}): {_unswapped(track, i, j)}"
+                f"{source}: column {track.label(POSITION_TARGETS[i])} ({POSITION_TARGETS[i]}), "
+                f"row {track.rows[0]} on: moves like "
+                f"{track.label(VELOCITY_TARGETS[j])} ({VELOCITY_TARGETS[j]}; r = {row[j]:.2f}): "
+                f"{_unswapped(track, i, j)}"
             )
     return ""
 
 
-def _scale_reason(track: Track, slope: float) -> str:
+def _scale_reason(track: ImportedTrack, slope: float) -> str:
     """Why positions change so many times as fast as velocities say, and what to write."""
     near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
     if abs(np.log(near / slope)) >= 0.1:
@@ -141,38 +144,39 @@ def _scale_reason(track: Track, slope: float) -> str:
     return f"{words}: write {', or '.join(_mapped(track, *change) for change in changes)}"
 
 
-def _unswapped(track: Track, i: int, j: int) -> str:
+def _unswapped(track: ImportedTrack, i: int, j: int) -> str:
     """What to write where axis i of the positions is axis j of the velocities."""
-    own = [quoted(track.label(POSITION[k])) for k in (i, j)]
-    told = [meaning(track.label(POSITION[k])) for k in (i, j)]
+    own = [quote_column(track.label(POSITION_TARGETS[k])) for k in (i, j)]
+    told = [header_meaning(track.label(POSITION_TARGETS[k])) for k in (i, j)]
     if [None if one is None else one.target for one in told] == [
-        POSITION[j],
-        POSITION[i],
+        POSITION_TARGETS[j],
+        POSITION_TARGETS[i],
     ]:  # they have been exchanged already, by --axes or --map
         return (
             "positions and velocities have different axes; write, without --axes, "
-            f'--map "{POSITION[i]}:={own[0]}" --map "{POSITION[j]}:={own[1]}"'
+            f'--map "{POSITION_TARGETS[i]}:={own[0]}" --map "{POSITION_TARGETS[j]}:={own[1]}"'
         )
     return (
-        f'swapped, or north-east-down; write --map "{POSITION[i]}:={own[1]}" --map "{POSITION[j]}:={own[0]}", '
+        f'swapped, or north-east-down; write --map "{POSITION_TARGETS[i]}:={own[1]}" '
+        f'--map "{POSITION_TARGETS[j]}:={own[0]}", '
         "or --axes ned"
     )
 
 
-def _mapped(track: Track, target: str, wrong: float) -> str:
+def _mapped(track: ImportedTrack, target: str, wrong: float) -> str:
     """What to write so that a target is `wrong` times what it is now; an expression loses the unit of its header."""
     label = track.label(target)
-    name, unit = split(label)
-    own = {**TIMES, **LENGTHS, **SPEEDS}.get(unit, 1.0) if name else 1.0
-    return f'--map "{target}:={quoted(label)}*{own * wrong:.6g}"'
+    name, unit = split_header(label)
+    own = {**TIME_UNITS, **LENGTH_UNITS, **SPEED_UNITS}.get(unit, 1.0) if name else 1.0
+    return f'--map "{target}:={quote_column(label)}*{own * wrong:.6g}"'
 
 
-def check_jumps(track: Track, findings: Findings) -> None:
+def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
     """Rules 5 and 6: a row off its track is left out; a track that goes on elsewhere was reset, and is split there."""
-    surprise, scale = surprises(track)
+    surprise, scale = prediction_errors(track)
     if not len(surprise):
         return
-    place = track.stack(POSITION, 2)
+    place = track.stack(POSITION_TARGETS, 2)
     next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
     if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
         findings.fault(
@@ -182,7 +186,7 @@ def check_jumps(track: Track, findings: Findings) -> None:
         )
         return
     size = np.linalg.norm(surprise, axis=1)
-    limit = (SIGMAS if track.has(VELOCITY) else WILD) * scale
+    limit = (SIGMAS if track.has(VELOCITY_TARGETS) else WILD) * scale
     known = np.isin(np.arange(1, len(track.time)), track.breaks)
     jumps = np.flatnonzero((size > limit) & ~known)
     if len(jumps) > max(20, 0.05 * len(size)):
@@ -217,15 +221,15 @@ def _returns(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
     return bool(np.linalg.norm(first + second) < 0.3 * np.linalg.norm(first))
 
 
-def surprises(track: Track) -> tuple[NDArray[np.float64], float]:
+def prediction_errors(track: ImportedTrack) -> tuple[NDArray[np.float64], float]:
     """What each step is beyond its prediction (row - 1, 2), m, and a robust scale of it; zero across gaps."""
-    step = period_of(track)
-    place = track.stack(POSITION, 2)
+    step = median_period(track)
+    place = track.stack(POSITION_TARGETS, 2)
     moved, steps = np.diff(place, axis=0), np.diff(track.time)
     if len(moved) < 20:
         return np.empty((0, 2)), 0.0
-    if track.has(VELOCITY):
-        speed = track.stack(VELOCITY, 2)
+    if track.has(VELOCITY_TARGETS):
+        speed = track.stack(VELOCITY_TARGETS, 2)
         predicted = 0.5 * (speed[1:] + speed[:-1]) * steps[:, None]
     else:
         rate = moved / np.maximum(steps, 1e-12)[:, None]

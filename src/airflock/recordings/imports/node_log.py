@@ -4,15 +4,21 @@ from pathlib import Path
 
 import numpy as np
 
-from airflock.drones.onboard.log import read_ticks
-from airflock.drones.onboard.mission import AIR, FLY
-from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
-from airflock.support.errors import LinkError, RecordingError
+from airflock.drones import AIRBORNE_PHASES, FLYING_PHASES, read_log_ticks
+from airflock.recordings.imports.track import (
+    COMMAND_TARGETS,
+    POSITION_TARGETS,
+    VELOCITY_TARGETS,
+    ImportedTrack,
+    ImportOptions,
+    ImportReport,
+)
+from airflock.support import LinkError, RecordingError
 
 OTHERS = "of ArduPilot give the .bin that it was made from"  # whose text logs end in .log, too
 
 
-def read_node_log(path: Path, options: Options, findings: Findings) -> list[Track]:
+def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Track of the drone on which a node flew: local east-north-up of its mission, by the clock of its computer.
 
     A row is a tick at which the own state was another than at the tick before; between such rows the autopilot had said
@@ -22,7 +28,7 @@ def read_node_log(path: Path, options: Options, findings: Findings) -> list[Trac
         if not file.read(8).startswith(b'{"log":'):
             raise RecordingError(f"{path}: .log: unknown format; {OTHERS}")
     try:
-        told = read_ticks(path)
+        told = read_log_ticks(path)
     except LinkError as fault:
         raise RecordingError(str(fault)) from fault
     options.done(0.8)
@@ -32,16 +38,18 @@ def read_node_log(path: Path, options: Options, findings: Findings) -> list[Trac
         raise RecordingError(f"{path}: the autopilot never told where it is")
     ticks = [told.ticks[k] for k in rows]
     time = np.array([tick.time for tick in ticks])
-    flown = np.array([tick.phase in FLY for tick in ticks])
+    flown = np.array([tick.phase in FLYING_PHASES for tick in ticks])
     place = np.array([tick.own for tick in ticks], float)
     command = np.where(flown[:, None], np.array([tick.command for tick in ticks], float), np.nan)
-    columns = dict(zip((*POSITION, *VELOCITY), place.T, strict=True)) | dict(zip(COMMAND, command.T, strict=True))
+    columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), place.T, strict=True)) | dict(
+        zip(COMMAND_TARGETS, command.T, strict=True)
+    )
     if not flown.any():
         findings.notes.append(f"{path}: the node never flew: no commands")
-        columns = {name: column for name, column in columns.items() if name not in COMMAND}
-    labels = {name: f"own[{c}]" for c, name in enumerate((*POSITION, *VELOCITY))}
-    labels |= {name: f"set[{c}]" for c, name in enumerate(COMMAND)}
-    found = Track(
+        columns = {name: column for name, column in columns.items() if name not in COMMAND_TARGETS}
+    labels = {name: f"own[{c}]" for c, name in enumerate((*POSITION_TARGETS, *VELOCITY_TARGETS))}
+    labels |= {name: f"set[{c}]" for c, name in enumerate(COMMAND_TARGETS)}
+    found = ImportedTrack(
         f"member_{told.member}",
         str(path),
         time,
@@ -53,5 +61,5 @@ def read_node_log(path: Path, options: Options, findings: Findings) -> list[Trac
     )
     ends = time[[0, -1]]
     found.utc = np.stack([ends, told.utc * 1e-6 + ends - told.now], axis=1)
-    found.air = np.array([tick.phase in AIR for tick in ticks])
+    found.in_air = np.array([tick.phase in AIRBORNE_PHASES for tick in ticks])
     return [found]

@@ -4,12 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from airflock.recordings.imports import arrays, dataflash, movement, node_log, tables, ulog
-from airflock.recordings.imports.track import Findings, Options, Track
-from airflock.recordings.packed import refuse_packed, refuse_pickle
-from airflock.support.errors import RecordingError
-from airflock.support.untrusted import from_outside
+from airflock.recordings.imports.track import ImportedTrack, ImportOptions, ImportReport
+from airflock.recordings.packed import refuse_archive, refuse_pickle_file
+from airflock.support import RecordingError, as_error
 
-Reader = Callable[[Path, Options, Findings], list[Track]]
+Reader = Callable[[Path, ImportOptions, ImportReport], list[ImportedTrack]]
 READERS: dict[str, tuple[str, Reader]] = {
     ".csv": ("table", tables.read_csv),
     ".tsv": ("table", tables.read_csv),
@@ -26,20 +25,20 @@ READERS: dict[str, tuple[str, Reader]] = {
     ".npz": ("NumPy arrays", arrays.read_npy),
 }
 
-OF_AUTOPILOTS = (".ulg", ".bin", ".tlog", ".log")  # their axes are those of the ground
+AUTOPILOT_SUFFIXES = (".ulg", ".bin", ".tlog", ".log")  # their axes are those of the ground
 
 
-def read(path: Path, options: Options, findings: Findings) -> list[Track]:
+def read_file(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Tracks of a file; raises RecordingError for what is no known format."""
     if path.is_dir():
         raise RecordingError(f"{path}: is a folder; name the files in it")
     if not path.is_file():
         raise RecordingError(f"{path}: no such file")
     ending = path.suffix.lower()
-    refuse_packed(path)
-    refuse_pickle(path)
+    refuse_archive(path)
+    refuse_pickle_file(path)
     if ending not in READERS:
         known = ", ".join(READERS)
         raise RecordingError(f"{path}: {ending or 'a name without an ending'}: unknown format; known: {known}")
-    with from_outside(path, RecordingError):  # libraries raise whatever they happen to where a file is damaged
+    with as_error(path, RecordingError):  # libraries raise whatever they happen to where a file is damaged
         return READERS[ending][1](path, options, findings)

@@ -6,16 +6,19 @@ from typing import Any
 import numpy as np
 
 from airflock.recordings.imports import headers
-from airflock.recordings.imports.track import ACCEPTED, Findings, Options
-from airflock.support.numeric import is_number
+from airflock.recordings.imports.track import ACCEPTABLE_ERRORS, ImportOptions, ImportReport
+from airflock.support import is_number
 
 
 def check_options(
-    options: Options, findings: Findings, numbers: Mapping[str, Any], precision: Any, accept: Any, origin: Any
+    options: ImportOptions, findings: ImportReport, numbers: Mapping[str, Any], precision: Any, accept: Any, origin: Any
 ) -> None:
     """Refuse options that cannot be meant, all at once. Raises RecordingError."""
     faults = findings.faults
-    known = {"unit": ("", *headers.LENGTHS, *headers.PIXELS), "time_unit": ("", *headers.TIMES, "frames")}
+    known = {
+        "unit": ("", *headers.LENGTH_UNITS, *headers.PIXEL_UNITS),
+        "time_unit": ("", *headers.TIME_UNITS, "frames"),
+    }
     for name, allowed in {**known, "axes": ("", "enu", "ned"), "decimal": (".", ",")}.items():
         value = getattr(options, name)
         if not isinstance(value, str) or value not in allowed:
@@ -40,8 +43,12 @@ def check_options(
     if origin is not None and not _is_origin(origin):
         faults.append(f"origin = {origin!r} is not (latitude, longitude, height) in degrees, degrees and m")
     kinds = [accept] if isinstance(accept, str) or not isinstance(accept, Iterable) else list(accept)
-    faults += [f"accept = {kind} is none of {', '.join(ACCEPTED)}" for kind in kinds if str(kind) not in ACCEPTED]
-    findings.refuse()
+    faults += [
+        f"accept = {kind} is none of {', '.join(ACCEPTABLE_ERRORS)}"
+        for kind in kinds
+        if str(kind) not in ACCEPTABLE_ERRORS
+    ]
+    findings.raise_errors()
 
 
 def _shown(value: Any) -> str:

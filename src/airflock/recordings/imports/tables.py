@@ -9,21 +9,26 @@ import numpy as np
 import pandas as pd
 
 from airflock.recordings.imports import expressions, headers, px4
-from airflock.recordings.imports.absent import PLACES
-from airflock.recordings.imports.columns import Layout, layout
-from airflock.recordings.imports.heads import head_of
-from airflock.recordings.imports.track import GEODETIC, POSITION, Findings, Options, Track
-from airflock.recordings.imports.wide import first_of, pieces, wide_of
-from airflock.support.errors import RecordingError
-from airflock.support.memory import give_back_memory
+from airflock.recordings.imports.absent import PLACE_TARGETS
+from airflock.recordings.imports.columns import ColumnLayout, column_layout
+from airflock.recordings.imports.heads import read_head
+from airflock.recordings.imports.track import (
+    GEODETIC_TARGETS,
+    POSITION_TARGETS,
+    ImportedTrack,
+    ImportOptions,
+    ImportReport,
+)
+from airflock.recordings.imports.wide import first_individual_columns, split_by_individual, wide_columns
+from airflock.support import RecordingError, trim_heap
 
 CLOCK = r"\d+:[0-5]\d:[0-5]\d(\.\d+)?"  # hours, minutes, seconds
 CHUNK = 250_000  # rows that are read at a time, so that an hour of thirty drones fits
 
 
-def read_csv(path: Path, options: Options, findings: Findings) -> list[Track]:
+def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Tracks of a text table; raises RecordingError that names column and row."""
-    head = head_of(path, options)
+    head = read_head(path, options)
     if head.above:
         findings.notes.append(f"{path}: line{'s' * (head.above > 1)} above the table left out: {head.above}")
     size = path.stat().st_size
@@ -43,10 +48,10 @@ def read_csv(path: Path, options: Options, findings: Findings) -> list[Track]:
             except (pd.errors.ParserError, UnicodeDecodeError) as fault:
                 raise RecordingError(f"{path}: {str(fault).splitlines()[0]}") from fault
 
-    return from_parts(str(path), path.stem, head.names, parts, options, findings)
+    return tracks_from_parts(str(path), path.stem, head.names, parts, options, findings)
 
 
-def read_parquet(path: Path, options: Options, findings: Findings) -> list[Track]:
+def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Tracks of a Parquet table."""
     try:
         import pyarrow
@@ -68,10 +73,10 @@ def read_parquet(path: Path, options: Options, findings: Findings) -> list[Track
             pyarrow.default_memory_pool().release_unused()
             options.done(min(1.0, at / total))
 
-    return from_parts(str(path), path.stem, list(file.schema_arrow.names), parts, options, findings)
+    return tracks_from_parts(str(path), path.stem, list(file.schema_arrow.names), parts, options, findings)
 
 
-def table_of(columns: Mapping[str, Any]) -> pd.DataFrame:
+def table_from_columns(columns: Mapping[str, Any]) -> pd.DataFrame:
     """Columns by name as a table, one value for all rows where a column is no list; raises RecordingError."""
     lists = {str(k): list(v) for k, v in columns.items() if np.iterable(v) and not isinstance(v, str)}
     if len({len(column) for column in lists.values()}) != 1:
@@ -80,30 +85,36 @@ def table_of(columns: Mapping[str, Any]) -> pd.DataFrame:
     return pd.DataFrame({str(name): lists.get(str(name), value) for name, value in columns.items()})
 
 
-def read_frame(table: pd.DataFrame, options: Options, findings: Findings) -> list[Track]:
+def read_frame(table: pd.DataFrame, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Tracks of a pandas DataFrame; its index is a column too, where it has a name."""
     flat = table.reset_index() if any(name is not None for name in table.index.names) else table
     flat = flat.set_axis([str(c) for c in flat.columns], axis=1)
-    return from_parts("DataFrame", "individual", list(flat.columns), lambda _: iter([(0, flat)]), options, findings)
+    return tracks_from_parts(
+        "DataFrame", "individual", list(flat.columns), lambda _: iter([(0, flat)]), options, findings
+    )
 
 
-def from_parts(
-    where: str, stem: str, names: list[str], parts: Any, options: Options, findings: Findings
-) -> list[Track]:
+def tracks_from_parts(
+    where: str, stem: str, names: list[str], parts: Any, options: ImportOptions, findings: ImportReport
+) -> list[ImportedTrack]:
     """Tracks of a table that comes in parts, by the layout of its columns."""
-    wide = wide_of(names) if not any(target in options.map for target in (*POSITION, *GEODETIC)) else {}
-    how = layout(where, first_of(names, wide) if wide else names, options)
+    wide = (
+        wide_columns(names)
+        if not any(target in options.map for target in (*POSITION_TARGETS, *GEODETIC_TARGETS))
+        else {}
+    )
+    how = column_layout(where, first_individual_columns(names, wide) if wide else names, options)
     findings.notes += how.notes
-    timed = {expressions.bare(how.trees[target]) for target in ("t", "utc") if target in how.trees}
+    timed = {expressions.single_column(how.expressions[target]) for target in ("t", "utc") if target in how.expressions}
     gathered: dict[str, list[Any]] = {}
     nameless: list[Any] = [np.empty(0, int)]
     columns = None if wide else how.used
     for at, part in parts(columns):
         rows = np.arange(at, at + len(part))
-        for name, piece in pieces(part, wide, how, stem):
+        for name, piece in split_by_individual(part, wide, how, stem):
             numbers = {c: _numbers(piece[c], where, c, at, time=c in timed) for c in how.used if c != how.id}
             values = how.values(numbers, len(piece))
-            whole = np.all([np.isfinite(values[c]) for c in PLACES if c in values], axis=0)
+            whole = np.all([np.isfinite(values[c]) for c in PLACE_TARGETS if c in values], axis=0)
             whole &= np.isfinite(values["t" if "t" in values else "utc"])
             if how.id:
                 nameless.append(rows[whole & piece[how.id].isna().to_numpy()])
@@ -119,7 +130,7 @@ def from_parts(
     tracks = []
     for name in list(gathered):
         tracks.append(_track(name, where, gathered.pop(name), how, bool(how.id or wide), findings))
-    give_back_memory()
+    trim_heap()
     return tracks
 
 
@@ -180,11 +191,13 @@ def _taken(values: dict[str, Any], rows: Any, chosen: Any) -> tuple[dict[str, An
     return {target: array[every] for target, array in values.items()}, rows[every]
 
 
-def _track(name: str, where: str, parts: list[Any], how: Layout, shared: bool, findings: Findings) -> Track:
+def _track(
+    name: str, where: str, parts: list[Any], how: ColumnLayout, shared: bool, findings: ImportReport
+) -> ImportedTrack:
     """One individual of its pieces; shared: whether others have the same column of times."""
     columns = {target: np.concatenate([p[0][target] for p in parts]) for target in parts[0][0]}
     rows = np.concatenate([p[1] for p in parts])
-    origin, valid = px4.taken_out(columns)
+    origin, valid = px4.pop_origin_and_validity(columns)
     if valid is not None and not valid.all():
         findings.notes.append(px4.invalid_note(where, name, valid, rows))
         columns, rows = {target: values[valid] for target, values in columns.items()}, rows[valid]
@@ -197,7 +210,7 @@ def _track(name: str, where: str, parts: list[Any], how: Layout, shared: bool, f
     if utc is not None and utc is not time and np.isfinite(utc + time).any():
         pair = np.stack([time, utc], axis=1)[np.isfinite(utc + time)]
     air = columns.pop("air") > 0.5 if "air" in columns else None
-    found = Track(name, where, time, columns, rows, dict(how.labels), clock, pair, how.datum)
+    found = ImportedTrack(name, where, time, columns, rows, dict(how.user_labels), clock, pair, how.datum)
     found.origin, found.datum = (origin, found.datum or "amsl") if origin is not None else (None, found.datum)
-    found.air, found.ground = air, how.ground
+    found.in_air, found.ground = air, how.ground
     return found

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.support.errors import RecordingError
+from airflock.support import RecordingError
 
-POSITION, VELOCITY, COMMAND = ("x", "y", "z"), ("vx", "vy", "vz"), ("cx", "cy", "cz")
-GEODETIC = ("lat", "lon", "alt")
-TARGETS = ("t", *POSITION, *VELOCITY, *COMMAND, *GEODETIC, "utc", "air", "id", "frame")
-ACCEPTED = {
+POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS = ("x", "y", "z"), ("vx", "vy", "vz"), ("cx", "cy", "cz")
+GEODETIC_TARGETS = ("lat", "lon", "alt")
+TARGETS = ("t", *POSITION_TARGETS, *VELOCITY_TARGETS, *COMMAND_TARGETS, *GEODETIC_TARGETS, "utc", "air", "id", "frame")
+ACCEPTABLE_ERRORS = {
     "absent": "keep individuals that are there for less than a fifth of the time",
     "axes": "keep axes, signs and units although velocities contradict them",
     "down": "keep z below 0",
@@ -23,12 +23,12 @@ ACCEPTED = {
 }
 
 
-def nothing(_: float) -> None:
+def ignore_progress(_: float) -> None:
     """Take no notice of progress."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class ImportOptions:
     """What the user says about files that do not say it themselves.
 
     map        : target (t, x, vx, cx, id, lat, ...) → expression of column names
@@ -52,13 +52,13 @@ class Options:
     axes: str = ""
     decimal: str = "."
     delimiter: str = ""
-    done: Callable[[float], None] = nothing
+    done: Callable[[float], None] = ignore_progress
 
 
 @dataclass
-class Track:
+class ImportedTrack:
     """One individual. Arrays have one entry per row of the file. Readers keep rows without a
-    time or a place (nan); `absent.leave_out` tells of them and takes them out.
+    time or a place (nan); `absent.drop_incomplete_rows` tells of them and takes them out.
 
     name, source : the individual and its file, for messages
     time    : (row,) s, of the clock that `clock` names
@@ -79,13 +79,13 @@ class Track:
     time: NDArray[np.float64]
     columns: dict[str, NDArray[np.float64]]
     rows: NDArray[np.int64]
-    labels: dict[str, str] = field(default_factory=dict)
+    user_labels: dict[str, str] = field(default_factory=dict)
     clock: str = "shared"
     utc: NDArray[np.float64] | None = None
     datum: str = ""
     origin: tuple[float, float, float] | None = None
     ground: bool = False
-    air: NDArray[np.bool_] | None = None
+    in_air: NDArray[np.bool_] | None = None
     breaks: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     def has(self, names: tuple[str, ...]) -> bool:
@@ -99,7 +99,7 @@ class Track:
 
     def label(self, target: str) -> str:
         """The user's own word for a target."""
-        return self.labels.get(target, target)
+        return self.user_labels.get(target, target)
 
     def keep(self, chosen: NDArray[Any]) -> None:
         """Keep only the chosen rows (a mask or an order)."""
@@ -108,20 +108,20 @@ class Track:
         self.breaks = np.unique(place[place < len(last)]).astype(np.int64)
         self.time, self.rows = self.time[chosen], self.rows[chosen]
         self.columns = {name: values[chosen] for name, values in self.columns.items()}
-        self.air = None if self.air is None else self.air[chosen]
+        self.in_air = None if self.in_air is None else self.in_air[chosen]
 
 
 @dataclass
-class Findings:
+class ImportReport:
     """Faults and notes of an import, gathered to be reported together."""
 
-    accept: frozenset[str] = frozenset()
+    accepted_kinds: frozenset[str] = frozenset()
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def fault(self, line: str, kind: str = "") -> bool:
         """Note a fault; one of a kind that the user accepts is a note. Returns whether it was accepted."""
-        if kind in self.accept:
+        if kind in self.accepted_kinds:
             self.notes.append(f"accepted ({kind}): {line}")
             return True
         kept = "the first of each" if kind == "duplicates" else "it so"
@@ -129,7 +129,7 @@ class Findings:
         self.faults.append(line + way)
         return False
 
-    def refuse(self) -> None:
+    def raise_errors(self) -> None:
         """Raise a RecordingError with all faults, if there are any."""
         if self.faults:
             raise RecordingError("\n".join(dict.fromkeys(self.faults)))

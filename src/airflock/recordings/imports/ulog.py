@@ -5,16 +5,23 @@ from typing import Any
 
 import numpy as np
 
-from airflock.recordings.imports.px4 import invalid_note, origin_of
-from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
-from airflock.support.errors import RecordingError
+from airflock.recordings.imports.px4 import invalid_note, px4_origin
+from airflock.recordings.imports.track import (
+    COMMAND_TARGETS,
+    POSITION_TARGETS,
+    VELOCITY_TARGETS,
+    ImportedTrack,
+    ImportOptions,
+    ImportReport,
+)
+from airflock.support import RecordingError
 
 LOCAL, SETPOINT = "vehicle_local_position", "trajectory_setpoint"
 TOPICS = [LOCAL, SETPOINT, "vehicle_gps_position", "vehicle_land_detected"]
 NED = (("x", "y", "z"), ("vx", "vy", "vz"))
 
 
-def read_ulog(path: Path, options: Options, findings: Findings) -> list[Track]:
+def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Track of a PX4 log: vehicle_local_position, and trajectory_setpoint as the command in force.
 
     The set-point is what the companion asked for; vehicle_local_position_setpoint is the controller's own output and
@@ -34,20 +41,22 @@ def read_ulog(path: Path, options: Options, findings: Findings) -> list[Track]:
         raise RecordingError(f"{path}: has no {LOCAL}; log it (SDLOG_PROFILE, default set) or import the GNSS as CSV")
     local = topics[LOCAL]
     time = local["timestamp"] * 1e-6
-    columns = _enu({axis: local[axis] for axis in NED[0]}, POSITION) | _enu({a: local[a] for a in NED[1]}, VELOCITY)
+    columns = _enu({axis: local[axis] for axis in NED[0]}, POSITION_TARGETS) | _enu(
+        {a: local[a] for a in NED[1]}, VELOCITY_TARGETS
+    )
     columns |= _command(topics.get(SETPOINT), time, path, findings)
     valid = np.ones(len(time), bool)
     for flag in ("xy_valid", "v_xy_valid"):
         valid &= local[flag].astype(bool) if flag in local else True
     labels = {"x": "y", "y": "x", "z": "-z", "vx": "vy", "vy": "vx", "vz": "-vz"}
-    found = Track(path.stem, str(path), time, columns, np.arange(len(time)), labels, "boot", datum="amsl")
+    found = ImportedTrack(path.stem, str(path), time, columns, np.arange(len(time)), labels, "boot", datum="amsl")
     if "xy_reset_counter" in local:
         found.breaks = np.flatnonzero(np.diff(local["xy_reset_counter"].astype(np.int64)) != 0) + 1
         if found.breaks.size:
             findings.notes.append(f"{path}: {found.breaks.size} resets of the estimator: the track is split there")
-    found.origin = origin_of(local)
+    found.origin = px4_origin(local)
     found.utc = _utc(topics.get("vehicle_gps_position"))
-    found.air = _air(topics.get("vehicle_land_detected"), time)
+    found.in_air = _air(topics.get("vehicle_land_detected"), time)
     if not valid.any():
         raise RecordingError(f"{path}: the estimator never called its position valid")
     if not valid.all():
@@ -61,14 +70,14 @@ def _enu(ned: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     return {names[0]: east, names[1]: north, names[2]: -down}
 
 
-def _command(topic: Any, time: Any, path: Path, findings: Findings) -> dict[str, Any]:
+def _command(topic: Any, time: Any, path: Path, findings: ImportReport) -> dict[str, Any]:
     """Velocity set-point held until the next one; nan where the position was controlled instead."""
     if topic is None:
         findings.notes.append(f"{path}: has no {SETPOINT}: no commands")
         return {}
     new = "velocity[0]" in topic  # PX4 from 1.13
     parts = {axis: topic[f"velocity[{c}]" if new else f"v{axis}"] for c, axis in enumerate("xyz")}
-    ask = _enu(parts, COMMAND)
+    ask = _enu(parts, COMMAND_TARGETS)
     at = np.searchsorted(topic["timestamp"] * 1e-6, time, side="right") - 1
     held = {name: np.where(at >= 0, values[np.maximum(at, 0)], np.nan) for name, values in ask.items()}
     share = float(np.isnan(held["cx"]).mean()) if len(time) else 1.0

@@ -5,8 +5,8 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.recordings.measures.states import sound, states
-from airflock.support.errors import ParameterError
+from airflock.recordings.measures.states import check_numbers, track_arrays
+from airflock.support import ParameterError
 
 
 def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
@@ -31,10 +31,10 @@ def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
     >>> airflock.measures.bursts.bursts(fish, least=1.0)["speed_top"].tolist()
     [3.5]
     """
-    sound(least=least)
+    check_numbers(least=least)
     if not least > 0.0:
         raise ParameterError(f"least = {least:g} m/s must be above 0")
-    found = states(recording)
+    found = track_arrays(recording)
     speed = np.linalg.norm(found.velocity, axis=1)
     rows = []
     for i, name in enumerate(found.names):

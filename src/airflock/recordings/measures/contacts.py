@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.flown_scenario import scenario_of
-from airflock.recordings.measures.states import sound, states
-from airflock.support.errors import ParameterError
-from airflock.world.place import Place, Shapes
+from airflock.recordings.flown_scenario import scenario_of_recording
+from airflock.recordings.measures.states import check_numbers, track_arrays
+from airflock.support import ParameterError
+from airflock.world import Shapes, WorldMap
 
 
 def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame:
@@ -31,14 +31,14 @@ def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame
     >>> len(airflock.measures.contacts.contacts(airflock.simulate(short)))  # far from the walls
     0
     """
-    scenario = scenario_of(recording)
+    scenario = scenario_of_recording(recording)
     radius = scenario.metrics.r_body if radius is None else radius
-    sound(radius=radius)
+    check_numbers(radius=radius)
     if not 0.0 <= radius < float("inf"):
         raise ParameterError(f"radius = {radius:g} m is not a radius")
     stands = scenario.stands()
-    place = Place(scenario.world, Shapes(*stands.lists))
-    found, rows = states(recording), []
+    place = WorldMap(scenario.world, Shapes(*stands.as_lists))
+    found, rows = track_arrays(recording), []
     for i, name in enumerate(found.names):
         begun: dict[str, int] = {}
         for k in range(len(found.time) + 1):

@@ -5,8 +5,8 @@ import pandas as pd
 import xarray as xr
 
 from airflock.recordings import images
-from airflock.recordings.measures.states import sound, states
-from airflock.support.errors import ParameterError
+from airflock.recordings.measures.states import check_numbers, track_arrays
+from airflock.support import ParameterError
 
 NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of recordings in single precision
 
@@ -33,8 +33,8 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
     >>> airflock.measures.correlation.velocity_correlation(line, width=3.0).index.name
     'distance'
     """
-    sound(width=width, **({} if farthest is None else {"farthest": farthest}))
-    found = states(recording)
+    check_numbers(width=width, **({} if farthest is None else {"farthest": farthest}))
+    found = track_arrays(recording)
     if not width > 0.0:
         raise ParameterError(f"width = {width:g} m must be above 0")
     sums: dict[int, list[float]] = {}
@@ -47,7 +47,7 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
         u = u - u.mean(axis=1, keepdims=True)
         alone, count = alone + float((u * u).sum()), count + u.shape[1]
         i, j = np.triu_indices(u.shape[1], 1)
-        apart = np.linalg.norm(images.nearest(x[:, j] - x[:, i], found.box), axis=0)
+        apart = np.linalg.norm(images.nearest_image(x[:, j] - x[:, i], found.box), axis=0)
         bins = np.floor(apart / width).astype(int)
         alike = (u[:, i] * u[:, j]).sum(axis=0)
         number, total = np.bincount(bins), np.bincount(bins, alike)

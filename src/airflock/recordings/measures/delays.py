@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.measures.states import headings, sound, states
-from airflock.support.errors import ParameterError
+from airflock.recordings.measures.states import check_numbers, headings, track_arrays
+from airflock.support import ParameterError
 
 ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordings have single precision
 
@@ -30,10 +30,10 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
     >>> round(float(table.isel(leader=0, follower=1).sel(delay=0.5, method="nearest")), 3)
     1.0
     """
-    sound(longest=longest, slowest=slowest)
+    check_numbers(longest=longest, slowest=slowest)
     if not 0.0 <= longest < float("inf"):
         raise ParameterError(f"longest = {longest:g} s must be 0 or more")
-    found = states(recording)
+    found = track_arrays(recording)
     h = headings(found.velocity, slowest)
     shifts = np.arange(-round(longest / found.period), round(longest / found.period) + 1)
     shifts = shifts[np.abs(shifts) < len(h)]
@@ -75,7 +75,7 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
     >>> round(float(first["delay"]), 3)  # the second one does half a second later what the first one does
     0.5
     """
-    sound(longest=longest, least=least, slowest=slowest)
+    check_numbers(longest=longest, least=least, slowest=slowest)
     table = delay_correlation(recording, longest, slowest)
     shifts, n = table["delay"].values, table.sizes["leader"]
     best: dict[tuple[int, int], tuple[float, float]] = {}

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.measures.states import headings, sound, states
+from airflock.recordings.measures.states import check_numbers, headings, track_arrays
 
 
 def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
@@ -27,8 +27,8 @@ def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
     >>> round(float(airflock.measures.milling.milling(ring).iloc[10]), 3)
     1.0
     """
-    sound(slowest=slowest)
-    found = states(recording)
+    check_numbers(slowest=slowest)
+    found = track_arrays(recording)
     course = np.full(len(found.time), np.nan)
     h = headings(found.velocity, slowest)
     for k, there in enumerate(found.placed):

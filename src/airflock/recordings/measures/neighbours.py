@@ -5,8 +5,8 @@ import pandas as pd
 import xarray as xr
 
 from airflock.recordings import images
-from airflock.recordings.measures.states import sound, states
-from airflock.support.errors import ParameterError
+from airflock.recordings.measures.states import check_numbers, track_arrays
+from airflock.support import ParameterError
 
 
 def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
@@ -26,7 +26,7 @@ def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
     >>> airflock.measures.neighbours.nearest_distances(still).values[0].tolist()
     [5.0, 5.0]
     """
-    found = states(recording)
+    found = track_arrays(recording)
     table = np.full(found.placed.shape, np.nan)
     for k, there in enumerate(found.placed):
         if there.sum() > 1:
@@ -59,17 +59,17 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
     >>> float(shares.idxmax()), float(shares.sum() * 2.0)
     (5.0, 1.0)
     """
-    sound(width=width, farthest=farthest)
+    check_numbers(width=width, farthest=farthest)
     if not 0.0 < width < farthest:
         raise ParameterError(f"width = {width:g} m must lie between 0 and farthest = {farthest:g} m")
-    found = states(recording)
+    found = track_arrays(recording)
     edges = np.linspace(0.0, farthest, round(farthest / width) + 1)
     width = farthest / (len(edges) - 1)
     counts, pairs = np.zeros(len(edges) - 1), 0
     for place, there in zip(found.position, found.placed, strict=True):
         x = place[:, there]
         i, j = np.triu_indices(x.shape[1], 1)
-        counts += np.histogram(np.linalg.norm(images.nearest(x[:, j] - x[:, i], found.box), axis=0), edges)[0]
+        counts += np.histogram(np.linalg.norm(images.nearest_image(x[:, j] - x[:, i], found.box), axis=0), edges)[0]
         pairs += len(i)
     index = pd.Index(0.5 * (edges[1:] + edges[:-1]), name="distance")
     density = pd.Series(counts / (max(pairs, 1) * width), index=index, name="density")

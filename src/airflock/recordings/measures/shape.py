@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.measures.states import states
+from airflock.recordings.measures.states import track_arrays
 
 
 def group_shape(recording: xr.Dataset) -> pd.DataFrame:
@@ -30,7 +30,7 @@ def group_shape(recording: xr.Dataset) -> pd.DataFrame:
     """
     from scipy.spatial import ConvexHull, QhullError
 
-    found = states(recording)
+    found = track_arrays(recording)
     axes = found.position.shape[1]
     rows = []
     for place, speed, there, moves in zip(found.position, found.velocity, found.placed, found.present, strict=True):

@@ -8,16 +8,15 @@ from numpy.typing import NDArray
 
 from airflock.recordings import images
 from airflock.recordings.attributes import scenario_document
-from airflock.recordings.differences import velocities
-from airflock.recordings.flown_scenario import scenario_of
-from airflock.recordings.layout import check
-from airflock.support.errors import ParameterError, RecordingError
-from airflock.support.numeric import is_number
+from airflock.recordings.differences import differentiated_velocity
+from airflock.recordings.flown_scenario import scenario_of_recording
+from airflock.recordings.layout import check_recording
+from airflock.support import ParameterError, RecordingError, is_number
 
 Array = NDArray[Any]
 
 
-class States(NamedTuple):
+class TrackArrays(NamedTuple):
     """time (frame,) s, position m and velocity m/s (frame, axis, individual); placed and present (frame, individual).
 
     placed: its position is known; present: its velocity, too. What needs no motion counts all who are placed.
@@ -32,9 +31,9 @@ class States(NamedTuple):
     names: list[str]
     box: Array | None = None
 
-    def offsets(self, place: Array) -> Array:
+    def offsets(self, positions: Array) -> Array:
         """Offsets (axis, from, to), m, between all of some places (axis, individual), to the nearest images."""
-        return images.nearest(place[:, None, :] - place[:, :, None], self.box)
+        return images.nearest_image(positions[:, None, :] - positions[:, :, None], self.box)
 
     @property
     def period(self) -> float:
@@ -42,12 +41,12 @@ class States(NamedTuple):
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 1.0
 
 
-def states(recording: xr.Dataset, keypoint: str | None = None) -> States:
+def track_arrays(recording: xr.Dataset, keypoint: str | None = None) -> TrackArrays:
     """Arrays of a recording; where it has no velocities they are differentiated, unknown in a single frame.
 
     keypoint : which one, where there are several
     """
-    check(recording)
+    check_recording(recording)
     names = [str(name) for name in recording["keypoint"].values]
     if keypoint is None and len(names) > 1:
         raise RecordingError(f"recording: has {len(names)} keypoints; choose one of {', '.join(names)}")
@@ -60,20 +59,20 @@ def states(recording: xr.Dataset, keypoint: str | None = None) -> States:
     if "velocity" in own:
         velocity = own["velocity"].transpose(*order).values.astype(float)
     else:
-        velocity = velocities(position, time) if len(time) > 1 else np.full_like(position, np.nan)
+        velocity = differentiated_velocity(position, time) if len(time) > 1 else np.full_like(position, np.nan)
     placed = np.isfinite(position).all(axis=1)
     present = placed & np.isfinite(velocity).all(axis=1)
     nowhere, unknown = ~placed[:, None, :], ~present[:, None, :]
     individuals = [str(name) for name in own["individual"].values]
     position, velocity = np.where(nowhere, np.nan, position), np.where(unknown, np.nan, velocity)
-    world = scenario_of(recording).world if scenario_document(recording) is not None else None
-    box = images.sides(world, position.shape[1]) if world is not None else None
-    return States(time, position, velocity, placed, present, individuals, box)
+    world = scenario_of_recording(recording).world if scenario_document(recording) is not None else None
+    box = images.box_sides(world, position.shape[1]) if world is not None else None
+    return TrackArrays(time, position, velocity, placed, present, individuals, box)
 
 
-def sound(**given: Any) -> None:
+def check_numbers(**values: Any) -> None:
     """Refuse what is given as a number of a measure and is none, all at once. Raises ParameterError."""
-    faults = [f"{name} = {value!r} is not a number" for name, value in given.items() if not is_number(value)]
+    faults = [f"{name} = {value!r} is not a number" for name, value in values.items() if not is_number(value)]
     if faults:
         raise ParameterError("\n".join(faults))
 

@@ -4,8 +4,8 @@ import numpy as np
 import xarray as xr
 
 from airflock.recordings import images
-from airflock.recordings.measures.states import headings, sound, states
-from airflock.support.errors import ParameterError
+from airflock.recordings.measures.states import check_numbers, headings, track_arrays
+from airflock.support import ParameterError
 
 
 def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: float = 0.0) -> xr.DataArray:
@@ -31,11 +31,11 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
     >>> float(around.sum()) * 4.0  # cells of 4 m²: each of the four has three others near it
     3.0
     """
-    sound(reach=reach, cells=cells, slowest=slowest)
+    check_numbers(reach=reach, cells=cells, slowest=slowest)
     if not reach > 0.0 or cells < 1 or cells % 1:
         raise ParameterError(f"reach = {reach:g} m and cells = {cells}, a whole number, must be above 0")
     cells = int(cells)
-    found = states(recording)
+    found = track_arrays(recording)
     h = headings(found.velocity[:, :2], slowest)
     box = None if found.box is None else found.box[:2]
     edges = np.linspace(-reach, reach, cells + 1)
@@ -43,7 +43,7 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
     for place, ahead, there in zip(found.position[:, :2], h, found.placed, strict=True):
         x = place[:, there]
         for i in np.flatnonzero(there & np.isfinite(ahead).all(axis=0)):
-            offset = images.nearest(x - place[:, i : i + 1], box)
+            offset = images.nearest_image(x - place[:, i : i + 1], box)
             others = np.ones(offset.shape[1], bool)
             others[np.searchsorted(np.flatnonzero(there), i)] = False
             cx, cy = ahead[:, i]
@@ -82,15 +82,15 @@ def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> flo
     >>> airflock.measures.surroundings.anisotropy(group, reach=3.0)  # the nearest one is beside
     -1.0
     """
-    sound(reach=reach, slowest=slowest)
-    found = states(recording)
+    check_numbers(reach=reach, slowest=slowest)
+    found = track_arrays(recording)
     h = headings(found.velocity[:, :2], slowest)
     box = None if found.box is None else found.box[:2]
     total, count = 0.0, 0
     for place, ahead, there in zip(found.position[:, :2], h, found.placed, strict=True):
         rows = np.flatnonzero(there)
         x = place[:, rows]
-        offset = images.nearest(x[:, None, :] - x[:, :, None], box)
+        offset = images.nearest_image(x[:, None, :] - x[:, :, None], box)
         apart = np.linalg.norm(offset, axis=0)
         np.fill_diagonal(apart, np.inf)
         for k, i in enumerate(rows):

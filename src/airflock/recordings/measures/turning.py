@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from airflock.recordings.measures.states import headings, sound, states
+from airflock.recordings.measures.states import check_numbers, headings, track_arrays
 
 
 def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
@@ -26,8 +26,8 @@ def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
     >>> round(float(airflock.measures.turning.turning_speed(circle)[10, 0]), 3)
     1.0
     """
-    sound(slowest=slowest)
-    found = states(recording)
+    check_numbers(slowest=slowest)
+    found = track_arrays(recording)
     h = headings(found.velocity[:, :2], slowest)
     sine = h[:-1, 0] * h[1:, 1] - h[:-1, 1] * h[1:, 0]
     rate = np.arctan2(sine, (h[:-1] * h[1:]).sum(axis=1)) / np.diff(found.time)[:, None]

@@ -4,17 +4,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-Score = Callable[[Mapping[str, float], int], Mapping[str, Any]]  # parameters and seed → order parameters
+ScoreFunction = Callable[[Mapping[str, float], int], Mapping[str, Any]]  # parameters and seed → order parameters
 
 
 @dataclass(frozen=True)
 class Flight:
-    """One flight to be flown: `candidate` and `repeat` say which of a generation, `seed` decides all its chance.
+    """One flight to be flown: `candidate_index` and `repeat` say which of a generation, `seed` decides all its chance.
 
     place : which of the study's scenarios
     """
 
-    candidate: int
+    candidate_index: int
     repeat: int
     parameters: Mapping[str, float]
     seed: int
@@ -22,7 +22,7 @@ class Flight:
 
 
 @dataclass(frozen=True)
-class Landed:
+class FlightResult:
     """A flight that is over: its order parameters, or why there are none.
 
     duration : s from take-off to landing; worker : who flew it
@@ -38,7 +38,7 @@ class Landed:
 class Executor(Protocol):
     """Flies flights in any order."""
 
-    def fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
+    def fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield each flight as soon as it is over; on Ctrl-C only those in the air."""
 
     def close(self) -> None:

@@ -16,12 +16,10 @@ from threading import Lock
 from typing import Any
 
 from airflock.engine import compile_for, score_flight
-from airflock.runs.executors import Flight, Landed, Score
-from airflock.runs.executors.in_process import land
-from airflock.scenarios.making import make
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import AirflockError, StudyError
-from airflock.support.machine import processor
+from airflock.runs.executors import Flight, FlightResult, ScoreFunction
+from airflock.runs.executors.in_process import fly_task
+from airflock.scenarios import Scenario, build_scenario
+from airflock.support import AirflockError, StudyError, processor_name
 
 ANSWER = 10.0  # s to wait for a scheduler
 AHEAD = 2  # flights per thread that are handed out at a time
@@ -29,33 +27,33 @@ RETRIES = 2  # further tries of a flight that took too long
 DESERTED = 300.0  # s without a single worker after which nobody is expected to come back
 FRESH = 15.0  # s to wait for a fresh worker process
 LOSSES = 20  # worker processes that one flight may lose before it is held to be the cause
-Fly = Callable[[Mapping[str, float], int], tuple[Any, str, float, str]]  # as `Task.__call__`
-compiling = Lock()  # held while a worker compiles: its threads wait for the first
+FlyFunction = Callable[[Mapping[str, float], int], tuple[Any, str, float, str]]  # as `Task.__call__`
+_compile_lock = Lock()  # held while a worker compiles: its threads wait for the first
 
 
-def fly_on_their_cpu(scheduler: str | None, device: str) -> None:
+def check_worker_device(scheduler: str | None, device: str) -> None:
     """Refuse another device where workers fly. Raises StudyError."""
     if scheduler is not None and device != "cpu":
         raise StudyError(f"device = {device}: workers of a scheduler fly on their cpu; leave out one of the two")
 
 
-def sound_timeout(timeout: float | None) -> None:
+def check_timeout(timeout: float | None) -> None:
     """Refuse a time limit in which no flight could fly. Raises StudyError."""
     if timeout is not None and not timeout > 0.0:
         raise StudyError(f"timeout = {timeout:g} s must be above 0")
 
 
-class Cluster:
+class DaskCluster:
     """Workers of a dask scheduler."""
 
     def __init__(
         self,
-        tasks: Sequence[Fly],
+        tasks: Sequence[FlyFunction],
         address: str,
         *,
         timeout: float | None = None,
-        answer: float = ANSWER,
-        kept: bool = True,
+        connect_timeout: float = ANSWER,
+        is_stored: bool = True,
     ):
         """Connect.
 
@@ -69,21 +67,21 @@ class Cluster:
             from distributed import Client
         except ModuleNotFoundError as fault:
             raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from fault
-        self.tasks, self.timeout, self.kept = tuple(tasks), timeout, kept
+        self.tasks, self.timeout, self.kept = tuple(tasks), timeout, is_stored
         self.seen = 0.0  # when there was a worker, s of the monotonic clock
         try:
-            self.client: Any = Client(address, timeout=answer, set_as_default=False)
-            self.client.wait_for_workers(1, timeout=answer)
+            self.client: Any = Client(address, timeout=connect_timeout, set_as_default=False)
+            self.client.wait_for_workers(1, timeout=connect_timeout)
         except Exception as fault:  # whatever the network and its libraries raise
             reason = "has no workers" if hasattr(self, "client") else "does not answer"
             if hasattr(self, "client"):
                 self.client.close()
-            raise StudyError(f"--scheduler {address}: {reason} ({answer:g} s waited)") from fault
+            raise StudyError(f"--scheduler {address}: {reason} ({connect_timeout:g} s waited)") from fault
         self._warn_of_mixed_processors()
 
     def _warn_of_mixed_processors(self) -> None:
         # a worker may die before it answers
-        models = sorted(set(self.client.run(processor, on_error="ignore").values()))
+        models = sorted(set(self.client.run(processor_name, on_error="ignore").values()))
         if len(models) > 1:
             warnings.warn(
                 f"workers have different processors ({'; '.join(models)}): flights may differ in the last bits, and "
@@ -91,7 +89,7 @@ class Cluster:
                 stacklevel=3,
             )
 
-    def fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
+    def fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield each flight as soon as it is over; hand out only so many at a time."""
         from distributed import wait
 
@@ -138,23 +136,25 @@ class Cluster:
             raise StudyError(f"the scheduler has had no workers for {DESERTED:g} s{after}")
         return threads
 
-    def _landed(self, future: Any, flight: Flight, began: float, tries: dict[tuple[int, int], int]) -> Landed | None:
+    def _landed(
+        self, future: Any, flight: Flight, began: float, tries: dict[tuple[int, int], int]
+    ) -> FlightResult | None:
         """The outcome of a task that is over; None if it has to fly again."""
-        key = (flight.candidate, flight.repeat)
+        key = (flight.candidate_index, flight.repeat)
         if future.status == "finished":
             values, reason, duration, worker = future.result()
-            return Landed(flight, values, reason, duration, worker)
+            return FlightResult(flight, values, reason, duration, worker)
         fault = future.exception() if future.status == "error" else None
         lost = fault is None or type(fault).__name__ in ("KilledWorker", "CommClosedError", "CancelledError")
         tries[key] = tries.get(key, 0) + 1
         if lost and tries[key] < LOSSES:
             return None
         reason = f"its worker was lost {tries[key]} times" if lost else f"{type(fault).__name__}: {fault}"
-        return Landed(flight, None, reason.splitlines()[0], time.monotonic() - began)
+        return FlightResult(flight, None, reason.splitlines()[0], time.monotonic() - began)
 
     def _late(
         self, out: dict[Any, tuple[Flight, float]], waiting: list[Flight], tries: dict[tuple[int, int], int]
-    ) -> Iterator[Landed]:
+    ) -> Iterator[FlightResult]:
         """Take back flights that take too long: their worker process is started again, and they fly again or fail."""
         if not self.timeout:
             return
@@ -166,13 +166,13 @@ class Cluster:
         for future in late:
             flight, began = out.pop(future)
             future.cancel(force=True)
-            key = (flight.candidate, flight.repeat)
+            key = (flight.candidate_index, flight.repeat)
             tries[key] = tries.get(key, 0) + 1
             if tries[key] <= RETRIES:
                 waiting.append(flight)
             else:
                 reason = f"took longer than {self.timeout:g} s, {tries[key]} times"
-                yield Landed(flight, None, reason, time.monotonic() - began)
+                yield FlightResult(flight, None, reason, time.monotonic() - began)
         if workers:
             self.client.restart_workers(workers, timeout=FRESH, raise_for_error=False)
 
@@ -181,14 +181,14 @@ class Cluster:
         self.client.close()
 
 
-class Task:
+class ScenarioTask:
     """What a worker is sent to fly one scenario: small, and picklable wherever the worker's code comes from."""
 
     def __init__(self, scenario: Scenario, precision: int):
         """The scenario as JSON text; raises StudyError for one whose code exists only in this process."""
         self.text, self.where, self.precision = json.dumps(scenario.document), scenario.name, precision
         try:
-            rebuild(self.text, self.where)
+            rebuild_scenario(self.text, self.where)
         except AirflockError as fault:
             raise StudyError(
                 f"{scenario.name}: workers cannot rebuild this scenario; put its law into a file: {fault}"
@@ -196,26 +196,26 @@ class Task:
 
     def __call__(self, parameters: Mapping[str, float], seed: int) -> tuple[Any, str, float, str]:
         """Fly on a worker: order parameters or None, reason, duration (s), who flew."""
-        scenario = self.flown(rebuild(self.text, self.where))
-        with compiling:  # threads of a worker wait for the first to compile
+        scenario = self.flown(rebuild_scenario(self.text, self.where))
+        with _compile_lock:  # threads of a worker wait for the first to compile
             compile_for(scenario, precision=self.precision)
-        landed = land(self.score_of(scenario), Flight(0, 0, parameters, seed), worker_name())
+        landed = fly_task(self.score_function(scenario), Flight(0, 0, parameters, seed), worker_name())
         return landed.values, landed.reason, landed.duration, landed.worker
 
     def flown(self, scenario: Scenario) -> Scenario:
         """The scenario whose driver flies."""
         return scenario
 
-    def score_of(self, scenario: Scenario) -> Score:
+    def score_function(self, scenario: Scenario) -> ScoreFunction:
         """Parameters and seed → order parameters; here no parameters are varied."""
         return lambda _, seed: score_flight(scenario, seed, precision=self.precision)
 
 
 @lru_cache(maxsize=8)
-def rebuild(text: str, where: str) -> Scenario:
+def rebuild_scenario(text: str, where: str) -> Scenario:
     """Scenario from its document; made once in a worker process."""
     # its law has run where the study began: the user who began it has consented
-    return make(json.loads(text), where, folder=Path(where).parent, trust=True)
+    return build_scenario(json.loads(text), where, folder=Path(where).parent, trust=True)
 
 
 def worker_name() -> str:

@@ -6,34 +6,36 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
-from airflock.runs.executors import Flight, Landed, Score
-from airflock.support.errors import AirflockError
+from airflock.runs.executors import Flight, FlightResult, ScoreFunction
+from airflock.support import AirflockError
 
 
-def land(score: Score, flight: Flight, worker: str = "") -> Landed:
+def fly_task(score: ScoreFunction, task: Flight, worker: str = "") -> FlightResult:
     """Fly one flight; what goes wrong on purpose is a reason, and no error of the study."""
     begin = time.perf_counter()
     try:
-        values, reason = score(flight.parameters, flight.seed), ""
+        values, reason = score(task.parameters, task.seed), ""
     except (AirflockError, ArithmeticError) as fault:
         values, reason = None, str(fault).splitlines()[0] if str(fault) else type(fault).__name__
-    return Landed(flight, values, reason, time.perf_counter() - begin, worker)
+    return FlightResult(task, values, reason, time.perf_counter() - begin, worker)
 
 
-class InProcess:
+class ThreadExecutor:
     """A pool of threads, one per core unless told otherwise."""
 
-    def __init__(self, score: Score, threads: int, others: Sequence[Score] = ()):
+    def __init__(self, score: ScoreFunction, threads: int, other_scores: Sequence[ScoreFunction] = ()):
         """`score` turns parameters and a seed into order parameters; it is called from `threads` threads.
 
         others : the same for further scenarios of the study
         """
-        self.scores, self.name = (score, *others), f"{platform.node()}:{os.getpid()}"
+        self.scores, self.name = (score, *other_scores), f"{platform.node()}:{os.getpid()}"
         self.pool = ThreadPoolExecutor(max(1, threads))
 
-    def fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
+    def fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield each flight as soon as it is over."""
-        waiting: set[Future[Landed]] = {self.pool.submit(land, self.scores[f.place], f, self.name) for f in flights}
+        waiting: set[Future[FlightResult]] = {
+            self.pool.submit(fly_task, self.scores[f.place], f, self.name) for f in flights
+        }
         try:
             while waiting:
                 # a timeout, so that Ctrl-C is heard while flights are in the air

@@ -4,19 +4,19 @@ import re
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from airflock.core.parameters import declarations, with_unit
+from airflock.core import declarations, format_with_unit
 from airflock.engine import driver_text
-from airflock.runs.space import declared
-from airflock.scenarios.scenario import Scenario
+from airflock.runs import declared_numbers
+from airflock.scenarios import Scenario
 
-Row = tuple[str, str, str]  # key, value with its unit, source
+ReportRow = tuple[str, str, str]  # key, value with its unit, source
 LEFT_OUT = ("published", "title", "format")
 READ_AS = {"body": "b", "sensors": "s", "radio": "k", "wind": "a"}  # section → what a driver calls its numbers
 DRYDEN = ("at_6m", "height", "airspeed")  # a driver reads what follows from them
 ALWAYS = ("sensors.period", "radio.delay")  # a driver reads them as numbers of steps
 
 
-def said(scenario: Scenario, searched: Collection[str]) -> list[Row]:
+def document_rows(scenario: Scenario, searched: Collection[str]) -> list[ReportRow]:
     """Key, value and source of everything that the scenario's file says but the numbers that are searched."""
     rows = []
     for section, table in scenario.document.items():
@@ -30,14 +30,14 @@ def said(scenario: Scenario, searched: Collection[str]) -> list[Row]:
     return rows
 
 
-def _row(key: str, entry: Any, unit: str) -> Row:
+def _row(key: str, entry: Any, unit: str) -> ReportRow:
     """The row of a key; an entry may be a table with value, unit and source."""
     source = ""
     if isinstance(entry, Mapping):
         entry, unit, source = entry.get("value"), str(entry.get("unit", unit)), str(entry.get("source", ""))
     text = str(entry)
     text = text if len(text) < 80 else f"{text[:77]}..."
-    return key, text if isinstance(entry, str) else with_unit(text, unit), source
+    return key, text if isinstance(entry, str) else format_with_unit(text, unit), source
 
 
 def _unit(scenario: Scenario, section: str, name: str) -> str:
@@ -50,16 +50,16 @@ def _unit(scenario: Scenario, section: str, name: str) -> str:
     return units.get(name or section, "")
 
 
-def defaults(scenario: Scenario) -> list[Row]:
+def default_rows(scenario: Scenario) -> list[ReportRow]:
     """Numbers of drones, sensors, radio and wind that the file leaves as they are, are not zero, and are read."""
     read = _read(scenario)
     rows = []
-    for key, (how, value) in declared(scenario).items():
+    for key, (how, value) in declared_numbers(scenario).items():
         section, _, name = key.partition(".")
         given = scenario.document.get(section, {})
         if section in READ_AS and value and name not in given and key in read:
             rows.append(
-                (key, with_unit(f"{value:.4g}", how.unit), f"default: {how.source}" if how.source else "default")
+                (key, format_with_unit(f"{value:.4g}", how.unit), f"default: {how.source}" if how.source else "default")
             )
     return rows
 

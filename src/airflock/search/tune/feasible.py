@@ -2,20 +2,19 @@
 
 import math
 
-from airflock.certificates.campaign import Campaign
-from airflock.certificates.counting import least
-from airflock.certificates.run import COUNTED
-from airflock.search.tune.plan import CERTIFY, Plan
+from airflock.certificates import COUNT_BUDGET_SHARE, Campaign, flights_to_show
+from airflock.search.tune.plan import CERTIFY_SHARE, BudgetPlan
 
 
-def infeasible(campaign: Campaign, plan: Plan) -> list[str]:
+def infeasible_limit_lines(campaign: Campaign, plan: BudgetPlan) -> list[str]:
     """A line for each limit that the plan's flights could not show even if nothing ever happened in them."""
-    able = int(COUNTED * plan.seconds * plan.rate)
+    able = int(COUNT_BUDGET_SHARE * plan.seconds * plan.rate)
     return [
         f"{limit.text}: needs {flights:,} flights without an event to be shown, and there is time for {able:,}; "
-        f"give --budget {_time(1.1 * flights / plan.rate / CERTIFY / COUNTED)}, or ask for a larger limit"
+        f"give --budget {_time(1.1 * flights / plan.rate / CERTIFY_SHARE / COUNT_BUDGET_SHARE)}, "
+        "or ask for a larger limit"
         for limit in campaign.limits
-        if (flights := least(campaign, limit)) > able
+        if (flights := flights_to_show(campaign, limit)) > able
     ]
 
 

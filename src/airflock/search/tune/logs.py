@@ -8,21 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from airflock.estimate.identify.run import Identified, identify, read_heard
-from airflock.runs.folder import write
-from airflock.scenarios.files import load
-from airflock.scenarios.making import make
-from airflock.scenarios.scenario import Scenario
-from airflock.support import atomic
-from airflock.support.errors import RecordingError, StudyError
-from airflock.support.untrusted import from_outside, json_object, own_path, read_text
+from airflock.estimate import IdentifyResult, identify, read_heard
+from airflock.runs import write_toml_file
+from airflock.scenarios import Scenario, build_scenario, load
+from airflock.support import RecordingError, StudyError, as_error, atomic, expand_path, parse_json_object, read_text
 
-SCENARIO, TOLD = "identified.toml", "identified.json"
+SCENARIO, REPORT_FILE = "identified.toml", "identified.json"
 Paths = Sequence[str | os.PathLike[str]]
 
 
 @dataclass(frozen=True)
-class FromLogs:
+class IdentifiedFleet:
     """What logs say of a fleet: the scenario with its numbers, its file's content, and what to tell of it.
 
     told : files with their hashes, the law's scenario, numbers with intervals or the reason why not, notes
@@ -34,27 +30,27 @@ class FromLogs:
 
     def save(self, folder: Path) -> None:
         """Write identified.toml and identified.json, the latter last: it says that the stage is over."""
-        write(folder / SCENARIO, self.document, "Identified from logs by airflock tune.")
-        atomic.write(folder / TOLD, json.dumps(self.told))
+        write_toml_file(folder / SCENARIO, self.document, "Identified from logs by airflock tune.")
+        atomic.write_file(folder / REPORT_FILE, json.dumps(self.told))
 
 
-def identified(folder: Path, logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> FromLogs:
+def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> IdentifiedFleet:
     """What the folder holds of these logs, or what they say now.
 
     Raises StudyError where the folder holds what other logs said, RecordingError or AirflockError for bad logs.
     """
     asked = _asked(logs, like, heard)
-    if (folder / TOLD).is_file():
-        with from_outside(folder / TOLD, StudyError):
-            told = json_object(read_text(folder / TOLD))
+    if (folder / REPORT_FILE).is_file():
+        with as_error(folder / REPORT_FILE, StudyError):
+            told = parse_json_object(read_text(folder / REPORT_FILE))
         for key, value in asked.items():
             if told.get(key) != value:
                 raise StudyError(f"{folder}: holds the tuning of other logs ({key} differs); give another --out")
-        return FromLogs(load(folder / SCENARIO), {}, told)
+        return IdentifiedFleet(load(folder / SCENARIO), {}, told)
     found = identify(list(logs), like, heard=None if heard is None else read_heard(heard))
     document = found.document()
     # by the name of the file that it becomes, so that a tuning that is resumed is the same one
-    return FromLogs(make(document, str(folder / SCENARIO)), document, {**asked, **_told(found)})
+    return IdentifiedFleet(build_scenario(document, str(folder / SCENARIO)), document, {**asked, **_told(found)})
 
 
 def _asked(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> dict[str, Any]:
@@ -69,13 +65,13 @@ def _asked(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) ->
 
 def _hash(path: str | os.PathLike[str]) -> str:
     try:
-        with own_path(path).open("rb") as stream:
+        with expand_path(path).open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()[:12]
     except OSError as fault:
         raise RecordingError(f"{path}: {fault.strerror or fault}") from fault
 
 
-def _told(found: Identified) -> dict[str, Any]:
+def _told(found: IdentifyResult) -> dict[str, Any]:
     """Every number with its interval, or the reason why the logs do not tell it; and notes."""
     numbers = [
         {"key": n.key, "value": n.value, "low": n.low, "high": n.high, "origin": n.origin}

@@ -4,20 +4,20 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from airflock import __version__
-from airflock.support.errors import StudyError
+from airflock.support import StudyError
 
-SEARCH, HARDEN, CERTIFY = 0.45, 0.15, 0.4  # shares of the budget
+SEARCH, HARDEN, CERTIFY_SHARE = 0.45, 0.15, 0.4  # shares of the budget
 TRIED = 15  # rounds of flights that hardening is planned with; all whole and half steps and fresh seeds would be 19
 POPULATION = 24  # reaches a good set in less time than 100 do: small flocks' flights are few
 LEAST = 6  # generations
 FLIGHTS = 2  # of a candidate: from two on, chance can be told from merit
 AVERAGES = 2  # of the last means of the search, which also fly in its final
 USUAL = 100  # flights of a finalist
-CONFIDENCE = 0.95
+DEFAULT_CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Plan:
+class BudgetPlan:
     """Numbers of flights of each stage.
 
     search : keys of the table [search]; seeds: flights of each step of hardening; seconds: of certifying
@@ -30,14 +30,14 @@ class Plan:
     seconds: float
     rate: float
     limits: list[str] = field(default_factory=list)
-    confidence: float = CONFIDENCE
+    confidence: float = DEFAULT_CONFIDENCE
 
     def document(self) -> dict[str, Any]:
         """The plan as plain values."""
         return {"airflock": __version__, **asdict(self)}
 
 
-def plan_of(budget: float, rate: float, *, warm: bool = False, telling: int = USUAL) -> Plan:
+def make_plan(budget: float, rate: float, *, warm: bool = False, flights_for_limits: int = USUAL) -> BudgetPlan:
     """A plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
 
     telling : flights that tell whether the rarest limit is kept: at most so many for each finalist and each step
@@ -46,11 +46,11 @@ def plan_of(budget: float, rate: float, *, warm: bool = False, telling: int = US
     flights = budget * SEARCH * rate
     finals = flights / 4.0
     top = 4
-    final_seeds = int(min(max(finals / (2.0 * (top + AVERAGES + 2)), 8), max(telling, USUAL)))
+    final_seeds = int(min(max(finals / (2.0 * (top + AVERAGES + 2)), 8), max(flights_for_limits, USUAL)))
     pool = int(min(max(finals / 16.0, 2 * top), 100))
     spent = 8 * pool + (top + AVERAGES + 2) * final_seeds
     generations = int((flights - spent) / (POPULATION * FLIGHTS))
-    seeds = int(min(budget * HARDEN * rate / TRIED, max(telling, 2 * USUAL)))
+    seeds = int(min(budget * HARDEN * rate / TRIED, max(flights_for_limits, 2 * USUAL)))
     if generations < LEAST or seeds < 10:
         flown = max((LEAST * POPULATION * FLIGHTS + spent) / SEARCH, 10 * TRIED / HARDEN)
         raise StudyError(
@@ -63,4 +63,4 @@ def plan_of(budget: float, rate: float, *, warm: bool = False, telling: int = US
     }  # fmt: skip
     if warm:
         search["start"] = "scenario"
-    return Plan(search, seeds, budget * CERTIFY, rate)
+    return BudgetPlan(search, seeds, budget * CERTIFY_SHARE, rate)

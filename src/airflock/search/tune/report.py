@@ -11,21 +11,18 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from airflock import __version__
-from airflock.core.parameters import with_unit
-from airflock.estimate.identify.numbers import UNITS
-from airflock.runs.space import declared
-from airflock.runs.store import Store
-from airflock.scenarios.portrait import sentence
+from airflock.core import format_with_unit
+from airflock.estimate import KEY_UNITS
+from airflock.runs import FlightStore, declared_numbers
+from airflock.scenarios import summary
 from airflock.search import tables
-from airflock.search.safe import told
-from airflock.search.tune.assumed import defaults, said
-from airflock.search.tune.flown import circumstances, flights
-from airflock.search.tune.next_flight import card, replays
-from airflock.search.tune.result import STUDY, Tuned
+from airflock.search.safe import limit_report_line
+from airflock.search.tune.assumed import default_rows, document_rows
+from airflock.search.tune.flown import circumstance_sentences, flight_rows
+from airflock.search.tune.next_flight import flight_card_limits, replay_files
+from airflock.search.tune.result import STUDY_FOLDER, TuneResult
 from airflock.support import atomic
-from airflock.view.plots.certificate import certificate
-from airflock.view.plots.convergence import convergence
-from airflock.view.plots.save import fit_to_print
+from airflock.view import convergence, plot_certificate, print_settings
 
 PAGE, FIGURES = "report.html", "figures.pdf"
 STYLE = """
@@ -40,24 +37,24 @@ td.n, th.n { text-align: right } img { max-width: 100%; break-inside: avoid }
 """
 
 
-def save(found: Tuned) -> None:
+def save(found: TuneResult) -> None:
     """Write report.html, replays and figures.pdf into the folder of a tuning, each complete or not at all."""
-    figures, shows = _figures(found), replays(found)
+    figures, shows = _figures(found), replay_files(found)
     pictures = [_png(figure) for figure in figures.values()]
-    atomic.write(found.folder / PAGE, page(found, pictures, list(figures), shows))
+    atomic.write_file(found.folder / PAGE, report_html(found, pictures, list(figures), shows))
     content = io.BytesIO()
-    with fit_to_print(), PdfPages(content, metadata={"CreationDate": None}) as pdf:
+    with print_settings(), PdfPages(content, metadata={"CreationDate": None}) as pdf:
         for figure in figures.values():
             pdf.savefig(figure, bbox_inches="tight")
-    atomic.write(found.folder / FIGURES, content.getvalue())
+    atomic.write_file(found.folder / FIGURES, content.getvalue())
 
 
-def _figures(found: Tuned) -> dict[str, Figure]:
-    with Store(found.folder / STUDY, write=False) as store:
-        table = tables.candidates(store, ["fitness"])
+def _figures(found: TuneResult) -> dict[str, Figure]:
+    with FlightStore(found.folder / STUDY_FOLDER, write=False) as store:
+        table = tables.candidate_table(store, ["fitness"])
     return {
         "What the search found, generation by generation.": convergence(table, "fitness", what=found.start.name),
-        "Bounds by number of flights, distances, and how far numbers may change.": certificate(found.certificate),
+        "Bounds by number of flights, distances, and how far numbers may change.": plot_certificate(found.certificate),
     }
 
 
@@ -67,81 +64,86 @@ def _png(figure: Figure) -> str:
     return base64.b64encode(stream.getvalue()).decode()
 
 
-def page(found: Tuned, pictures: Sequence[str], captions: Sequence[str], shows: Mapping[int, str]) -> str:
+def report_html(
+    result: TuneResult, pictures: Sequence[str], captions: Sequence[str], replay_files: Mapping[int, str]
+) -> str:
     """The report as one HTML text; pictures are PNGs in base64, `shows` files beside it that play flights by seed."""
     body = [
-        *_summary(found),
-        *_assumed(found),
-        *_identified(found.identified),
-        *_flown(found),
-        *_searched(found),
-        *_hardened(found),
-        *_certified(found),
-        *_worst_flights(found, shows),
-        *_next_card(found),
+        *_summary(result),
+        *_assumed(result),
+        *_identified(result.identify_report),
+        *_flown(result),
+        *_searched(result),
+        *_hardened(result),
+        *_certified(result),
+        *_worst_flights(result, replay_files),
+        *_next_card(result),
         *(
             f'<h2>Figure {i}</h2><img alt="{escape(text)}" src="data:image/png;base64,{picture}"><p>{escape(text)}</p>'
             for i, (picture, text) in enumerate(zip(pictures, captions, strict=True), 1)
         ),
         '<h2>Signed</h2><table class="sign"><tr><td>Name, date</td><td>Signature</td></tr></table>',
     ]
-    title = escape(found.scenario.name)
+    title = escape(result.scenario.name)
     head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
     return f"{head}<style>{STYLE}</style><body>{''.join(body)}</body></html>\n"
 
 
-def _summary(found: Tuned) -> list[str]:
+def _summary(found: TuneResult) -> list[str]:
     """What was tuned, and whether all limits are shown."""
     shown, start = found.certificate.shown, found.start
     return [
         f"<h1>{escape(str(start.document.get('title') or start.name))}</h1>",
-        f"<p>{escape(sentence(start))}. Airflock {__version__}.</p>",
+        f"<p>{escape(summary(start))}. Airflock {__version__}.</p>",
         f'<p class="verdict{"" if shown else " no"}">{"All" if shown else "Not all"} limits are shown.</p>',
         _list(found.certificate.statements),
     ]
 
 
-def _assumed(found: Tuned) -> list[str]:
+def _assumed(found: TuneResult) -> list[str]:
     """What the tuning took for granted."""
     return [
         "<h2>What was assumed</h2>",
-        _table(("key", "value", "source"), [*said(found.start, found.result.parameters), *defaults(found.start)]),
+        _table(
+            ("key", "value", "source"),
+            [*document_rows(found.start, found.result.parameters), *default_rows(found.start)],
+        ),
         _list([*found.notes, *found.start.notes]),
     ]
 
 
-def _flown(found: Tuned) -> list[str]:
+def _flown(found: TuneResult) -> list[str]:
     """How many flights each stage flew on which seeds, and how."""
     return [
         "<h2>What was flown</h2>",
-        _table(("for", "flights", "seeds"), flights(found)),
-        _list(circumstances(found)),
+        _table(("for", "flights", "seeds"), flight_rows(found)),
+        _list(circumstance_sentences(found)),
     ]
 
 
-def _searched(found: Tuned) -> list[str]:
+def _searched(found: TuneResult) -> list[str]:
     """What the search found: fitness, limits, and each number before and after."""
-    r, before = found.result, declared(found.start)
+    r, before = found.result, declared_numbers(found.start)
     rows = [
         (
             key,
-            with_unit(f"{before[key][1]:.4g}", how.unit),
-            with_unit(f"{value:.4g}", how.unit),
+            format_with_unit(f"{before[key][1]:.4g}", how.unit),
+            format_with_unit(f"{value:.4g}", how.unit),
             _range(r.ranges.get(key)),
         )
-        for key, (how, value) in declared(found.scenario).items()
+        for key, (how, value) in declared_numbers(found.scenario).items()
         if key in r.parameters and value is not None
     ]
     return [
         "<h2>What was found</h2>",
         f"<p>Fitness {r.fitness:.3f} (95 % interval {r.low:.3f} to {r.high:.3f}) on {r.seeds} fresh flights, from "
-        f"{r.candidates:,} candidates.</p>",
-        _list([told(entry) for entry in r.limits]),
+        f"{r.candidate_count:,} candidates.</p>",
+        _list([limit_report_line(entry) for entry in r.limits]),
         _table(("number", "start", "tuned", "working range of the search"), rows),
     ]
 
 
-def _hardened(found: Tuned) -> list[str]:
+def _hardened(found: TuneResult) -> list[str]:
     """What each step of hardening cost and gained."""
     rows = [
         (s.name, f"{s.fitness:.3f}", _between(s.cost, ".3f"), f"{s.r_min:.2f}", _between(s.gain, ".2f"),
@@ -169,7 +171,7 @@ def _known(value: float, form: str) -> str:
     return "" if math.isnan(value) else format(value, form)
 
 
-def _certified(found: Tuned) -> list[str]:
+def _certified(found: TuneResult) -> list[str]:
     """The certificate, and how far numbers may move."""
     made = found.certificate
     hazards = [
@@ -178,9 +180,9 @@ def _certified(found: Tuned) -> list[str]:
         if hazard.events
     ]
     rows = [
-        (a["key"], with_unit(f"{a['nominal']:.4g}", a["unit"]), with_unit(f"{a['safe']:.4g}", a["unit"]),
+        (a["key"], format_with_unit(f"{a['nominal']:.4g}", a["unit"]), format_with_unit(f"{a['safe']:.4g}", a["unit"]),
          f"{a['factor']:.3g}" if "factor" in a else "",
-         with_unit(f"{a['not_shown']:.4g}", a["unit"]) if "not_shown" in a else "", f"{a['flights']:,}",
+         format_with_unit(f"{a['not_shown']:.4g}", a["unit"]) if "not_shown" in a else "", f"{a['flights']:,}",
          a.get("note", ""))
         for a in made.tolerance.get("axis", ())
     ]  # fmt: skip
@@ -199,7 +201,7 @@ def _certified(found: Tuned) -> list[str]:
     ]
 
 
-def _worst_flights(found: Tuned, shows: Mapping[int, str]) -> list[str]:
+def _worst_flights(found: TuneResult, shows: Mapping[int, str]) -> list[str]:
     """The worst flights of each limit, with how to fly and to watch them."""
     rows = [
         (entry["limit"], f"{entry['value']:.4g}", entry["replay"], shows.get(int(entry["seed"]), ""))
@@ -208,9 +210,9 @@ def _worst_flights(found: Tuned, shows: Mapping[int, str]) -> list[str]:
     return ["<h2>Worst flights</h2>", _table(("limit", "value", "fly it again", ""), rows)]
 
 
-def _next_card(found: Tuned) -> list[str]:
+def _next_card(found: TuneResult) -> list[str]:
     """The flight card of the first real flight."""
-    limits, to_run = card(found)
+    limits, to_run = flight_card_limits(found)
     head = "<h2>The flight card to fly next</h2>"
     if not limits:
         return [head, f"<p>{escape(to_run)}</p>"]
@@ -227,12 +229,12 @@ def _identified(told: Mapping[str, Any]) -> list[str]:
         return []
     rows = []
     for number in told["numbers"]:
-        key, unit = str(number["key"]), UNITS.get(str(number["key"]), "")
+        key, unit = str(number["key"]), KEY_UNITS.get(str(number["key"]), "")
         if "reason" in number:
             rows.append((key, "", "", f"as in {told['name']}: {number['reason']}"))
         else:
             span = f"{number['low']:.3g} to {number['high']:.3g}"
-            rows.append((key, with_unit(f"{number['value']:.4g}", unit), span, str(number["origin"])))
+            rows.append((key, format_with_unit(f"{number['value']:.4g}", unit), span, str(number["origin"])))
     files = ", ".join(f"{name} ({digest})" for name, digest in told["logs"].items())
     return [
         "<h2>What was identified</h2>",

@@ -6,18 +6,18 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from airflock.certificates.certificate import Certificate
-from airflock.scenarios.scenario import Scenario
-from airflock.search.result import Result
-from airflock.search.steps import Measured
+from airflock.certificates import Certificate
+from airflock.scenarios import Scenario
+from airflock.search.result import EvolveResult
+from airflock.search.steps import StepResult
 
-PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (
+PLAN_FILE, START_FILE, STUDY_FOLDER, TUNED_FILE, CERTIFICATE_FILE, STEPS_FILE = (
     "tune.toml", "start.toml", "study", "tuned.toml", "certificate.toml", "hardening.json",
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Tuned:
+class TuneResult:
     """What tuning found: the scenario to fly, and what each stage said.
 
     start      : the scenario that tuning began from; notes : what was noticed on the way
@@ -31,12 +31,12 @@ class Tuned:
     scenario: Scenario
     start: Scenario
     notes: tuple[str, ...]
-    result: Result
-    steps: tuple[Measured, ...]
+    result: EvolveResult
+    steps: tuple[StepResult, ...]
     why: str
     certificate: Certificate
     seconds: float
-    identified: Mapping[str, Any] = field(default_factory=dict)
+    identify_report: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def shown(self) -> bool:
@@ -44,23 +44,23 @@ class Tuned:
         return self.certificate.shown
 
     def __repr__(self) -> str:
-        return f"<Tuned {self.folder / TUNED}: fitness {self.result.fitness:.3f}; {self.certificate!r}>"
+        return f"<Tuned {self.folder / TUNED_FILE}: fitness {self.result.fitness:.3f}; {self.certificate!r}>"
 
     def _repr_html_(self) -> str:
         """Which file to fly, what its certificate says of the limits, and its keys, for a notebook."""
-        head = f"<p><b>{escape(str(self.folder / TUNED))}</b>, in {self.seconds:.0f} s</p>"
+        head = f"<p><b>{escape(str(self.folder / TUNED_FILE))}</b>, in {self.seconds:.0f} s</p>"
         return head + self.certificate._repr_html_() + self.scenario._repr_html_()
 
     def document(self) -> dict[str, Any]:
         """What was found as plain values, for --json."""
         return {
             "folder": str(self.folder),
-            "tuned": str(self.folder / TUNED),
+            "tuned": str(self.folder / TUNED_FILE),
             "notes": list(self.notes),
             "evolved": self.result.document(),
             "hardening": [step.as_dict() for step in self.steps],
             "why_not_hardened": self.why,
             "certificate": self.certificate.document(),
             "seconds": self.seconds,
-            **({"identified": dict(self.identified)} if self.identified else {}),
+            **({"identified": dict(self.identify_report)} if self.identify_report else {}),
         }

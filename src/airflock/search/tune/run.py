@@ -7,22 +7,27 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock.runs.folder import Interrupted
-from airflock.scenarios.change import variant
-from airflock.scenarios.scenario import Scenario
-from airflock.search.bounds import usual_space
-from airflock.search.safe import flights_that_count
-from airflock.search.tune.feasible import infeasible
-from airflock.search.tune.folder import keep_plan, kept_plan
-from airflock.search.tune.logs import TOLD, FromLogs, Paths, identified
-from airflock.search.tune.plan import plan_of
-from airflock.search.tune.request import request_of, sound_budget
-from airflock.search.tune.result import Tuned
-from airflock.search.tune.stages import Note, Stage, Watch, certificate, hardening, rate_of, search
-from airflock.search.tune.start import start_of
-from airflock.support.asked import Asked, or_else
-from airflock.support.errors import ScenarioError, StudyError
-from airflock.support.untrusted import own_path
+from airflock.runs import Interrupted
+from airflock.scenarios import Scenario, scenario_variant
+from airflock.search.bounds import default_space
+from airflock.search.safe import flights_per_event
+from airflock.search.tune.feasible import infeasible_limit_lines
+from airflock.search.tune.folder import load_plan, save_plan
+from airflock.search.tune.logs import REPORT_FILE, IdentifiedFleet, Paths, identify_fleet
+from airflock.search.tune.plan import make_plan
+from airflock.search.tune.request import check_tune_budget, make_request
+from airflock.search.tune.result import TuneResult
+from airflock.search.tune.stages import (
+    Notify,
+    OnTuneProgress,
+    TuneProgress,
+    measure_flight_rate,
+    run_certificate_stage,
+    run_hardening_stage,
+    run_search_stage,
+)
+from airflock.search.tune.start import prepare_start
+from airflock.support import ErrorCollector, ScenarioError, StudyError, expand_path, value_or_default
 
 
 def tune(
@@ -38,10 +43,10 @@ def tune(
     resume: bool = False,
     settings: Mapping[str, Any] | None = None,
     threads: int | None = None,
-    watch: Watch | None = None,
-    note: Note | None = None,
+    watch: OnTuneProgress | None = None,
+    note: Notify | None = None,
     trust: bool = False,
-) -> Tuned:
+) -> TuneResult:
     """From a scenario or logs of your own to a set that is evolved, hardened and certified, with a report.
 
     Parameters
@@ -72,8 +77,8 @@ def tune(
     threads : int, optional
         Flights side by side; by default one per core.
     watch, note : callable, optional
-        Told as each stage begins and of its flights (`airflock.search.tune.stages.Stage`); told in a line, before they
-        begin, of each limit that the budget leaves too little time to show.
+        Told as each stage begins and of its flights (`airflock.search.tune.stages.TuneProgress`); told in a line,
+        before they begin, of each limit that the budget leaves too little time to show.
     trust : bool
         Whether code that files name may run.
 
@@ -97,43 +102,43 @@ def tune(
     airflock.support.errors.ScenarioError: limit 'r_mim<3 at 1%': r_mim: unknown order parameter; did you mean r_min?
     """
     began = time.monotonic()
-    folder = own_path(out)
-    parts = Asked()  # all of it is refused before anything flies
-    parts.read(sound_budget, budget)
+    folder = expand_path(out)
+    parts = ErrorCollector()  # all of it is refused before anything flies
+    parts.read(check_tune_budget, budget)
     if like is not None:
-        parts.refuse()  # before logs are read, which takes long
+        parts.raise_errors()  # before logs are read, which takes long
     begun = parts.read(_begun, scenario, like, heard, settings, folder, trust)
     start = parts.read(lambda found: found.start, begun)
-    plan = parts.read(kept_plan, folder, start, resume)
-    asked = parts.read(request_of, start, limit, confidence, or_else(plan, None))
-    parts.refuse()
+    plan = parts.read(load_plan, folder, start, resume)
+    asked = parts.read(make_request, start, limit, confidence, value_or_default(plan, None))
+    parts.raise_errors()
     logs = begun.logs
     sure, rated = asked.campaign.confidence, [each for each in asked.campaign.limits if each.rate is not None]
     if plan is None:
-        telling = flights_that_count(rated, start)
-        made = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling)
+        telling = flights_per_event(rated, start)
+        made = make_plan(budget, measure_flight_rate(start, threads), warm=warm, flights_for_limits=telling)
         plan = replace(made, limits=asked.limits, confidence=sure)
-        keep_plan(folder, start, plan)
+        save_plan(folder, start, plan)
     searched = [each.text for each in rated]
-    if logs is not None and not (folder / TOLD).is_file():
+    if logs is not None and not (folder / REPORT_FILE).is_file():
         logs.save(folder)
-    short = infeasible(asked.campaign, plan)
+    short = infeasible_limit_lines(asked.campaign, plan)
     for line in short:
         if note is not None:
             note(line)
-    notes = [*begun.notes, *usual_space(start)[1], *short]
+    notes = [*begun.notes, *default_space(start)[1], *short]
     watch = watch or (lambda stage: None)
     try:
-        result = search(folder, start, plan, searched, threads, watch)
-        if result.dead:
-            raise StudyError(f"{start.name}: {result.dead}")
-        tuned, steps, why = hardening(folder, plan, searched, threads, trust, watch)
-        shown = certificate(folder, tuned, asked.limits, sure, plan, threads, watch)
-        found = Tuned(
+        result = run_search_stage(folder, start, plan, searched, threads, watch)
+        if result.dead_reason:
+            raise StudyError(f"{start.name}: {result.dead_reason}")
+        tuned, steps, why = run_hardening_stage(folder, plan, searched, threads, trust, watch)
+        shown = run_certificate_stage(folder, tuned, asked.limits, sure, plan, threads, watch)
+        found = TuneResult(
             folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
             {} if logs is None else logs.told,
         )  # fmt: skip
-        watch(Stage("report"))
+        watch(TuneProgress("report"))
         from airflock.search.tune.report import save
 
         save(found)
@@ -147,7 +152,7 @@ class _Begun(NamedTuple):
 
     start: Scenario
     notes: list[str]
-    logs: FromLogs | None
+    logs: IdentifiedFleet | None
 
 
 def _begun(
@@ -164,9 +169,9 @@ def _begun(
             raise ScenarioError(
                 ["tune takes one scenario; for logs, give --like PRESET, the scenario with their law, field and speed"]
             )
-        return _Begun(*start_of(variant(paths[0], settings, trust=trust)), None)
+        return _Begun(*prepare_start(scenario_variant(paths[0], settings, trust=trust)), None)
     files = [path for path in paths if not isinstance(path, Scenario)]
     if not files or len(files) != len(paths):
         raise ScenarioError(["like is given, so give log files, not a scenario"])
-    found = identified(folder, files, variant(like, settings, trust=trust), heard)
-    return _Begun(*start_of(found.scenario), found)
+    found = identify_fleet(folder, files, scenario_variant(like, settings, trust=trust), heard)
+    return _Begun(*prepare_start(found.scenario), found)

@@ -7,34 +7,32 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from airflock.certificates.campaign import FOLDER
-from airflock.certificates.certificate import Certificate
-from airflock.certificates.counting import Progress as Counted
-from airflock.certificates.executing import executor_for
-from airflock.certificates.request import campaign_of
-from airflock.certificates.run import run as certified
-from airflock.runs.folder import open_folder, write
-from airflock.scenarios.files import load
-from airflock.scenarios.scenario import Scenario
-from airflock.search.harden import MOST, harden
-from airflock.search.harden import document as hardened_document
-from airflock.search.result import BEST, Result
-from airflock.search.run import executor_for as searching
-from airflock.search.run import run as evolved
-from airflock.search.search import Progress as Searched
-from airflock.search.steps import Measured
+from airflock.certificates import (
+    CAMPAIGN_KIND,
+    Certificate,
+    CountProgress as Counted,
+    campaign_executor,
+    campaign_from_request,
+    run_campaign as certified,
+)
+from airflock.runs import open_folder, write_toml_file
+from airflock.scenarios import Scenario, load
+from airflock.search.harden import MAX_ROUNDS, harden, hardened_document as hardened_document
+from airflock.search.result import BEST_FILE, EvolveResult
+from airflock.search.run import run_study as evolved, study_executor as searching
+from airflock.search.search import SearchProgress as Searched
+from airflock.search.steps import StepResult
 from airflock.search.study import make_study
-from airflock.search.tune.folder import document, read_steps
-from airflock.search.tune.plan import Plan
-from airflock.search.tune.result import CERTIFICATE, STEPS, STUDY, TUNED
-from airflock.support import atomic
-from airflock.support.errors import ScenarioError
+from airflock.search.tune.folder import read_steps, scenario_text_document
+from airflock.search.tune.plan import BudgetPlan
+from airflock.search.tune.result import CERTIFICATE_FILE, STEPS_FILE, STUDY_FOLDER, TUNED_FILE
+from airflock.support import ScenarioError, atomic
 
 PILOT = 4  # flights per core that tell how long one takes
-Note = Callable[[str], None]
+Notify = Callable[[str], None]
 
 
-class Stage(NamedTuple):
+class TuneProgress(NamedTuple):
     """What tuning is at: its stage, what that has found so far in a few words, its flights and how many there will be.
 
     total : None where it is not known; hardening often ends before its total
@@ -46,96 +44,103 @@ class Stage(NamedTuple):
     total: int | None = None
 
 
-Watch = Callable[[Stage], None]
+OnTuneProgress = Callable[[TuneProgress], None]
 
 
-def rate_of(scenario: Scenario, threads: int | None) -> float:
+def measure_flight_rate(scenario: Scenario, threads: int | None) -> float:
     """Flights per second, from a few of them."""
     from airflock.engine import compile_for, score_flights
-    from airflock.support.threads import cores
+    from airflock.support import available_cores
 
     compile_for(scenario)
-    count = PILOT * (threads or cores())
+    count = PILOT * (threads or available_cores())
     began = time.perf_counter()
     score_flights([scenario] * count, range(count), threads=threads)
     return count / max(time.perf_counter() - began, 1e-6)
 
 
-def search(
-    folder: Path, start: Scenario, plan: Plan, limits: Sequence[str], threads: int | None, watch: Watch
-) -> Result:
+def run_search_stage(
+    folder: Path,
+    start: Scenario,
+    plan: BudgetPlan,
+    limits: Sequence[str],
+    threads: int | None,
+    on_progress: OnTuneProgress,
+) -> EvolveResult:
     """What the search of the folder found."""
-    watch(Stage("search"))
+    on_progress(TuneProgress("search"))
 
     def searched(p: Searched) -> None:
         best = "" if p.best is None else f", best {p.best:.4f}"
-        watch(Stage("search", f"generation {p.generation + 1}{best}", p.done, p.total))
+        on_progress(TuneProgress("search", f"generation {p.generation + 1}{best}", p.done, p.total))
 
     objective = {"objective": {"limits": list(limits)}} if limits else {}
     study = make_study(objective, start.name, search=plan.search, scenario=start)
-    open_folder(folder / STUDY, study, resume=(folder / STUDY / "study.toml").is_file())
-    return evolved(study, folder / STUDY, searching(study, threads=threads), searched)
+    open_folder(folder / STUDY_FOLDER, study, resume=(folder / STUDY_FOLDER / "study.toml").is_file())
+    return evolved(study, folder / STUDY_FOLDER, searching(study, threads=threads), searched)
 
 
-def hardening(
-    folder: Path, plan: Plan, limits: Sequence[str], threads: int | None, trust: bool, watch: Watch
-) -> tuple[Scenario, list[Measured], str]:
+def run_hardening_stage(
+    folder: Path, plan: BudgetPlan, limits: Sequence[str], threads: int | None, trust: bool, on_progress: OnTuneProgress
+) -> tuple[Scenario, list[StepResult], str]:
     """The scenario after hardening, its steps, and why there are none."""
-    if (folder / STEPS).is_file():
-        steps, why = read_steps(folder / STEPS)
-        return load(folder / TUNED, trust=trust), steps, why
-    best = load(folder / STUDY / BEST, trust=trust)
+    if (folder / STEPS_FILE).is_file():
+        steps, why = read_steps(folder / STEPS_FILE)
+        return load(folder / TUNED_FILE, trust=trust), steps, why
+    best = load(folder / STUDY_FOLDER / BEST_FILE, trust=trust)
     steps, why = [], ""
     flown = itertools.count(1)
-    watch(Stage("hardening"))
+    on_progress(TuneProgress("hardening"))
 
     def done() -> None:
         count = next(flown)
-        watch(Stage("hardening", "", count, max(count, MOST * plan.seeds)))
+        on_progress(TuneProgress("hardening", "", count, max(count, MAX_ROUNDS * plan.seeds)))
 
     try:
         steps = harden(best, range(plan.seeds), limit=limits, threads=threads, done=done)
-        write(folder / TUNED, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune.")
+        write_toml_file(
+            folder / TUNED_FILE, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune."
+        )
     except ScenarioError as fault:
         why = fault.faults[0]
-        law = folder / STUDY / str(best.document.get("model", {}).get("kind", ""))
+        law = folder / STUDY_FOLDER / str(best.document.get("model", {}).get("kind", ""))
         if law.suffix == ".py" and law.is_file():
-            atomic.write(folder / law.name, law.read_bytes())
-        write(folder / TUNED, document(best), "Evolved by airflock tune; not hardened.")
+            atomic.write_file(folder / law.name, law.read_bytes())
+        write_toml_file(folder / TUNED_FILE, scenario_text_document(best), "Evolved by airflock tune; not hardened.")
     told = {"why": why, "steps": [step.as_dict() for step in steps]}
-    atomic.write(folder / STEPS, json.dumps(told))
-    return load(folder / TUNED, trust=trust), steps, why
+    atomic.write_file(folder / STEPS_FILE, json.dumps(told))
+    return load(folder / TUNED_FILE, trust=trust), steps, why
 
 
-def certificate(
+def run_certificate_stage(
     folder: Path,
     tuned: Scenario,
     limits: Sequence[str],
     confidence: float,
-    plan: Plan,
+    plan: BudgetPlan,
     threads: int | None,
-    watch: Watch,
+    on_progress: OnTuneProgress,
 ) -> Certificate:
     """The certificate of the tuned set, saved in the folder."""
-    watch(Stage("certificate"))
+    on_progress(TuneProgress("certificate"))
 
     def counted(p: Counted) -> None:
         events = ", ".join(str(count) for count in p.events)
-        watch(Stage("certificate", f"{events} events", p.done, p.total))
+        on_progress(TuneProgress("certificate", f"{events} events", p.done, p.total))
 
     def follows(text: str) -> None:
-        watch(Stage("certificate", text))
+        on_progress(TuneProgress("certificate", text))
 
-    from airflock.certificates.environment import usual_keys
+    from airflock.certificates import used_and_unused_keys
 
-    campaign = campaign_of(tuned, limits, confidence)
+    campaign = campaign_from_request(tuned, limits, confidence)
     path = folder / "certificate_flights"
-    open_folder(path, campaign, resume=(path / f"{FOLDER}.toml").is_file(), kind=FOLDER)
-    executor = executor_for(campaign, threads=threads)
+    open_folder(path, campaign, resume=(path / f"{CAMPAIGN_KIND}.toml").is_file(), kind=CAMPAIGN_KIND)
+    executor = campaign_executor(campaign, threads=threads)
     try:
-        keys = usual_keys(tuned)
-        made = certified(campaign, path, executor, plan.seconds, counted, keys=keys, threads=threads, note=follows)
+        keys = used_and_unused_keys(tuned)
+        made = certified(campaign, path, executor, plan.seconds, counted, keys=keys, threads=threads, notify=follows)
     finally:
         executor.close()
-    made.save(folder / CERTIFICATE)
+    made.save(folder / CERTIFICATE_FILE)
     return made

@@ -5,34 +5,32 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
-from airflock.parts.metrics.registry import numbers_of
-from airflock.scenarios.change import remade
-from airflock.scenarios.scaling import starting_set
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import ScenarioError
+from airflock.parts.metrics import scalar_names
+from airflock.scenarios import Scenario, rebuilt, starting_set
+from airflock.support import ScenarioError
 
 SCALES = "vasarhelyi_2018"  # the law whose scaling with the speed is published
 
 
-def start_of(scenario: Scenario) -> tuple[Scenario, list[str]]:
+def prepare_start(scenario: Scenario) -> tuple[Scenario, list[str]]:
     """The scenario to start from, and what was set, for a person to read.
 
     Only numbers that the scenario's document does not give are set; every other value stays.
     """
     values, told = _scaled(scenario)
-    start = remade(scenario, values) if values else scenario
+    start = rebuilt(scenario, values) if values else scenario
     for room in _off_the_walls(scenario):
         with suppress(ScenarioError):  # they have no place so far from the walls
             why = f"no agent starts nearer than {room:g} m to walls and obstacles"
-            away = remade(start, {"start.wall_clearance": room})
+            away = rebuilt(start, {"start.wall_clearance": room})
             return away, [*told, f"{why} (start.wall_clearance, which is not given)"]
     return start, told
 
 
-def has_walls(scenario: Scenario) -> bool:
+def measures_walls(scenario: Scenario) -> bool:
     """Whether its order parameters tell how near agents come to walls and obstacles, and some stand there."""
     stand = scenario.world.arena != "none" or bool(scenario.world.obstacles)
-    return stand and "clearance" in numbers_of(scenario.measures, scenario.metrics)
+    return stand and "clearance" in scalar_names(scenario.measures, scenario.metrics)
 
 
 def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
@@ -61,7 +59,7 @@ def _off_the_walls(scenario: Scenario) -> list[float]:
     somebody was put at the start, whatever the law does.
     """
     drawn = scenario.start.kind in ("arena", "ball", "box")
-    if not (has_walls(scenario) and drawn) or "wall_clearance" in scenario.document.get("start", {}):
+    if not (measures_walls(scenario) and drawn) or "wall_clearance" in scenario.document.get("start", {}):
         return []
     least = float(scenario.metrics.r_coll)
     return sorted({max(least, 0.5 * scenario.separation()), least}, reverse=True)

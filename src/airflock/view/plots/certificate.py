@@ -13,34 +13,34 @@ from numpy.typing import NDArray
 from airflock.view.plots import style
 
 if TYPE_CHECKING:
-    from airflock.certificates.certificate import Certificate
+    from airflock.certificates import Certificate
 
 
-def certificate(found: "Certificate", *, ax: Axes | None = None) -> Figure:
+def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> Figure:
     """Upper bounds by flights, smallest distances, tolerances of the environment, and a map of two of its numbers.
 
     Panels without data are left out.
     """
     draws = [_bounds]
-    if found.rows and "r_min" in found.rows[0]:
+    if certificate.rows and "r_min" in certificate.rows[0]:
         draws.append(_distances)
-    if found.tolerance.get("axis"):
+    if certificate.tolerance.get("axis"):
         draws.append(_tolerances)
-    if found.over:
-        draws.append(_map)
-    figure, panels = style.panels(ax, 1, len(draws), 3.6 * len(draws) + 0.4, 3.2, layout="")
+    if certificate.over:
+        draws.append(_bound_map)
+    figure, panels = style.figure_and_panels(ax, 1, len(draws), 3.6 * len(draws) + 0.4, 3.2, layout="")
     for axes, draw, name in zip(panels[0], draws, "ABCD", strict=False):
-        draw(axes, found)
-        style.letter(axes, name)
-    said = "shown" if found.shown else "not shown"
-    details = f"{said}, {100.0 * found.campaign.confidence:g} % confidence"
-    style.overall(figure, found.campaign.scenario.name, details)
-    return style.root(figure)
+        draw(axes, certificate)
+        style.set_panel_letter(axes, name)
+    said = "shown" if certificate.shown else "not shown"
+    details = f"{said}, {100.0 * certificate.campaign.confidence:g} % confidence"
+    style.set_figure_title(figure, certificate.campaign.scenario.name, details)
+    return style.root_figure(figure)
 
 
-def _bounds(axes: Axes, found: "Certificate") -> None:
+def _bounds(axes: Axes, certificate: "Certificate") -> None:
     """Upper and lower bound of every limit at every look, and the limit itself."""
-    for verdict, color in zip(found.verdicts, style.LINES, strict=False):
+    for verdict, color in zip(certificate.verdicts, style.LINE_COLOURS, strict=False):
         if verdict.looks:
             n = [look.flights for look in verdict.looks]
             highs = [look.high if look.above > 0.0 else math.nan for look in verdict.looks]  # nan: not looked at
@@ -52,36 +52,38 @@ def _bounds(axes: Axes, found: "Certificate") -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.xaxis.set_minor_formatter(NullFormatter())
-    shown = [line for verdict in found.verdicts for line in (verdict.high, verdict.probability) if line]
-    axes.set_ylim(min([look.low for v in found.verdicts for look in v.looks if look.low > 0.0] + shown) / 3.0, 1.0)
-    style.dress(axes, "flights", "probability of a flight with an event")
-    style.legend(axes)
+    shown = [line for verdict in certificate.verdicts for line in (verdict.high, verdict.probability) if line]
+    axes.set_ylim(
+        min([look.low for v in certificate.verdicts for look in v.looks if look.low > 0.0] + shown) / 3.0, 1.0
+    )
+    style.style_axes(axes, "flights", "probability of a flight with an event")
+    style.add_legend(axes)
 
 
-def _distances(axes: Axes, found: "Certificate") -> None:
+def _distances(axes: Axes, certificate: "Certificate") -> None:
     """Share of flights whose smallest distance was below a value; dashed: limits on it.
 
-    Dotted: the tail as extreme value theory extrapolates it (`tail`), to look at; no bound comes from it.
+    Dotted: the tail as extreme value theory extrapolates it (`extrapolated_tail`), to look at; no bound comes from it.
     """
-    from_rows = [row.get("closest") if row.get("closest") is not None else row["r_min"] for row in found.rows]
+    from_rows = [row.get("closest") if row.get("closest") is not None else row["r_min"] for row in certificate.rows]
     values = np.sort(np.array(from_rows, float))
     values = values[np.isfinite(values)]
     if len(values):
         axes.step(values, np.arange(1, len(values) + 1) / len(values), where="post", color=style.BLUE, lw=1.2)
         axes.set_yscale("log")
-        fitted = tail(values)
+        fitted = extrapolated_tail(values)
         if fitted is not None:
             axes.plot(*fitted, ":", color=style.GREY, lw=1.2, label="extrapolated, no guarantee")
             axes.set_ylim(bottom=max(0.3 / len(values), 1e-12) / 30.0)
-            style.legend(axes)
-    for verdict in found.verdicts:
+            style.add_legend(axes)
+    for verdict in certificate.verdicts:
         if verdict.limit.score == "r_min":
             axes.axvline(verdict.limit.value, color=style.RED, lw=0.8, ls="--")
     axes.set_xlim(left=0.0)
-    style.dress(axes, "smallest distance in a flight (m)", "share of flights below")
+    style.style_axes(axes, "smallest distance in a flight (m)", "share of flights below")
 
 
-def tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def extrapolated_tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Distances (point,), m, and the share of flights below them (point,), extrapolated from the nearest flights.
 
     distances : smallest one of each flight, growing
@@ -108,13 +110,13 @@ def tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     return at, few / len(distances) * np.where(inside > 0.0, share, 0.0)
 
 
-def _tolerances(axes: Axes, found: "Certificate") -> None:
+def _tolerances(axes: Axes, certificate: "Certificate") -> None:
     """Tornado: factor by which each number may move, from its nominal value; those from zero without a bar.
 
     Black: the interval that the scenario's file gives, as identified.
     """
     rows = sorted(
-        found.tolerance["axis"], key=lambda axis: abs(math.log(axis["factor"])) if "factor" in axis else -1.0,
+        certificate.tolerance["axis"], key=lambda axis: abs(math.log(axis["factor"])) if "factor" in axis else -1.0,
         reverse=True,
     )  # fmt: skip
     for y, axis in enumerate(rows):
@@ -127,7 +129,7 @@ def _tolerances(axes: Axes, found: "Certificate") -> None:
         left, begin = factor < 1.0, "" if "factor" in axis else "0 to "
         axes.annotate(
             f"{begin}{axis['safe']:.3g} {unit}".rstrip(), (factor, y), (-4 if left else 4, 0),
-            textcoords="offset points", va="center", ha="right" if left else "left", fontsize=style.SMALL,
+            textcoords="offset points", va="center", ha="right" if left else "left", fontsize=style.SMALL_SIZE,
         )  # fmt: skip
     axes.set_xscale("log")
     axes.axvline(1.0, color=style.GREY, lw=0.6)
@@ -136,12 +138,12 @@ def _tolerances(axes: Axes, found: "Certificate") -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.margins(x=0.3)
-    style.dress(axes, "safe factor on the nominal value (red: not shown)")
+    style.style_axes(axes, "safe factor on the nominal value (red: not shown)")
 
 
-def _map(axes: Axes, found: "Certificate") -> None:
+def _bound_map(axes: Axes, certificate: "Certificate") -> None:
     """Upper bound over two numbers; the line is the level below which a cell is safe."""
-    told = found.over
+    told = certificate.over
     rows, columns = (np.array(values) for values in told["axes"])
     high = np.array([cell["high"] for cell in told["cell"]]).reshape(len(rows), len(columns))
     shown = axes.pcolormesh(
@@ -153,8 +155,8 @@ def _map(axes: Axes, found: "Certificate") -> None:
     across, down = (
         key if unit == "1" else f"{key} ({unit})" for key, unit in zip(told["keys"], told["units"], strict=True)
     )
-    style.dress(axes, down, across, grid=False)
-    style.legend(axes, above=True)
+    style.style_axes(axes, down, across, grid=False)
+    style.add_legend(axes, above=True)
     figure = axes.get_figure(root=True)
     assert figure is not None
-    style.colour_bar(figure, shown, axes, "flights with an event, at most")
+    style.add_colour_bar(figure, shown, axes, "flights with an event, at most")

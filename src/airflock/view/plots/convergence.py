@@ -26,17 +26,17 @@ def convergence(
     >>> airflock.plots.convergence(table, "fitness").axes[0].get_xlabel()
     'generation'
     """
-    figure, axes = style.place(ax, 5.6, 3.4)
+    figure, axes = style.figure_and_axes(ax, 5.6, 3.4)
     for i, (run, rows) in enumerate(table.groupby("run")):
         groups = rows.groupby("generation")[objective]
-        color = style.LINES[i % len(style.LINES)]
+        color = style.LINE_COLOURS[i % len(style.LINE_COLOURS)]
         best = groups.max().cummax() if maximise else groups.min().cummin()
         low, high = groups.quantile(0.1), groups.quantile(0.9)
         axes.fill_between(low.index, low, high, color=color, alpha=0.15, linewidth=0.0)
         axes.plot(groups.mean(), color=color, linewidth=1.6, label=f"run {run}: mean, 10 to 90 %")
         axes.plot(best, color=color, linewidth=1.0, linestyle="--", label=f"run {run}: best so far")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))  # half a generation is none
-    style.dress(axes, "generation", objective)
-    style.legend(axes)
-    style.heading(axes, what or "Convergence", f"{len(table)} candidates")
+    style.style_axes(axes, "generation", objective)
+    style.add_legend(axes)
+    style.set_title(axes, what or "Convergence", f"{len(table)} candidates")
     return figure

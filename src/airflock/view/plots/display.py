@@ -3,7 +3,7 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airflock.displays.show import Show
+from airflock.displays import Show
 from airflock.view.plots import style
 
 
@@ -21,13 +21,15 @@ def stood(show: Show, titles: list[str], *, ax: Axes | None = None) -> Figure:
     >>> len(airflock.plots.stood(show, ["AIR"]).axes)
     1
     """
-    count = len(show.formed)
-    figure, panels = style.panels(ax, 1, count, 2.6 * count, 2.8, background=style.NIGHT, layout="")
-    for axes, title, formed, frame in zip(panels[0], titles, show.formed, show.ends, strict=True):
+    count = len(show.shape_reports)
+    figure, panels = style.figure_and_panels(ax, 1, count, 2.6 * count, 2.8, background=style.NIGHT_SKY, layout="")
+    for axes, title, formed, frame in zip(panels[0], titles, show.shape_reports, show.ends, strict=True):
         x, z = show.frames[frame, 0], show.frames[frame, 2]
         axes.scatter(x, z, s=6.0, color=style.ORANGE, linewidths=0.0)
-        axes.set_facecolor(style.NIGHT)
+        axes.set_facecolor(style.NIGHT_SKY)
         axes.set_aspect("equal")
         axes.axis("off")
-        axes.set_title(f"{title}\n{formed.drones} drones, {formed.time:.0f} s", fontsize=style.SMALL, color="white")
-    return style.root(figure)
+        axes.set_title(
+            f"{title}\n{formed.drones} drones, {formed.time:.0f} s", fontsize=style.SMALL_SIZE, color="white"
+        )
+    return style.root_figure(figure)

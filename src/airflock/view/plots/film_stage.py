@@ -10,64 +10,69 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
-from airflock.recordings.scores import over_time
-from airflock.support.errors import RecordingError
-from airflock.support.spelling import meant
+from airflock.recordings import over_time
+from airflock.support import RecordingError, suggest
 from airflock.view.plots import style
 from airflock.view.plots.flight import (
-    Paths,
-    details_of,
-    extent,
-    flown_with,
-    name_of,
-    paths_of,
+    FlightPaths,
+    crosses_periodic_face,
+    paths_in_window,
+    picture_extent,
+    projection,
+    scenario_or_none,
+    short_name,
     speed_range,
-    through_face,
-    view_of,
-    walls,
-    world_of,
+    title_details,
+    wall_lines,
+    world_or_open,
 )  # fmt: skip
-from airflock.view.plots.scene_paths import ELEVATION, draw_outlines, nearby, outlines_in_space, scenery
-from airflock.world.place import half_sizes
+from airflock.view.plots.scene_paths import (
+    VIEW_ELEVATION_DEG,
+    draw_outlines,
+    outlines_in_space,
+    scenery_lines,
+    shapes_near_paths,
+)
+from airflock.world import half_sizes
 
 Array = NDArray[Any]
-TAIL_POINTS = 9
-DPI = 100.0 / 720.0  # dots per inch and pixel of height: text grows with the picture
+POINTS_PER_TAIL = 9
+DPI_PER_PIXEL = 100.0 / 720.0  # dots per inch and pixel of height: text grows with the picture
 # the outline of a dart that flies right, in units of its length
-DART = np.array([[0.6, 0.0], [-0.4, 0.32], [-0.22, 0.0], [-0.4, -0.32]])
-HEAD = 0.085  # height of title and clock, in heights of what is below them
-BESIDE = 0.62  # width of the chart beside the picture, in heights of it
+DART_OUTLINE = np.array([[0.6, 0.0], [-0.4, 0.32], [-0.22, 0.0], [-0.4, -0.32]])
+HEADER_HEIGHT = 0.085  # height of title and clock, in heights of what is below them
+CHART_WIDTH = 0.62  # width of the chart beside the picture, in heights of it
 
 
-class Stage:
+class VideoFrame:
     """Everything that stands still, drawn once; and a picture of what moves at any instant."""
 
     def __init__(
         self, recording: xr.Dataset, start: float | None, stop: float | None, *, tail: float, height: int, speed: float,
         space: bool | None = None, chart: str = "",
     ):  # fmt: skip
-        first = paths_of(recording, start, stop)
+        first = paths_in_window(recording, start, stop)
         # what lies before the window is only needed for tails
         before = max(float(first.times[0]) - tail, float(recording["time"].values[0]))
-        self.paths: Paths = paths_of(recording, before, stop)
+        self.paths: FlightPaths = paths_in_window(recording, before, stop)
         self.flat = self.paths.position.shape[1] == 2
-        self.oblique = not self.flat if space is None else space
-        self.tail, self.speed = tail, speed
-        self.world = world = world_of(recording)
-        scenario = flown_with(recording)
+        self.is_oblique = not self.flat if space is None else space
+        self.tail_seconds, self.speed = tail, speed
+        self.world = world = world_or_open(recording)
+        scenario = scenario_or_none(recording)
         rows = None  # of the scene, where it is seen obliquely
-        self.view = view_of(3 if self.oblique else 2)
-        if self.oblique and not self.flat and scenario is not None and scenario.scene.kind != "none":
-            rows = nearby(scenario, first)
-            self.view = view_of(3, elevation_deg=ELEVATION)
+        self.view = projection(3 if self.is_oblique else 2)
+        if self.is_oblique and not self.flat and scenario is not None and scenario.scene.kind != "none":
+            rows = shapes_near_paths(scenario, first)
+            self.view = projection(3, elevation_deg=VIEW_ELEVATION_DEG)
         around = [] if rows is None else outlines_in_space(rows)
-        left, right, bottom, top = extent(first, world, self.view, margin=0.03, around=around)
-        head = HEAD * (top - bottom)
+        left, right, bottom, top = picture_extent(first, world, self.view, margin=0.03, around=around)
+        head = HEADER_HEIGHT * (top - bottom)
         aspect = float(np.clip((right - left) / (top + head - bottom), 0.4, 3.0))
-        beside = BESIDE if chart else 0.0
+        beside = CHART_WIDTH if chart else 0.0
         share = aspect / (aspect + beside)
-        self.size = (even(height * (aspect + beside)), even(height))
-        self.dart = 0.022 * max(right - left, top - bottom) * (1.0 if self.paths.agents <= 150 else 0.6)
+        self.size = (to_even(height * (aspect + beside)), to_even(height))
+        self.dart_length = 0.022 * max(right - left, top - bottom) * (1.0 if self.paths.agents <= 150 else 0.6)
         self.canvas = _canvas(self.size)
         self.axes = axes = self.canvas.figure.add_axes((0.0, 0.0, share, 1.0))
         axes.set(xlim=(left, right), ylim=(bottom, top + head), aspect="equal")
@@ -76,40 +81,40 @@ class Stage:
         if rows is not None:
             draw_outlines(axes, rows, self.view)
         else:
-            lines = [np.column_stack(self.view(line)) for line in scenery(recording, first)]
+            lines = [np.column_stack(self.view(line)) for line in scenery_lines(recording, first)]
             axes.add_collection(LineCollection(lines, colors=style.GREY, linewidths=0.6, alpha=0.6), autolim=False)
         self.clock = _head(axes, recording, speed)
         self.scale = Normalize(*speed_range(first))
         self.tails = LineCollection([], linewidths=1.6, animated=True, capstyle="butt")
         edge: dict[str, Any] = {"edgecolors": "white", "linewidths": 0.5}
-        self.darts = PolyCollection([], cmap=style.SPEED, norm=self.scale, animated=True, **edge)
+        self.darts = PolyCollection([], cmap=style.SPEED_COLOURS, norm=self.scale, animated=True, **edge)
         axes.add_collection(self.tails, autolim=False)
         axes.add_collection(self.darts, autolim=False)
         _key(axes, self.scale)
-        self.cursor = _chart(self.canvas.figure, recording, chart, share, first) if chart else None
+        self.chart_cursor = _chart(self.canvas.figure, recording, chart, share, first) if chart else None
         self.canvas.draw()
         self.still = self.canvas.copy_from_bbox(self.canvas.figure.bbox)
 
-    def picture(self, instant: float) -> Array:
+    def render(self, instant: float) -> Array:
         """Picture at an instant (s): (row, column, red green blue alpha), 8 bits each; valid until the next one."""
-        where = self._place(instant)
+        where = self._positions(instant)
         x, y = self.view(where, axis=0)
-        x0, y0, tempo = self._pace(instant)
+        x0, y0, tempo = self._velocities(instant)
         self.canvas.restore_region(self.still)
         self._set_tails(instant)
-        self.darts.set_verts(list(_darts(x, y, x0, y0, self.dart)))
+        self.darts.set_verts(list(_dart_corners(x, y, x0, y0, self.dart_length)))
         self.darts.set_array(tempo)
         self.clock.set_text(f"{instant:7.1f} s")
         for artist in (self.tails, self.darts, self.clock):
             self.axes.draw_artist(artist)
-        if self.cursor is not None:
-            self.cursor.set_xdata([instant, instant])
-            self.cursor.axes.draw_artist(self.cursor)
+        if self.chart_cursor is not None:
+            self.chart_cursor.set_xdata([instant, instant])
+            self.chart_cursor.axes.draw_artist(self.chart_cursor)
         return np.asarray(self.canvas.buffer_rgba())
 
     def _stand(self, axes: Any) -> None:
         """Draw walls and obstacles."""
-        for corners, obstacle in walls(self.world):
+        for corners, obstacle in wall_lines(self.world):
             x, y = self.view(corners)
             color = style.RED if obstacle else style.BLUE
             if obstacle and self.flat:
@@ -117,44 +122,44 @@ class Stage:
             else:
                 axes.plot(x, y, color=color, linewidth=1.4)
 
-    def _place(self, instant: float) -> Array:
+    def _positions(self, instant: float) -> Array:
         """Positions of all agents (axis, agent), m."""
-        return _between(self.paths.times, self.paths.position, instant, self._leap)
+        return _interpolated(self.paths.times, self.paths.position, instant, self._periodic_halves)
 
     @property
-    def _leap(self) -> Array | None:
+    def _periodic_halves(self) -> Array | None:
         """Ways along each axis that lead through a periodic face, m."""
         if self.world.edges != "periodic":
             return None
         return np.array(half_sizes(self.world)[: self.paths.position.shape[1]])
 
-    def _pace(self, instant: float) -> tuple[Array, Array, Array]:
+    def _velocities(self, instant: float) -> tuple[Array, Array, Array]:
         """Velocities of all agents along the picture, and their speeds, m/s."""
-        values = _between(self.paths.times, self.paths.velocity, instant)
+        values = _interpolated(self.paths.times, self.paths.velocity, instant)
         return *self.view(values, axis=0), np.sqrt((values**2).sum(0))
 
     def _set_tails(self, instant: float) -> None:
-        begin = max(instant - self.tail, float(self.paths.times[0]))
-        if self.tail <= 0.0 or instant - begin < 1e-9:
+        begin = max(instant - self.tail_seconds, float(self.paths.times[0]))
+        if self.tail_seconds <= 0.0 or instant - begin < 1e-9:
             self.tails.set_segments([])
             return
-        moments = np.linspace(begin, instant, TAIL_POINTS)
-        past = np.stack([self._place(float(m)) for m in moments])  # (moment, axis, agent)
+        moments = np.linspace(begin, instant, POINTS_PER_TAIL)
+        past = np.stack([self._positions(float(m)) for m in moments])  # (moment, axis, agent)
         pieces = np.stack([past[:-1], past[1:]], axis=1)  # (moment, end, axis, agent)
         ways = np.moveaxis(pieces, 3, 1).reshape(-1, 2, past.shape[1])
-        kept = ~through_face(ways, self.world)
+        kept = ~crosses_periodic_face(ways, self.world)
         self.tails.set_segments(list(np.stack(self.view(ways[kept], axis=2), axis=-1)))
-        paces = np.stack([self._pace(float(m))[2] for m in moments[1:]])
-        colors = style.SPEED(self.scale(paces.ravel()))
-        age = (moments[1:] - instant) / self.tail
+        paces = np.stack([self._velocities(float(m))[2] for m in moments[1:]])
+        colors = style.SPEED_COLOURS(self.scale(paces.ravel()))
+        age = (moments[1:] - instant) / self.tail_seconds
         colors[:, 3] = np.repeat(np.clip(0.6 * (1.0 + age), 0.02, 1.0), past.shape[2])
         self.tails.set_color(colors[kept])
 
 
 def _canvas(size: tuple[int, int]) -> Any:
     """A canvas of so many pixels (width, height), on a figure whose text grows with its height."""
-    dots = DPI * size[1]
-    figure = style.Picture((size[0] + 1e-3) / dots, (size[1] + 1e-3) / dots)
+    dots = DPI_PER_PIXEL * size[1]
+    figure = style.NotebookFigure((size[0] + 1e-3) / dots, (size[1] + 1e-3) / dots)
     figure.set_dpi(dots)
     figure.set_layout_engine("none")
     canvas: Any = FigureCanvasAgg(figure)
@@ -166,21 +171,21 @@ def _head(axes: Any, recording: xr.Dataset, speed: float) -> Any:
     words: dict[str, Any] = {"va": "top", "transform": axes.transAxes}
     large: dict[str, Any] = {"fontsize": 12, "color": style.INK}
     small: dict[str, Any] = {"fontsize": 9, "color": style.GREY}
-    axes.text(0.02, 0.985, name_of(recording), weight="bold", **large, **words)
-    axes.text(0.02, 0.948, details_of(recording), **small, **words)
+    axes.text(0.02, 0.985, short_name(recording), weight="bold", **large, **words)
+    axes.text(0.02, 0.948, title_details(recording), **small, **words)
     axes.text(0.98, 0.948, f"{speed:g} × real time", ha="right", **small, **words)
     mono: dict[str, Any] = {"family": "DejaVu Sans Mono", "animated": True}
     return axes.text(0.98, 0.985, "", ha="right", **mono, **large, **words)
 
 
-def check_chart(chart: str, known: Sequence[str], whose: str) -> None:
+def check_chart(chart: str, known_charts: Sequence[str], owner: str) -> None:
     """Raise RecordingError for a chart of an order parameter that a flight does not have: also before it is flown."""
-    if chart and chart not in known:
-        hint = meant(chart, known, lead="; ")
-        raise RecordingError(f"chart = {chart!r} is none that {whose} has: {', '.join(known)}{hint}")
+    if chart and chart not in known_charts:
+        hint = suggest(chart, known_charts, lead="; ")
+        raise RecordingError(f"chart = {chart!r} is none that {owner} has: {', '.join(known_charts)}{hint}")
 
 
-def _chart(figure: Any, recording: xr.Dataset, name: str, share: float, first: Paths) -> Any:
+def _chart(figure: Any, recording: xr.Dataset, name: str, share: float, first: FlightPaths) -> Any:
     """An order parameter over time beside the picture; returns the line that moves."""
     course = over_time(recording)
     check_chart(name, list(course.columns), "this recording")
@@ -188,30 +193,30 @@ def _chart(figure: Any, recording: xr.Dataset, name: str, share: float, first: P
     values = values.loc[first.times[0] - 1e-9 : first.times[-1] + 1e-9]
     axes = figure.add_axes((share + 0.3 * (1.0 - share), 0.14, 0.62 * (1.0 - share), 0.7))
     axes.plot(values.index, values, color=style.BLUE, linewidth=1.0)
-    style.dress(axes, "time (s)", name)
+    style.style_axes(axes, "time (s)", name)
     return axes.axvline(float(first.times[0]), color=style.RED, linewidth=1.0, animated=True)
 
 
-def _between(times: Array, values: Array, instant: float, leap: Array | None = None) -> Array:
+def _interpolated(times: Array, values: Array, instant: float, period: Array | None = None) -> Array:
     """Values (time, axis, agent) at an instant, linear between frames; the nearer frame's where one leaps farther."""
     after = int(np.clip(np.searchsorted(times, instant), 1, max(len(times) - 1, 1)))
     if len(times) == 1:
         return np.asarray(values[0])
     share = float(np.clip((instant - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0))
     step = values[after] - values[after - 1]
-    if leap is not None:
-        through = (np.abs(step) > leap[:, None]).any(axis=0)
+    if period is not None:
+        through = (np.abs(step) > period[:, None]).any(axis=0)
         near = values[after if share >= 0.5 else after - 1]
         return np.asarray(np.where(through, near, values[after - 1] + share * step))
     return np.asarray(values[after - 1] + share * step)
 
 
-def _darts(x: Array, y: Array, along: Array, up: Array, length: float) -> Array:
+def _dart_corners(x: Array, y: Array, along: Array, up: Array, length: float) -> Array:
     """Corners (agent, corner, axis) of darts at (x, y) that point along the velocities (along, up); all m, m/s."""
     pace = np.hypot(along, up)
     still = ~(pace > 1e-9)
     hx, hy = np.where(still, 1.0, along / np.maximum(pace, 1e-9)), np.where(still, 0.0, up / np.maximum(pace, 1e-9))
-    ahead, side = length * DART[:, 0], length * DART[:, 1]
+    ahead, side = length * DART_OUTLINE[:, 0], length * DART_OUTLINE[:, 1]
     cx = x[:, None] + hx[:, None] * ahead - hy[:, None] * side
     cy = y[:, None] + hy[:, None] * ahead + hx[:, None] * side
     return np.stack([cx, cy], axis=2)
@@ -221,13 +226,13 @@ def _key(axes: Any, scale: Normalize) -> None:
     """Small colour bar of speed in the second line of the head."""
     low, high = float(scale.vmin or 0.0), float(scale.vmax or 1.0)
     inset = axes.inset_axes((0.42, 0.929, 0.16, 0.014))
-    inset.imshow(np.linspace(0.0, 1.0, 256)[None, :], cmap=style.SPEED, aspect="auto")
+    inset.imshow(np.linspace(0.0, 1.0, 256)[None, :], cmap=style.SPEED_COLOURS, aspect="auto")
     inset.set_axis_off()
     words: dict[str, Any] = {"fontsize": 9, "color": style.GREY, "va": "center", "transform": inset.transAxes}
     inset.text(-0.04, 0.45, f"{low:g}", ha="right", **words)
     inset.text(1.04, 0.45, f"{high:g} m/s", ha="left", **words)
 
 
-def even(pixels: float) -> int:
+def to_even(pixels: float) -> int:
     """The nearest even number of pixels, which encoders ask for."""
     return 2 * max(16, round(pixels / 2.0))

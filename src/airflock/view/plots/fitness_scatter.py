@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from airflock.view.plots import style
 
-COLUMNS = 4
+PANEL_COLUMNS = 4
 
 
 def fitness_scatter(
@@ -40,9 +40,9 @@ def fitness_scatter(
     >>> [axes.get_xlabel() for axes in figure.axes[:2]]
     ['model.p_rep (1/s)', 'model.r0_rep (m)']
     """
-    rows = -(-len(units) // COLUMNS)
-    columns = min(COLUMNS, len(units))
-    figure, grid = style.panels(ax, rows, columns, 10.0, 2.3 * rows + 0.4, layout="", sharey=True)
+    rows = -(-len(units) // PANEL_COLUMNS)
+    columns = min(PANEL_COLUMNS, len(units))
+    figure, grid = style.figure_and_panels(ax, rows, columns, 10.0, 2.3 * rows + 0.4, layout="", sharey=True)
     panels = grid.ravel()
     shown = table.sort_values("generation", kind="stable")
     for axes, (key, unit) in zip(panels, units.items(), strict=False):
@@ -51,9 +51,9 @@ def fitness_scatter(
         )
         if best is not None:
             axes.axvline(best[key], color=style.RED, linewidth=1.0)
-        style.dress(axes, f"{key} ({unit})", objective if axes in panels[::COLUMNS] else "")
+        style.style_axes(axes, f"{key} ({unit})", objective if axes in panels[::PANEL_COLUMNS] else "")
     for axes in panels[len(units) :]:
         axes.set_visible(False)
-    style.colour_bar(figure, dots, panels.tolist(), "generation")
-    style.overall(figure, what or "Fitness against parameters", f"{len(table)} candidates; line: chosen")
-    return style.root(figure)
+    style.add_colour_bar(figure, dots, panels.tolist(), "generation")
+    style.set_figure_title(figure, what or "Fitness against parameters", f"{len(table)} candidates; line: chosen")
+    return style.root_figure(figure)

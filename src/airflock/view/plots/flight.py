@@ -9,20 +9,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.recordings import attributes
-from airflock.recordings.differences import velocities
-from airflock.recordings.flown_scenario import scenario_of
-from airflock.recordings.layout import DIMENSIONS, check
-from airflock.scenarios.geometry import ground_plan
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import RecordingError
-from airflock.world import arena
-from airflock.world.place import half_sizes
+from airflock.recordings import DIMENSIONS, attributes, check_recording, differentiated_velocity, scenario_of_recording
+from airflock.scenarios import Scenario, ground_plan
+from airflock.support import RecordingError
+from airflock.world import arena, half_sizes
 
 Array = NDArray[Any]
 
 
-class Paths(NamedTuple):
+class FlightPaths(NamedTuple):
     """Trajectories in a window of time; missing positions are nan.
 
     times    : (time,) s
@@ -45,16 +40,16 @@ class Paths(NamedTuple):
         return int(self.position.shape[2])
 
 
-def paths_of(
+def paths_in_window(
     recording: xr.Dataset, start: float | None = None, stop: float | None = None, *, last: float | None = None
-) -> Paths:
+) -> FlightPaths:
     """Trajectories from start to stop, s; without a start, the `last` seconds, or all of them.
 
     Raises a RecordingError when the window holds no frame.
     """
-    check(recording)
+    check_recording(recording)
     times = recording["time"].values.astype(float)
-    begin, end = window(times, start, stop, last)
+    begin, end = time_window(times, start, stop, last)
     chosen = (times >= begin - 1e-9) & (times <= end + 1e-9)
     if not chosen.any():
         raise RecordingError(
@@ -66,13 +61,15 @@ def paths_of(
     if "velocity" in shown:
         velocity = shown["velocity"].transpose(*order).values.astype(float)
     elif chosen.sum() > 1:
-        velocity = velocities(position, times[chosen])
+        velocity = differentiated_velocity(position, times[chosen])
     else:
         velocity = np.zeros_like(position)
-    return Paths(times[chosen], position, velocity)
+    return FlightPaths(times[chosen], position, velocity)
 
 
-def window(times: Array, start: float | None, stop: float | None, last: float | None = None) -> tuple[float, float]:
+def time_window(
+    times: Array, start: float | None, stop: float | None, last: float | None = None
+) -> tuple[float, float]:
     """First and last instant shown, s."""
     end = float(times[-1]) if stop is None else float(stop)
     if start is not None:
@@ -84,75 +81,75 @@ def window(times: Array, start: float | None, stop: float | None, last: float | 
     return begin, end
 
 
-def flown_with(recording: xr.Dataset) -> Scenario | None:
+def scenario_or_none(recording: xr.Dataset) -> Scenario | None:
     """Scenario that a recording was flown with; None for tracks."""
-    check(recording)
-    return scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
+    check_recording(recording)
+    return scenario_of_recording(recording) if recording.attrs.get("airflock_scenario") else None
 
 
-def world_of(recording: xr.Dataset) -> arena.Parameters:
+def world_or_open(recording: xr.Dataset) -> arena.Parameters:
     """World of a recording; open for tracks."""
-    scenario = flown_with(recording)
+    scenario = scenario_or_none(recording)
     return scenario.world if scenario else arena.Parameters(arena="none")
 
 
-def name_of(what: xr.Dataset | Scenario) -> str:
+def short_name(source: xr.Dataset | Scenario) -> str:
     """Short name of a scenario or recording: that of the preset or file, or of the file of its tracks."""
-    name = what.name if isinstance(what, Scenario) else attributes.name_of(what)
+    name = source.name if isinstance(source, Scenario) else attributes.recording_name(source)
     return Path(name).stem if name.endswith((".toml", ".nc")) else name
 
 
-def details_of(recording: xr.Dataset, shown: Paths | None = None) -> str:
+def title_details(recording: xr.Dataset, paths: FlightPaths | None = None) -> str:
     """What else a title says: number of agents, seed, and the window of time that is shown."""
     agents = recording.sizes["individual"]
     parts = [f"{agents} agent{'s' if agents > 1 else ''}"]
     if "airflock_seed" in recording.attrs:
         parts.append(f"seed {recording.attrs['airflock_seed']}")
-    if shown is not None:
-        parts.append(f"{shown.times[0]:.4g} to {shown.times[-1]:.4g} s")
+    if paths is not None:
+        parts.append(f"{paths.times[0]:.4g} to {paths.times[-1]:.4g} s")
     return " · ".join(parts)
 
 
-class Outline(NamedTuple):
+class WorldOutline(NamedTuple):
     """Corners (corner, axis) in m of a closed polygon, and whether it is an obstacle."""
 
     corners: Array
     obstacle: bool
 
 
-def _ends(world: arena.Parameters) -> list[tuple[float, float]]:
+def _outline_heights(world: arena.Parameters) -> list[tuple[float, float]]:
     """Lowest and highest height of each outline of a 3-D arena, m."""
     whole = arena.heights_of(world)
     found = [] if world.arena == "none" else [whole]
     return found + [(h[0], h[1]) for h in world.heights or [whole] * len(world.obstacles)]
 
 
-def outlines(world: arena.Parameters) -> list[Outline]:
+def world_outlines(world: arena.Parameters) -> list[WorldOutline]:
     """Ground plans of the arena (first, if there is one) and of the obstacles, as closed polygons in the plane."""
     plan = ground_plan(world)
-    found = [] if plan is None else [Outline(np.array(plan.exterior.coords), False)]
+    found = [] if plan is None else [WorldOutline(np.array(plan.exterior.coords), False)]
     for corners in world.obstacles:
-        found.append(Outline(np.array([*corners, corners[0]]), True))
+        found.append(WorldOutline(np.array([*corners, corners[0]]), True))
     return found
 
 
-def walls(world: arena.Parameters) -> list[Outline]:
+def wall_lines(world: arena.Parameters) -> list[WorldOutline]:
     """Faces and edges to draw: in the plane the outlines, in space floor, ceiling and uprights of each."""
     if world.dimensions == "2":
-        return outlines(world)
+        return world_outlines(world)
     found = []
-    for (corners, obstacle), (low, high) in zip(outlines(world), _ends(world), strict=True):
-        found += [Outline(_raised(corners, z), obstacle) for z in (low, high)]
+    for (corners, obstacle), (low, high) in zip(world_outlines(world), _outline_heights(world), strict=True):
+        found += [WorldOutline(_at_height(corners, z), obstacle) for z in (low, high)]
         step = max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1  # a circle gets eight uprights
-        found += [Outline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
+        found += [WorldOutline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
     return found
 
 
-def _raised(corners: Array, z: float) -> Array:
+def _at_height(corners: Array, z: float) -> Array:
     return np.column_stack([corners, np.full(len(corners), z)])
 
 
-def through_face(segments: Array, world: arena.Parameters) -> Array:
+def crosses_periodic_face(segments: Array, world: arena.Parameters) -> Array:
     """Which segments (segment, end, axis), m, lead through a face of a periodic world to the opposite one."""
     if world.edges != "periodic":
         return np.zeros(len(segments), bool)
@@ -160,7 +157,7 @@ def through_face(segments: Array, world: arena.Parameters) -> Array:
     return np.asarray((np.abs(segments[:, 1] - segments[:, 0]) > halves).any(axis=1))
 
 
-class View(NamedTuple):
+class Projection(NamedTuple):
     """Parallel projection onto the picture: `right` and `up` are unit vectors (axis,)."""
 
     right: Array
@@ -174,22 +171,24 @@ class View(NamedTuple):
         return moved @ self.right[:known], moved @ self.up[:known]
 
 
-def view_of(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.0) -> View:
+def projection(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.0) -> Projection:
     """From above in the plane; in space from the given direction."""
     if axes == 2:
-        return View(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+        return Projection(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
     a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
     right = np.array([-math.sin(a), math.cos(a), 0.0])
     up = np.array([-math.cos(a) * math.sin(e), -math.sin(a) * math.sin(e), math.cos(e)])
-    return View(right, up)
+    return Projection(right, up)
 
 
-def extent(
-    shown: Paths, world: arena.Parameters, view: View, margin: float = 0.04, around: Sequence[Array] = ()
+def picture_extent(
+    paths: FlightPaths, world: arena.Parameters, view: Projection, margin: float = 0.04, around: Sequence[Array] = ()
 ) -> tuple[float, float, float, float]:
     """Left, right, bottom and top of a picture that holds the arena, every path and the lines `around` it, m."""
-    xs, ys = view(shown.position)
-    points = [(xs.ravel(), ys.ravel())] + [view(line) for line in (*(wall.corners for wall in walls(world)), *around)]
+    xs, ys = view(paths.position)
+    points = [(xs.ravel(), ys.ravel())] + [
+        view(line) for line in (*(wall.corners for wall in wall_lines(world)), *around)
+    ]
     x, y = np.concatenate([p[0] for p in points]), np.concatenate([p[1] for p in points])
     if not np.isfinite(x).any():
         raise RecordingError("recording: every position in this window is missing")
@@ -198,9 +197,9 @@ def extent(
     return left - edge, right + edge, bottom - edge, top + edge
 
 
-def speed_range(shown: Paths) -> tuple[float, float]:
+def speed_range(paths: FlightPaths) -> tuple[float, float]:
     """Ends of a colour bar, m/s: what all but a few percent lie between, rounded outwards."""
-    speed = shown.speed[np.isfinite(shown.speed)]
+    speed = paths.speed[np.isfinite(paths.speed)]
     if not speed.size:
         return 0.0, 1.0
     slow, fast = (max(float(v), 1e-3) for v in np.quantile(speed, (0.01, 0.999)))

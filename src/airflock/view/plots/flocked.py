@@ -7,13 +7,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airflock.recordings.scores import measure
-from airflock.support.errors import RecordingError
+from airflock.recordings import measure_recording
+from airflock.support import RecordingError
 from airflock.view.plots import style
-from airflock.view.plots.flight import details_of, name_of, window
-from airflock.view.plots.series import Pen
+from airflock.view.plots.flight import short_name, time_window, title_details
+from airflock.view.plots.series import SmoothedLines
 
-FEW = 10.0  # sub-swarms or collisions up to which their axis is linear
+LINEAR_LIMIT = 10.0  # sub-swarms or collisions up to which their axis is linear
 
 
 def flocked(
@@ -44,29 +44,29 @@ def flocked(
     >>> len(airflock.plots.flocked(recording).axes)
     2
     """
-    values, course = measure(recording, settings)
+    values, course = measure_recording(recording, settings)
     if "flocked" not in course:
         raise RecordingError("recording: the share flocked is measured by metrics.kind = 'kidger'; --set it")
-    begin, end = window(course.index.to_numpy(), start, stop)
+    begin, end = time_window(course.index.to_numpy(), start, stop)
     course = course.loc[begin - 1e-9 : end + 1e-9]
-    figure, panels = style.panels(ax, 2, 1, 7.0, 4.2, sharex=True, height_ratios=(2.0, 1.0))
+    figure, panels = style.figure_and_panels(ax, 2, 1, 7.0, 4.2, sharex=True, height_ratios=(2.0, 1.0))
     upper, lower = panels[:, 0]
-    pen = Pen(course, smooth)
+    pen = SmoothedLines(course, smooth)
     handles = pen.draw(upper, course["flocked"], style.BLUE, "flocked")
     handles += pen.draw(upper, course["polarisation"], style.GREEN, "polarisation")
     reached = [time for time in values.get("time_to_goal", []) if begin <= time <= end]
     lines = [upper.axvline(time, color=style.ORANGE, linewidth=0.7, zorder=0, label="goal reached") for time in reached]
     handles += lines[:1]
     upper.set_ylim(0.0, 1.05)
-    style.dress(upper, y="share (1)")
-    style.legend(upper, handles, columns=3, above=True)
+    style.style_axes(upper, y="share (1)")
+    style.add_legend(upper, handles, columns=3, above=True)
     lower.plot(course.index, course["n_clusters"], color=style.PURPLE, linewidth=0.9, label="sub-swarms")
     lower.plot(course.index, course["n_coll"].cumsum(), color=style.RED, linewidth=0.9, label="collisions so far")
-    if max(course["n_clusters"].max(), course["n_coll"].sum()) > 2.0 * FEW:  # else one tick would be all
-        lower.set_yscale("symlog", linthresh=FEW)
+    if max(course["n_clusters"].max(), course["n_coll"].sum()) > 2.0 * LINEAR_LIMIT:  # else one tick would be all
+        lower.set_yscale("symlog", linthresh=LINEAR_LIMIT)
     lower.yaxis.set_major_formatter("{x:g}")
     lower.set_ylim(bottom=0.0)
-    style.dress(lower, "time (s)", "number")
-    style.legend(lower, lower.get_lines(), columns=2)
-    style.overall(figure, name_of(recording), f"{details_of(recording)}{pen.told}")
-    return style.root(figure)
+    style.style_axes(lower, "time (s)", "number")
+    style.add_legend(lower, lower.get_lines(), columns=2)
+    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.told}")
+    return style.root_figure(figure)

@@ -9,16 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from airflock.core.parameters import Quantity, declarations
-from airflock.parts.metrics.registry import METRICS
-from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.sections import SECTIONS, Flight
-from airflock.support.errors import AirflockError
+from airflock.core import Quantity, declarations
+from airflock.parts.metrics import METRICS
+from airflock.scenarios import SECTIONS, Flight, Scenario
+from airflock.support import AirflockError
 from airflock.view.plots import style
-from airflock.view.plots.flight import name_of
+from airflock.view.plots.flight import short_name
 
-UNITS = {name: unit or "1" for metric in METRICS.values() for name, (unit, _) in metric.reports.items()}
-WRITTEN = 120  # cells; in a larger map the numbers would not be legible
+METRIC_UNITS = {name: unit or "1" for metric in METRICS.values() for name, (unit, _) in metric.reports.items()}
+MAX_WRITTEN_CELLS = 120  # cells; in a larger map the numbers would not be legible
 
 
 def heatmap(
@@ -54,24 +53,24 @@ def heatmap(
         raise AirflockError(
             f"a sweep of {len(keys)} keys with {len(table)} rows cannot be drawn; give 1 or 2 keys and rows"
         )
-    figure, axes = style.place(ax, *((5.2, 3.4) if len(keys) == 1 else (5.6, 4.4)), layout="constrained")
-    labels = [_label(key, scenario) for key in keys]
-    shown = f"{value} ({UNITS.get(value, '1')})"
+    figure, axes = style.figure_and_axes(ax, *((5.2, 3.4) if len(keys) == 1 else (5.6, 4.4)), layout="constrained")
+    labels = [_axis_label(key, scenario) for key in keys]
+    shown = f"{value} ({METRIC_UNITS.get(value, '1')})"
     flights = table.groupby(list(keys), sort=True)[value].count()
     per_point = f"{flights.min()}" if flights.min() == flights.max() else f"{flights.min()} to {flights.max()}"
     if len(keys) == 1:
         _line(axes, table, keys[0], value)
-        style.dress(axes, labels[0], shown)
+        style.style_axes(axes, labels[0], shown)
         details = f"mean ± SD of {per_point} flights per point"
     else:
         _map(figure, axes, table, keys, value, shown)
-        style.dress(axes, labels[0], labels[1], grid=False)
+        style.style_axes(axes, labels[0], labels[1], grid=False)
         details = f"mean of {per_point} flights per cell"
-    style.heading(axes, name_of(scenario) if scenario else f"{value} over {', '.join(keys)}", details)
+    style.set_title(axes, short_name(scenario) if scenario else f"{value} over {', '.join(keys)}", details)
     return figure
 
 
-def _label(key: str, scenario: Scenario | None) -> str:
+def _axis_label(key: str, scenario: Scenario | None) -> str:
     section, _, name = key.rpartition(".")
     record: Any = SECTIONS.get(section, Flight if not section else None)
     if section == "model":
@@ -82,22 +81,22 @@ def _label(key: str, scenario: Scenario | None) -> str:
     return key
 
 
-def _numeric(levels: list[Any]) -> bool:
+def _are_numbers(levels: list[Any]) -> bool:
     return all(isinstance(v, (int, float, np.number)) and not isinstance(v, bool) for v in levels)
 
 
-def _named_ticks(axes: Axes, which: str, levels: list[Any]) -> None:
+def _named_ticks(axes: Axes, axis: str, levels: list[Any]) -> None:
     """Levels as names at 0, 1, 2, ...; every so many of them when there are many."""
     every = max(1, -(-len(levels) // 12))
     names = [f"{v:g}" if isinstance(v, (int, float, np.number)) else str(v) for v in levels]
-    getattr(axes, f"set_{which}ticks")(range(0, len(levels), every), names[::every])
+    getattr(axes, f"set_{axis}ticks")(range(0, len(levels), every), names[::every])
 
 
 def _line(axes: Axes, table: pd.DataFrame, key: str, value: str) -> None:
     groups = table.groupby(key, sort=True)[value]
     levels = list(groups.mean().index)
-    x: Any = np.array(levels, dtype=float) if _numeric(levels) else np.arange(len(levels))
-    if not _numeric(levels):
+    x: Any = np.array(levels, dtype=float) if _are_numbers(levels) else np.arange(len(levels))
+    if not _are_numbers(levels):
         _named_ticks(axes, "x", levels)
     mean, spread = groups.mean().to_numpy(), groups.std(ddof=1).fillna(0.0).to_numpy()
     places = dict(zip(levels, x, strict=True))
@@ -111,24 +110,24 @@ def _line(axes: Axes, table: pd.DataFrame, key: str, value: str) -> None:
 def _map(figure: Figure, axes: Axes, table: pd.DataFrame, keys: Sequence[str], value: str, label: str) -> None:
     grid = table.pivot_table(index=keys[1], columns=keys[0], values=value, aggfunc="mean", sort=True, dropna=False)
     levels = list(grid.columns), list(grid.index)
-    edges = [_edges(axes, which, v) for which, v in zip("xy", levels, strict=True)]
+    edges = [_cell_edges(axes, which, v) for which, v in zip("xy", levels, strict=True)]
     cells = np.ma.masked_invalid(grid.to_numpy(dtype=float))
     low, high = (float(cells.min()), float(cells.max())) if cells.count() else (0.0, 1.0)
     signed = low < 0.0 < high
     most = max(-low, high)
-    axes.set_facecolor(style.PALE)  # a point that was not flown
+    axes.set_facecolor(style.PALE_GREY)  # a point that was not flown
     mesh = axes.pcolormesh(
         *edges, cells, cmap="RdBu_r" if signed else "viridis",
         vmin=-most if signed else low, vmax=most if signed else high, edgecolors="white", linewidth=0.4,
     )  # fmt: skip
-    if cells.size <= WRITTEN:
+    if cells.size <= MAX_WRITTEN_CELLS:
         _write(axes, mesh, edges, cells)
-    style.colour_bar(figure, mesh, axes, label, shrink=0.9)
+    style.add_colour_bar(figure, mesh, axes, label, shrink=0.9)
 
 
 def _write(axes: Axes, mesh: Any, edges: list[Any], cells: Any) -> None:
     """The number in each cell, dark or light, whichever reads better on its colour."""
-    size = style.SMALL - 1.0 if max(cells.shape) <= 8 else style.SMALL - 2.5
+    size = style.SMALL_SIZE - 1.0 if max(cells.shape) <= 8 else style.SMALL_SIZE - 2.5
     for (row, column), number in np.ndenumerate(cells):
         if np.ma.is_masked(cells[row, column]):
             continue
@@ -138,14 +137,14 @@ def _write(axes: Axes, mesh: Any, edges: list[Any], cells: Any) -> None:
         axes.text(x, y, f"{number:.3g}", ha="center", va="center", fontsize=size, color=color)
 
 
-def _edges(axes: Axes, which: str, levels: list[Any]) -> Any:
+def _cell_edges(axes: Axes, axis: str, levels: list[Any]) -> Any:
     """Borders of cells: to scale where levels are evenly spaced numbers, else of equal size and named one by one."""
-    steps = np.diff(np.array(levels, dtype=float)) if _numeric(levels) else np.zeros(0)
+    steps = np.diff(np.array(levels, dtype=float)) if _are_numbers(levels) else np.zeros(0)
     if len(levels) > 12 and steps.size and steps.max() < 1.01 * steps.min():
         places: Any = np.array(levels, dtype=float)
     else:
         places = np.arange(len(levels), dtype=float)
-        _named_ticks(axes, which, levels)
+        _named_ticks(axes, axis, levels)
     if len(places) == 1:
         return np.array([-0.5, 0.5])
     middle = 0.5 * (places[1:] + places[:-1])

@@ -30,11 +30,11 @@ def pareto(
     'phi_vel'
     """
     pairs = list(combinations(objectives, 2))
-    figure, panels = style.panels(ax, 1, len(pairs), 3.6 * len(pairs) + 0.4, 3.4, layout="")
+    figure, panels = style.figure_and_panels(ax, 1, len(pairs), 3.6 * len(pairs) + 0.4, 3.4, layout="")
     best = table.iloc[list(front)]
     for axes, (x, y) in zip(panels[0], pairs, strict=True):
         axes.plot(table[x], table[y], ".", color=style.GREY, markersize=1.5, alpha=0.4, rasterized=True)
         axes.plot(best[x], best[y], "o", color=style.BLUE, markersize=4.0, markeredgewidth=0.0, label="front")
-        style.dress(axes, x, y)
-    style.overall(figure, what or "Pareto front", f"{len(best)} of {len(table)} candidates")
-    return style.root(figure)
+        style.style_axes(axes, x, y)
+    style.set_figure_title(figure, what or "Pareto front", f"{len(best)} of {len(table)} candidates")
+    return style.root_figure(figure)

@@ -9,14 +9,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airflock.recordings.files import load_recording
-from airflock.recordings.flights import simulate
-from airflock.recordings.flown_scenario import scenario_of
-from airflock.scenarios.change import variant
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import AirflockError, RecordingError
-from airflock.support.spelling import meant
-from airflock.view.plots.flight import flown_with
+from airflock.recordings import load_recording, scenario_of_recording, simulate
+from airflock.scenarios import Scenario, scenario_variant
+from airflock.support import AirflockError, RecordingError, suggest
+from airflock.view.plots.flight import scenario_or_none
 from airflock.view.plots.flocked import flocked
 from airflock.view.plots.rays import rays
 from airflock.view.plots.reception import received
@@ -30,12 +26,12 @@ from airflock.view.plots.wash import wash
 KINDS = (
     "trajectories", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash", "reception",
 )  # fmt: skip
-OF_A_SCENARIO = ("rules", "transfer")  # pictures that take no flight
-What = Scenario | xr.Dataset | str | os.PathLike[str]
+SCENARIO_KINDS = ("rules", "transfer")  # pictures that take no flight
+PlotSource = Scenario | xr.Dataset | str | os.PathLike[str]
 
 
 def plot(
-    what: What,
+    what: PlotSource,
     kind: str = "trajectories",
     *,
     seed: int = 0,
@@ -89,22 +85,22 @@ def plot(
     True
     """
     if kind not in KINDS:
-        raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}{meant(kind, KINDS, lead='; ')}")
-    if kind in OF_A_SCENARIO:
+        raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}{suggest(kind, KINDS, lead='; ')}")
+    if kind in SCENARIO_KINDS:
         _refuse_tracks(what, kind)
         scenario = _scenario(what, settings, law, trust)
         return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)
     keep = ("heard",) if kind == "reception" else ()
-    recording = flight_of(what, seed, settings, law, trust=trust, keep=keep)
-    with named(what):
+    recording = recording_or_flight(what, seed, settings, law, trust=trust, keep=keep)
+    with naming_file(what):
         return _of_recording(recording, kind, start, stop, ax)
 
 
-def _refuse_tracks(what: What, kind: str) -> None:
+def _refuse_tracks(source: PlotSource, kind: str) -> None:
     """Raise RecordingError for tracks where a law or a fitness is drawn: they have none."""
-    recording = load_recording(what) if _is_file(what) else what  # type: ignore[arg-type]
-    if isinstance(recording, xr.Dataset) and flown_with(recording) is None:
-        raise RecordingError(f"{_name(what)}: tracks were flown by no scenario, which the kind {kind} draws")
+    recording = load_recording(source) if _is_recording_file(source) else source  # type: ignore[arg-type]
+    if isinstance(recording, xr.Dataset) and scenario_or_none(recording) is None:
+        raise RecordingError(f"{_source_name(source)}: tracks were flown by no scenario, which the kind {kind} draws")
 
 
 def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None, ax: Axes | None) -> Figure:
@@ -123,41 +119,41 @@ def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: f
     return trajectories(recording, start=start, stop=stop, ax=ax)
 
 
-def _is_file(what: Any) -> bool:
-    return isinstance(what, (str, os.PathLike)) and str(what).lower().endswith(".nc")
+def _is_recording_file(source: Any) -> bool:
+    return isinstance(source, (str, os.PathLike)) and str(source).lower().endswith(".nc")
 
 
-def _scenario(what: What, settings: Mapping[str, Any] | None, law: Any, trust: bool) -> Scenario:
-    if isinstance(what, xr.Dataset) or _is_file(what):
-        return scenario_of(what if isinstance(what, xr.Dataset) else load_recording(what), settings)  # type: ignore[arg-type]
-    return variant(what, settings, law, trust=trust)
+def _scenario(source: PlotSource, settings: Mapping[str, Any] | None, law: Any, trust: bool) -> Scenario:
+    if isinstance(source, xr.Dataset) or _is_recording_file(source):
+        return scenario_of_recording(source if isinstance(source, xr.Dataset) else load_recording(source), settings)  # type: ignore[arg-type]
+    return scenario_variant(source, settings, law, trust=trust)
 
 
-def flight_of(
-    what: What, seed: int, settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False,
+def recording_or_flight(
+    source: PlotSource, seed: int, settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False,
     keep: Sequence[str] = (),
 ) -> xr.Dataset:  # fmt: skip
     """The recording that is given or named, or a flight of the scenario that is."""
-    if isinstance(what, xr.Dataset) or _is_file(what):
+    if isinstance(source, xr.Dataset) or _is_recording_file(source):
         if settings or law is not None:
             raise AirflockError(
-                f"{_name(what)}: is a recording; --set, --agents, --duration and --law need a scenario to fly"
+                f"{_source_name(source)}: is a recording; --set, --agents, --duration and --law need a scenario to fly"
             )
-        return what if isinstance(what, xr.Dataset) else load_recording(what)  # type: ignore[arg-type]
-    return simulate(_scenario(what, settings, law, trust), seed, keep=keep)
+        return source if isinstance(source, xr.Dataset) else load_recording(source)  # type: ignore[arg-type]
+    return simulate(_scenario(source, settings, law, trust), seed, keep=keep)
 
 
 @contextmanager
-def named(what: Any) -> Iterator[None]:
+def naming_file(source: Any) -> Iterator[None]:
     """Faults of a recording that are told inside begin with the name of its file, where it is one."""
     try:
         yield
     except RecordingError as fault:
         before, colon, said = str(fault).partition(": ")
-        if before != "recording" or not colon or not _is_file(what):
+        if before != "recording" or not colon or not _is_recording_file(source):
             raise
-        raise RecordingError(f"{what}: {said}") from fault
+        raise RecordingError(f"{source}: {said}") from fault
 
 
-def _name(what: Any) -> str:
-    return "recording" if isinstance(what, xr.Dataset) else str(what)
+def _source_name(source: Any) -> str:
+    return "recording" if isinstance(source, xr.Dataset) else str(source)

@@ -6,18 +6,18 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from airflock.core.agent import Heard, State
-from airflock.scenarios.surroundings import Course, Place
-from airflock.support.errors import RecordingError
+from airflock.core import HeardNeighbour, State
+from airflock.scenarios import FlightWorld, GoalCourse
+from airflock.support import RecordingError
 from airflock.view.plots import style
-from airflock.view.plots.flight import details_of, flown_with, name_of, paths_of
-from airflock.view.plots.scene_paths import ground_plans, nearby
-from airflock.view.stage.rays import Ray, cast_rays
+from airflock.view.plots.flight import paths_in_window, scenario_or_none, short_name, title_details
+from airflock.view.plots.scene_paths import draw_ground_plans, shapes_near_paths
+from airflock.view.stage.rays import CastRay, rays_and_command
 
 
-def cast_at(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[Ray], tuple[float, float, float]]:
+def rays_at_frame(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[CastRay], tuple[float, float, float]]:
     """Rays that an agent cast at a frame of its recording, and the command (m/s) that it decided on."""
-    scenario = flown_with(recording)
+    scenario = scenario_or_none(recording)
     if scenario is None or scenario.model.sight is None:
         raise RecordingError("recording: its model casts no rays; kidger does")
     states = np.concatenate([recording[name].values[:, :, 0, :] for name in ("position", "velocity")], axis=1)
@@ -27,14 +27,14 @@ def cast_at(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[Ray], t
     def flock(k: int) -> list[State]:
         return [State(*map(float, (*s[:dims], *pad, *s[dims:], *pad))) for s in states[k].T]
 
-    place, course = Place(scenario), Course(scenario)
+    place, course = FlightWorld(scenario), GoalCourse(scenario)
     elapsed = float(recording["time"].values[1]) if len(states) > 1 else scenario.flight.dt
     for k in range(frame + 1):
         course.advance(k * elapsed, elapsed, flock(k))
     now = flock(frame)
-    place.appear(frame * elapsed, now)
-    heard = [Heard(j, state, 0.0) for j, state in enumerate(now) if j != agent]
-    return cast_rays(scenario, place, course, now[agent], heard, frame * elapsed, agent)
+    place.update_appearing(frame * elapsed, now)
+    heard = [HeardNeighbour(j, state, 0.0) for j, state in enumerate(now) if j != agent]
+    return rays_and_command(scenario, place, course, now[agent], heard, frame * elapsed, agent)
 
 
 def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, ax: Axes | None = None) -> Figure:
@@ -59,16 +59,16 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, a
     times = recording["time"].values.astype(float)
     if start is None:
         few = np.unique(np.linspace(0, np.searchsorted(times, 20.0, side="right") - 1, 80).astype(int))
-        frame = int(max(few, key=lambda k: len(cast_at(recording, agent, int(k))[0])))
+        frame = int(max(few, key=lambda k: len(rays_at_frame(recording, agent, int(k))[0])))
     else:
         frame = int(np.abs(times - start).argmin())
-    found, command = cast_at(recording, agent, frame)
-    scenario, shown = flown_with(recording), paths_of(recording)
+    found, command = rays_at_frame(recording, agent, frame)
+    scenario, shown = scenario_or_none(recording), paths_in_window(recording)
     assert scenario is not None
     x, y = (float(c) for c in shown.position[frame, :2, agent])
     reach = 1.3 * max(ray.length for ray in found)
-    figure, axes = style.place(ax, 6.0, 5.6)
-    ground_plans(axes, nearby(scenario, shown))
+    figure, axes = style.figure_and_axes(ax, 6.0, 5.6)
+    draw_ground_plans(axes, shapes_near_paths(scenario, shown))
     lines = [[(x, y), (x + ray.free * ray.x, y + ray.free * ray.y)] for ray in found]
     colours = [style.GREEN if ray.free >= ray.length else style.RED for ray in found]
     axes.add_collection(LineCollection(lines, colors=colours, linewidths=0.8, alpha=0.8, zorder=3))
@@ -80,7 +80,7 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, a
     axes.scatter([x], [y], s=40.0, color=style.INK, zorder=6)
     axes.set(xlim=(x - reach, x + reach), ylim=(y - reach, y + reach))
     axes.set_aspect("equal")
-    style.dress(axes, "east (m)", "north (m)", grid=False)
+    style.style_axes(axes, "east (m)", "north (m)", grid=False)
     words = f"agent {agent} at {times[frame]:.4g} s · {len(found)} rays cast"
-    style.heading(axes, name_of(recording), f"{words} · {details_of(recording)}")
+    style.set_title(axes, short_name(recording), f"{words} · {title_details(recording)}")
     return figure

@@ -6,11 +6,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airflock.recordings.reception import BINS, reception
+from airflock.recordings import BINS, packet_age
 from airflock.view.plots import style
-from airflock.view.plots.flight import details_of, flown_with, name_of
+from airflock.view.plots.flight import scenario_or_none, short_name, title_details
 
-FEW = 10  # pairs of a bin below which it is not drawn
+MIN_PAIRS = 10  # pairs of a bin below which it is not drawn
 
 
 def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | None = None) -> Figure:
@@ -31,9 +31,9 @@ def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | N
     >>> airflock.plots.received(heard, bins=4).axes[1].get_xlabel()
     'distance (m)'
     """
-    table = reception(heard, bins)
-    shown = table[table["count"] >= min(FEW, int(table["count"].max()))]
-    figure, panels = style.panels(ax, 2, 1, 6.0, 4.2, sharex=True, height_ratios=(3.0, 1.0))
+    table = packet_age(heard, bins)
+    shown = table[table["count"] >= min(MIN_PAIRS, int(table["count"].max()))]
+    figure, panels = style.figure_and_panels(ax, 2, 1, 6.0, 4.2, sharex=True, height_ratios=(3.0, 1.0))
     upper, lower = panels[:, 0]
     x = shown["distance"].to_numpy()
     for low, high, alpha, label in (("q05", "q95", 0.15, "90 % of all"), ("q25", "q75", 0.3, "half of all")):
@@ -43,17 +43,17 @@ def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | N
         upper.set_yscale("log")
     else:
         upper.set_ylim(bottom=0.0)
-    style.dress(upper, y="time since the last packet (s)")
-    scenario = flown_with(heard) if isinstance(heard, xr.Dataset) else None
+    style.style_axes(upper, y="time since the last packet (s)")
+    scenario = scenario_or_none(heard) if isinstance(heard, xr.Dataset) else None
     if scenario is not None:
         upper.axhline(scenario.radio.delay, color=style.RED, linewidth=1.0, linestyle=(0, (5, 3)), label="delay")
-    style.legend(upper)
+    style.add_legend(upper)
     lower.plot(x, shown["heard"], color=style.GREEN, linewidth=1.8)
     lower.set_ylim(-0.03, 1.05)
-    style.dress(lower, "distance (m)", "heard so far")
+    style.style_axes(lower, "distance (m)", "heard so far")
     lower.set_xlim(0.0, float(x[-1]) if len(x) else None)
     if isinstance(heard, xr.Dataset):
-        style.overall(figure, name_of(heard), details_of(heard))
+        style.set_figure_title(figure, short_name(heard), title_details(heard))
     else:
-        style.overall(figure, "reception", f"{len(heard)} rows, {heard['receiver'].nunique()} receivers")
-    return style.root(figure)
+        style.set_figure_title(figure, "reception", f"{len(heard)} rows, {heard['receiver'].nunique()} receivers")
+    return style.root_figure(figure)

@@ -10,16 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.contract import Model
-from airflock.core.vocabulary import asks
-from airflock.support.errors import RuleError
-from airflock.view.stage.arrows import vectors
+from airflock.core import Model, argument_names
+from airflock.support import RuleError
+from airflock.view.stage.arrows import vector_fields
 
 Array = NDArray[Any]
-FASTEST = 1e3  # m/s; a larger allowed difference is drawn as none
+MAX_DIFFERENCE = 1e3  # m/s; a larger allowed difference is drawn as none
 
 
-class Response(NamedTuple):
+class RuleResponse(NamedTuple):
     """Answer of a pair rule along one axis: to each vector among its sums."""
 
     name: str
@@ -36,48 +35,50 @@ def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
     }  # fmt: skip
     if model.neighbour is None:
         raise RuleError(f"model {model.name} has no rule neighbour")
-    names = asks(model.neighbour, "neighbour", model.name)
+    names = argument_names(model.neighbour, "neighbour", model.name)
     if "dv" in names and dv == 0.0:
         given["dv"] = 1e-6  # as a driver guards it: the length of nothing divides safely
     return model.neighbour(*(given[name] for name in names))
 
 
-def repulsion(model: Model, p: Any, r: Array) -> list[Response]:
+def repulsion_curve(model: Model, p: Any, r: Array) -> list[RuleResponse]:
     """Push away from a neighbour at rest at distances r (m), positive outwards; one Response per vector."""
     sums = [pair_sums(model, p, float(d)) for d in r]
     return [
-        Response(name, np.array([-getattr(s, x) for s in sums], dtype=float))
-        for name, (x, _) in vectors(model.Sums).items()
+        RuleResponse(name, np.array([-getattr(s, x) for s in sums], dtype=float))
+        for name, (x, _) in vector_fields(model.Sums).items()
     ]
 
 
-def alignment(model: Model, p: Any, r: Array, dv: float) -> list[Response]:
+def alignment_curve(model: Model, p: Any, r: Array, dv: float) -> list[RuleResponse]:
     """Response along a velocity difference dv (m/s) at distances r (m), beyond what a neighbour at rest causes."""
     rest = [pair_sums(model, p, float(d)) for d in r]
     moved = [pair_sums(model, p, float(d), dv) for d in r]
     return [
-        Response(name, np.array([getattr(b, y) - getattr(a, y) for a, b in zip(rest, moved, strict=True)], dtype=float))
-        for name, (_, y) in vectors(model.Sums).items()
+        RuleResponse(
+            name, np.array([getattr(b, y) - getattr(a, y) for a, b in zip(rest, moved, strict=True)], dtype=float)
+        )
+        for name, (_, y) in vector_fields(model.Sums).items()
     ]
 
 
-def allowed_difference(model: Model, p: Any, r: Array) -> Array:
+def allowed_difference_curve(model: Model, p: Any, r: Array) -> Array:
     """Largest velocity difference (m/s) at distances r (m) that causes no alignment; nan where none does.
 
     Found by halving an interval, from the rule alone: any difference above it must cause some.
     """
-    return np.array([_allowed(model, p, float(d)) for d in r])
+    return np.array([_largest_allowed_difference(model, p, float(d)) for d in r])
 
 
-def _allowed(model: Model, p: Any, r: float) -> float:
-    fields = [y for _, y in vectors(model.Sums).values()]
+def _largest_allowed_difference(model: Model, p: Any, r: float) -> float:
+    fields = [y for _, y in vector_fields(model.Sums).values()]
     rest = pair_sums(model, p, r)
 
     def aligns(dv: float) -> bool:
         moved = pair_sums(model, p, r, dv)
         return any(abs(getattr(moved, y) - getattr(rest, y)) > 1e-12 * dv for y in fields)
 
-    low, high = 0.0, FASTEST
+    low, high = 0.0, MAX_DIFFERENCE
     if not aligns(high):
         return float("nan")
     if aligns(1e-6):
@@ -88,14 +89,14 @@ def _allowed(model: Model, p: Any, r: float) -> float:
     return high
 
 
-def wall_response(model: Model, p: Any, distance: Array, v: float) -> list[Response]:
+def wall_curve(model: Model, p: Any, distance: Array, v: float) -> list[RuleResponse]:
     """What one wall adds to the command of an agent that flies straight at it at v (m/s), positive inwards."""
     if model.boundary is None:
         raise RuleError(f"model {model.name} has no rule boundary")
-    names = asks(model.boundary, "boundary", model.name)
+    names = argument_names(model.boundary, "boundary", model.name)
     given = {"nx": 1.0, "ny": 0.0, "nz": 0.0, "vx": -v, "vy": 0.0, "vz": 0.0, "p": p}
     answers = [model.boundary(*({**given, "distance": float(d)}[name] for name in names)) for d in distance]
     return [
-        Response(name, np.array([getattr(a, x) for a in answers], dtype=float))
-        for name, (x, _) in vectors(model.Walls).items()
+        RuleResponse(name, np.array([getattr(a, x) for a in answers], dtype=float))
+        for name, (x, _) in vector_fields(model.Walls).items()
     ]

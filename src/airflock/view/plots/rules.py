@@ -11,19 +11,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airflock.core.contract import Model
-from airflock.core.contract.declared import COMMANDS
-from airflock.core.vocabulary import asks
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import RuleError
+from airflock.core import COMMANDS, Model, argument_names
+from airflock.scenarios import Scenario
+from airflock.support import RuleError
 from airflock.view.plots import style
-from airflock.view.plots.flight import name_of
-from airflock.view.plots.responses import FASTEST, Array, alignment, allowed_difference, repulsion, wall_response
-from airflock.view.plots.save import positive
-from airflock.view.stage.arrows import vectors, word_of
+from airflock.view.plots.flight import short_name
+from airflock.view.plots.responses import (
+    MAX_DIFFERENCE,
+    Array,
+    alignment_curve,
+    allowed_difference_curve,
+    repulsion_curve,
+    wall_curve,
+)
+from airflock.view.plots.save import check_positive
+from airflock.view.stage.arrows import term_name_and_unit, vector_fields
 
-POINTS = 400
-SHARES = (0.5, 1.0, 2.0)  # of the velocity difference, in the panel of alignment
+CURVE_POINTS = 400
+DIFFERENCE_SHARES = (0.5, 1.0, 2.0)  # of the velocity difference, in the panel of alignment
 
 
 def rules(
@@ -53,28 +58,30 @@ def rules(
     preferred = model.preferred_speed(p) if model.preferred_speed else 1.0
     dv = float(preferred if difference is None else difference)
     v = float(preferred if speed is None else speed)
-    reach = float(farthest if farthest is not None else _farthest(scenario))
-    positive(difference=dv, speed=v, farthest=reach)
-    r = np.linspace(reach / POINTS, reach, POINTS)
+    reach = float(farthest if farthest is not None else _largest_distance(scenario))
+    check_positive(difference=dv, speed=v, farthest=reach)
+    r = np.linspace(reach / CURVE_POINTS, reach, CURVE_POINTS)
     unit = COMMANDS[model.command].replace("^2", "²")
     draws: list[tuple[str, Callable[[Axes], None]]] = []
-    if model.neighbour is not None and (model.terms or len(vectors(model.Sums)) > 1):
-        for stem in vectors(model.Sums):
-            draws.append((word_of(model, stem)[0], partial(_term_panel, model=model, p=p, r=r, dv=dv, stem=stem)))
+    if model.neighbour is not None and (model.terms or len(vector_fields(model.Sums)) > 1):
+        for stem in vector_fields(model.Sums):
+            draws.append(
+                (term_name_and_unit(model, stem)[0], partial(_term_panel, model=model, p=p, r=r, dv=dv, stem=stem))
+            )
     elif model.neighbour is not None:
         draws.append(("one neighbour", partial(_pair_panel, model=model, p=p, r=r, dv=dv, unit=unit)))
         draws.append(("alignment", partial(_alignment_panel, model=model, p=p, r=r, dv=dv, unit=unit)))
     if model.boundary is not None:
         draws.append(("one wall", partial(_wall_panel, model=model, p=p, r=r, v=v, unit=unit)))
-    figure, panels = style.panels(ax, 1, len(draws), 3.4 * len(draws) + 0.4, 3.1)
+    figure, panels = style.figure_and_panels(ax, 1, len(draws), 3.4 * len(draws) + 0.4, 3.1)
     for axes, (title, draw), name in zip(panels[0], draws, "ABCDEFGH", strict=False):
         draw(axes)
-        style.letter(axes, f"{name}  {title}")
-    style.overall(figure, name_of(scenario), f"rules of {model.name} against distance")
-    return style.root(figure)
+        style.set_panel_letter(axes, f"{name}  {title}")
+    style.set_figure_title(figure, short_name(scenario), f"rules of {model.name} against distance")
+    return style.root_figure(figure)
 
 
-def _farthest(scenario: Scenario) -> float:
+def _largest_distance(scenario: Scenario) -> float:
     known = scenario.model.interaction_range or scenario.model.reach
     span = float(known(scenario.parameters)) if known else scenario.radio.range
     return 1.25 * (span if span < 1e4 else min(scenario.radio.range, 100.0))
@@ -82,74 +89,76 @@ def _farthest(scenario: Scenario) -> float:
 
 def _term_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, stem: str) -> None:
     """One term of a law: what a neighbour at rest adds to it, and what its motion adds, up to the law's own reach."""
-    word, unit = word_of(model, stem)
+    word, unit = term_name_and_unit(model, stem)
     assert model.neighbour is not None
-    by_velocity = bool({"dvx", "dvy", "dv"} & set(asks(model.neighbour, "neighbour", model.name)))
+    by_velocity = bool({"dvx", "dvy", "dv"} & set(argument_names(model.neighbour, "neighbour", model.name)))
     inside = r < float(model.reach(p)) if model.reach else np.full(len(r), True)
-    place = list(vectors(model.Sums)).index(stem)
-    away = np.where(inside, repulsion(model, p, r)[place].values, 0.0)
+    place = list(vector_fields(model.Sums)).index(stem)
+    away = np.where(inside, repulsion_curve(model, p, r)[place].values, 0.0)
     if away.any():
         towards = away.max() <= 0.0
         label = "towards it" if towards else "away from it"
         axes.plot(r, -away if towards else away, color=style.BLUE, linewidth=1.8, label=label)
-    for share, color in zip(SHARES if by_velocity else (1.0,), (style.ORANGE, style.RED, style.PURPLE), strict=False):
-        along = np.where(inside, alignment(model, p, r, share * dv)[place].values, 0.0)
+    for share, color in zip(
+        DIFFERENCE_SHARES if by_velocity else (1.0,), (style.ORANGE, style.RED, style.PURPLE), strict=False
+    ):
+        along = np.where(inside, alignment_curve(model, p, r, share * dv)[place].values, 0.0)
         if along.any():
             label = f"$\\Delta v$ = {share * dv:.3g} m/s" if by_velocity else "along its heading"
             axes.plot(r, along, color=color, linewidth=1.8, label=label)
     axes.axhline(0.0, color=style.GREY, linewidth=0.6, zorder=0)
-    style.dress(axes, "distance (m)", f"{word} ({unit})" if unit else word)
+    style.style_axes(axes, "distance (m)", f"{word} ({unit})" if unit else word)
     axes.set_xlim(0.0, float(r[-1]))
-    style.legend(axes)
+    style.add_legend(axes)
 
 
 def _pair_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
     """Fig. 6 itself: repulsion, largest allowed difference, and the difference at hand."""
-    pushes = repulsion(model, p, r)
-    allowed = allowed_difference(model, p, r)
+    pushes = repulsion_curve(model, p, r)
+    allowed = allowed_difference_curve(model, p, r)
     shared = unit == "m/s"  # one axis serves both
     for line, push in zip((style.BLUE, style.SKY, style.PURPLE), pushes, strict=False):
-        axes.plot(r, push.values, color=line, linewidth=1.8, label=_named("repulsion", push.name))
-    other = axes if shared else style.second_axis(axes, "velocity difference (m/s)", style.GREEN)
+        axes.plot(r, push.values, color=line, linewidth=1.8, label=_curve_label("repulsion", push.name))
+    other = axes if shared else style.add_right_axis(axes, "velocity difference (m/s)", style.GREEN)
     other.plot(r, allowed, color=style.GREEN, linewidth=1.8, label="largest allowed\nvelocity difference")
     other.axhline(dv, color=style.RED, linewidth=1.2, linestyle=(0, (5, 3)), label="actual difference")
-    beyond = np.nan_to_num(allowed, nan=FASTEST) < dv
+    beyond = np.nan_to_num(allowed, nan=MAX_DIFFERENCE) < dv
     other.fill_between(r, allowed, dv, where=beyond.tolist(), color=style.RED, alpha=0.08, linewidth=0.0)
-    style.dress(axes, "distance (m)", f"speed ({unit})" if shared else f"repulsion ({unit})")
+    style.style_axes(axes, "distance (m)", f"speed ({unit})" if shared else f"repulsion ({unit})")
     lines = axes.get_legend_handles_labels()[0] + ([] if shared else other.get_legend_handles_labels()[0])
     highest = max([2.0 * dv] + ([float(push.values.max()) for push in pushes] if shared else []))
     other.set_ylim(min(0.0, axes.get_ylim()[0] if shared else 0.0), 1.25 * highest)
     axes.set_xlim(0.0, float(r[-1]))
-    style.legend(axes, lines)
+    style.add_legend(axes, lines)
 
 
 def _alignment_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
-    for share, color in zip(SHARES, (style.ORANGE, style.RED, style.PURPLE), strict=True):
-        for number, term in enumerate(alignment(model, p, r, share * dv)):
+    for share, color in zip(DIFFERENCE_SHARES, (style.ORANGE, style.RED, style.PURPLE), strict=True):
+        for number, term in enumerate(alignment_curve(model, p, r, share * dv)):
             dashes = ("-", "--", ":")[number % 3]
-            label = _named(f"$\\Delta v$ = {share * dv:.3g} m/s", term.name)
+            label = _curve_label(f"$\\Delta v$ = {share * dv:.3g} m/s", term.name)
             axes.plot(r, term.values, color=color, linewidth=1.8, linestyle=dashes, label=label)
-    style.dress(axes, "distance (m)", f"alignment term ({unit})")
+    style.style_axes(axes, "distance (m)", f"alignment term ({unit})")
     axes.set_xlim(0.0, float(r[-1]))
     low, high = axes.get_ylim()
     axes.set_ylim(min(0.0, low), 1.4 * high)  # room for the legend
-    style.legend(axes)
+    style.add_legend(axes)
 
 
 def _wall_panel(axes: Axes, *, model: Model, p: Any, r: Array, v: float, unit: str) -> None:
     reach = float(r[-1])
-    distance = np.linspace(-0.1 * reach, reach, POINTS)
+    distance = np.linspace(-0.1 * reach, reach, CURVE_POINTS)
     colors = (style.ORANGE, style.RED, style.PURPLE)
-    for share, color in zip(SHARES, colors, strict=True):
-        for number, term in enumerate(wall_response(model, p, distance, share * v)):
+    for share, color in zip(DIFFERENCE_SHARES, colors, strict=True):
+        for number, term in enumerate(wall_curve(model, p, distance, share * v)):
             dashes = ("-", "--", ":")[number % 3]
-            label = _named(f"{share * v:.3g} m/s towards it", term.name)
+            label = _curve_label(f"{share * v:.3g} m/s towards it", term.name)
             axes.plot(distance, term.values, color=color, linewidth=1.8, linestyle=dashes, label=label)
-    axes.axvspan(float(distance[0]), 0.0, color=style.PALE, alpha=0.6, linewidth=0.0)
-    style.dress(axes, "distance to the wall (m)", f"wall term ({unit})")
+    axes.axvspan(float(distance[0]), 0.0, color=style.PALE_GREY, alpha=0.6, linewidth=0.0)
+    style.style_axes(axes, "distance to the wall (m)", f"wall term ({unit})")
     axes.set_xlim(float(distance[0]), reach)
-    style.legend(axes)
+    style.add_legend(axes)
 
 
-def _named(what: str, name: str) -> str:
-    return f"{what}, {name}" if name else what
+def _curve_label(label: str, name: str) -> str:
+    return f"{label}, {name}" if name else label

@@ -12,28 +12,28 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import RecordingError
+from airflock.scenarios import Scenario
+from airflock.support import RecordingError
 from airflock.view.plots import style
 from airflock.view.plots.flight import (
-    Paths,
-    View,
-    details_of,
-    extent,
-    flown_with,
-    name_of,
-    paths_of,
+    FlightPaths,
+    Projection,
+    crosses_periodic_face,
+    paths_in_window,
+    picture_extent,
+    projection,
+    scenario_or_none,
+    short_name,
     speed_range,
-    through_face,
-    view_of,
-    walls,
+    title_details,
+    wall_lines,
 )  # fmt: skip
-from airflock.world.shapes import BOX, CYLINDER, SEGMENT, TRIANGLE
+from airflock.world import BOX, CYLINDER, SEGMENT, TRIANGLE
 
-MARGIN = 40.0  # m of scenery shown around the paths
-MOST = 4000  # shapes drawn in space
-ELEVATION = 42.0  # deg; from which a city is seen
-HEIGHT = LinearSegmentedColormap.from_list("height", ["#F2F2F2", "#8A8A8A"], N=256)
+SCENERY_MARGIN = 40.0  # m of scenery shown around the paths
+MAX_SHAPES = 4000  # shapes drawn in space
+VIEW_ELEVATION_DEG = 42.0  # deg; from which a city is seen
+HEIGHT_COLOURS = LinearSegmentedColormap.from_list("height", ["#F2F2F2", "#8A8A8A"], N=256)
 
 
 def through(
@@ -60,66 +60,66 @@ def through(
     >>> airflock.plots.through(city).axes[0].get_xlabel()
     'east (m)'
     """
-    scenario, shown = flown_with(recording), paths_of(recording, start, stop)
+    scenario, shown = scenario_or_none(recording), paths_in_window(recording, start, stop)
     if scenario is None:
         raise RecordingError("recording: tracks have no scene; plot its trajectories")
     if space and shown.position.shape[1] == 2:
         raise RecordingError("recording: was flown in a plane; draw it from above")
-    figure, axes = style.place(ax, 7.4, 5.4 if space else 6.0)
+    figure, axes = style.figure_and_axes(ax, 7.4, 5.4 if space else 6.0)
     scale = Normalize(*speed_range(shown))
     low, high = _around(shown)
     goals = scenario.waypoints()
     goals = goals[((goals[:, :2] >= low) & (goals[:, :2] <= high)).all(axis=1)]
     if space:
-        in_space(axes, scenario, shown, scale, goals)
+        draw_in_space(axes, scenario, shown, scale, goals)
     else:
-        rows = nearby(scenario, shown)
-        heights = ground_plans(axes, rows)
+        rows = shapes_near_paths(scenario, shown)
+        heights = draw_ground_plans(axes, rows)
         _paths(axes, shown, scale)
-        _stars(axes, goals[:, :2])
+        _draw_goals(axes, goals[:, :2])
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-        style.dress(axes, "east (m)", "north (m)", grid=False)
+        style.style_axes(axes, "east (m)", "north (m)", grid=False)
         if heights is not None and shown.position.shape[1] == 3:
-            style.colour_bar(figure, heights, axes, "height of the scene (m)", shrink=0.8)
-    bar = ScalarMappable(scale, style.SPEED)
-    style.colour_bar(figure, bar, axes, "speed (m/s)", shrink=0.6 if space else 0.8)
-    style.legend(axes, above=True)
-    style.heading(axes, name_of(recording), details_of(recording, shown))
+            style.add_colour_bar(figure, heights, axes, "height of the scene (m)", shrink=0.8)
+    bar = ScalarMappable(scale, style.SPEED_COLOURS)
+    style.add_colour_bar(figure, bar, axes, "speed (m/s)", shrink=0.6 if space else 0.8)
+    style.add_legend(axes, above=True)
+    style.set_title(axes, short_name(recording), title_details(recording, shown))
     return figure
 
 
-def in_space(axes: Any, scenario: Scenario, shown: Paths, scale: Normalize, goals: NDArray[Any]) -> None:
+def draw_in_space(axes: Any, scenario: Scenario, paths: FlightPaths, scale: Normalize, goals: NDArray[Any]) -> None:
     """Draw outlines of the scene, paths, goals and a scale of three axes, obliquely from above."""
-    view, rows = view_of(3, elevation_deg=ELEVATION), nearby(scenario, shown)
-    box = extent(shown, scenario.world, view, margin=0.02, around=outlines_in_space(rows))
-    for wall in walls(scenario.world):
+    view, rows = projection(3, elevation_deg=VIEW_ELEVATION_DEG), shapes_near_paths(scenario, paths)
+    box = picture_extent(paths, scenario.world, view, margin=0.02, around=outlines_in_space(rows))
+    for wall in wall_lines(scenario.world):
         axes.plot(*view(wall.corners), color=style.RED if wall.obstacle else style.BLUE, linewidth=0.8, zorder=1)
     draw_outlines(axes, rows, view)
-    stride = max(1, len(shown.times) * shown.agents // 60_000)
-    where, speed = shown.position[::stride], shown.speed[::stride]
+    stride = max(1, len(paths.times) * paths.agents // 60_000)
+    where, speed = paths.position[::stride], paths.speed[::stride]
     pieces = np.stack([where[:-1], where[1:]], axis=1).transpose(0, 3, 1, 2).reshape(-1, 2, 3)
     pace = (0.5 * (speed[:-1] + speed[1:])).ravel()
-    kept = np.isfinite(pieces).all(axis=(1, 2)) & ~through_face(pieces, scenario.world)
+    kept = np.isfinite(pieces).all(axis=(1, 2)) & ~crosses_periodic_face(pieces, scenario.world)
     flat = np.stack(view(pieces[kept], axis=2), axis=-1)
-    lines = LineCollection(list(flat), norm=scale, cmap=style.SPEED, linewidths=0.9, zorder=3)
+    lines = LineCollection(list(flat), norm=scale, cmap=style.SPEED_COLOURS, linewidths=0.9, zorder=3)
     lines.set_array(pace[kept])
     axes.add_collection(lines)
-    ends = np.stack(view(shown.position[-1].T), axis=-1)
+    ends = np.stack(view(paths.position[-1].T), axis=-1)
     axes.scatter(*ends.T, s=14.0, color=style.INK, edgecolors="white", linewidths=0.4, zorder=5, label="at the end")
-    _stars(axes, np.stack(view(goals), axis=-1))
+    _draw_goals(axes, np.stack(view(goals), axis=-1))
     _triad(axes, view, box)
     axes.set(xlim=box[:2], ylim=box[2:], aspect="equal")
     axes.set_axis_off()
 
 
-def _stars(axes: Any, points: NDArray[Any]) -> None:
+def _draw_goals(axes: Any, points: NDArray[Any]) -> None:
     """Goals."""
     if len(points):
         look: dict[str, Any] = {"s": 90.0, "color": style.ORANGE, "edgecolors": style.INK, "linewidths": 0.5}
         axes.scatter(*points.T, marker="*", zorder=6, label="goal", **look)
 
 
-def _triad(axes: Any, view: View, box: tuple[float, float, float, float]) -> None:
+def _triad(axes: Any, view: Projection, box: tuple[float, float, float, float]) -> None:
     """Arrows of a round length to the east, north and up, at the lower left."""
     left, right, bottom, top = box
     span = 0.16 * (right - left)
@@ -135,26 +135,26 @@ def _triad(axes: Any, view: View, box: tuple[float, float, float, float]) -> Non
             foot,
             arrowprops={"arrowstyle": "-|>", "color": style.GREY, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
         )
-        axes.annotate(name, foot + 1.08 * tip, fontsize=style.SMALL, color=style.GREY, ha="center", va="center")
+        axes.annotate(name, foot + 1.08 * tip, fontsize=style.SMALL_SIZE, color=style.GREY, ha="center", va="center")
     below = [foot[0], corner[1] - 0.035 * (top - bottom)]  # of all arrows: one may point down
-    axes.annotate(f"{length:g} m", below, fontsize=style.SMALL, color=style.GREY)
+    axes.annotate(f"{length:g} m", below, fontsize=style.SMALL_SIZE, color=style.GREY)
 
 
-def _around(shown: Paths) -> tuple[NDArray[Any], NDArray[Any]]:
+def _around(shown: FlightPaths) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the lower and the upper corner (2,) of the ground plan that is shown around the paths, m."""
     plan = shown.position[:, :2]
-    return np.nanmin(plan, axis=(0, 2)) - MARGIN, np.nanmax(plan, axis=(0, 2)) + MARGIN
+    return np.nanmin(plan, axis=(0, 2)) - SCENERY_MARGIN, np.nanmax(plan, axis=(0, 2)) + SCENERY_MARGIN
 
 
-def nearby(scenario: Scenario, shown: Paths) -> NDArray[np.float64]:
+def shapes_near_paths(scenario: Scenario, paths: FlightPaths) -> NDArray[np.float64]:
     """Rows of the shapes around the paths, without the ground."""
     shapes = scenario.stands().shapes
-    low, high = _around(shown)
+    low, high = _around(paths)
     inside = (shapes[:, 3:5] > low).all(axis=1) & (shapes[:, :2] < high).all(axis=1)
     return np.asarray(shapes[inside & np.isin(shapes[:, 6], (BOX, CYLINDER, SEGMENT, TRIANGLE))])
 
 
-def ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection | None:
+def draw_ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection | None:
     """Ground plans; a higher solid is darker. Returns what a colour bar of heights (m) needs, where there are any."""
     solid = None
     boxes, trunks = rows[rows[:, 6] == BOX], rows[rows[:, 6] == CYLINDER]
@@ -163,7 +163,9 @@ def ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection | None
     if patches:
         height = np.minimum(np.concatenate([boxes[:, 5], trunks[:, 5]]), 1000.0)
         grey = Normalize(0.0, max(float(height.max()), 1.0))
-        solid = PatchCollection(patches, cmap=HEIGHT, norm=grey, edgecolors=style.GREY, linewidths=0.3, zorder=1)
+        solid = PatchCollection(
+            patches, cmap=HEIGHT_COLOURS, norm=grey, edgecolors=style.GREY, linewidths=0.3, zorder=1
+        )
         solid.set_array(height)
         axes.add_collection(solid)
     walls, faces = rows[rows[:, 6] == SEGMENT], rows[rows[:, 6] == TRIANGLE]
@@ -173,14 +175,14 @@ def ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection | None
     return solid
 
 
-def draw_outlines(axes: Any, rows: NDArray[np.float64], view: View) -> None:
+def draw_outlines(axes: Any, rows: NDArray[np.float64], view: Projection) -> None:
     """Draw outlines of shapes in space, and pale roofs: without them front edges are easily taken for back ones."""
     lines = [np.column_stack(view(line)) for line in outlines_in_space(rows)]
     axes.add_collection(LineCollection(lines, colors=style.GREY, linewidths=0.5, alpha=0.7, zorder=1), autolim=False)
     upright = rows[np.isin(rows[:, 6], (BOX, CYLINDER))]
-    rings = [(outline_from_above(row), row[5]) for row in upright[:MOST]]
+    rings = [(outline_from_above(row), row[5]) for row in upright[:MAX_SHAPES]]
     roofs = [np.column_stack(view(np.column_stack([ring, np.full(len(ring), top)]))) for ring, top in rings]
-    axes.add_collection(PolyCollection(roofs, facecolors=style.PALE, alpha=0.6, zorder=1), autolim=False)
+    axes.add_collection(PolyCollection(roofs, facecolors=style.PALE_GREY, alpha=0.6, zorder=1), autolim=False)
 
 
 def outlines_in_space(rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -189,7 +191,7 @@ def outlines_in_space(rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     Segments are left out: they are the plans of the world's own walls, which `walls` gives with their heights.
     """
     lines: list[NDArray[np.float64]] = []
-    for r in rows[rows[:, 6] != SEGMENT][:MOST]:
+    for r in rows[rows[:, 6] != SEGMENT][:MAX_SHAPES]:
         if r[6] == TRIANGLE:
             lines.append(r[[7, 8, 9, 10, 11, 12, 13, 14, 15, 7, 8, 9]].reshape(4, 3))
             continue
@@ -211,23 +213,23 @@ def outline_from_above(row: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([[row[0], row[1]], [row[3], row[1]], [row[3], row[4]], [row[0], row[4]], [row[0], row[1]]])
 
 
-def scenery(recording: xr.Dataset, shown: Paths) -> list[NDArray[np.float64]]:
+def scenery_lines(recording: xr.Dataset, paths: FlightPaths) -> list[NDArray[np.float64]]:
     """Outlines of what stands around the paths, as lines (point, axis) in m; none for tracks."""
-    scenario = flown_with(recording)
+    scenario = scenario_or_none(recording)
     if scenario is None or scenario.scene.kind == "none":
         return []
-    rows = nearby(scenario, shown)
-    return outlines_in_space(rows) if shown.position.shape[1] == 3 else [outline_from_above(r) for r in rows]
+    rows = shapes_near_paths(scenario, paths)
+    return outlines_in_space(rows) if paths.position.shape[1] == 3 else [outline_from_above(r) for r in rows]
 
 
-def _paths(axes: Any, shown: Paths, scale: Normalize) -> None:
-    stride = max(1, len(shown.times) * shown.agents // 60_000)
-    where, speed = shown.position[::stride, :2], shown.speed[::stride]
-    for agent in range(shown.agents):
+def _paths(axes: Any, paths: FlightPaths, scale: Normalize) -> None:
+    stride = max(1, len(paths.times) * paths.agents // 60_000)
+    where, speed = paths.position[::stride, :2], paths.speed[::stride]
+    for agent in range(paths.agents):
         line = where[:, :, agent]
         segments = np.stack([line[:-1], line[1:]], axis=1)
-        pieces = LineCollection(list(segments), norm=scale, cmap=style.SPEED, linewidths=0.9, zorder=3)
+        pieces = LineCollection(list(segments), norm=scale, cmap=style.SPEED_COLOURS, linewidths=0.9, zorder=3)
         pieces.set_array(speed[:-1, agent])
         axes.add_collection(pieces)
     look: dict[str, Any] = {"s": 14.0, "color": style.INK, "edgecolors": "white", "linewidths": 0.4}
-    axes.scatter(*shown.position[-1, :2], zorder=5, label="at the end", **look)
+    axes.scatter(*paths.position[-1, :2], zorder=5, label="at the end", **look)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from airflock.view.plots import style
 
-CELLS = 14
+CELLS_PER_AXIS = 14
 
 
 def slices(
@@ -44,7 +44,7 @@ def slices(
     """
     keys = list(bounds)
     n = max(len(keys) - 1, 1)
-    figure, grid = style.panels(ax, n, n, 1.2 * n + 1.6, 1.2 * n + 1.0, layout="")
+    figure, grid = style.figure_and_panels(ax, n, n, 1.2 * n + 1.6, 1.2 * n + 1.0, layout="")
     values = table[objective].to_numpy(float)
     sound = np.isfinite(values)
     low, high = (float(values[sound].min()), float(values[sound].max())) if sound.any() else (0.0, 1.0)
@@ -58,18 +58,18 @@ def slices(
             drawn.append(axes)
             x, y = keys[column], keys[row + 1]
             cells = _best_in_cells(table.loc[sound, [x, y]].to_numpy(), values[sound], bounds[x], bounds[y], maximise)
-            edges = [np.linspace(*bounds[key], CELLS + 1) for key in (x, y)]
+            edges = [np.linspace(*bounds[key], CELLS_PER_AXIS + 1) for key in (x, y)]
             mesh = axes.pcolormesh(*edges, cells, cmap="viridis", vmin=low, vmax=high, rasterized=True)
-            axes.set_facecolor(style.PALE)  # nobody was there
+            axes.set_facecolor(style.PALE_GREY)  # nobody was there
             if best is not None:
                 axes.plot(best[x], best[y], "x", color=style.RED, markersize=4.0)
             labels = (x.rpartition(".")[2] if row == n - 1 else "", y.rpartition(".")[2] if column == 0 else "")
-            style.dress(axes, *labels, grid=False)
-            axes.tick_params(labelbottom=row == n - 1, labelleft=column == 0, labelsize=style.SMALL - 2.0)
+            style.style_axes(axes, *labels, grid=False)
+            axes.tick_params(labelbottom=row == n - 1, labelleft=column == 0, labelsize=style.SMALL_SIZE - 2.0)
     if mesh is not None:
-        style.colour_bar(figure, mesh, drawn, f"best {objective} in each cell")
-    style.overall(figure, what or "Pairwise slices", "grey: no candidate there; cross: chosen")
-    return style.root(figure)
+        style.add_colour_bar(figure, mesh, drawn, f"best {objective} in each cell")
+    style.set_figure_title(figure, what or "Pairwise slices", "grey: no candidate there; cross: chosen")
+    return style.root_figure(figure)
 
 
 def _best_in_cells(
@@ -78,9 +78,9 @@ def _best_in_cells(
     """Best value (row, column) in each cell of two ranges, masked where there is none."""
     sign = 1.0 if maximise else -1.0
     index = [
-        np.clip(((points[:, i] - low) / (high - low) * CELLS).astype(int), 0, CELLS - 1)
+        np.clip(((points[:, i] - low) / (high - low) * CELLS_PER_AXIS).astype(int), 0, CELLS_PER_AXIS - 1)
         for i, (low, high) in enumerate((x, y))
     ]
-    cells = np.full((CELLS, CELLS), -np.inf)
+    cells = np.full((CELLS_PER_AXIS, CELLS_PER_AXIS), -np.inf)
     np.maximum.at(cells, (index[1], index[0]), sign * values)
     return np.ma.masked_invalid(np.where(np.isfinite(cells), sign * cells, np.nan))

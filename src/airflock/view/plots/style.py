@@ -16,30 +16,30 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
-from airflock.support.errors import AirflockError
-from airflock.view.stage.colours import WHEEL
+from airflock.support import AirflockError
+from airflock.view.stage.colours import WHEEL_STOPS
 
 # Okabe & Ito, "Color universal design" (2008)
 BLUE, GREEN, RED, ORANGE, SKY, PURPLE = "#0072B2", "#009E73", "#D55E00", "#E69F00", "#56B4E9", "#CC79A7"
-INK, GREY, PALE = "#222222", "#666666", "#D9D9D9"
-NIGHT = "#05070D"
-LINES = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY)
+INK, GREY, PALE_GREY = "#222222", "#666666", "#D9D9D9"
+NIGHT_SKY = "#05070D"
+LINE_COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY)
 
 # slow to fast; even in lightness like viridis, without the yellow that vanishes on white paper
-SPEED = LinearSegmentedColormap.from_list(
+SPEED_COLOURS = LinearSegmentedColormap.from_list(
     "speed", ["#2B1155", "#3B3C8F", "#2F6C9E", "#23938C", "#3FB76A", "#9CCB3B"], N=256
 )
-COMPASS = LinearSegmentedColormap.from_list("compass", np.vstack([WHEEL, WHEEL[:1]]) / 255.0, N=256)
-TEXT, SMALL, HEAD = 9.0, 8.0, 11.0  # points
-RESOLUTION = 200  # dots per inch of pixel formats
+COMPASS_COLOURS = LinearSegmentedColormap.from_list("compass", np.vstack([WHEEL_STOPS, WHEEL_STOPS[:1]]) / 255.0, N=256)
+TEXT_SIZE, SMALL_SIZE, TITLE_SIZE = 9.0, 8.0, 11.0  # points
+PIXEL_RESOLUTION = 200  # dots per inch of pixel formats
 
 
-class Picture(Figure):
+class NotebookFigure(Figure):
     """A figure with a canvas of its own, which notebooks show without pyplot."""
 
     def __init__(self, width: float, height: float, background: str = "white"):
         """Size in inches."""
-        super().__init__(figsize=(width, height), facecolor=background, layout="compressed", dpi=RESOLUTION)
+        super().__init__(figsize=(width, height), facecolor=background, layout="compressed", dpi=PIXEL_RESOLUTION)
         FigureCanvasAgg(self)
 
     def _repr_png_(self) -> bytes:
@@ -48,28 +48,28 @@ class Picture(Figure):
         return stream.getvalue()
 
 
-def place(ax: Axes | None, width: float, height: float, layout: str = "") -> tuple[Figure, Any]:
+def figure_and_axes(ax: Axes | None, width: float, height: float, layout: str = "") -> tuple[Figure, Any]:
     """The axes that are given, in their figure; or a new figure of a size in inches with axes of its own."""
     if ax is not None:
         return ax.get_figure(root=True), ax  # type: ignore[return-value]
-    figure = Picture(width, height)
+    figure = NotebookFigure(width, height)
     if layout:
         figure.set_layout_engine(layout)  # type: ignore[arg-type]
     return figure, figure.add_subplot()
 
 
-def panels(
+def figure_and_panels(
     ax: Axes | None, rows: int, columns: int, width: float, height: float, *, background: str = "white",
     layout: str = "constrained", **shared: Any,
 ) -> tuple[Figure, Any]:  # fmt: skip
     """A figure of several panels and its axes (row, column): a new one of a size in inches, or one in the place of ax.
 
-    The latter is a SubFigure, which draws like any; `root` gives the figure that it is a part of.
+    The latter is a SubFigure, which draws like any; `root_figure` gives the figure that it is a part of.
     shared : sharex, sharey, height_ratios, as `Figure.subplots` takes them
     Raises AirflockError for axes that stand in no grid, so that nothing says where their place is.
     """
     if ax is None:
-        figure: Any = Picture(width, height, background)
+        figure: Any = NotebookFigure(width, height, background)
         if layout:
             figure.set_layout_engine(layout)
     else:
@@ -82,29 +82,29 @@ def panels(
     return figure, figure.subplots(rows, columns, squeeze=False, **shared)
 
 
-def root(figure: Figure) -> Figure:
+def root_figure(figure: Figure) -> Figure:
     """The whole figure that a picture is drawn in."""
     return figure.get_figure(root=True)
 
 
-def dress(axes: Axes, x: str = "", y: str = "", *, grid: bool = True) -> None:
+def style_axes(axes: Axes, x: str = "", y: str = "", *, grid: bool = True) -> None:
     """Labels with units, thin grey spines, a faint grid behind the data."""
-    axes.set_xlabel(x, fontsize=TEXT, color=INK)
-    axes.set_ylabel(y, fontsize=TEXT, color=INK)
-    axes.tick_params(labelsize=SMALL, color=GREY, labelcolor=INK, length=3, width=0.6)
+    axes.set_xlabel(x, fontsize=TEXT_SIZE, color=INK)
+    axes.set_ylabel(y, fontsize=TEXT_SIZE, color=INK)
+    axes.tick_params(labelsize=SMALL_SIZE, color=GREY, labelcolor=INK, length=3, width=0.6)
     for side, spine in axes.spines.items():
         spine.set_visible(side in ("left", "bottom"))
         spine.set_color(GREY)
         spine.set_linewidth(0.6)
     axes.set_axisbelow(True)
     if grid:
-        axes.grid(True, color=PALE, linewidth=0.5, alpha=0.7)
+        axes.grid(True, color=PALE_GREY, linewidth=0.5, alpha=0.7)
 
 
-def second_axis(axes: Axes, label: str, color: str) -> Axes:
+def add_right_axis(axes: Axes, label: str, color: str) -> Axes:
     """A second vertical axis on the right, in the colour of what it measures."""
     other = axes.twinx()
-    dress(other, y=label, grid=False)
+    style_axes(other, y=label, grid=False)
     other.yaxis.label.set_color(color)
     other.tick_params(axis="y", labelcolor=color)
     other.spines["left"].set_visible(False)
@@ -113,10 +113,10 @@ def second_axis(axes: Axes, label: str, color: str) -> Axes:
     return other
 
 
-def heading(axes: Axes, what: str, details: str = "", *, color: str = INK) -> None:
+def set_title(axes: Axes, title: str, details: str = "", *, color: str = INK) -> None:
     """Title at the upper left: what in bold, details in grey below it."""
     lift = 18.0 if details else 6.0
-    axes.set_title(what, loc="left", fontsize=HEAD, fontweight="bold", color=color, pad=lift, parse_math=False)
+    axes.set_title(title, loc="left", fontsize=TITLE_SIZE, fontweight="bold", color=color, pad=lift, parse_math=False)
     if details:
         shade = GREY if color == INK else color
         axes.annotate(
@@ -125,40 +125,47 @@ def heading(axes: Axes, what: str, details: str = "", *, color: str = INK) -> No
             (0.0, 6.0),
             xycoords="axes fraction",
             textcoords="offset points",
-            fontsize=SMALL,
+            fontsize=SMALL_SIZE,
             color=shade,
         )
 
 
-def letter(axes: Axes, name: str) -> None:
+def set_panel_letter(axes: Axes, name: str) -> None:
     """Name of a panel at its upper left, as journals print it."""
-    axes.set_title(name, loc="left", fontsize=TEXT, fontweight="bold", color=INK, pad=6.0)
+    axes.set_title(name, loc="left", fontsize=TEXT_SIZE, fontweight="bold", color=INK, pad=6.0)
 
 
-def overall(figure: Figure, what: str, details: str = "") -> None:
+def set_figure_title(figure: Figure, heading: str, details: str = "") -> None:
     """Title of a picture of several panels: what in bold, details behind it; both may hold any sign."""
-    look: dict[str, Any] = {"fontsize": TEXT + 0.5, "color": INK, "parse_math": False}
-    title = figure.suptitle(what, x=0.01, ha="left", fontweight="bold", **look)
+    look: dict[str, Any] = {"fontsize": TEXT_SIZE + 0.5, "color": INK, "parse_math": False}
+    title = figure.suptitle(heading, x=0.01, ha="left", fontweight="bold", **look)
     if details:
         behind = Annotation(details, (1.0, 0.0), (10.0, 0.0), title, "offset points", va="bottom", **look)
         figure.add_artist(behind)
 
 
-def legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 4, *, above: bool = False) -> None:
+def add_legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 4, *, above: bool = False) -> None:
     """Legend without a frame; above the axes, or where it hides least."""
     found = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
     if not found:
         return
     if above:
         axes.legend(
-            handles=found, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, frameon=False, fontsize=SMALL,
-            handlelength=1.6, columnspacing=1.2, borderaxespad=0.2,
-        )  # fmt: skip
+            handles=found,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            ncols=columns,
+            frameon=False,
+            fontsize=SMALL_SIZE,
+            handlelength=1.6,
+            columnspacing=1.2,
+            borderaxespad=0.2,
+        )
     else:
-        axes.legend(handles=found, loc="best", frameon=False, fontsize=SMALL, handlelength=1.6)
+        axes.legend(handles=found, loc="best", frameon=False, fontsize=SMALL_SIZE, handlelength=1.6)
 
 
-def colour_bar(
+def add_colour_bar(
     figure: Figure,
     shown: Any,
     axes: Axes | list[Axes],
@@ -170,7 +177,7 @@ def colour_bar(
 ) -> Colorbar:
     """Colour bar beside axes, without a frame."""
     bar = figure.colorbar(shown, ax=axes, shrink=shrink, aspect=32, pad=pad)
-    bar.set_label(label, fontsize=TEXT, color=color)
-    bar.ax.tick_params(labelsize=SMALL, labelcolor=color, color=color, length=2.5, width=0.6)
+    bar.set_label(label, fontsize=TEXT_SIZE, color=color)
+    bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=color, color=color, length=2.5, width=0.6)
     bar.outline.set_visible(False)
     return bar

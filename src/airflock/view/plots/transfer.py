@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airflock.core.maths import bell, peak, rising
-from airflock.scenarios.scenario import Scenario
+from airflock.core import bell, peak, rising
+from airflock.scenarios import Scenario
 from airflock.view.plots import style
-from airflock.view.plots.flight import name_of
+from airflock.view.plots.flight import short_name
 
 
 def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Figure:
@@ -27,20 +27,20 @@ def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Fig
     >>> len(airflock.plots.transfer(short).axes)
     3
     """
-    figure, grid = style.panels(ax, 1, 3, 7.4, 2.5, sharey=True)
+    figure, grid = style.figure_and_panels(ax, 1, 3, 7.4, 2.5, sharey=True)
     panels = grid[0]
     if scenario is None:
         v0, d, s, a = 1.0, 0.375, 1.0, 1.0
         labels = (r"$\phi/\phi_0$   ($d = 0.375\,\phi_0$)", r"$\phi/s$", r"$\phi/a$")
     else:
-        q = scenario.measured_by()
+        q = scenario.resolved_metrics()
         v0, d, s, a = q.v_flock or 1.0, q.v_tol or 0.375, q.r_tol, q.a_tol
         labels = (
             r"mean speed $\phi^{\mathrm{vel}}$ (m/s)",
             r"excursion $\phi^{\mathrm{wall}}$ (m)",
             r"collision risk $\phi^{\mathrm{coll}}$ (1)",
         )
-        style.overall(figure, name_of(scenario), "transfer functions of the fitness")
+        style.set_figure_title(figure, short_name(scenario), "transfer functions of the fitness")
     lowest = -3.0 * s if scenario is None else 0.0  # an excursion is never negative
     judge: Any = (lambda x: rising(x, v0, d), lambda x: bell(x, s), lambda x: peak(x, a))
     spans = (np.linspace(0.0, 1.4 * v0, 561), np.linspace(lowest, 3.0 * s, 601), np.linspace(0.0, 6.0 * a, 601))
@@ -57,11 +57,11 @@ def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Fig
             axes.plot([px], [py], "o", color=style.INK, markersize=4.0)
             side = (6.0, 4.0) if 0.0 < py < 1.0 else (-5.0, 6.0)
             where = "left" if side[0] > 0 else "right"
-            axes.annotate(text, (px, py), side, textcoords="offset points", fontsize=style.SMALL, ha=where)
-        style.dress(axes, label)
-        style.letter(axes, name)
+            axes.annotate(text, (px, py), side, textcoords="offset points", fontsize=style.SMALL_SIZE, ha=where)
+        style.style_axes(axes, label)
+        style.set_panel_letter(axes, name)
         axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4), useMathText=True)
-        axes.xaxis.get_offset_text().set_fontsize(style.SMALL)
+        axes.xaxis.get_offset_text().set_fontsize(style.SMALL_SIZE)
         axes.set_ylim(-0.03, 1.12)
-    panels[0].set_ylabel("partial fitness (1)", fontsize=style.TEXT, color=style.INK)
-    return style.root(figure)
+    panels[0].set_ylabel("partial fitness (1)", fontsize=style.TEXT_SIZE, color=style.INK)
+    return style.root_figure(figure)

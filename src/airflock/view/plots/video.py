@@ -13,17 +13,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.recordings.layout import check
-from airflock.support.errors import AirflockError
-from airflock.support.suffixes import VIDEOS
-from airflock.support.untrusted import own_path
-from airflock.view.plots.film_stage import Stage
-from airflock.view.plots.flight import window
-from airflock.view.plots.save import PictureError, complete_or_absent, positive
+from airflock.recordings import check_recording
+from airflock.support import VIDEOS, AirflockError, expand_path
+from airflock.view.plots.film_stage import VideoFrame
+from airflock.view.plots.flight import time_window
+from airflock.view.plots.save import PictureError, atomic_picture, check_positive
 
 Array = NDArray[Any]
 # GIF: a palette for each frame, because one for all would need all frames in memory
-PALETTE = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"
+GIF_PALETTE_FILTER = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"
 
 
 def video(
@@ -85,16 +83,16 @@ def video(
     >>> airflock.video(airflock.simulate(short), "flight.gif", fps=5, height=120).name
     'flight.gif'
     """
-    instants = _instants(recording, fps, speed, start, stop)
-    positive(height=height)
-    ffmpeg()
-    with complete_or_absent(path, VIDEOS) as temporary:
-        stage = Stage(recording, start, stop, tail=tail, height=height, speed=speed, space=space, chart=chart)
+    instants = _frame_times(recording, fps, speed, start, stop)
+    check_positive(height=height)
+    import_ffmpeg()
+    with atomic_picture(path, VIDEOS) as temporary:
+        stage = VideoFrame(recording, start, stop, tail=tail, height=height, speed=speed, space=space, chart=chart)
         film = _film(temporary, stage.size, fps)
         try:
             for number, instant in enumerate(instants):
                 try:
-                    film.send(stage.picture(float(instant)))
+                    film.send(stage.render(float(instant)))
                 except OSError as fault:  # a broken pipe: ffmpeg is gone and does not say why
                     raise RuntimeError(f"ffmpeg stopped after {number} pictures; is the disk full?") from fault
                 if done is not None:
@@ -102,10 +100,10 @@ def video(
         finally:
             film.close()
         _complete(temporary, len(instants))
-    return own_path(path)
+    return expand_path(path)
 
 
-def ffmpeg() -> Any:
+def import_ffmpeg() -> Any:
     """The package imageio_ffmpeg, which brings an ffmpeg; raises PictureError with what to install."""
     try:
         import imageio_ffmpeg
@@ -125,17 +123,17 @@ def frame_count(
     stop: float | None = None,
 ) -> int:
     """Number of pictures in such a video."""
-    return len(_instants(recording, fps, speed, start, stop))
+    return len(_frame_times(recording, fps, speed, start, stop))
 
 
-def _instants(recording: xr.Dataset, fps: float, speed: float, start: float | None, stop: float | None) -> Array:
+def _frame_times(recording: xr.Dataset, fps: float, speed: float, start: float | None, stop: float | None) -> Array:
     """Instants of the pictures, s."""
-    positive(fps=fps, speed=speed)
+    check_positive(fps=fps, speed=speed)
     if fps > 240.0:
         raise AirflockError(f"fps = {fps:g} lies outside (0, 240] 1/s")
-    check(recording)
+    check_recording(recording)
     times = recording["time"].values.astype(float)
-    begin, end = window(times, start, stop)
+    begin, end = time_window(times, start, stop)
     begin, end = max(begin, float(times[0])), min(end, float(times[-1]))
     count = max(1, math.floor((end - begin) * fps / speed + 1e-9) + 1)
     return begin + np.arange(count) * (speed / fps)
@@ -145,10 +143,15 @@ def _film(path: Path, size: tuple[int, int], fps: float) -> Any:
     """A running ffmpeg that takes one picture at a time."""
     given: dict[str, Any] = {"fps": fps, "pix_fmt_in": "rgba", "macro_block_size": 1, "ffmpeg_log_level": "quiet"}
     if path.suffix.lower() == ".gif":
-        given |= {"codec": "gif", "pix_fmt_out": "pal8", "output_params": ["-filter_complex", PALETTE], "quality": None}
+        given |= {
+            "codec": "gif",
+            "pix_fmt_out": "pal8",
+            "output_params": ["-filter_complex", GIF_PALETTE_FILTER],
+            "quality": None,
+        }
     else:
         given |= {"codec": "libx264", "quality": 8, "output_params": ["-movflags", "+faststart", "-f", "mp4"]}
-    film: Iterator[Any] = ffmpeg().write_frames(str(path), size, **given)
+    film: Iterator[Any] = import_ffmpeg().write_frames(str(path), size, **given)
     next(film)
     return film
 
@@ -156,7 +159,7 @@ def _film(path: Path, size: tuple[int, int], fps: float) -> Any:
 def _complete(path: Path, frames: int) -> None:
     """Raise unless the file holds what was handed over; ffmpeg itself says nothing about a full disk at the end."""
     try:
-        found, _ = ffmpeg().count_frames_and_secs(str(path))
+        found, _ = import_ffmpeg().count_frames_and_secs(str(path))
     except (RuntimeError, OSError) as fault:
         raise RuntimeError("ffmpeg wrote no complete video; is the disk full?") from fault
     if found != frames:

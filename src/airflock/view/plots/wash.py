@@ -11,22 +11,29 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from airflock.parts.aero import filaments
-from airflock.parts.aero.formation import forward, place_wings
-from airflock.parts.aero.lifting_line import induced_drag, shapes, solo_drag, solve
-from airflock.parts.aero.wing import pitch, segments_of
-from airflock.scenarios.scenario import Scenario
-from airflock.support.errors import RecordingError
+from airflock.parts.aero import (
+    filaments,
+    forward,
+    induced_drag,
+    pitch,
+    place_wings,
+    segments_of,
+    shapes,
+    solo_drag,
+    solve,
+)
+from airflock.scenarios import Scenario
+from airflock.support import RecordingError
 from airflock.view.plots import style
-from airflock.view.plots.flight import details_of, flown_with, name_of, paths_of
+from airflock.view.plots.flight import paths_in_window, scenario_or_none, short_name, title_details
 
 Array = NDArray[Any]
-BESIDE, AHEAD, BEHIND = 1.5, 1.0, 5.0  # spans of air shown around the birds
-POINTS = 260  # of the field along its longer side
-MOST = 60  # birds; the lifting line of more takes long without a compiler
+SPANS_BESIDE, SPANS_AHEAD, SPANS_BEHIND = 1.5, 1.0, 5.0  # spans of air shown around the birds
+FIELD_POINTS = 260  # of the field along its longer side
+MAX_BIRDS = 60  # birds; the lifting line of more takes long without a compiler
 
 
-class Formation(NamedTuple):
+class SolvedFormation(NamedTuple):
     """A flock as its lifting line sees it.
 
     place       : (bird, axis) m: ahead, across (to the left), up
@@ -42,7 +49,7 @@ class Formation(NamedTuple):
     solo: float
 
 
-def formation_at(scenario: Scenario, position: Array, velocity: Array) -> Formation:
+def solve_formation(scenario: Scenario, position: Array, velocity: Array) -> SolvedFormation:
     """Solve the lifting line of a flock: positions (axis, bird) m and velocities, m/s, by the rules themselves."""
     wing, n = scenario.wing, position.shape[1]
     m = segments_of(wing)
@@ -55,10 +62,10 @@ def formation_at(scenario: Scenario, position: Array, velocity: Array) -> Format
     solve(n, work, wing)
     drag = [induced_drag(i, work, work.circulation, wing) for i in range(n)]
     circulation, wash = (np.array(part)[:, :m] for part in (work.circulation, work.wash))
-    return Formation(np.array(work.place).T, circulation, wash, np.array(drag), float(solo_drag(work, wing)))
+    return SolvedFormation(np.array(work.place).T, circulation, wash, np.array(drag), float(solo_drag(work, wing)))
 
 
-def downwash(scenario: Scenario, formation: Formation, points: Array, without: int = -1) -> Array:
+def downwash(scenario: Scenario, formation: SolvedFormation, points: Array, without: int = -1) -> Array:
     """Downwash, m/s, that all wings (but one) induce at points (point, axis), m, in the formation's own axes."""
     wing = scenario.wing
     m, h, core = segments_of(wing), pitch(wing), wing.core * wing.span
@@ -69,7 +76,7 @@ def downwash(scenario: Scenario, formation: Formation, points: Array, without: i
         dx, dy, dz = (points - place).T
         for segment in range(m):
             y = dy - (segment - 0.5 * (m - 1)) * h
-            ends = _leg(dx, y + 0.5 * h, dz, core * core) - _leg(dx, y - 0.5 * h, dz, core * core)
+            ends = _filament_leg(dx, y + 0.5 * h, dz, core * core) - _filament_leg(dx, y - 0.5 * h, dz, core * core)
             total += circulation[segment] * filaments.SHARE * ends
     return total
 
@@ -79,7 +86,7 @@ def _over_arrays(rule: Any) -> Any:
     return FunctionType(rule.__code__, {**rule.__globals__, "math": SimpleNamespace(sqrt=np.sqrt)})
 
 
-_leg = _over_arrays(filaments.leg)
+_filament_leg = _over_arrays(filaments.leg)
 
 
 def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None = None) -> Figure:
@@ -98,24 +105,24 @@ def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None =
     >>> len(airflock.plots.wash(birds).axes) > 0
     True
     """
-    scenario, shown = flown_with(recording), paths_of(recording)
+    scenario, shown = scenario_or_none(recording), paths_in_window(recording)
     if scenario is None or shown.position.shape[1] == 2:
         raise RecordingError("recording: the wash needs a scenario with wings that fly in space")
-    if shown.agents > MOST:
-        raise RecordingError(f"recording: has {shown.agents} birds; the wash can be drawn for at most {MOST}")
+    if shown.agents > MAX_BIRDS:
+        raise RecordingError(f"recording: has {shown.agents} birds; the wash can be drawn for at most {MAX_BIRDS}")
     frame = len(shown.times) - 1 if start is None else int(np.abs(shown.times - start).argmin())
-    found = formation_at(scenario, shown.position[frame], shown.velocity[frame])
+    found = solve_formation(scenario, shown.position[frame], shown.velocity[frame])
     span = float(scenario.wing.span)
     low, high = found.place.min(axis=0), found.place.max(axis=0)
-    ahead = float(low[0]) - BEHIND * span, float(high[0]) + AHEAD * span
-    right = -float(high[1]) - BESIDE * span, -float(low[1]) + BESIDE * span
+    ahead = float(low[0]) - SPANS_BEHIND * span, float(high[0]) + SPANS_AHEAD * span
+    right = -float(high[1]) - SPANS_BESIDE * span, -float(low[1]) + SPANS_BESIDE * span
     tall, wide = ahead[1] - ahead[0], right[1] - right[0]
-    rows, columns = (max(2, math.ceil(POINTS * side / max(tall, wide))) for side in (tall, wide))
+    rows, columns = (max(2, math.ceil(FIELD_POINTS * side / max(tall, wide))) for side in (tall, wide))
     u, v = np.meshgrid(np.linspace(right[0], right[1], columns), np.linspace(ahead[0], ahead[1], rows))
     points = np.column_stack([v.ravel(), -u.ravel(), np.full(u.size, found.place[:, 2].mean())])
     field = -downwash(scenario, found, points).reshape(u.shape)
     most = max(float(np.quantile(np.abs(field), 0.97)), 1e-6)
-    figure, axes = style.place(ax, 6.4, float(np.clip(6.0 * tall / wide, 3.0, 8.0)))
+    figure, axes = style.figure_and_axes(ax, 6.4, float(np.clip(6.0 * tall / wide, 3.0, 8.0)))
     picture = axes.imshow(
         field, extent=(*right, *ahead), origin="lower", cmap="PuOr_r", norm=TwoSlopeNorm(0.0, -most, most),
         interpolation="bilinear", zorder=0,
@@ -125,14 +132,14 @@ def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None =
         axes.plot([middle - 0.5 * span, middle + 0.5 * span], [place[0]] * 2, color=style.INK, linewidth=2.4, zorder=3)
         said = f"{100.0 * (drag / found.solo - 1.0):+.0f} %"
         axes.annotate(
-            said, (middle, place[0]), (0.0, 5.0), textcoords="offset points", ha="center", fontsize=style.SMALL,
+            said, (middle, place[0]), (0.0, 5.0), textcoords="offset points", ha="center", fontsize=style.SMALL_SIZE,
             color=style.INK, zorder=4, bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0.0, "pad": 1.0},
         )  # fmt: skip
-    style.dress(axes, "across (m)", "ahead (m)", grid=False)
+    style.style_axes(axes, "across (m)", "ahead (m)", grid=False)
     axes.set(xlim=right, ylim=ahead, aspect="equal")
     saving = 1.0 - found.drag.mean() / found.solo
     against = f"{100.0 * abs(saving):.0f} % {'below' if saving >= 0.0 else 'above'} that of lone birds"
     instant = f"t = {shown.times[frame]:.4g} s · induced drag {against}"
-    style.heading(axes, name_of(recording), f"{details_of(recording)} · {instant}")
-    style.colour_bar(figure, picture, axes, "upwash (m/s)", shrink=0.7)
+    style.set_title(axes, short_name(recording), f"{title_details(recording)} · {instant}")
+    style.add_colour_bar(figure, picture, axes, "upwash (m/s)", shrink=0.7)
     return figure

@@ -17,26 +17,19 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from airflock.parts.metrics.registry import numbers_of
-from airflock.recordings import attributes
-from airflock.recordings.flown_scenario import scenario_of
-from airflock.recordings.layout import frames_of
-from airflock.scenarios.events import Event, events_of
-from airflock.scenarios.scenario import Scenario
-from airflock.support import atomic
-from airflock.support.errors import RecordingError
-from airflock.support.spelling import meant
-from airflock.support.suffixes import PAGES, suffix_fault
-from airflock.support.untrusted import own_path
-from airflock.view.replays.layers import flown_layers, layers
-from airflock.view.replays.pack import pack
+from airflock.parts.metrics import scalar_names
+from airflock.recordings import attributes, recording_frames, scenario_of_recording
+from airflock.scenarios import Event, Scenario, to_events
+from airflock.support import PAGES, RecordingError, atomic, expand_path, suffix_error, suggest
+from airflock.view.replays.layers import colour_layers, scenario_layer_names
+from airflock.view.replays.pack import pack_positions
 from airflock.view.stage import colours, shades
-from airflock.view.stage.scene import Stage, stage_of
+from airflock.view.stage.scene import SceneGeometry, scenario_geometry
 
-RATE = 10.0  # frames per second that are kept at most; the page draws between them
-MOST_EVENTS = 500
-SCRIPTS = ("data", "colours", "scene", "trails", "charts", "replay")  # in the order in which they need each other
-COUNTED = {"n_coll", "phi_coll", "collisions"}  # order parameters of flocks that can collide
+MAX_RATE = 10.0  # frames per second that are kept at most; the page draws between them
+MAX_EVENTS = 500
+SCRIPT_NAMES = ("data", "colours", "scene", "trails", "charts", "replay")  # in the order in which they need each other
+COLLISION_METRICS = {"n_coll", "phi_coll", "collisions"}  # order parameters of flocks that can collide
 
 
 @dataclass(frozen=True)
@@ -48,11 +41,11 @@ class Replay:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the page as .html."""
-        target = own_path(path)
-        wrong = suffix_fault(target, PAGES)
+        target = expand_path(path)
+        wrong = suffix_error(target, PAGES)
         if wrong:
             raise RecordingError(wrong)
-        atomic.write(target, self.text)
+        atomic.write_file(target, self.text)
         return target
 
     def _repr_html_(self) -> str:
@@ -62,7 +55,7 @@ class Replay:
         )
 
 
-def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") -> Replay:
+def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "speed") -> Replay:
     """Page that plays a recording; it opens from disk without network and displays itself in a notebook.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
@@ -89,58 +82,60 @@ def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") 
     """
     if not 0.0 < rate < math.inf:
         raise RecordingError(f"rate = {rate:g} frames per second is not above 0")
-    frames, period, present = frames_of(recording)
+    frames, period, present = recording_frames(recording)
     axes = frames.shape[1] // 2
     stride = max(1, math.ceil(1.0 / (rate * period) - 1e-6))
     there, every = present[::stride], period * stride
     kept = _held(frames, present)[::stride]
-    scenario = scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
-    rows = layers(recording, scenario, kept[:, :axes], there, stride)
+    scenario = scenario_of_recording(recording) if recording.attrs.get("airflock_scenario") else None
+    rows = colour_layers(recording, scenario, kept[:, :axes], there, stride)
     whole = there.all()
     flat = np.zeros((kept.shape[2], 3))
     flat[:, :axes] = kept[0, :axes].T
-    stage = _stage(scenario, kept[:, :axes], flat)
-    packed = pack(kept[:, :axes], [layer.bytes for layer in rows] + ([] if whole else [there.astype(np.uint8)]))
+    stage = _scene_json(scenario, kept[:, :axes], flat)
+    packed = pack_positions(
+        kept[:, :axes], [layer.bytes for layer in rows] + ([] if whole else [there.astype(np.uint8)])
+    )
     if scenario is None:  # tracks may lie at 5,000 km north, where a graphics card tells places half a metre apart
         packed = packed._replace(low=[*np.subtract(packed.low[:2], stage["centre"][:2]).tolist(), *packed.low[2:]])
         stage["centre"][:2] = 0.0, 0.0
-    own = [layer.shade.name for layer in rows]
-    ways = [*_motion(axes), *own]
+    own = [layer.colours.name for layer in rows]
+    ways = [*_motion_colourings(axes), *own]
     _check_colour(colour, ways, "this recording")
     first = float(recording["time"].values[0])
-    name = attributes.name_of(recording)
+    name = attributes.recording_name(recording)
     speed = np.sqrt((frames[::stride, axes:] ** 2).sum(1))
-    nearest, collisions = _near(frames[:, :axes], present, period, scenario)
+    nearest, collisions = _nearest_and_collisions(frames[:, :axes], present, period, scenario)
     about = {
         "name": name, "seed": int(recording.attrs["airflock_seed"]) if "airflock_seed" in recording.attrs else None,
-        "first": first, "period": every, "shape": packed.shape, "low": packed.low, "quantum": packed.quantum,
-        "top": _nice(float(np.nanquantile(speed, 0.995))), "ramp": colours.RAMP.astype(int).tolist(),
-        "wheel": colours.WHEEL.astype(int).tolist(), "blank": shades.BLANK, "way": colour, "ways": ways,
-        "layers": [_told_layer(layer.shade) for layer in rows], "whole": bool(whole),
+        "first": first, "period": every, "shape": packed.shape, "low": packed.low, "quantum": packed.step,
+        "top": _rounded_up(float(np.nanquantile(speed, 0.995))), "ramp": colours.RAMP_STOPS.astype(int).tolist(),
+        "wheel": colours.WHEEL_STOPS.astype(int).tolist(), "blank": shades.NO_VALUE_COLOUR, "way": colour, "ways": ways,
+        "layers": [_layer_json(layer.colours) for layer in rows], "whole": bool(whole),
         "height": [float(np.nanmin(frames[:, axes - 1])), float(np.nanmax(frames[:, axes - 1]))],
-        "leap": _leap(scenario), "collisions": [[first + t, i, j] for t, i, j in collisions],
-        "events": _events(recording, scenario), "stage": stage,
-        "charts": _known({"mean speed (m/s)": _mean(speed), "nearest pair (m)": nearest[::stride]}),
+        "leap": _longest_step(scenario), "collisions": [[first + t, i, j] for t, i, j in collisions],
+        "events": _event_rows(recording, scenario), "stage": stage,
+        "charts": _charts({"mean speed (m/s)": _mean_over_present(speed), "nearest pair (m)": nearest[::stride]}),
     }  # fmt: skip
-    return Replay(_page(name, about, packed.data), name)
+    return Replay(_page_html(name, about, packed.data), name)
 
 
 def check_colour(scenario: Scenario, colour: str) -> None:
     """Raise RecordingError for a colour that a replay of a flight of a scenario would refuse: before it is flown."""
-    _check_colour(colour, [*_motion(scenario.dimensions), *flown_layers(scenario)], scenario.name)
+    _check_colour(colour, [*_motion_colourings(scenario.dimensions), *scenario_layer_names(scenario)], scenario.name)
 
 
-def _motion(axes: int) -> list[str]:
+def _motion_colourings(axes: int) -> list[str]:
     return ["speed", "heading", *(["height"] if axes == 3 else []), "agent"]
 
 
-def _check_colour(colour: str, ways: Sequence[str], whose: str) -> None:
-    if colour not in ways:
-        hint = meant(colour, ways, lead="; ")
-        raise RecordingError(f"colour = {colour!r} is none that {whose} knows: {', '.join(ways)}{hint}")
+def _check_colour(colour: str, colourings: Sequence[str], owner: str) -> None:
+    if colour not in colourings:
+        hint = suggest(colour, colourings, lead="; ")
+        raise RecordingError(f"colour = {colour!r} is none that {owner} knows: {', '.join(colourings)}{hint}")
 
 
-def _page(name: str, about: dict[str, Any], data: bytes) -> str:
+def _page_html(name: str, about: dict[str, Any], data: bytes) -> str:
     """The template with everything in its place."""
     root = resources.files("airflock.view.replays")
     text = (root / "replay.html").read_text(encoding="utf-8")
@@ -149,7 +144,7 @@ def _page(name: str, about: dict[str, Any], data: bytes) -> str:
         "ABOUT": json.dumps(about, allow_nan=False).replace("<", "\\u003c"),
         "DATA": base64.b64encode(data).decode(),
         "THREE": (root / "three.min.js").read_text(encoding="utf-8"),
-        "SCRIPT": "\n".join((root / f"{part}.js").read_text(encoding="utf-8") for part in SCRIPTS),
+        "SCRIPT": "\n".join((root / f"{part}.js").read_text(encoding="utf-8") for part in SCRIPT_NAMES),
     }
     return re.sub("@([A-Z]+)@", lambda place: parts[place[1]], text)
 
@@ -167,34 +162,42 @@ def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
     return found
 
 
-def _known(courses: Mapping[str, NDArray[Any]]) -> list[list[Any]]:
+def _charts(courses: Mapping[str, NDArray[Any]]) -> list[list[Any]]:
     """Charts, as titles and values, of what is known at some time: a lone agent has no nearest pair."""
-    return [[title, _short(values)] for title, values in courses.items() if np.isfinite(values).any()]
+    return [[title, _rounded(values)] for title, values in courses.items() if np.isfinite(values).any()]
 
 
-def _mean(speed: NDArray[Any]) -> NDArray[Any]:
+def _mean_over_present(speed: NDArray[Any]) -> NDArray[Any]:
     """Mean (time,) over those present; nan where nobody is."""
     known = np.isfinite(speed)
     total = np.where(known, speed, 0.0).sum(axis=1)
     return np.asarray(np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan))
 
 
-def _told_layer(shade: shades.Shade) -> dict[str, Any]:
+def _layer_json(shade: shades.AgentColours) -> dict[str, Any]:
     """What the page needs to know of a layer."""
-    words = f"{shades.WORDS.get(shade.name, shade.name)}; {shade.told}" if shade.kind == shades.MARKS else shade.told
+    words = (
+        f"{shades.COLOURING_NOTES.get(shade.name, shade.name)}; {shade.told}"
+        if shade.kind == shades.IDENTITIES
+        else shade.told
+    )
     return {
         "name": shade.name, "kind": shade.kind, "ends": [f"{shade.low:.3g}", f"{shade.high:.3g} {shade.unit}".strip()],
-        "names": list(shade.names), "tones": shades.palette(len(shade.names)).tolist(),
+        "names": list(shade.names), "tones": shades.category_colours(len(shade.names)).tolist(),
         "told": words,
     }  # fmt: skip
 
 
-def _near(
+def _nearest_and_collisions(
     position: NDArray[Any], present: NDArray[np.bool_], period: float, scenario: Any
 ) -> tuple[NDArray[Any], list[tuple[float, int, int]]]:
     """Smallest distance at each frame (m; nan of one agent), and when which pair came nearer than a collision."""
-    measured = scenario.measured_by() if scenario else None
-    limit = float(measured.r_coll) if measured and COUNTED & set(numbers_of(scenario.measures, measured)) else 0.0
+    measured = scenario.resolved_metrics() if scenario else None
+    limit = (
+        float(measured.r_coll)
+        if measured and COLLISION_METRICS & set(scalar_names(scenario.measures, measured))
+        else 0.0
+    )
     nearest, found = np.full(len(position), np.nan), []
     touching: set[tuple[int, int]] = set()
     for number, frame in enumerate(position):
@@ -213,20 +216,20 @@ def _near(
         now = {(int(who[i]), int(who[j])) for i, j in near}
         found += [(number * period, i, j) for i, j in sorted(now - touching)]
         touching = now
-    return nearest, found[:MOST_EVENTS]
+    return nearest, found[:MAX_EVENTS]
 
 
-def _events(recording: xr.Dataset, scenario: Any) -> list[list[Any]]:
+def _event_rows(recording: xr.Dataset, scenario: Any) -> list[list[Any]]:
     """What was done to the flight: when, s, and what."""
-    found = [] if scenario is None else events_of(attributes.events(recording))[:MOST_EVENTS]
-    return [[event.step * scenario.flight.dt, _told(event)] for event in found]
+    found = [] if scenario is None else to_events(attributes.recorded_events(recording))[:MAX_EVENTS]
+    return [[event.step * scenario.flight.dt, _event_text(event)] for event in found]
 
 
-def _told(event: Event) -> str:
+def _event_text(event: Event) -> str:
     return f"{event.kind} " + ", ".join(f"{key} = {value}" for key, value in event.data.items())
 
 
-def _stage(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> dict[str, Any]:
+def _scene_json(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> dict[str, Any]:
     """What stands in the world, as plain lists."""
     axes = position.shape[1]
     low, high = position.min(axis=(0, 2)), position.max(axis=(0, 2))
@@ -234,25 +237,25 @@ def _stage(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> dict[s
     solids: list[Any] = []
     lines: list[Any] = []
     if scenario is not None:
-        stage: Stage = stage_of(scenario, first)
+        stage: SceneGeometry = scenario_geometry(scenario, first)
         if scenario.world.arena != "none":
             centre, span = stage.centre.tolist(), max(stage.span, 1e-6)
-        solids = [[_short(s.vertices.ravel()), s.faces.ravel().tolist(), s.colour] for s in stage.solids]
-        lines = [[_short(line.points.ravel()), line.colour] for line in stage.lines]
+        solids = [[_rounded(s.vertices.ravel()), s.faces.ravel().tolist(), s.colour] for s in stage.solids]
+        lines = [[_rounded(line.points.ravel()), line.colour] for line in stage.lines]
     plain = [float(c) for c in centre]
     return {"centre": plain, "span": max(span, 1e-3), "space": axes == 3, "solids": solids, "lines": lines}
 
 
-def _leap(scenario: Any) -> float | None:
+def _longest_step(scenario: Any) -> float | None:
     """Longest way between two frames that is flown, not a way through a periodic face, m; None without one."""
     return 0.5 * float(scenario.world.side) if scenario and scenario.world.edges == "periodic" else None
 
 
-def _short(values: NDArray[Any]) -> list[float | None]:
+def _rounded(values: NDArray[Any]) -> list[float | None]:
     """Numbers of five digits, for JSON; null for what is not finite."""
     return [float(f"{v:.5g}") if np.isfinite(v) else None for v in np.asarray(values, float).tolist()]
 
 
-def _nice(value: float) -> float:
+def _rounded_up(value: float) -> float:
     """A little more than a value, of two digits."""
     return float(f"{max(value, 1e-6) * 1.1:.2g}")

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.contract import Model
+from airflock.core import Model
 
 
-def vectors(record: Any) -> dict[str, tuple[str, str]]:
+def vector_fields(record: Any) -> dict[str, tuple[str, str]]:
     """Vectors among the fields of a NamedTuple: name → fields of its x and y component.
 
     Sums(x, y, z) is one vector without a name; Sums(away_x, away_y, away_z, n) one called away.
@@ -22,20 +22,20 @@ def vectors(record: Any) -> dict[str, tuple[str, str]]:
     return found
 
 
-def word_of(model: Model, stem: str) -> tuple[str, str]:
+def term_name_and_unit(model: Model, stem: str) -> tuple[str, str]:
     """What a law calls a vector among its Sums, and its unit; by default the field's stem."""
     return model.terms.get(stem, (stem or "neighbours", ""))
 
 
-def values(record: Any) -> dict[str, NDArray[np.float64]]:
+def vector_values(record: Any) -> dict[str, NDArray[np.float64]]:
     """The vectors that a NamedTuple holds, by name: (3,), without a z component 0."""
     return {
         name: np.array([getattr(record, x), getattr(record, y), getattr(record, f"{x[:-1]}z", 0.0)], float)
-        for name, (x, y) in vectors(type(record)).items()
+        for name, (x, y) in vector_fields(type(record)).items()
     }
 
 
-def arrow(begin: NDArray[Any], end: NDArray[Any]) -> NDArray[np.float64]:
+def arrow_lines(begin: NDArray[Any], end: NDArray[Any]) -> NDArray[np.float64]:
     """A shaft and two barbs, (3, 2, 3), in the plane or as seen from above; nothing for an arrow of no length."""
     along = np.asarray(end, float) - begin
     length = float(np.linalg.norm(along))

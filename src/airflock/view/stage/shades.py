@@ -7,19 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.parameters import Quantity, declarations
-from airflock.scenarios.groups import LETTERS
-from airflock.scenarios.scenario import Scenario
+from airflock.core import Quantity, declarations
+from airflock.scenarios import LETTERS, Scenario
 from airflock.view.stage import colours
 
-SCALE, TURN, NAMES, MARKS = "scale", "turn", "names", "marks"
-MOTION = ("speed", "heading", "height")  # what the motion alone tells
-GOLDEN = 0.6180339887  # of a turn between two marks: neighbouring numbers look unlike
-BLANK = (150, 150, 150)  # of -1: none of the names, alone
-WORDS = {"agent": "each agent has a colour of its own", "cluster": "a colour for each cluster"}
+NUMBERS, HEADING, CATEGORIES, IDENTITIES = "scale", "turn", "names", "marks"
+MOTION_COLOURINGS = ("speed", "heading", "height")  # what the motion alone tells
+GOLDEN_TURN = 0.6180339887  # of a turn between two marks: neighbouring numbers look unlike
+NO_VALUE_COLOUR = (150, 150, 150)  # of -1: none of the names, alone
+COLOURING_NOTES = {"agent": "each agent has a colour of its own", "cluster": "a colour for each cluster"}
 
 
-class Shade(NamedTuple):
+class AgentColours(NamedTuple):
     """One value of every agent.
 
     name   : what it is
@@ -39,35 +38,42 @@ class Shade(NamedTuple):
     told: str = ""
 
     @property
-    def tones(self) -> NDArray[np.uint8]:
+    def colours(self) -> NDArray[np.uint8]:
         """Colours (agent, 3); grey where there is no value."""
         values = np.asarray(self.values, float)
-        known = np.isfinite(values) & ((values >= 0.0) | (self.kind in (SCALE, TURN)))
+        known = np.isfinite(values) & ((values >= 0.0) | (self.kind in (NUMBERS, HEADING)))
         whole = np.where(known, values, 0.0)
-        if self.kind == SCALE:
-            tones = colours.ramp((whole - self.low) / max(self.high - self.low, 1e-9))
-        elif self.kind == NAMES:
-            tones = palette(len(self.names))[whole.astype(int)]
+        if self.kind == NUMBERS:
+            tones = colours.ramp_colours((whole - self.low) / max(self.high - self.low, 1e-9))
+        elif self.kind == CATEGORIES:
+            tones = category_colours(len(self.names))[whole.astype(int)]
         else:
-            tones = colours.wheel(whole if self.kind == TURN else whole * GOLDEN)
-        tones[~known] = BLANK
+            tones = colours.wheel_colours(whole if self.kind == HEADING else whole * GOLDEN_TURN)
+        tones[~known] = NO_VALUE_COLOUR
         return tones
 
     @property
     def key(self) -> str:
         """The key to the colours, as HTML."""
-        if self.kind == MARKS:
-            words = WORDS.get(self.name, self.name)
-            return _small(", ".join(part for part in (words, self.told) if part))
-        if self.kind == NAMES:
-            chips = [_chip(tone, name) for tone, name in zip(palette(len(self.names)), self.names, strict=True)]
-            return _small(" ".join([f"{html.escape(self.name)}:", *chips, _chip(BLANK, self.told or "none")]))
-        if self.kind == TURN:
-            sample, left, right = colours.wheel(np.linspace(0.0, 1.0, 25)), "east", "north, west, south, east"
+        if self.kind == IDENTITIES:
+            words = COLOURING_NOTES.get(self.name, self.name)
+            return _small_print_html(", ".join(part for part in (words, self.told) if part))
+        if self.kind == CATEGORIES:
+            chips = [
+                _colour_chip_html(tone, name)
+                for tone, name in zip(category_colours(len(self.names)), self.names, strict=True)
+            ]
+            return _small_print_html(
+                " ".join(
+                    [f"{html.escape(self.name)}:", *chips, _colour_chip_html(NO_VALUE_COLOUR, self.told or "none")]
+                )
+            )
+        if self.kind == HEADING:
+            sample, left, right = colours.wheel_colours(np.linspace(0.0, 1.0, 25)), "east", "north, west, south, east"
         else:
-            sample = colours.ramp(np.linspace(0.0, 1.0, 17))
+            sample = colours.ramp_colours(np.linspace(0.0, 1.0, 17))
             left, right = f"{self.low:.3g}", f"{self.high:.3g} {self.unit}".strip()
-        bands = ", ".join(map(_hex, sample.tolist()))
+        bands = ", ".join(map(_hex_colour, sample.tolist()))
         return (
             f'<div style="padding:0 0.75em"><div style="height:0.7em;border-radius:3px;'
             f'background:linear-gradient(to right, {bands})"></div><div '
@@ -76,38 +82,40 @@ class Shade(NamedTuple):
         )
 
 
-def of_motion(
-    name: str, position: NDArray[Any], velocity: NDArray[Any], top: float, height: tuple[float, float]
-) -> Shade:
+def motion_colours(
+    name: str, position: NDArray[Any], velocity: NDArray[Any], max_speed: float, height_range: tuple[float, float]
+) -> AgentColours:
     """Speed (0 to `top` m/s), heading, or height (between two, m) of agents: (agent, 3), m and m/s."""
     if name == "heading":
-        return Shade(name, TURN, np.arctan2(velocity[:, 1], velocity[:, 0]) / (2.0 * np.pi))
+        return AgentColours(name, HEADING, np.arctan2(velocity[:, 1], velocity[:, 0]) / (2.0 * np.pi))
     if name == "height":
-        return Shade(name, SCALE, position[:, 2], *height, "m")
-    return Shade("speed", SCALE, np.sqrt((velocity**2).sum(1)), 0.0, top, "m/s")
+        return AgentColours(name, NUMBERS, position[:, 2], *height_range, "m")
+    return AgentColours("speed", NUMBERS, np.sqrt((velocity**2).sum(1)), 0.0, max_speed, "m/s")
 
 
-def of_numbers(name: str, values: NDArray[Any], unit: str = "") -> Shade:
+def number_colours(name: str, values: NDArray[Any], unit: str = "") -> AgentColours:
     """Any number of agents, on a scale over all values at hand."""
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
-    return Shade(name, SCALE, values, low, high, unit)
+    return AgentColours(name, NUMBERS, values, low, high, unit)
 
 
-def of_agents(count: int) -> Shade:
+def individual_colours(count: int) -> AgentColours:
     """A colour for each agent."""
-    return Shade("agent", MARKS, np.arange(count))
+    return AgentColours("agent", IDENTITIES, np.arange(count))
 
 
-def of_groups(groups: Sequence[Any], count: int) -> Shade:
+def group_colours(groups: Sequence[Any], count: int) -> AgentColours:
     """To which group of a scenario each of `count` agents belongs."""
     values = np.full(count, -1)
     for number, group in enumerate(groups):
         values[list(group.agents)] = number
-    return Shade("group", NAMES, values, names=tuple(group.name for group in groups))
+    return AgentColours("group", CATEGORIES, values, names=tuple(group.name for group in groups))
 
 
-def of_faults(faults: Sequence[Mapping[str, Any]], time: float, count: int, kinds: Sequence[str] = ()) -> Shade:
+def fault_colours(
+    faults: Sequence[Mapping[str, Any]], time: float, count: int, kinds: Sequence[str] = ()
+) -> AgentColours:
     """Which kind of fault is at work in each of `count` agents at a time, s; of several, that which began last.
 
     faults : kind, agent, begin and end, s (None: never); kinds : names in the order of the key, if they are known
@@ -118,10 +126,10 @@ def of_faults(faults: Sequence[Mapping[str, Any]], time: float, count: int, kind
         over = fault["end"] is not None and time >= float(fault["end"])
         if float(fault["begin"]) <= time and not over and 0 <= int(fault["agent"]) < count:
             values[int(fault["agent"])] = names.index(str(fault["kind"]))
-    return Shade("fault", NAMES, values, names=names, told="sound")
+    return AgentColours("fault", CATEGORIES, values, names=names, told="sound")
 
 
-def own_numbers(scenario: Scenario) -> dict[str, str]:
+def varied_number_units(scenario: Scenario) -> dict[str, str]:
     """Numbers of law and body that differ among agents, such as model.v_flock, with their units."""
     found = {}
     records = {"model": scenario.parameters, "body": scenario.body, "sensors": scenario.sensors}
@@ -132,33 +140,37 @@ def own_numbers(scenario: Scenario) -> dict[str, str]:
     return found
 
 
-def of_own(scenario: Scenario, key: str, seed: int) -> Shade:
+def varied_colours(scenario: Scenario, key: str, seed: int) -> AgentColours:
     """A number that differs among agents, such as model.v_flock, as it is drawn with a seed."""
     section, _, name = key.partition(".")
-    return of_numbers(key, np.array(scenario.own_numbers(LETTERS[section], name, seed)), own_numbers(scenario)[key])
+    return number_colours(
+        key, np.array(scenario.agent_values(LETTERS[section], name, seed)), varied_number_units(scenario)[key]
+    )
 
 
-def of_clusters(least: NDArray[Any]) -> Shade:
+def cluster_colours(least: NDArray[Any]) -> AgentColours:
     """Clusters as `view.stage.clusters` names them."""
     known, sizes = np.unique(least[least >= 0], return_counts=True)
     most = f", the largest of {sizes.max()}" if len(known) else ""
-    return Shade("cluster", MARKS, least, told=f"{len(known)} of two and more{most}, grey: alone")
+    return AgentColours("cluster", IDENTITIES, least, told=f"{len(known)} of two and more{most}, grey: alone")
 
 
-def palette(count: int) -> NDArray[np.uint8]:
+def category_colours(count: int) -> NDArray[np.uint8]:
     """Colours (count, 3) of names: those that colour-blind readers tell apart, then others."""
-    own = np.array(colours.KINDS, np.uint8)[:count]
-    return np.vstack([own, colours.wheel(np.arange(len(own), count) * GOLDEN)]).astype(np.uint8)
+    own = np.array(colours.CATEGORY_COLOURS, np.uint8)[:count]
+    return np.vstack([own, colours.wheel_colours(np.arange(len(own), count) * GOLDEN_TURN)]).astype(np.uint8)
 
 
-def _small(text: str) -> str:
+def _small_print_html(text: str) -> str:
     return f"<div style='padding:0 0.75em'><small>{text}</small></div>"
 
 
-def _chip(tone: Any, name: str) -> str:
-    return f"<span style='white-space:nowrap'><span style='color:{_hex(tone)}'>●</span> {html.escape(name)}</span>"
+def _colour_chip_html(tone: Any, name: str) -> str:
+    return (
+        f"<span style='white-space:nowrap'><span style='color:{_hex_colour(tone)}'>●</span> {html.escape(name)}</span>"
+    )
 
 
-def _hex(tone: Any) -> str:
+def _hex_colour(tone: Any) -> str:
     red, green, blue = (int(part) for part in tone)
     return f"#{red:02x}{green:02x}{blue:02x}"

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from shapely import constrained_delaunay_triangles
 from shapely.geometry import Polygon
 
-from airflock.support.errors import SceneError
+from airflock.support import SceneError
 from airflock.world import bvh, goals, scenery
 from airflock.world.inside import inside
 from airflock.world.scenes.city import buildings, half_side
 from airflock.world.scenes.forest import trees
-from airflock.world.scenes.tree import TALL, Scene, boxes, ground, scene, segments, triangles
+from airflock.world.scenes.tree import TALL_HEIGHT, Scene, box_rows, ground_row, make_scene, segment_rows, triangle_rows
 from airflock.world.shapes import APPEARS, BOX, CYLINDER
 
 __all__ = ["Scene", "clearance", "in_mesh", "scene_of", "waypoints"]
@@ -35,10 +35,12 @@ def scene_of(
     polygons : walls besides, m; heights: lowest and highest of the last of them, if they have ends in height, m
     """
     tall = len(polygons) - len(heights)
-    walls = [segments([[*a, *b] for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]) for ring in polygons[:tall]]
-    walls += [triangles(_faces(ring, *ends)) for ring, ends in zip(polygons[tall:], heights, strict=True)]
+    walls = [
+        segment_rows([[*a, *b] for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]) for ring in polygons[:tall]
+    ]
+    walls += [triangle_rows(_faces(ring, *ends)) for ring, ends in zip(polygons[tall:], heights, strict=True)]
     if p.kind == "none":
-        return scene(walls)
+        return make_scene(walls)
     notes: tuple[str, ...] = ()
     if p.kind == "mesh":
         from airflock.world.scenes.meshes import load_mesh
@@ -46,18 +48,18 @@ def scene_of(
         rows, notes = load_mesh(p, dimensions)
     elif p.kind == "boxes":
         given = np.array(p.boxes, float).reshape(-1, 7)
-        rows = boxes(given[:, :6])
+        rows = box_rows(given[:, :6])
         rows[:, APPEARS] = given[:, 6]
     else:
         rows = buildings(p) if p.kind == "city" else trees(p)
-        rows[:, APPEARS] = appearances(p, len(rows))
+        rows[:, APPEARS] = appearance_times(p, len(rows))
     if dimensions == 2:
         flat = (rows[:, 6] == BOX) | (rows[:, 6] == CYLINDER)
-        rows[flat, 2], rows[flat, 5] = -TALL, TALL
-        return scene([rows, *walls], notes)
+        rows[flat, 2], rows[flat, 5] = -TALL_HEIGHT, TALL_HEIGHT
+        return make_scene([rows, *walls], notes)
     half = half_side(p, rows) + MARGIN
-    below = [ground([-half, -half, -DEPTH, half, half, 0.0])] if p.ground == "yes" else []
-    return scene([*below, rows, *walls], notes)
+    below = [ground_row([-half, -half, -DEPTH, half, half, 0.0])] if p.ground == "yes" else []
+    return make_scene([*below, rows, *walls], notes)
 
 
 def _faces(ring: tuple[tuple[float, ...], ...], low: float, high: float) -> list[list[tuple[float, ...]]]:
@@ -69,7 +71,7 @@ def _faces(ring: tuple[tuple[float, ...], ...], low: float, high: float) -> list
     return found + [[(*corner, z) for corner in part] for part in flat for z in (low, high)]
 
 
-def appearances(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
+def appearance_times(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
     """When each of so many shapes appears, s; 0: it stands from the start. A tree's trunk and crown come together."""
     parts = 2 if p.kind == "forest" else 1
     rng = np.random.default_rng([int(p.seed), 2])
@@ -77,21 +79,21 @@ def appearances(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
     return np.tile(np.where(late < p.later, np.maximum(when * p.later_until, 1e-6), 0.0), parts)
 
 
-def clearance(found: Scene, position: Any, within: float = 1e6) -> float:
+def clearance(scene: Scene, position: Any, within: float = 1e6) -> float:
     """Distance (m) to what stands in a scene; negative inside a solid, 1e30 if nothing is within (m)."""
     x, y, z = (float(c) for c in position)
-    return float(bvh.nearest(x, y, z, within, *_tables(found)).distance)
+    return float(bvh.nearest(x, y, z, within, *_tables(scene)).distance)
 
 
-def in_mesh(found: Scene, position: Any) -> bool:
+def in_mesh(scene: Scene, position: Any) -> bool:
     """Whether a position lies inside a closed mesh, in a plane inside its cut at height 0."""
     x, y, z = (float(c) for c in position)
-    return found.closed and bool(inside(x, y, z, *_tables(found)) > 0.5)
+    return scene.has_closed_surface and bool(inside(x, y, z, *_tables(scene)) > 0.5)
 
 
 def _tables(found: Scene) -> Any:
     """Shapes, nodes and links for plain Python: lists, or the arrays where there are too many."""
-    return found.lists if len(found.shapes) < MANY else (found.shapes, found.nodes, found.links)
+    return found.as_lists if len(found.shapes) < MANY else (found.shapes, found.nodes, found.links)
 
 
 @lru_cache(maxsize=32)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.world import scenery
-from airflock.world.scenes.tree import boxes
+from airflock.world.scenes.tree import box_rows
 
 
 def buildings(p: scenery.Parameters) -> NDArray[np.float64]:
@@ -18,7 +18,7 @@ def buildings(p: scenery.Parameters) -> NDArray[np.float64]:
     height = rng.uniform(min(p.low, p.high), max(p.low, p.high), n * n)
     stands = rng.uniform(0.0, 1.0, n * n) < p.density
     flat = np.zeros(n * n)
-    return boxes(np.stack([x, y, flat, x + p.block, y + p.block, height], axis=1)[stands])
+    return box_rows(np.stack([x, y, flat, x + p.block, y + p.block, height], axis=1)[stands])
 
 
 def extent(p: scenery.Parameters) -> float:

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.support.errors import SceneError
+from airflock.support import SceneError
 from airflock.world import scenery
-from airflock.world.scenes.tree import cylinders
+from airflock.world.scenes.tree import cylinder_rows
 
 # Our choice: a stand of grown broad-leaved trees; the thesis's scene is not available
 MOST = 200_000  # trees, of two shapes each: their tree of boxes takes some 10 s to build
@@ -29,4 +29,4 @@ def trees(p: scenery.Parameters) -> NDArray[np.float64]:
     ground = np.zeros(n)
     stems = np.stack([x, y, trunk, ground, clear * height], axis=1)
     crowns = np.stack([x, y, crown, clear * height, height], axis=1)
-    return cylinders(np.concatenate([stems, crowns]))
+    return cylinder_rows(np.concatenate([stems, crowns]))

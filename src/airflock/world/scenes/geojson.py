@@ -3,16 +3,15 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from airflock.support.errors import bounded
-from airflock.support.untrusted import FormatError, json_object
-from airflock.world.scenes.rings import NO_AREA, Outline, Ring, heights_of, opened
+from airflock.support import FormatError, parse_json_object, shortened
+from airflock.world.scenes.rings import NO_AREA, Outline, Ring, heights_of, open_ring
 
 MOST_CORNERS = 100_000  # of all polygons of a file
 
 
-def outlines_of(text: str) -> list[Outline]:
+def parse_outlines(text: str) -> list[Outline]:
     """Shapes of a GeoJSON text (RFC 7946), in its order."""
-    document = json_object(text)
+    document = parse_json_object(text)
     crs = str(document.get("crs", "")).upper()
     if crs and "CRS84" not in crs and "4326" not in crs:
         raise FormatError("is in other coordinates than longitude and latitude (key crs); export it as WGS 84")
@@ -33,7 +32,7 @@ def _features(value: Any, name: str, properties: Mapping[str, Any] | None = None
     elif kind == "Feature":
         given = value.get("properties")
         given = given if isinstance(given, Mapping) else {}
-        yield from _features(value.get("geometry"), bounded(str(given.get("name") or name), 60), given)
+        yield from _features(value.get("geometry"), shortened(str(given.get("name") or name), 60), given)
     elif kind == "GeometryCollection":
         for one in _list(value.get("geometries"), "geometries"):
             yield from _features(one, name, properties)
@@ -57,6 +56,6 @@ def _ring(points: Any) -> Ring:
     for point in _list(points, "a ring of coordinates"):
         numbers = point if isinstance(point, list) else []
         if len(numbers) < 2 or any(isinstance(n, bool) or not isinstance(n, (int, float)) for n in numbers[:2]):
-            raise FormatError(f"{bounded(repr(point), 40)} is not a point [longitude, latitude]")
+            raise FormatError(f"{shortened(repr(point), 40)} is not a point [longitude, latitude]")
         found.append((float(numbers[0]), float(numbers[1])))
-    return opened(found)
+    return open_ring(found)

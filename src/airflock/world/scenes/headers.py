@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from airflock.support.errors import SceneError
+from airflock.support import SceneError
 
 STRIP = 5  # glTF: from this mode on every corner may begin a triangle; before, three corners make one
 
 
-def check_header(path: Path, kind: str, size: int, most: int) -> None:
-    """Raise SceneError for a file of `size` bytes that is cut short or announces more than `most` triangles."""
+def check_header(path: Path, kind: str, size: int, max_triangles: int) -> None:
+    """Raise SceneError for a file of `size` bytes that is cut short or has more than `max_triangles` triangles."""
     if kind == "stl":
         _stl(path, size)
     elif kind in ("gltf", "glb"):
@@ -25,8 +25,8 @@ def check_header(path: Path, kind: str, size: int, most: int) -> None:
             raise
         except Exception as fault:  # any part of the document may be missing or of another kind
             raise SceneError(f"scene.file = {path}: cannot be read, it is damaged or cut short: {fault}") from fault
-        if count > most:
-            raise SceneError(f"scene.file = {path}: {count} triangles are more than {most}; simplify the mesh")
+        if count > max_triangles:
+            raise SceneError(f"scene.file = {path}: {count} triangles are more than {max_triangles}; simplify the mesh")
 
 
 def _stl(path: Path, size: int) -> None:

@@ -3,19 +3,18 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from airflock.support.errors import bounded
-from airflock.support.untrusted import Element, FormatError, xml
-from airflock.world.scenes.rings import NO_AREA, Outline, Ring, heights_of, opened
+from airflock.support import Element, FormatError, parse_xml, shortened
+from airflock.world.scenes.rings import NO_AREA, Outline, Ring, heights_of, open_ring
 
 
-def outlines_of(text: str) -> list[Outline]:
+def parse_outlines(text: str) -> list[Outline]:
     """Shapes of a KML text, in its order; heights are those of its extended data, not of its coordinates."""
-    return list(_placed(xml(text), "", {}))
+    return list(_placed(parse_xml(text), "", {}))
 
 
 def _placed(element: Element, name: str, told: Mapping[str, str]) -> Iterator[Outline]:
     """Shapes within an element, with the name of the nearest thing around them that has one, and what is told of it."""
-    name = next((bounded(one.text, 60) for one in element.children if one.tag == "name" and one.text), name)
+    name = next((shortened(one.text, 60) for one in element.children if one.tag == "name" and one.text), name)
     if element.tag == "Placemark":
         told = {key: value for one in element.children if one.tag == "ExtendedData" for key, value in _data(one)}
     if element.tag == "Polygon":
@@ -66,6 +65,6 @@ def _coordinates(text: str) -> Ring:
         try:
             longitude, latitude, *_ = (float(number) for number in point.split(","))
         except ValueError:
-            raise FormatError(f"{bounded(repr(point), 40)} is not a point longitude,latitude") from None
+            raise FormatError(f"{shortened(repr(point), 40)} is not a point longitude,latitude") from None
         found.append((longitude, latitude))
-    return opened(found)
+    return open_ring(found)

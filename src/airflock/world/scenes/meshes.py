@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.support.errors import SceneError
-from airflock.support.untrusted import from_outside, own_path
+from airflock.support import SceneError, as_error, expand_path
 from airflock.world import scenery
 from airflock.world.scenes.headers import check_header
-from airflock.world.scenes.tree import segments, triangles
+from airflock.world.scenes.tree import segment_rows, triangle_rows
 from airflock.world.shapes import CLOSED
 
 MOST_BYTES = 200_000_000  # a larger file is refused before it is opened
@@ -21,21 +20,21 @@ LEAST, MOST = 1.0, 1e5  # m; a world for drones is neither smaller nor larger
 
 def load_mesh(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Triangles of scene.file, one a row, in m, z up; in a plane, its walls where it crosses height 0. And notes."""
-    with from_outside(f"scene.file = {p.file}", SceneError):  # what a damaged file holds may break at any later step
+    with as_error(f"scene.file = {p.file}", SceneError):  # what a damaged file holds may break at any later step
         return _loaded(p, dimensions)
 
 
 def _loaded(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    mesh = read(own_path(p.file))
+    mesh = read_mesh(expand_path(p.file))
     notes = []
     corners = np.asarray(mesh.vertices, float) * p.unit
     if p.up == "y":
         corners = np.stack([corners[:, 0], -corners[:, 2], corners[:, 1]], axis=1)
-    faults = check(p, corners)
+    faults = mesh_size_errors(p, corners)
     if faults:
         raise SceneError("\n".join(faults))
     mesh.vertices = corners
-    closed = in_closed(mesh)
+    closed = closed_faces(mesh)
     if not closed.all():
         notes.append(
             f"scene.file = {p.file}: the mesh is open, {int((~closed).sum())} of {len(closed)} triangles; these "
@@ -46,20 +45,20 @@ def _loaded(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64]
             f"scene.file = {p.file}: the mesh is inverted (its faces look inwards); "
             "its surfaces are taken from both sides"
         )
-    found = triangles(corners[np.asarray(mesh.faces)])
+    found = triangle_rows(corners[np.asarray(mesh.faces)])
     found[:, CLOSED] = closed
     sound = mesh.area_faces > 1e-12
     if not sound.all():
         notes.append(f"scene.file = {p.file}: {int((~sound).sum())} triangles without area were left out")
         found = found[sound]
     if dimensions == 2:
-        found = cut(mesh, closed)
+        found = cut_at_ground(mesh, closed)
         if not len(found):
             raise SceneError(f"scene.file = {p.file}: in a plane the mesh is cut at height 0, but nothing stands there")
     return found, tuple(notes)
 
 
-def in_closed(mesh: Any) -> NDArray[np.bool_]:
+def closed_faces(mesh: Any) -> NDArray[np.bool_]:
     """Which faces (face,) of a mesh belong to a closed surface: to a connected part without a free edge."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -75,7 +74,7 @@ def in_closed(mesh: Any) -> NDArray[np.bool_]:
     return found
 
 
-def cut(mesh: Any, closed: NDArray[np.bool_]) -> NDArray[np.float64]:
+def cut_at_ground(mesh: Any, closed: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Walls where a mesh crosses height 0, as segments that have its outside on their right."""
     from trimesh import intersections
 
@@ -84,12 +83,12 @@ def cut(mesh: Any, closed: NDArray[np.bool_]) -> NDArray[np.float64]:
     a, b = np.asarray(lines).reshape(-1, 2, 3)[:, :, :2].transpose(1, 0, 2)
     out = mesh.face_normals[faces]
     turned = (b - a)[:, 1] * out[:, 0] - (b - a)[:, 0] * out[:, 1] < 0.0
-    found = segments(np.where(turned[:, None], np.hstack([b, a]), np.hstack([a, b])))
+    found = segment_rows(np.where(turned[:, None], np.hstack([b, a]), np.hstack([a, b])))
     found[:, CLOSED] = closed[faces]
     return found
 
 
-def read(path: Path) -> Any:
+def read_mesh(path: Path) -> Any:
     """Mesh of a file. Raises SceneError where it is missing, too large, of another format, empty or damaged."""
     try:
         import trimesh
@@ -125,7 +124,7 @@ def read(path: Path) -> Any:
     return mesh
 
 
-def check(p: scenery.Parameters, corners: NDArray[np.float64]) -> list[str]:
+def mesh_size_errors(p: scenery.Parameters, corners: NDArray[np.float64]) -> list[str]:
     """What is wrong with the size of a mesh, one line each."""
     size = float(np.ptp(corners, axis=0).max())
     if LEAST <= size <= MOST:

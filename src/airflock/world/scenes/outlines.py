@@ -12,9 +12,7 @@ from typing import Any
 from shapely.geometry import LineString, Point, Polygon
 from shapely.validation import explain_validity
 
-from airflock.support.coordinates import Site
-from airflock.support.errors import ScenarioError, bounded
-from airflock.support.untrusted import from_outside, read_text
+from airflock.support import FlightSite, ScenarioError, as_error, read_text, shortened
 from airflock.world.scenes import geojson, kml
 from airflock.world.scenes.rings import Outline, Ring
 
@@ -29,7 +27,7 @@ Solid = tuple[str, Polygon, Mapping[str, float]]  # name, plan in m, and heights
 
 
 @dataclass(frozen=True)
-class Ground:
+class Field:
     """A field in local metres about its origin: keys of the section [world], and a note of what was read."""
 
     keys: dict[str, Any]
@@ -37,7 +35,7 @@ class Ground:
     note: str
 
 
-def ground_of(path: Path, *, simplify: float = 0.0, space: bool = False) -> Ground:
+def load_field(path: Path, *, simplify: float = 0.0, space: bool = False) -> Field:
     """The field of a GeoJSON or KML file: its largest polygon, and what must not be entered inside.
 
     simplify : how far outlines may move to have fewer corners, m
@@ -45,14 +43,14 @@ def ground_of(path: Path, *, simplify: float = 0.0, space: bool = False) -> Grou
 
     Raises ScenarioError with one line per fault.
     """
-    where = f"world.file = {bounded(str(path), 120)}"
+    where = f"world.file = {shortened(str(path), 120)}"
     kinds: dict[str, Callable[[str], list[Outline]]] = {
-        ".geojson": geojson.outlines_of, ".json": geojson.outlines_of, ".kml": kml.outlines_of,
+        ".geojson": geojson.parse_outlines, ".json": geojson.parse_outlines, ".kml": kml.parse_outlines,
     }  # fmt: skip
     if path.suffix.lower() not in kinds:
         hint = "; unzip it first" if path.suffix.lower() == ".kmz" else ""
         raise ScenarioError([f"{where}: the name ends in none of {', '.join(kinds)}{hint}"])
-    with from_outside(where):
+    with as_error(where):
         found = kinds[path.suffix.lower()](read_text(path))
     outlines, others = [one for one in found if not one.shape], [one for one in found if one.shape]
     if not outlines:
@@ -82,7 +80,7 @@ def _degrees(one: Outline) -> Iterator[str]:
                 break
 
 
-def _flat(ring: Ring, site: Site, simplify: float) -> Polygon:
+def _flat(ring: Ring, site: FlightSite, simplify: float) -> Polygon:
     """A ring in metres about a site, without corners that are given twice or lie on a straight side."""
     points = [site.local(latitude, longitude, 0.0)[:2] for longitude, latitude in ring]
     apart = [point for point, after in zip(points, [*points[1:], points[0]], strict=True)
@@ -100,11 +98,11 @@ def _fewer(shape: Polygon, most: float) -> Polygon:
     return few
 
 
-def _ground(outlines: list[Outline], where: str, simplify: float, space: bool, left_out: str) -> Ground:
+def _ground(outlines: list[Outline], where: str, simplify: float, space: bool, left_out: str) -> Field:
     """The largest polygon as an arena, holes and other polygons as obstacles."""
     west, south, east, north = Polygon(max(outlines, key=lambda one: Polygon(one.shell).area).shell).bounds
     origin = round(0.5 * (south + north), 7), round(0.5 * (west + east), 7)
-    site = Site(*origin, 0.0)
+    site = FlightSite(*origin, 0.0)
 
     def local(ring: Ring) -> Polygon:
         return _flat(ring, site, simplify)
@@ -133,7 +131,7 @@ def _ground(outlines: list[Outline], where: str, simplify: float, space: bool, l
         f"{where}: {arena.name}, {len(keys['corners'])} corners and {plan.area:.4g} m², {len(solid)} obstacles; its "
         f"origin is at latitude {origin[0]:.7f}, longitude {origin[1]:.7f}{_many(plan)}{dropped}{far}{left_out}"
     )
-    return Ground(keys, origin, note)
+    return Field(keys, origin, note)
 
 
 def _cut(shape: Polygon, plan: Polygon, most: float) -> Polygon:

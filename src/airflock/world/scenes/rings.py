@@ -5,8 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from airflock.support.errors import bounded
-from airflock.support.untrusted import FormatError
+from airflock.support import FormatError, shortened
 
 NO_AREA = {"Point", "MultiPoint", "LineString", "MultiLineString", "LinearRing", "Track", "MultiTrack", "Model"}
 Ring = list[tuple[float, float]]
@@ -26,7 +25,7 @@ class Outline:
     shape: str = ""
 
 
-def opened(ring: Ring) -> Ring:
+def open_ring(ring: Ring) -> Ring:
     """A ring without its last point, where that is the first again, and without points that are given twice."""
     return [point for point, after in zip(ring, [*ring[1:], ring[0]], strict=True) if point != after] if ring else []
 
@@ -36,5 +35,5 @@ def heights_of(properties: Mapping[str, Any]) -> dict[str, float]:
     found = {key: properties[key] for key in ("floor", "ceiling") if properties.get(key) is not None}
     for key, value in found.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise FormatError(f"the property {key} = {bounded(repr(value), 40)} is not a height in m")
+            raise FormatError(f"the property {key} = {shortened(repr(value), 40)} is not a height in m")
     return {key: float(value) for key, value in found.items()}

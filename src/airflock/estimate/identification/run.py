@@ -1,0 +1,256 @@
+"""From logs to the numbers of a scenario: `identify`, and what it found."""
+
+import datetime
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from scipy.stats import norm
+
+from airflock.estimate.identification import body, packets, periods, sensors
+from airflock.estimate.identification.hills import CURVE_PARAMETERS
+from airflock.estimate.identification.logs import FlightLogs, logs_from_recording, logs_from_tracks
+from airflock.estimate.identification.numbers import KEY_UNITS, IdentifiedParameter, IdentifiedParameters
+from airflock.parts.bodies import motion
+from airflock.parts.sensors import langevin
+from airflock.recordings import ImportOptions, ImportReport, read_tracks, refuse_archive
+from airflock.scenarios import Scenario, build_scenario, load_if_named
+from airflock.support import AirflockError, RecordingError, expand_path, is_file
+
+LEAST = 1e-6  # share of packets; what nothing was heard of
+WIDE = 0.2  # half of an interval of a share of packets, beyond which it says too little
+
+
+@dataclass
+class IdentifyResult:
+    """What identify found: numbers by key, notes, and the fits behind them for pictures."""
+
+    like: Scenario
+    numbers: dict[str, IdentifiedParameter]
+    notes: list[str]
+    logs: FlightLogs
+    body: body.BodyFit
+    sensors: sensors.SensorFit
+    radio: packets.RadioFit | None
+    has_one_clock: bool
+    sources: list[str] = field(default_factory=list)
+
+    def settings(self, level: float | None = None) -> dict[str, float]:
+        """Keys and values that replace those of `like`: what was told, or its pessimistic end at a level."""
+        return {
+            key: number.value if level is None else number.pessimistic_end(level)
+            for key, number in self.numbers.items()
+            if number.told
+        }
+
+    def scenario(self, level: float | None = None) -> Scenario:
+        """The scenario `like` with these numbers; `published` is left out, for it speaks of other numbers."""
+        document = {key: value for key, value in self.like.document.items() if key != "published"}
+        return build_scenario(document, self.like.name, self.settings(level))
+
+    def document(self, level: float | None = None, *, uncertain: bool = False) -> dict[str, Any]:
+        """A scenario file's content: each number with unit and source, on request with its interval."""
+        document = _copied(self.like.document)
+        document.pop("published", None)
+        document["title"] = f"{self.like.name} with the numbers of {len(self.sources) or self.logs.drones} logs"
+        today = datetime.date.today().isoformat()
+        for key, value in self.settings(level).items():
+            section, _, name = key.partition(".")
+            number = self.numbers[key]
+            half = 0.5 * (number.high - number.low)
+            how = f"identify, {today}: {number.origin}, ± {half:.2g}"
+            entry: dict[str, Any] = {"value": _short(value)}
+            if KEY_UNITS[key] != "1":
+                entry["unit"] = KEY_UNITS[key]
+            entry["source"] = how + (f"; pessimistic end at {level:g}" if level is not None else "")
+            if uncertain:
+                entry["interval"] = [_short(max(number.low, 0.0)), _short(number.high)]
+            document.setdefault(section, {})[name] = entry
+        return document
+
+
+def identify(
+    flight_logs: Any,
+    like: Scenario | str,
+    *,
+    heard: pd.DataFrame | None = None,
+    standing: tuple[float, float] | None = None,
+    same_clock: bool = False,
+    options: ImportOptions | None = None,
+    accept: Iterable[str] = (),
+    begin: float | None = None,
+    end: float | None = None,
+) -> IdentifyResult:
+    """Numbers of a scenario from flight logs, with 95 % intervals, and reasons where logs cannot tell.
+
+    Parameters
+    ----------
+    flight_logs : path, list of paths, xarray.Dataset or Logs
+        Files (as in `load_tracks`), a recording, or Logs.
+    like : Scenario or str
+        Scenario or preset that is flown by the same law; what is not identified stays as it is there.
+    heard : pandas.DataFrame, optional
+        Packets: receiver, sender, t (receiver's clock, s), stamp (sender's clock, s), and for reception distance (m)
+        and got (0 or 1; one row per decision and pair).
+    standing : tuple of float, optional
+        First and last time on the ground, s after each log begins, unless the logs tell it.
+    same_clock : bool
+        The clocks of all files agree.
+    options : Options, optional
+        How files are read (`airflock.recordings.imports.track.ImportOptions`), as in `load_tracks`.
+    accept : iterable of str
+        Kinds of faults that are meant so, as in `load_tracks`.
+    begin, end : float, optional
+        Window of time of the files that is used, s.
+
+    Returns
+    -------
+    Identified
+        `numbers`: key → value, interval, origin, or the reason why the logs cannot tell; `scenario()` has them in it.
+
+    Raises
+    ------
+    AirflockError
+        If body or sensor are not the multirotor and the langevin that this knows, or the logs lack what it needs.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> scenario = airflock.load("vasarhelyi_2018/real_6ms", {"agents": 3, "duration": 30.0})
+    >>> found = airflock.identify(airflock.simulate(scenario, seed=1), scenario)
+    >>> tau = found.numbers["body.tau"]
+    >>> tau.low < 1.0 < tau.high
+    True
+    >>> found.numbers["radio.delay"].told
+    False
+    """
+    scenario = load_if_named(like)
+    if not isinstance(scenario.body, motion.Parameters):
+        raise AirflockError(f"{scenario.name}: its body is not the multirotor that identify knows")
+    if not isinstance(scenario.sensors, langevin.Parameters):
+        raise AirflockError(f"{scenario.name}: its sensor is {scenario.sensor.name}; identify knows langevin alone")
+    findings = ImportReport(frozenset([accept] if isinstance(accept, str) else accept))
+    logs, comparable, sources = _logs(
+        flight_logs, options or ImportOptions(), findings, standing, same_clock, (begin, end)
+    )
+    if heard is not None:
+        logs, aligned = _on_one_clock(logs, packets.check_packets(heard))
+        comparable = comparable or aligned
+        findings.notes += ["clocks of the drones aligned by the ages of their packets"] * aligned
+    notes = list(findings.notes)
+    numbers = IdentifiedParameters(scenario)
+    still = sensors.fit_sensors(logs, scenario.sensors.period)
+    for name in ("noise", "damping", "scale"):
+        origin = f"{still.seconds:.0f} s of standing"
+        numbers.add(f"sensors.{name}", still.value[name], still.intervals[name], origin, still.refused.get(name, ""))
+    sensor_numbers = {
+        n: still.value[n] if n not in still.refused else getattr(scenario.sensors, n) for n in ("noise", "damping")
+    }
+    moving = body.fit_body(logs, scenario.flight.dt, sensor_numbers["noise"] * sensor_numbers["damping"])
+    rows = f"{moving.rows} rows, {moving.saturated_rows} limited"
+    for name in ("tau", "a_max", "noise"):
+        numbers.add(f"body.{name}", moving.value[name], moving.intervals[name], rows, moving.refused.get(name, ""))
+    notes += moving.notes
+    period, interval, reason = periods.decision_period(logs)
+    numbers.add("sensors.period", period, interval, "changes of commands", reason)
+    links = _radio(heard, numbers)
+    if links is not None and links.notes:
+        notes += [
+            f"{note}; {numbers.reference_value('radio.range'):g} m in --like, which is kept" for note in links.notes
+        ]
+    most, reason = periods.largest_command(logs, numbers.reference_value("model.v_flock"))
+    if hasattr(scenario.parameters, "v_max"):
+        numbers.add("model.v_max", most, (0.995 * most, most), "largest command", reason)
+    numbers.refuse_out_of_range()
+    return IdentifyResult(scenario, numbers.by_key, notes, logs, moving, still, links, comparable, sources)
+
+
+def _logs(
+    what: Any,
+    options: ImportOptions,
+    findings: ImportReport,
+    standing: tuple[float, float] | None,
+    same_clock: bool,
+    window: tuple[float | None, float | None],
+) -> tuple[FlightLogs, bool, list[str]]:
+    if isinstance(what, FlightLogs):
+        return what, same_clock, []
+    if isinstance(what, xr.Dataset):
+        return logs_from_recording(what), bool(what.attrs.get("airflock_comparable", 1)), []
+    tracks, _ = read_tracks(what, options, findings, same_clock=True, begin=window[0], end=window[1])
+    sources = sorted({track.source for track in tracks})
+    comparable = same_clock or len(sources) == 1 or all(track.clock == "utc" for track in tracks)
+    return logs_from_tracks(tracks, standing), comparable, sources
+
+
+def _on_one_clock(logs: FlightLogs, heard: pd.DataFrame) -> tuple[FlightLogs, bool]:
+    """Logs on one clock, by packets in both directions, if these name the drones as the logs do."""
+    ahead = packets.fit_delay(heard).ahead
+    if not set(logs.names) <= set(ahead):
+        return logs, False
+    own = np.array([ahead[name] for name in logs.names])
+    return replace(logs, time=logs.time - own[logs.who]), True
+
+
+def _radio(heard: pd.DataFrame | None, numbers: IdentifiedParameters) -> packets.RadioFit | None:
+    """Add the numbers of the radio, or why there is none; its fit, for pictures."""
+    nan, scenario = float("nan"), numbers.like
+    if heard is None:
+        reason = "no table of packets (--heard): neither PX4 nor ArduPilot logs them, the companion computer must"
+        for name in ("delay", *CURVE_PARAMETERS):
+            numbers.add(f"radio.{name}", nan, (nan, nan), "", reason)
+        return None
+    table = packets.check_packets(heard)
+    late = packets.fit_delay(table)
+    origin = f"stamps, ± {1e3 * late.scatter:.0f} ms each"
+    numbers.add("radio.delay", late.value, late.interval, origin, late.reason)
+    links = packets.fit_links(table, scenario.sensors.period, packets.curve_parameters(scenario.radio))
+    if scenario.transceiver.name == "table":
+        _table(table, numbers)
+        return links
+    lossy = scenario.transceiver.name == "links"
+    for name in CURVE_PARAMETERS:
+        why = links.refused.get(name, "") or (
+            "" if lossy else "radio.kind of --like has no such curve: --set radio.kind=links"
+        )
+        numbers.add(f"radio.{name}", links.value[name], links.intervals[name], f"{len(table)} packets", why)
+    return links
+
+
+def _table(heard: pd.DataFrame, numbers: IdentifiedParameters) -> None:
+    """Add the entries of a radio of kind "table", at the spacing that the scenario has."""
+    k: Any = numbers.like.radio
+    shares, errors = packets.fit_table(heard, k.spacing)
+    half = norm.ppf(0.975) * errors
+    for n, (share, off) in enumerate(zip(shares.tolist(), half.tolist(), strict=True)):
+        near = f"no pair flew within {k.spacing:g} m of {n * k.spacing:g} m apart; kept from --like"
+        wide = f"only known to ± {off:.2f}: more packets at {n * k.spacing:g} m" if off > WIDE else ""
+        ends = (max(share - off, 0.0), min(share + off, 1.0))
+        share = max(share, LEAST)
+        numbers.add(f"radio.received_{n}", share, ends, f"{len(heard)} packets", near if np.isnan(off) else wide)
+
+
+def _copied(document: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: _copied(v) if isinstance(v, Mapping) else v for k, v in document.items()}
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def read_heard(path: Any) -> pd.DataFrame:
+    """Read a table of packets (CSV); raises RecordingError for what is none."""
+    place = expand_path(path)
+    if not is_file(place):
+        raise RecordingError(f"{path}: no such file")
+    refuse_archive(place)
+    try:
+        table = pd.read_csv(place, skipinitialspace=True)
+    except (OSError, ValueError, pd.errors.ParserError) as fault:
+        raise RecordingError(f"{path}: is not a table of packets: {str(fault).splitlines()[0]}") from fault
+    if len(table.columns) == 1 and ";" in str(table.columns[0]):
+        raise RecordingError(f"{path}: has ; between its columns; write it with commas, and points in its numbers")
+    return packets.check_packets(table, str(path))

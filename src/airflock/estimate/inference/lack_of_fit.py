@@ -1,0 +1,202 @@
+"""Lack of fit: how much better the next step would be predicted by the law and a free answer to neighbours together.
+
+The differences that a law leaves are regressed on what neighbours do: sums of directions towards them and of their
+headings in shells of distance, as they are and of length one, and how many there are. Laws answer bluntly to these (the
+nearest zone that is not empty, a turn as large as the body allows), so the answer is a sum of hundreds of saturating
+functions drawn at random (random features: Rahimi & Recht 2008), the same to the left as to the right. It is fitted on
+every other span and judged on the rest, so that noise explains nothing: a test that knows no law.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.estimate.inference.likelihood import FitModel
+from airflock.estimate.inference.tracks import ABSENT, COUNTED, ENTERS, UNSEEN
+
+Array = NDArray[np.float64]
+SHELLS = (0.35, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0)  # nearest distances
+CLOSE = 2.0  # nearest distances, within which differences of velocity are summed besides
+MANY = 3  # neighbours in a shell, beyond which more make no difference
+UNITS = 400
+SHARE = 0.15  # of what neighbours do, that one unit looks at
+RIDGE = 0.5  # share of a unit's power
+FEWEST = 100  # steps of each half
+
+
+@dataclass(frozen=True)
+class NeighbourFrame:
+    """What neighbours did before a frame, and by how much the law was wrong at it; last axes are individuals.
+
+    even, odd    : what a mirror from left to right leaves as it is, and what it turns round, by kind
+    error        : along and to the left, m
+    counted      : whether the error counts; corrected: whether the walk was put right; new: who enters or is absent
+    """
+
+    even: Array
+    odd: Array
+    error: Array
+    counted: NDArray[np.bool_]
+    corrected: NDArray[np.bool_]
+    new: NDArray[np.bool_]
+
+
+def lack_of_fit(model: FitModel, point: Array, spans: Sequence[int]) -> float:
+    """Log-likelihood that a free answer to neighbours would gain on the spans beside the law; 0 or more."""
+    found = [frames for frames in _frames(model, point, spans) if frames]
+    if not found:
+        return 0.0
+    answer, gains = RandomFeatures(found), model.split(point)[1]
+    sums = [[HalfSums(size), HalfSums(size)] for size in answer.sizes]
+    for number, frames in enumerate(found):
+        pushes = zip(*map(answer.pushes, frames), strict=True)
+        for component, (each, share) in enumerate(zip(pushes, (gains.along, gains.across), strict=True)):
+            moved = zip(carry_pushes(each, frames, share), frames, strict=True)
+            sums[component][number % 2].add(
+                np.concatenate([push[:, frame.counted] for push, frame in moved], axis=1),
+                np.concatenate([frame.error[component, frame.counted] for frame in frames]),
+            )
+    return sum(max(_gained(*halves), 0.0) for halves in sums)
+
+
+def carry_pushes(
+    pushes: Iterable[Array], frames: Sequence[NeighbourFrame], gains: tuple[float, float]
+) -> Iterator[Array]:
+    """By how much pushes (unit, individual) have moved individuals until each frame.
+
+    A push goes on in position and velocity until the walk has put them right, by its shares of a difference.
+    """
+    moved: Array = np.zeros(())
+    faster: Array = moved
+    for push, frame in zip(pushes, frames, strict=True):
+        faster = faster + push
+        moved = moved + faster
+        yield moved
+        seen = np.where(frame.corrected, moved, 0.0)
+        moved, faster = moved - gains[0] * seen, faster - gains[1] * seen
+        moved, faster = np.where(frame.new, 0.0, moved), np.where(frame.new, 0.0, faster)
+
+
+def _gained(one: "HalfSums", other: "HalfSums") -> float:
+    """Log-likelihood that each half gains by the weights of the other."""
+    if min(one.steps, other.steps) < FEWEST:
+        return 0.0
+    after = other.left(one.weights()) + one.left(other.weights())
+    return 0.5 * (one.steps + other.steps) * math.log((one.square + other.square) / after)
+
+
+class HalfSums:
+    """Sums of every other span, from which units are weighed and by which those of the other half are judged."""
+
+    def __init__(self, size: int):
+        self.power, self.products, self.square, self.steps = np.zeros((size, size)), np.zeros(size), 0.0, 0
+
+    def add(self, pushed: Array, error: Array) -> None:
+        """Count a span: (unit, step) and (step,)."""
+        self.power += pushed @ pushed.T
+        self.products += pushed @ error
+        self.square += float(error @ error)
+        self.steps += len(error)
+
+    def weights(self) -> Array:
+        """Weights of units, each drawn to zero by a share of its power."""
+        own = np.diagonal(self.power)
+        matrix = self.power + np.diag(RIDGE * own + 1e-12 * (own.max() + 1e-300))
+        return np.asarray(np.linalg.solve(matrix, self.products), np.float64)
+
+    def left(self, weights: Array) -> float:
+        """Sum of squares that remain."""
+        return self.square - 2.0 * float(weights @ self.products) + float(weights @ self.power @ weights)
+
+
+class RandomFeatures:
+    """Saturating functions of what neighbours do, drawn at random, beside what they do itself."""
+
+    def __init__(self, tracks_frames: Sequence[Sequence[NeighbourFrame]]):
+        even, odd = (
+            np.concatenate([getattr(frame, kind) for frames in tracks_frames for frame in frames], axis=1)
+            for kind in ("even", "odd")
+        )
+        self.even_means, self.spread = even.mean(axis=1)[:, None], even.std(axis=1)[:, None] + 1e-6
+        self.odd_deviations = odd.std(axis=1)[:, None] + 1e-6
+        generator = np.random.default_rng(0)
+        self.even_weights, self.odd_weights = (
+            size * generator.normal(size=(UNITS, len(kind))) * (generator.random((UNITS, len(kind))) < SHARE)
+            for size, kind in ((1.0, even), (1.5, odd))
+        )
+        self.offset = generator.normal(size=(UNITS, 1))
+
+        self.sizes = (UNITS + len(even), UNITS + len(odd))
+
+    def pushes(self, frame: NeighbourFrame) -> tuple[Array, Array]:
+        """Pushes (unit, individual) along, which are even, and to the left, which are odd."""
+        even, odd = (frame.even - self.even_means) / self.spread, frame.odd / self.odd_deviations
+        either, side = self.even_weights @ even + self.offset, self.odd_weights @ odd
+        here, mirrored = np.tanh(either + side), np.tanh(either - side)
+        return np.concatenate([here + mirrored, even]), np.concatenate([here - mirrored, odd])
+
+
+def _frames(model: FitModel, place: Array, spans: Sequence[int]) -> list[list[NeighbourFrame]]:
+    """Frames after the first of each span."""
+    found = []
+    for walk, own in model.parts(spans):
+        tracks = walk.tracks
+        kept = np.zeros((len(walk.seen), 2 * walk.axes, tracks.individual_count))
+        e = walk.errors(*model.split(place), own, kept)
+        for begin, end in (tracks.spans[s] for s in own):
+            frames = []
+            for k in range(begin + 1, end):
+                even, odd = _around(kept[k - 1], tracks.state[k - 1] > ABSENT, tracks.nearest, model.scale.near)
+                state = tracks.state[k]
+                new = (state == ABSENT) | (state == ENTERS)
+                frames.append(
+                    NeighbourFrame(even, odd, e[k, :2].copy(), state == COUNTED, ~new & (state != UNSEEN), new)
+                )
+            found.append(frames)
+    return found
+
+
+def _around(
+    motion: Array, there: NDArray[np.bool_], nearest: Callable[[Array], Array], near: float
+) -> tuple[Array, Array]:
+    """What neighbours of each individual do (kind, individual), even and odd."""
+    axes, n = len(motion) // 2, motion.shape[1]
+    x, v = motion[:axes], motion[axes:]
+    h = v / np.maximum(np.linalg.norm(v, axis=0), 1e-12)
+    left = np.zeros_like(h)
+    flat = np.maximum(np.linalg.norm(h[:2], axis=0), 1e-12)
+    left[0], left[1] = -h[1] / flat, h[0] / flat
+    d = nearest((x[:, None, :] - x[:, :, None]).reshape(axes, -1)).reshape(axes, n, n)  # from i (first) to j
+    apart = np.linalg.norm(d, axis=0)
+    pair = there[:, None] & there[None, :] & (apart > 0.0)
+    towards, headings = d / np.maximum(apart, 1e-12), np.broadcast_to(h[:, None, :], d.shape)
+    shell = np.digitize(apart / near, SHELLS)
+    even: list[Array] = []
+    odd: list[Array] = []
+
+    def tell(total: Array) -> None:
+        even.append((total * h).sum(axis=0))
+        odd.append((total * left).sum(axis=0))
+
+    before = np.zeros((2, axes, n))
+    for s in range(len(SHELLS) + 1):
+        inside = pair & (shell == s)
+        even.append(np.minimum(inside.sum(axis=1), MANY).astype(float))
+        totals = np.array([np.where(inside, field, 0.0).sum(axis=2) for field in (towards, headings)])
+        for total, inner in zip(totals, before, strict=True):
+            tell(total)
+            tell(_of_length_one(total))
+            if s:
+                tell(_of_length_one(total + inner))
+        before = totals
+    for inside in (pair & (apart < CLOSE * near), pair):
+        tell(np.where(inside, v[:, None, :] - v[:, :, None], 0.0).sum(axis=2))
+    return np.array(even), np.array(odd)
+
+
+def _of_length_one(vectors: Array) -> Array:
+    found: Array = vectors / np.maximum(np.linalg.norm(vectors, axis=0), 1e-9)
+    return found

@@ -1,0 +1,186 @@
+"""Tracks as the filter walks through them: positions in spans of time, and who is there, seen and counted when."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock.recordings import check_recording
+from airflock.support import RecordingError
+
+Array = NDArray[np.float64]
+ABSENT, UNSEEN, COUNTED, SEEN, ENTERS = 0, 1, 2, 3, 4  # what an individual is at a frame
+LONGEST_GAP = 1.0  # s; an individual that is not seen for longer has left
+SETTLING = 10  # frames after an entry that are not counted
+BEGINNING = 5  # frames from which the velocity at an entry is taken
+SPAN = 12.0  # s; spans are what is held out, and what errors are taken over
+SPANS = (8, 400)  # least and largest number of spans
+SHORT = 30  # frames; no span is shorter
+FEW = 4 * SHORT  # frames below which nothing is inferred
+
+
+@dataclass(frozen=True)
+class SpanTracks:
+    """One recording, cut into spans.
+
+    period  : between frames, s
+    seen    : (frame, axis, individual) positions, m; nan where an individual was not seen
+    state   : (frame, individual) ABSENT, UNSEEN, COUNTED, SEEN or ENTERS
+    speed   : (frame, axis, individual) velocity of those who enter, m/s; 0 elsewhere
+    spans   : first and last frame (exclusive) of each span
+    box     : half sides of a periodic box, m; 0 along an axis that is open
+    """
+
+    period: float
+    seen: Array
+    state: NDArray[np.int8]
+    speed: Array
+    spans: tuple[tuple[int, int], ...]
+    name: str
+    box: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+    @property
+    def axes(self) -> int:
+        """2 in a plane, 3 in space."""
+        return int(self.seen.shape[1])
+
+    @property
+    def individual_count(self) -> int:
+        """How many there are, at one time or another."""
+        return int(self.seen.shape[2])
+
+    def nearest(self, offset: Array) -> Array:
+        """Offsets (axis, individual), m, to the nearest image of the box."""
+        return nearest_image(offset, self.box, 0)
+
+    @property
+    def counted(self) -> int:
+        """Steps that are scored."""
+        return int((self.state == COUNTED).sum())
+
+
+@dataclass(frozen=True)
+class TrackScale:
+    """Lengths and speeds that were seen: nearest and farthest pair (m), median and largest speed (m/s), period (s)."""
+
+    near: float
+    far: float
+    speed: float
+    max_speed: float
+    period: float
+
+
+def tracks_from_recording(
+    recording: xr.Dataset, name: str = "tracks", span: float = SPAN, box: tuple[float, ...] = (0.0, 0.0, 0.0)
+) -> SpanTracks:
+    """Tracks of a recording whose frames are evenly spaced.
+
+    span : length of a span, s; less where the recording is short
+    box  : as in `SpanTracks`
+
+    Positions alone are used: velocities of tracks are differentiated, and so contain the future.
+    """
+    check_recording(recording)
+    order = ("time", "space", "individual")
+    own = recording.isel(keypoint=0)
+    time = own["time"].values.astype(float)
+    seen = own["position"].transpose(*order).values.astype(float)
+    if len(time) < FEW:
+        raise RecordingError(f"{name}: {len(time)} frames are too few to infer a law from; {FEW} or more")
+    steps = np.diff(time)
+    period = float(np.median(steps))
+    if np.abs(steps - period).max() > 0.01 * period:
+        raise RecordingError(f"{name}: frames are not evenly spaced; import it with --rate")
+    if seen.shape[1] == 3 and not np.nanmax(seen[:, 2]) - np.nanmin(seen[:, 2]) > 1e-9:
+        seen = seen[:, :2]  # flown at one height
+    sure: Any = np.isfinite(seen).all(axis=1)
+    if "confidence" in own:
+        sure &= own["confidence"].transpose("time", "individual").values >= 1.0  # not those that were bridged
+    seen = np.where(sure[:, None], seen, np.nan)
+    length = len(time) * period
+    parts = int(np.clip(round(length / span), min(SPANS[0], len(time) // SHORT), min(SPANS[1], len(time) // SHORT)))
+    cuts = np.linspace(0, len(time), parts + 1).astype(int)
+    spans = tuple((int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True))
+    found = with_positions(
+        SpanTracks(period, seen, np.zeros(sure.shape, np.int8), np.zeros_like(seen), spans, name, box), seen
+    )
+    if not found.counted:
+        raise RecordingError(f"{name}: no individual is seen for {SETTLING + 1} frames in a row")
+    return found
+
+
+def with_positions(tracks: SpanTracks, positions: Array) -> SpanTracks:
+    """The same tracks with other positions: who is there and who enters is found anew."""
+    sure: Any = np.isfinite(positions).all(axis=1)
+    state, speed = np.zeros(sure.shape, np.int8), np.zeros_like(positions)
+    gap = max(2, round(LONGEST_GAP / tracks.period))
+    for begin, end in tracks.spans:
+        for i in range(sure.shape[1]):
+            own = positions[begin:end, :, i]
+            _walk(
+                sure[begin:end, i], own, state[begin:end, i], speed[begin:end, :, i], gap, tracks.period, tracks.box
+            )  # fmt: skip
+    return replace(tracks, seen=np.ascontiguousarray(positions), state=state, speed=speed)
+
+
+def nearest_image(offset: Array, box: tuple[float, ...], axis: int) -> Array:
+    """Offsets (m) to the nearest image of a periodic box; `axis` is that of coordinates."""
+    found = offset.copy()
+    for a, half in enumerate(box[: offset.shape[axis]]):
+        if half > 0.0:
+            part = np.take(found, a, axis)
+            part = part - 2.0 * half * np.round(part / (2.0 * half))
+            found[(slice(None),) * axis + (a,)] = part
+    return found
+
+
+def _walk(
+    sure: NDArray[np.bool_], seen: Array, state: NDArray[np.int8], speed: Array, gap: int, period: float,
+    box: tuple[float, ...],
+) -> None:  # fmt: skip
+    """Fill in what one individual is at each frame of a span."""
+    frames = np.flatnonzero(sure)
+    since, last = 0, -1
+    for order, k in enumerate(frames.tolist()):
+        if last < 0 or k - last > gap:
+            near = frames[order : order + BEGINNING]
+            near = near[near - k < 2 * BEGINNING]
+            if len(near) < 3:
+                last = -1
+                continue
+            t = (near - near.mean()) * period
+            speed[k] = (t[:, None] * nearest_image(seen[near] - seen[k], box, 1)).sum(axis=0) / (t * t).sum()
+            state[k], since = ENTERS, 0
+        else:
+            state[last + 1 : k] = UNSEEN
+            since += 1
+            state[k] = COUNTED if since > SETTLING and k - last == 1 else SEEN
+        last = k
+
+
+def tracks_scale(all_tracks: list[SpanTracks]) -> TrackScale:
+    """Lengths and speeds in several tracks of one kind."""
+    near, far, speeds = [], [], []
+    for tracks in all_tracks:
+        lag = max(1, round(0.2 / tracks.period))
+        step = nearest_image(tracks.seen[lag:] - tracks.seen[:-lag], tracks.box, 1)
+        moved = np.linalg.norm(step, axis=1) / (lag * tracks.period)
+        speeds.append(moved[np.isfinite(moved)])
+        for frame in tracks.seen[:: max(1, len(tracks.seen) // 200)]:
+            x = frame[:, np.isfinite(frame).all(axis=0)]
+            if x.shape[1] > 1:
+                apart = np.linalg.norm(nearest_image(x[:, :, None] - x[:, None, :], tracks.box, 0), axis=0)
+                far.append(float(apart.max()))
+                np.fill_diagonal(apart, np.inf)
+                near.append(float(np.median(apart.min(axis=0))))
+    speed = np.concatenate(speeds)
+    if not near or not len(speed):
+        raise RecordingError(
+            f"{all_tracks[0].name}: no two individuals are ever seen together, so nobody to flock with"
+        )
+    return TrackScale(
+        float(np.median(near)), float(np.quantile(far, 0.9)), float(np.median(speed)),
+        float(np.quantile(speed, 0.999)), all_tracks[0].period,
+    )  # fmt: skip

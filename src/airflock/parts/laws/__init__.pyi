@@ -1,0 +1,6 @@
+# The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
+from . import (
+    kidger as kidger,
+    vasarhelyi_2018 as vasarhelyi_2018,
+)
+from .vasarhelyi_2018 import Parameters as Parameters

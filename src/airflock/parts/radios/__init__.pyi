@@ -1,0 +1,10 @@
+# The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
+from . import (
+    links as links,
+    table as table,
+)
+from .registry import (
+    DEFAULT_RADIO as DEFAULT_RADIO,
+    RADIOS as RADIOS,
+)
+from .table import ENTRIES as ENTRIES

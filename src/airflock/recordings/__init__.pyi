@@ -1,0 +1,82 @@
+# The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
+from . import (
+    attributes as attributes,
+    measures as measures,
+)
+from .attributes import (
+    axis_names as axis_names,
+    faults_line as faults_line,
+    recorded_faults as recorded_faults,
+)
+from .differences import differentiated_velocity as differentiated_velocity
+from .exports.export import (
+    SUFFIXES as SUFFIXES,
+    export as export,
+)
+from .files import (
+    load_recording as load_recording,
+    replay_recording as replay_recording,
+    save as save,
+)
+from .flights import (
+    provenance as provenance,
+    recording_of as recording_of,
+    simulate as simulate,
+    to_plain_values as to_plain_values,
+)
+from .flown_scenario import (
+    power_settings as power_settings,
+    scenario_of_recording as scenario_of_recording,
+)
+from .groups import (
+    PAIR_METRICS as PAIR_METRICS,
+    group_scores as group_scores,
+)
+from .health import doctor as doctor
+from .imports.load import (
+    load_tracks as load_tracks,
+    read_tracks as read_tracks,
+)
+from .imports.track import (
+    COMMAND_TARGETS as COMMAND_TARGETS,
+    POSITION_TARGETS as POSITION_TARGETS,
+    VELOCITY_TARGETS as VELOCITY_TARGETS,
+    ImportedTrack as ImportedTrack,
+    ImportOptions as ImportOptions,
+    ImportReport as ImportReport,
+)
+from .isolated import ReaderProcess as ReaderProcess
+from .layout import (
+    DIMENSIONS as DIMENSIONS,
+    check_recording as check_recording,
+    make_dataset as make_dataset,
+    recording_frames as recording_frames,
+)
+from .lengths import (
+    body_length_settings as body_length_settings,
+    missing_lengths_note as missing_lengths_note,
+)
+from .packed import refuse_archive as refuse_archive
+from .perception import packet_uniforms as packet_uniforms
+from .rare import (
+    rare_event_notes as rare_event_notes,
+    upper_probability_bound as upper_probability_bound,
+)
+from .reception import (
+    BINS as BINS,
+    packet_age as packet_age,
+)
+from .score_table import with_units as with_units
+from .scores import (
+    between_frames_note as between_frames_note,
+    measure_recording as measure_recording,
+    over_time as over_time,
+    time_series_names as time_series_names,
+    undefined_metrics_of as undefined_metrics_of,
+)
+from .sweeps import (
+    fly_points as fly_points,
+    grid_points as grid_points,
+    metric_to_show as metric_to_show,
+    scenarios_at as scenarios_at,
+)
