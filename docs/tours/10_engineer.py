@@ -38,10 +38,7 @@ for name in ("6ms", "real_6ms"):
     table = airflock.score(f"{name}.toml", seeds=30)
     hit = int((table["n_coll"] > 0).sum())
     print(table[["phi_vel", "phi_corr", "r_min", "phi_wall", "n_coll", "fitness"]].agg(["mean", "min", "max"]).round(3))
-    print(
-        f"collisions in {hit} of 30 flights: at most {upper_probability_bound(hit, 30):.0%} of such flights, "
-        f"at 95 % confidence"
-    )
+    print(f"collisions in {hit} of 30 flights: at most {upper_probability_bound(hit, 30):.0%} at 95 % confidence")
 
 # %%
 # Look at the worst flight of the second set.
