@@ -93,7 +93,7 @@ def found_of(name):
     """Digests of the drivers of a scenario: in single precision, in double with a recording, of a GPU, by cells."""
     one = SCENARIOS[name]
     plan = plan_of(one, precision=32).built(grid=False)
-    shape = shape_of(one.agents, 1, sequential=plan.sequential, whole=bool(plan.model.flock))
+    shape = shape_of(one.agents, 1, sequential=plan.sequential, whole_flock=bool(plan.model.flock))
     found = {
         "32": trees_of(driver.flight_driver_text, plan),
         "64": trees_of(driver.flight_driver_text, plan.built(bits=64, keep_frames=True)),

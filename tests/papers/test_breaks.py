@@ -243,7 +243,7 @@ def test_changes_of_all_papers_go_on_where_they_were_cut_off_and_leave_out_claim
     flown: list = []
     monkeypatch.setattr(breaks, "committed", lambda: ROWS)
     monkeypatch.setattr(breaks, "SEEDS", {("kidger", "last"): 7})
-    monkeypatch.setattr(breaks, "kind", lambda: "zen")
+    monkeypatch.setattr(breaks, "processor_kind", lambda: "zen")
     monkeypatch.setattr(breaks, "fly", broken(flown))
     with pytest.raises(KeyboardInterrupt):
         breaks.fly_all(tmp_path, print)
@@ -254,7 +254,7 @@ def test_changes_of_all_papers_go_on_where_they_were_cut_off_and_leave_out_claim
     assert breaks._kept(kept, json.loads(kept.read_text())["texts"], {"first.a"}) == ROWS[:1]
     assert breaks._kept(kept, json.loads(kept.read_text())["texts"], {"first.a", "first.b"}) is None
     assert breaks._kept(kept, "others", {"first.a"}) is None
-    monkeypatch.setattr(breaks, "kind", lambda: "lake")  # where other flights were kept
+    monkeypatch.setattr(breaks, "processor_kind", lambda: "lake")  # where other flights were kept
     elsewhere = breaks.fly_all(tmp_path, print)
     assert flown[3:] == flown[:2] and [row.processor for row in elsewhere] == ["lake", "lake", ""]
 

@@ -109,7 +109,7 @@ def test_the_search_finds_the_digit_that_a_row_asks_for() -> None:
 def test_a_point_that_is_kept_is_not_flown_again(tmp_path, monkeypatch) -> None:
     flown = []
 
-    def score(scenarios, seeds, *, threads, done):
+    def score(scenarios, seeds, *, threads, on_done):
         flown.append(list(seeds))
         return [dict.fromkeys(MEASURED, 0.5) for _ in seeds]
 

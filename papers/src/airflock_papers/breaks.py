@@ -31,7 +31,7 @@ from airflock_papers.statements import Statement, load
 from airflock_papers.texts import texts
 
 COMMITTED = "breaks.csv"
-GOOD = {processor_kind: verdicts[0] for processor_kind, verdicts in VERDICTS.items()}
+GOOD = {kind: verdicts[0] for kind, verdicts in VERDICTS.items()}
 RED = "turned red"
 GREEN = "still holds"  # a claim that its own change does not break
 UNSHOWN = "does not hold with so few flights"  # so that its turning red would say nothing

@@ -35,7 +35,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         "airflock.score(scenario, seeds=4)",
         "score",
         {
-            "scenario": "what",
+            "scenario": "scenario_or_recording",
             **SEED_OPTIONS,
             **LOAD_OPTIONS,
             **MANY_FLIGHT_OPTIONS,
@@ -48,7 +48,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         "airflock.score(recording)",
         "score",
         {
-            "files": "what",
+            "files": "scenario_or_recording",
             "changes": "settings",
             "trust": "trust",
             **JSON_OPTIONS,
@@ -62,7 +62,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         'airflock.sweep(scenario, {"radio.delay": [0, 1, 2]})',
         "sweep",
         {
-            "scenario": "what",
+            "scenario": "scenario",
             "over": "over",
             **SEED_OPTIONS,
             **SETTINGS_OPTIONS,
@@ -78,7 +78,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         'airflock.evolve("vasarhelyi_2018/6ms", "study")',
         "evolve",
         {
-            "scenario": "what",
+            "scenario": "scenario",
             "out": "out",
             **SETTINGS_OPTIONS,
             **JSON_OPTIONS,
@@ -177,7 +177,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         'airflock.video(recording, "flight.mp4")',
         "video",
         {
-            "what": "recording",
+            "source": "recording",
             "out": "path",
             "seed": "airflock.simulate",
             "begin": "start",
@@ -209,7 +209,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         "airflock.replay(recording)",
         "replay",
         {
-            "what": "recording",
+            "source": "recording",
             "page": "airflock.view.replays.Replay.save",
             "seed": "airflock.simulate",
             "rate": "rate",
@@ -238,7 +238,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         'airflock.load_tracks("fish.csv", unit="mm")',
         "load_tracks",
         {
-            "files": "what",
+            "files": "source",
             "save": "airflock.save",
             **JSON_OPTIONS,
             **{
@@ -274,7 +274,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         'airflock.identify(files, "vasarhelyi_2018/real_6ms")',
         "identify",
         {
-            "files": "what",
+            "files": "flight_logs",
             "like": "like",
             "heard": "heard",
             "standing": "standing",
@@ -284,8 +284,8 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             "accept": "accept",
             "changes": "airflock.load",
             **JSON_OPTIONS,
-            "out": "airflock.estimate.identification.run.Identified.document",
-            **dict.fromkeys(("conservative", "uncertain"), "airflock.estimate.identification.run.Identified.document"),
+            "out": "airflock.estimate.identification.run.IdentifyResult.document",
+            **dict.fromkeys(("conservative", "uncertain"), "airflock.estimate.identification.run.IdentifyResult.document"),
             "plot": "airflock.view.plots.identified.plot_identified",
             "plan": "airflock.estimate.identification.plan.flight_card",
             "flights": "airflock.estimate.identification.check.check_against_logs",
@@ -303,7 +303,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             "seed": "seed",
             "trust": "trust",
             **JSON_OPTIONS,
-            "out": "airflock.estimate.inference.result.Inferred.document",
+            "out": "airflock.estimate.inference.result.InferResult.document",
             "plot": "airflock.view.plots.inferred.plot_inferred",
         },
     ),
