@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airflock import support
 from airflock.engine import pick_device, plan_of, score_flights
 from airflock.scenarios import cost
 from airflock.scenarios.files import load
-from airflock.support import gpu as gpu
+from airflock.support import gpu
 from airflock.support.errors import DeviceError, FlightError, ScenarioError
 from flocks import scenario
 from gpus import runtime
@@ -21,13 +22,15 @@ SMALL = scenario(agents=3, duration=0.2, world__side=60.0, world__walls="nearest
 
 @pytest.fixture
 def present(monkeypatch):
-    monkeypatch.setattr(gpu, "unavailable_reason", lambda: None)
-    monkeypatch.setattr(gpu, "cuda_runtime", lambda: runtime(free=140e9))
+    for home in (gpu, support):  # where it is, and the door through which others reach it
+        monkeypatch.setattr(home, "unavailable_reason", lambda: None)
+        monkeypatch.setattr(home, "cuda_runtime", lambda: runtime(free=140e9))
 
 
 @pytest.fixture
 def absent(monkeypatch):
-    monkeypatch.setattr(gpu, "unavailable_reason", lambda: "no driver")
+    for home in (gpu, support):
+        monkeypatch.setattr(home, "unavailable_reason", lambda: "no driver")
 
 
 def test_unknown_devices_are_refused():
@@ -146,8 +149,8 @@ def test_the_step_at_which_a_closed_flight_left_the_finite_numbers_is_found(wron
 
 def test_the_command_ends_with_one_line_and_status_2_without_a_gpu():
     code = "import sys; sys.argv = ['airflock', 'run', 'vasarhelyi_2018/4ms', '--device', 'cuda']\n"
-    code += "from airflock import gpu as device\ndevice.trouble = lambda: 'no driver'\n"
-    code += "from airflock.cli import main\nmain()\n"
+    code += "from airflock.support import gpu as device\ndevice.unavailable_reason = lambda: 'no driver'\n"
+    code += "from airflock.cli.main import main\nmain()\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr.strip() == "airflock: device = cuda: no driver; choose device = cpu or auto"
