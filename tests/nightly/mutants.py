@@ -1,6 +1,7 @@
 """Do the tests notice errors? 200 small errors (mutants), drawn once: each is put into the source, and tests are run.
 
     python tests/nightly/mutants.py rows                   print the rows that do not apply to this tree
+    python tests/nightly/mutants.py rename REVISION        rewrite them, if only names have changed since a revision
     python tests/nightly/mutants.py run FOLDER [ID ...]    run the rows that have a result, here, and compare
     python tests/nightly/mutants.py run FOLDER --baseline --tree TREE
                                                            run the rows that have no result, and write it into the table
@@ -12,10 +13,11 @@ killed by the same files later: not fewer `yes` than in the table. Some mutants 
 not all can be killed. The table was drawn from 66fb6ba3; its results are those of d0341249, and `module` is that of
 c840a19d.
 
-A mutant is found by its text, since modules move: `line` (stripped) in a function of the name `function` anywhere in
-src/airflock, or `line` alone where only one line reads so. Where names inside a line have changed, edit `line` and
-`mutant` of that row by hand, and nothing else; where a file of tests has another name, edit `tests`. `rows` and `run`
-print the rows that need it.
+A mutant is found by its text, since modules move: `line` (without its comment) in a function of the name `function`
+anywhere in src/airflock, or `line` alone where only one line reads so. Where names inside a line have changed, `rename`
+edits `function`, `line` and `mutant`: it finds the function that differs from the old one in names and texts only. The
+rest is edited by hand, and nothing but these three; where a file of tests has another name, edit `tests`. `rows` and
+`run` print the rows that need it.
 
 The draw is stratified over the packages by their lines of code. It leaves out messages, types, code of a GPU, functions
 that open sockets, start processes or browsers, or delete files, and lines that the OTHER revisions do not have.
@@ -34,6 +36,7 @@ import contextlib
 import csv
 import io
 import json
+import keyword
 import math
 import os
 import random
@@ -45,10 +48,12 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+import textwrap
 import time
 import tokenize
 import warnings
 from collections import Counter
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import NamedTuple
 
@@ -69,6 +74,7 @@ LEFT_OUT = re.compile(  # files of tests
     r"tests/(gpu|browser|papers|nightly|snapshots|typed)/|test_(trees|packaging|fuzz|cuda\w*|\w*gpu\w*)\.py"
 )
 
+LAYOUT = {tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.COMMENT, tokenize.ENDMARKER}
 COMPARED = {"<": (">", "<="), "<=": (">", "<"), ">": ("<", ">="), ">=": ("<", ">"), "==": ("!=",), "!=": ("==",),
             "is": ("is not",), "is not": ("is",), "in": ("not in",), "not in": ("in",)}  # fmt: skip
 COMPUTED = {"+": "-", "-": "+", "*": "/", "/": "*", "//": "*", "%": "*", "**": "*"}
@@ -80,8 +86,11 @@ class Function(NamedTuple):
 
     module: str
     name: str
-    node: ast.AST
+    node: ast.FunctionDef | ast.AsyncFunctionDef
     lines: dict[int, str]
+
+
+Body = tuple[Function, list[tokenize.TokenInfo]]
 
 
 class Site(NamedTuple):
@@ -97,9 +106,18 @@ class Site(NamedTuple):
 # --- the source -------------------------------------------------------------------------------------------------------
 
 
+def code_lines(text: str) -> list[str]:
+    """Lines of a module without comments, stripped."""
+    rows = text.splitlines()
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            rows[token.start[0] - 1] = token.line[: token.start[1]]
+    return [row.strip() for row in rows]
+
+
 def functions_of(module: str, text: str) -> list[Function]:
     """Functions of a module; a line belongs to the innermost one around it."""
-    rows, out = text.splitlines(), []
+    rows, out = code_lines(text), []
 
     def visit(node: ast.AST, names: tuple[str, ...]) -> set[int]:
         """Add the functions inside a node; return their lines."""
@@ -109,7 +127,7 @@ def functions_of(module: str, text: str) -> list[Function]:
                 inner = visit(child, (*names, child.name))
                 if not isinstance(child, ast.ClassDef):
                     span = set(range(child.body[0].lineno, (child.end_lineno or 0) + 1))
-                    own = {number: rows[number - 1].strip() for number in sorted(span - inner)}
+                    own = {number: rows[number - 1] for number in sorted(span - inner)}
                     out.append(Function(module, ".".join((*names, child.name)), child, own))
                     inner |= span
                 taken |= inner
@@ -152,6 +170,81 @@ class Tree:
         return None
 
 
+def tree_of(revision: str, folder: Path) -> Tree:
+    """Return the source of a revision of Git, unpacked into a folder."""
+    archive = subprocess.check_output(["git", "-C", ROOT, "archive", revision, "src"])
+    with tarfile.open(fileobj=io.BytesIO(archive)) as files:
+        files.extractall(folder / revision, filter="data")
+    return Tree(folder / revision)
+
+
+# --- names that have changed ------------------------------------------------------------------------------------------
+
+
+def tokens_of(text: str) -> list[tokenize.TokenInfo]:
+    """Tokens of a text, without comments, breaks of lines, and commas before a bracket that closes."""
+    read = tokenize.generate_tokens(io.StringIO(textwrap.dedent(text)).readline)
+    tokens = [token for token in read if token.type not in LAYOUT]
+    return [
+        a for a, b in zip(tokens, [*tokens[1:], tokens[-1]], strict=True) if a.string != "," or b.string not in ")]}"
+    ]
+
+
+def bodies(tree: Tree) -> dict[str, list[Body]]:
+    """Functions of a tree with their tokens, by shape: their text with names and strings taken out."""
+    blank = {tokenize.NAME: "name", tokenize.STRING: "text"}
+    texts = {module: path.read_text(encoding="utf-8").splitlines(keepends=True) for module, path in tree.paths.items()}
+    out: dict[str, list[Body]] = {}
+    for function in tree.functions:
+        tokens = tokens_of("".join(texts[function.module][function.node.lineno - 1 : function.node.end_lineno]))
+        shape = [t.string if keyword.iskeyword(t.string) else blank.get(t.type, t.string) for t in tokens]
+        out.setdefault(" ".join(shape), []).append((function, tokens))
+    return out
+
+
+def renamed(mutant: str, old: list[tokenize.TokenInfo], new: list[tokenize.TokenInfo]) -> str:
+    """Return a mutated line with the names and texts of the new line in place of those of the old one."""
+    other = {a.string: b.string for a, b in zip(old, new, strict=True) if a.type in (tokenize.NAME, tokenize.STRING)}
+    names = sorted(other, key=len, reverse=True)
+    pattern = "|".join(rf"(?<!\w){re.escape(name)}(?!\w)" for name in names) or r"(?!)"
+    return re.sub(pattern, lambda match: other[match[0]], mutant)
+
+
+def followed(row: dict[str, str], place: tuple[Body, int], bodies: list[Body], now: Tree) -> dict[str, str] | None:
+    """Return a row with the names of a tree in which its function has the same shape; None where its line differs."""
+    (function, tokens), number = place
+    if not bodies:
+        return None
+    strings = [token.string for token in tokens]
+    other, others = max(bodies, key=lambda body: SequenceMatcher(None, strings, [t.string for t in body[1]]).ratio())
+    span = [k for k, token in enumerate(tokens) if token.start[0] == number - function.node.lineno + 1]
+    line = others[span[0]].start[0]
+    if [k for k, token in enumerate(others) if token.start[0] == line] != span:
+        return None  # the formatter has broken the line elsewhere
+    at = line + other.node.lineno - 1
+    nth = sum(other.lines[at] == text for k, text in other.lines.items() if k <= at)
+    words = [tokens[k] for k in span], [others[k] for k in span]
+    changed = row | {"module": other.module, "function": other.name, "line": other.lines[at], "occurrence": str(nth)}
+    changed["mutant"] = renamed(row["mutant"], *words)
+    return changed if renamed(row["line"], *words) == changed["line"] and now.find(changed) == (other, at) else None
+
+
+def rename(revision: str, folder: Path) -> None:
+    """Rewrite the rows whose names have changed since a revision; print what was done."""
+    before, now, rows = tree_of(revision, folder), Tree(ROOT), read(TABLE)
+    new_bodies = bodies(now)
+    old_bodies = {body[0].node: (shape, body) for shape, alike in bodies(before).items() for body in alike}
+    for row in rows:
+        place, found = before.find(row), now.find(row)
+        if place and not (found and found[0].name == row["function"]):
+            shape, body = old_bodies[place[0].node]
+            changed = followed(row, (body, place[1]), new_bodies.get(shape, []), now)
+            if changed and changed != row:
+                print(f"{row['id']}: {row['line']}  ->  {changed['line']}  ->  {changed['mutant']}")
+                row |= changed
+    write(TABLE, rows)
+
+
 # --- the draw ---------------------------------------------------------------------------------------------------------
 
 
@@ -162,8 +255,8 @@ class Sites(ast.NodeVisitor):
         self.rows = [row.encode() for row in rows]
         self.own = function.lines
         self.sites: list[Site] = []
-        body = function.node.body  # type: ignore[attr-defined]
-        for statement in body[1:] if ast.get_docstring(function.node) else body:  # type: ignore[arg-type]
+        body = function.node.body
+        for statement in body[1:] if ast.get_docstring(function.node) else body:
             self.visit(statement)
 
     def add(self, line: int, start: int, end: int, text: str, kind: str) -> None:
@@ -288,7 +381,7 @@ class Sites(ast.NodeVisitor):
 def mutants_of(function: Function, text: str) -> list[tuple[Site, str]]:
     """Sites of a function, each with the stripped line that it makes; the module with it is read by Python."""
     rows, out = text.splitlines(), []
-    if UNTOUCHED.search("\n".join(function.lines.values())):
+    if UNTOUCHED.search("\n".join(rows[number - 1] for number in function.lines)):
         return []
     before = ast.dump(ast.parse(text))
     for site in Sites(function, rows).sites:
@@ -300,7 +393,8 @@ def mutants_of(function: Function, text: str) -> list[tuple[Site, str]]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 if ast.dump(ast.parse(changed)) != before:
-                    out.append((site, line.strip()))
+                    comment = rows[site.line - 1].strip().removeprefix(function.lines[site.line])
+                    out.append((site, line.strip().removesuffix(comment).strip()))
         except SyntaxError:
             continue
     return out
@@ -308,10 +402,9 @@ def mutants_of(function: Function, text: str) -> list[tuple[Site, str]]:
 
 def lines_of_code(text: str) -> int:
     """Count the lines that hold tokens, less those of strings that are statements."""
-    skipped = {tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.COMMENT, tokenize.ENDMARKER}
     lines: set[int] = set()
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type not in skipped:
+        if token.type not in LAYOUT:
             lines |= set(range(token.start[0], token.end[0] + 1))
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
@@ -321,12 +414,7 @@ def lines_of_code(text: str) -> int:
 
 def draw(revisions: list[str], folder: Path) -> None:
     """Draw the table from the first revision, of lines that all the others have."""
-    trees = []
-    for revision in revisions:
-        archive = subprocess.check_output(["git", "-C", ROOT, "archive", revision, "src"])
-        with tarfile.open(fileobj=io.BytesIO(archive)) as files:
-            files.extractall(folder / revision, filter="data")
-        trees.append(Tree(folder / revision))
+    trees = [tree_of(revision, folder) for revision in revisions]
     first = trees[0]
     strata: dict[str, list[Function]] = {}
     size: Counter[str] = Counter()
@@ -392,7 +480,8 @@ class Imports:
     def names(self, module: str) -> dict[str, tuple[str, str]]:
         """Names that a module imports: (module, name) of each; a stub beside it counts."""
         if module not in self.bound:
-            self.bound[module] = out = {}
+            out: dict[str, tuple[str, str]] = {}
+            self.bound[module] = out
             path = self.paths[module]
             package = module if path.name == "__init__.py" else module.rpartition(".")[0]
             for file in (path, path.with_suffix(".pyi")):
@@ -444,7 +533,7 @@ class Imports:
             size = math.sqrt(sum(x * x for x in out.values())) or 1.0
             return {word: x / size for word, x in out.items()}
 
-        doc = ast.get_docstring(function.node) or ""  # type: ignore[arg-type]
+        doc = ast.get_docstring(function.node) or ""
         text = " ".join([function.module, function.name, doc, *function.lines.values()])
         own = vector(Counter(WORD.findall(text.lower())))
         return {file: sum(x * own.get(w, 0.0) for w, x in vector(counts).items()) for file, counts in words.items()}
@@ -625,7 +714,8 @@ class Runner:
         files = row["tests"].split()[::-1]  # the one that failed is the last
         if imports:
             files = imports.ranked(function, self.cost())
-        begun, used, ran, by = time.monotonic(), 0.0, [], ""
+        begun, used, by = time.monotonic(), 0.0, ""
+        ran: list[str] = []
         for file in files:
             cost = self.cost().get(file, 5.0)
             if imports and (len(ran) == MOST_FILES or used + cost > BUDGET):
@@ -692,10 +782,10 @@ def run(folder: Path, tree: Path, baseline: bool, minutes: float, chosen: list[s
         print(row["id"], row["killed"] or "no test", row["seconds"], row["kind"], row["by"], flush=True)
     done = [row for row in rows if row["killed"]]
     killed = [row for row in done if row["killed"] == "yes"]
-    before = {row["id"] for row in read(TABLE) if row["killed"] == "yes"}
-    lost = sorted((row["id"] for row in done if row["killed"] == "no" and row["id"] in before), key=int)
+    expected = {row["id"] for row in read(TABLE) if row["killed"] == "yes"}
+    lost = sorted((row["id"] for row in done if row["killed"] == "no" and row["id"] in expected), key=int)
     print(f"{len(killed)} of {len(done)} killed; no longer killed: {' '.join(lost) or 'none'}")
-    return int(len(killed) < len(before & {row["id"] for row in done}))
+    return int(len(killed) < len(expected & {row["id"] for row in done}))
 
 
 def main() -> int:
@@ -704,6 +794,7 @@ def main() -> int:
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("draw").add_argument("revisions", nargs="+")
     commands.add_parser("rows")
+    commands.add_parser("rename").add_argument("revision")
     part = commands.add_parser("run")
     part.add_argument("folder", type=Path)
     part.add_argument("ids", nargs="*")
@@ -711,11 +802,15 @@ def main() -> int:
     part.add_argument("--tree", type=Path, default=ROOT, help="a work tree of another revision")
     part.add_argument("--minutes", type=float, default=math.inf, help="begin no mutant after this time")
     options = parser.parse_args()
-    if options.command == "draw":
+    if options.command in ("draw", "rename"):
         with tempfile.TemporaryDirectory() as folder:
-            draw(options.revisions, Path(folder))
+            if options.command == "draw":
+                draw(options.revisions, Path(folder))
+            else:
+                rename(options.revision, Path(folder))
+    if options.command == "draw":
         return 0
-    if options.command == "rows":
+    if options.command in ("rows", "rename"):
         return int(unfit(Tree(ROOT)) > 0)
     return run(options.folder.resolve(), options.tree.resolve(), options.baseline, options.minutes, options.ids)
 
