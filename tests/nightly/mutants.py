@@ -27,7 +27,7 @@ Limits are processor seconds, so that a busy machine changes nothing; compiled c
 chosen by what they import and by the words that they share with the function, the nearest first, up to BUDGET seconds;
 FILE:7 means the first seven tests of a slow file. Files that compare texts with records (tests/snapshots, test_trees)
 are left out, since they notice any change. The row ends with the first file that fails, and a later `run` begins with
-that file. Both kinds of `run` are resumable.
+that file, and with the rows that were killed. Both kinds of `run` are resumable; each tree needs a FOLDER of its own.
 """
 
 import argparse
@@ -759,16 +759,18 @@ def unfit(tree: Tree) -> int:
 def run(folder: Path, tree: Path, baseline: bool, minutes: float, chosen: list[str]) -> int:
     """Run what has no result yet, in a drawn order, so that a part is a sample; the status is 1 if fewer are killed."""
     folder.mkdir(parents=True, exist_ok=True)
-    table = TABLE if baseline else folder / "mutants.csv"
-    if not table.exists():
-        before = [row for row in read(TABLE) if row["killed"]]
-        write(table, [row | {"killed": "", "by": "", "seconds": ""} for row in before])
-    rows, end = read(table), time.monotonic() + 60.0 * minutes
+    table, rows, end = TABLE, read(TABLE), time.monotonic() + 60.0 * minutes
+    expected = {row["id"] for row in rows if row["killed"] == "yes"}
+    if not baseline:
+        table = folder / "mutants.csv"
+        done = {(row["id"], row["mutant"]): row for row in read(table)} if table.exists() else {}
+        rows = [done.get((row["id"], row["mutant"]), row | dict.fromkeys(("killed", "by", "seconds"), ""))
+                for row in rows if row["killed"]]  # fmt: skip
     runner = Runner(tree, folder)
     imports = Imports(runner.tree) if baseline else None
     order = list(range(COUNT))
     random.Random(SEED).shuffle(order)
-    for row in sorted(rows, key=lambda row: order[int(row["id"])]):
+    for row in sorted(rows, key=lambda row: (not baseline and row["id"] not in expected, order[int(row["id"])])):
         if row["killed"] or (chosen and row["id"] not in chosen) or time.monotonic() > end:
             continue
         result = runner.run(row, imports)
@@ -780,12 +782,11 @@ def run(folder: Path, tree: Path, baseline: bool, minutes: float, chosen: list[s
         row |= result
         write(table, rows)
         print(row["id"], row["killed"] or "no test", row["seconds"], row["kind"], row["by"], flush=True)
-    done = [row for row in rows if row["killed"]]
-    killed = [row for row in done if row["killed"] == "yes"]
-    expected = {row["id"] for row in read(TABLE) if row["killed"] == "yes"}
-    lost = sorted((row["id"] for row in done if row["killed"] == "no" and row["id"] in expected), key=int)
-    print(f"{len(killed)} of {len(done)} killed; no longer killed: {' '.join(lost) or 'none'}")
-    return int(len(killed) < len(expected & {row["id"] for row in done}))
+    ran = {row["id"] for row in rows if row["killed"]}
+    killed = {row["id"] for row in rows if row["killed"] == "yes"}
+    lost = sorted(expected & ran - killed, key=int)
+    print(f"{len(killed)} of {len(ran)} killed; no longer killed: {' '.join(lost) or 'none'}")
+    return int(len(killed) < len(expected & ran))
 
 
 def main() -> int:
