@@ -123,7 +123,7 @@ def order_parameters(drawn: bool) -> None:
         for metric in found.metrics:
             homes |= {name: metric.sample for name in metric.reports if name not in homes}
             absent |= {name: metric.absence(name) for name in metric.reports}
-        for name, about in registry.reports(found).items():
+        for name, about in registry.reported_values(found).items():
             units.setdefault(name, about)
             sets.setdefault(name, []).append(kind)
     for module in (fitness_kidger, fitness_dimock, fitness_vasarhelyi):
@@ -139,7 +139,7 @@ def order_parameters(drawn: bool) -> None:
         "`airflock keys metrics` lists their parameters.\n\n",
         table(
             ("metrics.kind", "order parameters"),
-            ((f"`{k}`", _names(registry.reports(found))) for k, found in registry.SETS.items()),
+            ((f"`{k}`", _names(registry.reported_values(found))) for k, found in registry.SETS.items()),
         ),
         "\nHere $N$ is the number of agents, $r_{ij}$ a distance, $h_i$ a heading (unit vector), a bar a mean over the "
         "flock, and $\\langle\\cdot\\rangle_t$ a mean over the samples of a flight. "
