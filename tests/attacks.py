@@ -6,8 +6,8 @@ python tests/attacks.py 1000000 7
 import random
 import sys
 
+from airflock.drones.mavlink.messages import STATUS_MESSAGE, DroneStatus, status_message
 from airflock.drones.mavlink.signing import MAX_STAMP, SIGNING_EPOCH, PacketReceiver, PacketSigner
-from airflock.drones.mavlink.status import STATUS_MESSAGE, DroneStatus, status_message
 from airflock.support.coordinates import FlightSite
 
 KEY, NOW = bytes(range(32)), 1_800_000_000_000_000

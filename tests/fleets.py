@@ -3,8 +3,8 @@
 import airflock
 from airflock.drones.mavlink.orders import new_operator_keys
 from airflock.drones.onboard.card import card_hash, parse_card
+from airflock.fleets.card_document import make_card_document
 from airflock.fleets.lockstep import LockstepFleet
-from airflock.fleets.prepare import make_card_document
 
 SITE = (47.5, 19.0, 120.0)
 QUIET = {"body.noise": 0.0, "sensors.noise": 0.0}

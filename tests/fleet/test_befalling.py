@@ -12,10 +12,11 @@ import pytest
 from airflock.core.hearing import EARLY
 from airflock.drones.onboard.card import card_hash, parse_card
 from airflock.drones.onboard.mission import MissionPhase
-from airflock.fleets import compare, live as live_, realtime, starting
-from airflock.fleets.ailing import FaultyNode
-from airflock.fleets.befalling import DroneFaults
-from airflock.fleets.lockstep import LockstepFleet
+from airflock.fleets import compare, realtime
+from airflock.fleets.drone_faults import DroneFaults
+from airflock.fleets.lockstep import LockstepFleet, is_clear_between
+from airflock.fleets.radio_channel import FaultyNode
+from airflock.fleets.realtime import fly_in_realtime, lockstep_only_errors
 from airflock.parts.faults.registry import KINDS
 from airflock.recordings.flights import simulate
 from airflock.support.errors import CardError
@@ -162,7 +163,7 @@ def live(faults, duration=2.0, mode="tasks", agents=2, **more):
     keys = {"radio.delay": 0.1, "world.side": 120.0} | more
     found = compare.with_metric_period(scenario(agents, duration, **keys, faults=faults), 0.2)
     made = compare.software_card(found, stop_for_lost=True, realtime=True)
-    return realtime.fly_in_realtime(found, made, 1, mode, start=compare.simulated_start(found, 1))
+    return fly_in_realtime(found, made, 1, mode, start=compare.simulated_start(found, 1))
 
 
 @pytest.mark.parametrize("mode", ["tasks", "processes"])
@@ -214,19 +215,18 @@ def test_on_the_real_clock_packets_say_what_a_fault_tells():
 def test_on_the_real_clock_buildings_shade_the_radio(monkeypatch):
     """The ether asks the map of the card between where two vehicles are; it took all ways for clear."""
     asked = []
-    monkeypatch.setattr(starting, "is_clear_between", lambda card, here, there: bool(asked.append((here, there))))
-    monkeypatch.setattr(live_, "clear", starting.is_clear_between)
+    monkeypatch.setattr(realtime, "is_clear_between", lambda card, here, there: bool(asked.append((here, there))))
     keys = {"radio.kind": "shadow", "radio.near": 5.0, "radio.far": 25.0, "world.obstacles": ISLANDS}
     live((), duration=0.4, **keys)
     assert asked and all(0.0 < math.dist(*pair) < 120.0 for pair in asked)
     with_buildings = card(scenario(2, **keys))
     monkeypatch.undo()
-    assert not starting.is_clear_between(with_buildings, (-30.0, -5.0, 20.0), (30.0, -5.0, 20.0)), "through an island"
-    assert starting.is_clear_between(with_buildings, (-30.0, -30.0, 20.0), (30.0, -30.0, 20.0)), "south of it"
+    assert not is_clear_between(with_buildings, (-30.0, -5.0, 20.0), (30.0, -5.0, 20.0)), "through an island"
+    assert is_clear_between(with_buildings, (-30.0, -30.0, 20.0), (30.0, -30.0, 20.0)), "south of it"
 
 
 def test_no_kind_is_refused_on_any_clock():
     for kind in KINDS:
         found = scenario(2, 1.0, faults=hit(kind, {"at": 0.5}))
-        assert DroneFaults(found, 0) and not realtime.lockstep_only_errors(())
+        assert DroneFaults(found, 0) and not lockstep_only_errors(())
         assert math.isfinite(DroneFaults(found, 0).ahead(1, 0.7))

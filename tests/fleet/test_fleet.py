@@ -18,22 +18,18 @@ import pytest
 from airflock.core import random
 from airflock.core.agent import State
 from airflock.core.radio import lost
-from airflock.drones.mavlink import dialect
 from airflock.drones.mavlink.autopilots import AUTOPILOTS, AutopilotCommands
-from airflock.drones.mavlink.frames import frames_in
+from airflock.drones.mavlink.frames import common_dialect, frames_in
 from airflock.drones.mavlink.orders import OrderKind
-from airflock.drones.onboard.log import replay
+from airflock.drones.onboard.flight_log import replay
 from airflock.drones.onboard.mission import MissionPhase
-from airflock.drones.onboard.ports import open_port
-from airflock.drones.onboard.run import run_node as fly_node
+from airflock.drones.onboard.node_program import open_port, run_node as fly_node
 from airflock.fleets import compare
-from airflock.fleets.dice import MotionNoise, PacketNumbers, SensorWords
-from airflock.fleets.ether import RadioChannel
-from airflock.fleets.faults import INJECTED_KINDS, InjectedFault, read_injected_faults
-from airflock.fleets.holding import POSITION_GAIN, STANDING_SPEED
-from airflock.fleets.individuals import agent_sensors
-from airflock.fleets.lockstep import SOFTWARE_KEY
-from airflock.fleets.vehicle import SoftwareVehicle
+from airflock.fleets.card_document import agent_sensors
+from airflock.fleets.drone_faults import INJECTED_KINDS, InjectedFault, read_injected_faults
+from airflock.fleets.lockstep import MotionNoise, SensorWords
+from airflock.fleets.radio_channel import SOFTWARE_KEY, PacketNumbers, RadioChannel
+from airflock.fleets.vehicle import POSITION_GAIN, STANDING_SPEED, SoftwareVehicle
 from airflock.parts.radios import jitter, links
 from airflock.parts.radios.registry import RADIOS
 from airflock.recordings.flights import simulate
@@ -542,7 +538,7 @@ def test_a_vehicle_takes_any_bytes_and_only_finite_setpoints():
     v, rng, say = vehicle(), Random(4), AutopilotCommands(AUTOPILOTS["px4"], 1)
     for _ in range(300):
         v.receive(rng.randbytes(rng.randrange(300)), 0.0)
-    pack = dialect.common_dialect()
+    pack = common_dialect()
     bad = pack.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x0DC7, 0, 0, 0, math.nan, 0, 0, 0, 0, 0, 0, 0)
     v.receive(bytes(600) + say._pack(bad), 0.0)
     assert v.target == (0.0, 0.0, 0.0) and v.setpoint_at < 0.0

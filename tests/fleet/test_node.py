@@ -10,23 +10,23 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from airflock.core.agent import State
-from airflock.drones.mavlink import dialect, orders, status
-from airflock.drones.mavlink.frames import FramePacker, frames_in
+from airflock.drones.mavlink import orders
+from airflock.drones.mavlink.frames import FramePacker, common_dialect, frames_in
+from airflock.drones.mavlink.messages import DroneStatus, status_message
 from airflock.drones.mavlink.orders import OperatorOrder, OrderKind, new_operator_keys
 from airflock.drones.mavlink.signing import PacketSigner
-from airflock.drones.mavlink.status import DroneStatus
 from airflock.drones.onboard.card import card_hash, parse_card, read_card, write_card
-from airflock.drones.onboard.log import LoggingNode, read_node_memory, replay
+from airflock.drones.onboard.flight_log import LoggingNode, read_node_memory, replay
 from airflock.drones.onboard.mission import MissionPhase
-from airflock.drones.onboard.node import Node, NodeMemory
-from airflock.drones.onboard.saying import own_status
-from airflock.fleets.lockstep import SOFTWARE_KEY, START_TIME
+from airflock.drones.onboard.node import Node, NodeMemory, own_status
+from airflock.fleets.lockstep import START_TIME
+from airflock.fleets.radio_channel import SOFTWARE_KEY
 from airflock.fleets.vehicle import SoftwareVehicle
 from airflock.support.coordinates import Geodetic
 from airflock.support.errors import CardError, LinkError
 from fleets import PRIVATE, document, fleet, scenario
 
-common = dialect.common_dialect()
+common = common_dialect()
 SCENARIO = scenario(3)
 CARD = parse_card({**(d := document(SCENARIO)), "hash": card_hash(d)})
 
@@ -58,7 +58,7 @@ def told(
     who=2, at=(10.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), utc=START_TIME, phase=MissionPhase.READY, flies=False, **more
 ):
     made = DroneStatus(utc, at, velocity, 1.0, int(phase), flies, CARD.mission, bytes.fromhex(CARD.hash)[:4], 90)
-    return PacketSigner(SOFTWARE_KEY, who)(status.status_message(made._replace(**more), CARD.site), utc)
+    return PacketSigner(SOFTWARE_KEY, who)(status_message(made._replace(**more), CARD.site), utc)
 
 
 def state(node):
@@ -119,7 +119,7 @@ def test_a_neighbour_that_jumps_is_not_believed():
     for k, x in enumerate((10.0, 10.5, 90.0, 11.5)):
         utc = START_TIME + 100_000 * (k + 1)
         made = DroneStatus(utc, (x, 0.0, 20.0), (4.0, 0.0, 0.0), 1.0, 6, True, 7, bytes.fromhex(CARD.hash)[:4])
-        node.radio(sign(status.status_message(made, CARD.site), utc), 0.1 * (k + 1))
+        node.radio(sign(status_message(made, CARD.site), utc), 0.1 * (k + 1))
     assert node.peers.refused["jump"] == 1 and node.peers.all[2].status.position[0] == pytest.approx(11.5, abs=0.02)
 
 
@@ -145,7 +145,7 @@ def test_whom_it_lost_is_feared_less_if_its_last_packet_said_that_it_does_not_fl
     node = Node(card, 1, SOFTWARE_KEY, now=0.0, utc=START_TIME)
     sent, told_hash = START_TIME + 1000, bytes.fromhex(card.hash)[:4]
     said = DroneStatus(sent, (60.0, 0.0, 20.0), (0.0, 0.0, 0.0), 1.0, int(phase), True, card.mission, told_hash)
-    node.radio(PacketSigner(SOFTWARE_KEY, 2)(status.status_message(said, card.site), sent), 0.01)
+    node.radio(PacketSigner(SOFTWARE_KEY, 2)(status_message(said, card.site), sent), 0.01)
     assert 1 in node.pilot.packets
     assert node.pilot.lost_near(State(*(0.0,) * 6), 8.0) is (
         phase in (MissionPhase.FLOCK, MissionPhase.GOTO, MissionPhase.LAND)
@@ -212,7 +212,7 @@ def test_an_autopilot_that_is_not_heard_is_told_until_it_is():
     (lambda v: setattr(v, "state", v.state._replace(y=2e6)), r"is 2000 km away from the card's site"),
     (lambda v: setattr(v, "battery", 20.0), "battery: 20 %"),
     (lambda v: setattr(v, "accuracy", 9.0), "accuracy 9.0 m"),
-    (lambda v: setattr(v, "started", START_TIME + 700_000), r"clock: \+0.70 s .* start the node anew"),
+    (lambda v: setattr(v, "start_time", START_TIME + 700_000), r"clock: \+0.70 s .* start the node anew"),
     (lambda v: setattr(v, "state", v.state._replace(x=500.0)), "outside the fence: is the card's site right"),
 ])  # fmt: skip
 def test_each_miss_is_told_in_a_line(change, line):
@@ -231,7 +231,7 @@ def test_no_site_is_doubted_before_there_are_satellites():
     vehicle.origin = CARD.site.to_geodetic(0.0, 0.0, 0.0)
     vehicle.state = vehicle.state._replace(y=-5e6)
     heard = node.autopilot
-    node.autopilot = lambda data, now: (heard(data, now), setattr(node.autopilot_link, "fix", 1))[0]
+    node.autopilot = lambda data, now: (heard(data, now), setattr(node.autopilot_link, "fix_type", 1))[0]
     notes = live(node, vehicle, 0.0, 2.0)
     assert any("no own position" in note for note in notes) and not any("away from the card" in note for note in notes)
 
@@ -271,7 +271,7 @@ def test_two_drones_with_one_number_do_not_start():
         node.radio(datagram, 1.2)  # a radio that hears itself
     node.radio(
         PacketSigner(bytes(32), 1)(
-            status.status_message(
+            status_message(
                 own_status(CARD, node.autopilot_link, node.autopilot_link.state, START_TIME, node.phase, peers=0),
                 CARD.site,
             ),
@@ -417,8 +417,8 @@ class Refuse:
         if name.partition(".")[0] in {REFUSED}:
             raise ImportError(name + " is not installed on board")
 sys.meta_path.insert(0, Refuse())
-import airflock.drones.onboard, airflock.drones.onboard.run
-from airflock.drones.onboard.run import main
+import airflock.drones.onboard, airflock.drones.onboard.node_program
+from airflock.drones.onboard.node_program import main
 assert "cryptography" not in sys.modules, "seals are checked rarely"
 for kind in ("couzin_2002", "kidger", "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995"):
     __import__("airflock.parts.laws." + kind)
@@ -430,7 +430,7 @@ sys.exit(main(sys.argv[1:]))
 
 
 def test_a_node_needs_neither_numpy_nor_numba_nor_pydantic_nor_typer(tmp_path):
-    from airflock.drones.mavlink.keys import write_key
+    from airflock.drones.mavlink.signing import write_key
 
     write_card(tmp_path / "m.json", document(SCENARIO, expires=2**39))
     write_key(tmp_path / "m.key", SOFTWARE_KEY)
@@ -451,7 +451,7 @@ def test_a_node_needs_neither_numpy_nor_numba_nor_pydantic_nor_typer(tmp_path):
 
 
 def test_the_command_tells_all_that_is_wrong_at_once(tmp_path, capsys):
-    from airflock.drones.onboard.run import main
+    from airflock.drones.onboard.node_program import main
 
     write_card(tmp_path / "m.json", document(SCENARIO))
     code = main([str(tmp_path / "m.json"), "--member", "9", "--autopilot", "tcp:1", "--radio", "udp:127.0.0.1:99999"])

@@ -5,7 +5,7 @@ import pytest
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.node import KILL_SECONDS
-from airflock.fleets.modes import GUIDED, PILOT_MODE
+from airflock.fleets.vehicle import GUIDED, PILOT_MODE
 from fleets import fleet, scenario
 
 

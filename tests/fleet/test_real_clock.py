@@ -15,10 +15,17 @@ import pytest
 from airflock.drones.mavlink.autopilots import AUTOPILOTS, AutopilotCommands
 from airflock.drones.mavlink.frames import frames_in
 from airflock.drones.onboard.mission import AIRBORNE_PHASES
-from airflock.drones.onboard.ports import UdpAddresses, UdpPort
-from airflock.drones.onboard.resting import TaskRest
-from airflock.fleets import compare, live, realtime
-from airflock.fleets.faults import InjectedFault
+from airflock.drones.onboard.node_program import TaskRest, UdpAddresses, UdpPort
+from airflock.fleets import compare, realtime
+from airflock.fleets.drone_faults import InjectedFault
+from airflock.fleets.realtime import (
+    LOCAL_HOST,
+    FleetPorts,
+    RealtimePlan,
+    fly_in_realtime,
+    run_in_event_loop,
+    vehicle_task,
+)
 from airflock.support.errors import LinkError, ScenarioError
 from fleets import PRIVATE, card, scenario
 
@@ -28,7 +35,7 @@ SHORT = {"radio.delay": 0.1, "world.side": 120.0}
 def flown(mode, agents=2, duration=1.0, faults=(), **more):
     found = compare.with_metric_period(scenario(agents, duration, **(SHORT | more)), 0.2)
     made = compare.software_card(found, stop_for_lost=True, realtime=True)
-    return realtime.fly_in_realtime(found, made, 1, mode, start=compare.simulated_start(found, 1), faults=faults)
+    return fly_in_realtime(found, made, 1, mode, start=compare.simulated_start(found, 1), faults=faults)
 
 
 @pytest.mark.parametrize("mode", ["tasks", "processes"])
@@ -52,10 +59,10 @@ def test_a_node_that_dies_stays_dead_and_its_last_word_is_kept():
 
 def test_from_the_ground_and_back_by_orders(monkeypatch):
     """One drone arms, takes off, comes home and lands; a low layer, so that it does not take long."""
-    monkeypatch.setattr(realtime, "READY_TIME", 1.0)
+    monkeypatch.setattr(realtime, "SECONDS_BEFORE_START", 1.0)
     found = compare.with_metric_period(scenario(1, 3.0, **SHORT), 0.2)
     made = card(found, safety={"base": 2.5, "tick": 0.05, "status_period": 0.1})
-    f = realtime.fly_in_realtime(found, made, 0, "tasks", start=None, operator=PRIVATE)
+    f = fly_in_realtime(found, made, 0, "tasks", start=None, operator=PRIVATE)
     notes = [note.split(":")[0] for _, _, note in f.log]
     assert "CLEARED → ARMING" in notes and "ARMING → TAKEOFF" in notes, f.log
     heights = f.array()[:, 0, 2]
@@ -65,12 +72,12 @@ def test_from_the_ground_and_back_by_orders(monkeypatch):
 def test_a_client_joins_where_a_vehicle_calls():
     """It hears a heartbeat twice a second; once it has spoken, everything; and it is answered."""
     found = scenario(1)
-    made, client = compare.software_card(found, realtime=True), UdpPort(UdpAddresses((live.LOCAL_HOST, 0), None))
-    ports, now = live.FleetPorts.open(1, client.here), time.monotonic()
-    plan = live.RealtimePlan(found, made, 0, None, (), ports, [now, now + 60.0, 0.0], [0.0] * 4, 1_800_000_000_000_000)
+    made, client = compare.software_card(found, realtime=True), UdpPort(UdpAddresses((LOCAL_HOST, 0), None))
+    ports, now = FleetPorts.open(1, client.here), time.monotonic()
+    plan = RealtimePlan(found, made, 0, None, (), ports, [now, now + 60.0, 0.0], [0.0] * 4, 1_800_000_000_000_000)
 
     async def joined():
-        life = asyncio.create_task(realtime.run_in_event_loop(live.vehicle_task(plan, 0)))
+        life = asyncio.create_task(run_in_event_loop(vehicle_task(plan, 0)))
         heard = []
 
         async def hear(count):
@@ -100,7 +107,7 @@ def test_a_process_that_fails_ends_the_fleet_in_a_line(monkeypatch, capfd):
         yield TaskRest(0.0)
         raise RuntimeError("a wing came off")
 
-    monkeypatch.setattr(realtime, "craft_life", fails)
+    monkeypatch.setattr(realtime, "vehicle_task", fails)
     with pytest.raises(LinkError, match="a process of the fleet ended with status 1"):
         flown("processes")
     assert "a wing came off" in capfd.readouterr().err
@@ -114,7 +121,7 @@ def test_a_process_that_is_killed_ends_the_others_without_a_word_of_theirs(monke
     def stop(number, _):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(realtime, "craft_life", killed)
+    monkeypatch.setattr(realtime, "vehicle_task", killed)
     before = signal.signal(signal.SIGTERM, stop)  # as the command has it; processes inherit it
     try:
         with pytest.raises(LinkError, match="a process of the fleet ended with status -9"):

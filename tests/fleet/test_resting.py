@@ -8,9 +8,8 @@ import time
 
 import pytest
 
-from airflock.drones.onboard import ports as ports_module
-from airflock.drones.onboard.ports import SerialPort, UdpAddresses, UdpPort
-from airflock.drones.onboard.resting import TaskRest, run_alone
+from airflock.drones.onboard import node_program
+from airflock.drones.onboard.node_program import SerialPort, TaskRest, UdpAddresses, UdpPort, run_alone
 
 HOST = "127.0.0.1"
 
@@ -50,7 +49,7 @@ def test_a_rest_ends_at_its_time_and_no_sooner(port):
 
 def test_a_flood_is_read_in_portions(port, monkeypatch):
     """Whoever sends faster than a node reads must not keep it from its tick."""
-    monkeypatch.setattr(ports_module, "MAX_DATAGRAMS", 10)
+    monkeypatch.setattr(node_program, "MAX_DATAGRAMS", 10)
     for number in range(25):
         port.send(bytes([number]), port.here)
     portions = [[data[0] for data in port.read()] for _ in range(4)]

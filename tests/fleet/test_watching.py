@@ -12,21 +12,19 @@ from typer.testing import CliRunner
 import airflock
 from airflock.cli.main import app
 from airflock.core.agent import State
-from airflock.drones.mavlink import witness
-from airflock.drones.mavlink.keys import write_key
+from airflock.drones.mavlink.messages import CHANNEL_SYSTEM, HEARS_REPORT, parse_report, report_message
 from airflock.drones.mavlink.orders import OrderKind
-from airflock.drones.mavlink.signing import PacketSigner
+from airflock.drones.mavlink.signing import PacketSigner, write_key
 from airflock.drones.onboard.card import read_card
 from airflock.drones.onboard.mission import MissionPhase
+from airflock.drones.onboard.node_program import UdpAddresses, UdpPort
 from airflock.drones.onboard.peers import HEARD_WITHIN
-from airflock.drones.onboard.ports import UdpAddresses, UdpPort
-from airflock.fleets import compare, realtime
-from airflock.fleets.befalling import DroneFaults
-from airflock.fleets.faults import INJECTED_KINDS, InjectedFault
-from airflock.fleets.lockstep import START_TIME
-from airflock.fleets.observer import FleetObserver
-from airflock.fleets.starting import SOFTWARE_KEY, OperatorStation, write_card_and_key
-from airflock.fleets.teller import SCENARIO_FAULT_NAMES, TelemetryBroadcast
+from airflock.fleets import compare
+from airflock.fleets.drone_faults import INJECTED_KINDS, DroneFaults, InjectedFault
+from airflock.fleets.fleet_observer import SCENARIO_FAULT_NAMES, FleetObserver, TelemetryBroadcast
+from airflock.fleets.lockstep import START_TIME, OperatorStation, write_card_and_key
+from airflock.fleets.radio_channel import SOFTWARE_KEY
+from airflock.fleets.realtime import fly_in_realtime
 from airflock.studio.fleet_tables import drone_html, faults_html, fleet_warning, members_html, notes_html
 from airflock.studio.fleet_watch import open_card_and_radios
 from airflock.support.errors import AirflockError, CardError, StudioError
@@ -185,17 +183,17 @@ def test_a_fault_of_the_scenario_is_told_by_what_its_kind_does(kind):
 def test_what_the_ether_tells_needs_the_key_and_its_own_system():
     f, observer = watched()
     utc = START_TIME + round(f.now * 1e6)
-    told = witness.report_message(witness.HEARS_REPORT, 1, {2, 3})
-    for key, system in ((bytes(32), witness.CHANNEL_SYSTEM), (SOFTWARE_KEY, 2)):
+    told = report_message(HEARS_REPORT, 1, {2, 3})
+    for key, system in ((bytes(32), CHANNEL_SYSTEM), (SOFTWARE_KEY, 2)):
         observer.take(PacketSigner(key, system)(told, utc), f.now)
     assert not observer.links(f.now) and not observer.accepted_count
 
 
 @pytest.mark.parametrize("systems", [set(), {1}, set(range(1, 251))])
-@pytest.mark.parametrize("what", [witness.HEARS_REPORT, len(INJECTED_KINDS)])
+@pytest.mark.parametrize("what", [HEARS_REPORT, len(INJECTED_KINDS)])
 def test_what_is_told_comes_back(what, systems):
-    made = witness.report_message(what, 7, systems)
-    back = witness.parse_report({"payload": made.payload, "payload_length": made.payload_length})
+    made = report_message(what, 7, systems)
+    back = parse_report({"payload": made.payload, "payload_length": made.payload_length})
     assert back == (what, 7, systems)
 
 
@@ -233,7 +231,7 @@ def test_a_fleet_on_the_real_clock_is_heard_where_it_flies():
     ears = threading.Thread(target=hear)
     ears.start()
     try:
-        flown = realtime.fly_in_realtime(
+        flown = fly_in_realtime(
             found, made, 1, "tasks", start=compare.simulated_start(found, 1), watcher=port.here,
             faults=(InjectedFault("outage", (2,), 0.0, 1e6),),
         )  # fmt: skip

@@ -28,7 +28,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from airflock.fleets import compare  # noqa: E402
-from airflock.fleets.faults import INJECTED_KINDS, InjectedFault  # noqa: E402
+from airflock.fleets.drone_faults import INJECTED_KINDS, InjectedFault  # noqa: E402
 from fleets import scenario  # noqa: E402
 
 HOURS, SECONDS, AGENTS, SIDE = 24.0, 360.0, 10, 120.0

@@ -22,7 +22,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from airflock.fleets import compare  # noqa: E402
-from airflock.fleets.faults import InjectedFault  # noqa: E402
+from airflock.fleets.drone_faults import InjectedFault  # noqa: E402
 from fleets import scenario  # noqa: E402
 
 SEEDS = 40

@@ -16,8 +16,15 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.drones.onboard.ports import UdpAddresses, UdpPort  # noqa: E402
-from airflock.fleets import compare, live, realtime  # noqa: E402
+from airflock.drones.onboard.node_program import UdpAddresses, UdpPort  # noqa: E402
+from airflock.fleets import compare  # noqa: E402
+from airflock.fleets.realtime import (  # noqa: E402
+    LOCAL_HOST,
+    FleetPorts,
+    RealtimePlan,
+    run_in_event_loop,
+    vehicle_task,
+)
 from fleets import scenario  # noqa: E402
 
 FLIGHT = Path(__file__).with_name("mavsdk_flight.py")
@@ -26,7 +33,7 @@ LONGEST = 300.0  # s of one flight
 
 def free():
     """A port where nobody listens."""
-    port = UdpPort(UdpAddresses((live.LOCAL_HOST, 0), None))
+    port = UdpPort(UdpAddresses((LOCAL_HOST, 0), None))
     number = port.here[1]
     port.close()
     return number
@@ -36,10 +43,10 @@ async def flown(kind, python, patience):
     """What MAVSDK says of its flight with one vehicle, and the status that it ends with."""
     found, join = scenario(1, 60.0), free()
     card = compare.software_card(found, vehicle=kind, realtime=True)
-    ports, now = live.FleetPorts.open(1, (live.LOCAL_HOST, join)), time.monotonic()
+    ports, now = FleetPorts.open(1, (LOCAL_HOST, join)), time.monotonic()
     epoch = time.time_ns() // 1000 - round(now * 1e6)
-    plan = live.RealtimePlan(found, card, 0, None, (), ports, [now, now + LONGEST, 0.0], [0.0] * 4, epoch)
-    vehicle = asyncio.create_task(realtime.run_in_event_loop(live.vehicle_task(plan, 0)))
+    plan = RealtimePlan(found, card, 0, None, (), ports, [now, now + LONGEST, 0.0], [0.0] * 4, epoch)
+    vehicle = asyncio.create_task(run_in_event_loop(vehicle_task(plan, 0)))
     try:
         client = await asyncio.create_subprocess_exec(
             python, str(FLIGHT), str(join), str(patience), stdout=subprocess.PIPE, stderr=subprocess.STDOUT

@@ -391,14 +391,14 @@ def commanded(words, folder, tell=False):
 def no_flights():
     """Whatever would compile or fly in this process ends there."""
     from airflock.displays import show
-    from airflock.fleets import lockstep
+    from airflock.fleets.lockstep import LockstepFleet
     from inside import drivers, interpreted, measuring, simulate, store
 
     def flown(*_, **__):
         raise Flown
 
     store.load_driver = drivers.load_driver = measuring.load_driver = flown
-    lockstep.LockstepFleet.advance = flown
+    LockstepFleet.advance = flown
     interpreted.flight_driver = flown
     simulate.compile_for = show.fly_show = flown
     simulate.in_threads = flown

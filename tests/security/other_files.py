@@ -45,7 +45,7 @@ def sound():
 def sound_card():
     """Bytes of a flight card."""
     from airflock.drones.onboard.card import card_hash
-    from airflock.fleets.prepare import make_card_document
+    from airflock.fleets.card_document import make_card_document
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_4ms", {"topology.kind": "nearest", "topology.k": 4})
@@ -100,7 +100,7 @@ KEY = bytes(range(32))
 
 def _log():
     """Twenty ticks of a node that heard a datagram and its autopilot say nothing that makes sense."""
-    from airflock.drones.onboard.log import LoggingNode
+    from airflock.drones.onboard.flight_log import LoggingNode
     from airflock.drones.onboard.node import Node, NodeMemory
 
     lines = []
@@ -264,7 +264,7 @@ def _ground(path):
 
 
 def _faults(path):
-    from airflock.fleets.faults import read_injected_faults
+    from airflock.fleets.drone_faults import read_injected_faults
 
     read_injected_faults(path, (1, 2, 3))
 
@@ -276,14 +276,14 @@ def _read_card(path):
 
 
 def _replay_log(path):
-    from airflock.drones.onboard.log import replay_log_file
+    from airflock.drones.onboard.flight_log import replay_log_file
 
     for _ in replay_log_file(path, _made_card(), KEY):
         pass
 
 
 def _memory(path):
-    from airflock.drones.onboard.log import read_node_memory
+    from airflock.drones.onboard.flight_log import read_node_memory
 
     read_node_memory(path)
 

@@ -13,9 +13,9 @@ from typing import Any
 
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.card import card_hash
-from airflock.drones.onboard.log import LoggingNode
+from airflock.drones.onboard.flight_log import LoggingNode
 from airflock.drones.onboard.node import NodeMemory
-from airflock.fleets.lockstep import SOFTWARE_KEY
+from airflock.fleets.radio_channel import SOFTWARE_KEY
 from fleets import card, document, fleet, scenario
 from haswell import airflock
 from snapshots import options

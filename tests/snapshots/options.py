@@ -5,7 +5,7 @@ from typing import Any
 import typer.main
 
 from airflock.cli.main import app
-from airflock.drones.onboard.run import make_parser
+from airflock.drones.onboard.node_program import make_parser
 
 
 def _type_of(kind: Any) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.fleets import compare
-from airflock.fleets.faults import InjectedFault
+from airflock.fleets.drone_faults import InjectedFault
 from airflock.fleets.lockstep import LockstepFleet
 from fleets import card, scenario
 

@@ -7,17 +7,31 @@ import struct
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from airflock.drones.mavlink import dialect, orders, status
+from airflock.drones.mavlink import orders
 from airflock.drones.mavlink.autopilots import AUTOPILOTS, AutopilotCommands
-from airflock.drones.mavlink.frames import FramePacker, FrameStream, frames_in
-from airflock.drones.mavlink.keys import read_key, write_key
-from airflock.drones.mavlink.signing import MAX_STAMP, SIGNING_EPOCH, PacketReceiver, PacketSigner, stamp_of_time
-from airflock.drones.mavlink.status import DroneStatus
+from airflock.drones.mavlink.frames import (
+    FramePacker,
+    FrameStream,
+    common_dialect,
+    frames_in,
+    message_fields,
+    message_layout,
+)
+from airflock.drones.mavlink.messages import STATUS_MESSAGE, DroneStatus, parse_status, status_message
+from airflock.drones.mavlink.signing import (
+    MAX_STAMP,
+    SIGNING_EPOCH,
+    PacketReceiver,
+    PacketSigner,
+    read_key,
+    stamp_of_time,
+    write_key,
+)
 from airflock.support.coordinates import FLATTENING, SEMI_MAJOR, FlightSite, swap_enu_ned
 from airflock.support.errors import LinkError
 from attacks import attacks
 
-common = dialect.common_dialect()
+common = common_dialect()
 KEY = bytes(range(32))
 NOW = 1_800_000_000_000_000  # µs
 SITE = FlightSite(47.5, 19.0, 120.0)
@@ -27,12 +41,12 @@ finite = st.floats(-1e3, 1e3, width=32)
 
 def receiver(own=1, **more):
     return PacketReceiver(
-        KEY, own, {status.STATUS_MESSAGE: range(1, 60), orders.TUNNEL_MESSAGE: (255,)}, started=NOW - 10**7, **more
+        KEY, own, {STATUS_MESSAGE: range(1, 60), orders.TUNNEL_MESSAGE: (255,)}, started=NOW - 10**7, **more
     )
 
 
 def packet(who=7, utc=NOW, key=KEY, told=STATUS):
-    return PacketSigner(key, who)(status.status_message(told, SITE), utc)
+    return PacketSigner(key, who)(status_message(told, SITE), utc)
 
 
 # --------------------------------------------------------------------------------------------------------- frames
@@ -41,10 +55,10 @@ def packet(who=7, utc=NOW, key=KEY, told=STATUS):
 @given(st.sampled_from(sorted(common.mavlink_map)), st.binary(min_size=255, max_size=255))
 @settings(max_examples=300)
 def test_every_message_reads_as_pymavlink_reads_it(number, noise):
-    known = dialect.message_layout(number)
+    known = message_layout(number)
     payload = noise[: known.size]
     expected = common.mavlink_map[number](*_in_order(number, known.unpack(payload)))
-    found = dialect.message_fields(number, payload)
+    found = message_fields(number, payload)
     for name in expected.fieldnames:
         a, b = found[name], getattr(expected, name)
         if isinstance(a, str):
@@ -55,7 +69,7 @@ def test_every_message_reads_as_pymavlink_reads_it(number, noise):
 
 def _in_order(number, flat):
     kind = common.mavlink_map[number]
-    known = dialect.message_layout(number)
+    known = message_layout(number)
     fields = {name: (index, 0) for name, index in (*known.numbers, *known.texts)}
     fields |= {name: (index, count) for name, index, count in known.arrays}
     for name in kind.fieldnames:
@@ -105,7 +119,7 @@ def test_pymavlink_accepts_what_we_sign_and_we_what_it_signs():
     theirs.signing.secret_key, theirs.signing.timestamp = KEY, stamp_of_time(NOW) - 1
     assert theirs.decode(bytearray(packet())).get_type() == "UTM_GLOBAL_POSITION"
     got = receiver()(packet(), NOW)
-    assert (got.system, got.stamp, got.message) == (7, stamp_of_time(NOW), status.STATUS_MESSAGE)
+    assert (got.system, got.stamp, got.message) == (7, stamp_of_time(NOW), STATUS_MESSAGE)
 
 
 def test_a_forged_stamp_locks_nobody_out():
@@ -120,11 +134,9 @@ def test_a_forged_stamp_locks_nobody_out():
 def test_a_replay_is_refused_after_a_restart_too():
     before, old = receiver(), packet()
     assert before(old, NOW) and before(old, NOW) is None
-    fresh = PacketReceiver(KEY, 1, {status.STATUS_MESSAGE: range(1, 60)}, started=NOW + 500_000)  # half a second later
+    fresh = PacketReceiver(KEY, 1, {STATUS_MESSAGE: range(1, 60)}, started=NOW + 500_000)  # half a second later
     assert fresh(old, NOW + 500_000) is None and fresh.refused["replay"] == 1
-    behind = PacketReceiver(
-        KEY, 1, {status.STATUS_MESSAGE: range(1, 60)}, started=NOW - 10**6, last_stamps=before.heard
-    )
+    behind = PacketReceiver(KEY, 1, {STATUS_MESSAGE: range(1, 60)}, started=NOW - 10**6, last_stamps=before.heard)
     assert behind(old, NOW) is None, "the own clock went back over the restart; what was heard is still known"
     assert fresh(packet(utc=NOW + 600_000), NOW + 600_000) is not None
 
@@ -151,15 +163,15 @@ def test_a_clock_that_is_wrong_moves_nobody_elses(off):
     assert (
         ours(packet(utc=max(SIGNING_EPOCH, min(NOW + round(off * 1e6), SIGNING_EPOCH + 10 * MAX_STAMP))), NOW) is None
     )
-    signer(status.status_message(STATUS, SITE), NOW)
+    signer(status_message(STATUS, SITE), NOW)
     assert ours.refused["clock"] == 1 and signer.last == stamp_of_time(NOW)
 
 
 def test_stamps_grow_over_a_restart_with_a_clock_that_went_back():
     first = PacketSigner(KEY, 7)
-    first(status.status_message(STATUS, SITE), NOW)
+    first(status_message(STATUS, SITE), NOW)
     again = PacketSigner(KEY, 7, last=first.last)
-    assert receiver(heard={7: first.last})(again(status.status_message(STATUS, SITE), NOW - 10**6), NOW) is not None
+    assert receiver(last_stamps={7: first.last})(again(status_message(STATUS, SITE), NOW - 10**6), NOW) is not None
 
 
 def test_who_may_send_what():
@@ -222,7 +234,7 @@ def test_the_date_line_is_no_wall():
 )
 def test_a_status_arrives_as_it_was_told(at, velocity, phase, airborne):
     told = STATUS._replace(position=at, velocity=velocity, phase=phase, is_airborne=airborne)
-    heard = status.parse_status(receiver()(packet(told=told), NOW).values, SITE)
+    heard = parse_status(receiver()(packet(told=told), NOW).values, SITE)
     assert heard.position == pytest.approx(at, abs=6e-4) and heard.velocity == pytest.approx(velocity, abs=3e-5)
     assert heard._replace(position=at, velocity=velocity) == told
 
@@ -231,7 +243,7 @@ def test_a_status_takes_95_bytes_and_none_of_another_kind_passes():
     assert len(packet(told=STATUS)) == 95
     values = receiver()(packet(), NOW).values
     for key, value in (("flags", 1), ("flight_state", 16), ("uas_id", (1, *values["uas_id"][1:]))):
-        assert status.parse_status(values | {key: value}, SITE) is None
+        assert parse_status(values | {key: value}, SITE) is None
 
 
 def test_only_the_operators_key_gives_orders():

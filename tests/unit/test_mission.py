@@ -9,64 +9,71 @@ from hypothesis import given, strategies as st
 from airflock.core.agent import State
 from airflock.core.maths import braking_curve
 from airflock.drones.mavlink.orders import OrderKind
-from airflock.drones.onboard.limiter import limit_velocity
+from airflock.drones.onboard.card import SafetyLimits
 from airflock.drones.onboard.mission import FLYING_PHASES, MISSION_TABLE, MissionFacts, MissionPhase, next_step
-from airflock.drones.onboard.safety import SafetyLimits
+from airflock.drones.onboard.steering import limit_velocity
 
 WELL, SAFE = MissionFacts(), SafetyLimits()
 P = MissionPhase
-PILOT = {"mode_ours": False}
+PILOT = {"in_guided_mode": False}
 # number, phase, facts that fire it, next phase; facts of a higher row and where that leads
 ROWS = [
     ("1", P.FLOCK, PILOT, P.MANUAL, None, None),
-    ("1", P.LAND, {"mode_ours": False, "mode_land": False}, P.MANUAL, None, None),
-    ("2", P.MANUAL, {"resume": True, "streamed_for": 2.0}, P.HOLD, None, None),
+    ("1", P.LAND, {"in_guided_mode": False, "in_land_mode": False}, P.MANUAL, None, None),
+    ("2", P.MANUAL, {"resume_ordered": True, "setpoints_for": 2.0}, P.HOLD, None, None),
     ("3", P.MANUAL, {"armed": False}, P.DONE, None, None),
-    ("4", P.FLOCK, {"killed": True}, P.DONE, PILOT, P.MANUAL),
+    ("4", P.FLOCK, {"kill_confirmed": True}, P.DONE, PILOT, P.MANUAL),
     ("5", P.FLOCK, {"position_bad_for": 0.1}, P.HOLD, PILOT, P.MANUAL),
     ("5b", P.HOLD, {"position_bad_for": 5.1}, P.LAND, PILOT, P.MANUAL),
     ("6", P.GOTO, {"gnss_bad_for": 0.1}, P.HOLD, {"position_bad_for": 9.0}, P.LAND),
-    ("6b", P.HOLD, {"gnss_bad_for": 10.1}, P.LAND, {"killed": True}, P.DONE),
+    ("6b", P.HOLD, {"gnss_bad_for": 10.1}, P.LAND, {"kill_confirmed": True}, P.DONE),
     ("7", P.FLOCK, {"battery_critical": True}, P.LAND, {"gnss_bad_for": 1.0}, P.HOLD),
-    ("8", P.FLOCK, {"battery_home": True}, P.RETURN, {"battery_critical": True}, P.LAND),
+    ("8", P.FLOCK, {"battery_needed_home": True}, P.RETURN, {"battery_critical": True}, P.LAND),
     ("9", P.FLOCK, {"outside_for": 0.1}, P.RETURN, {"battery_critical": True}, P.LAND),
     ("9b", P.RETURN, {"outside_for": 10.1}, P.LAND, PILOT, P.MANUAL),
-    ("10", P.FLOCK, {"near_fence": True}, None, {"outside_for": 1.0}, P.RETURN),
+    ("10", P.FLOCK, {"is_at_fence": True}, None, {"outside_for": 1.0}, P.RETURN),
     ("11", P.FLOCK, {"lost_near": True}, None, {"outside_for": 1.0}, P.RETURN),
-    ("11b", P.FLOCK, {"deaf_for": 20.1}, P.RETURN, {"battery_critical": True}, P.LAND),
-    ("12", P.FLOCK, {"few_for": 10.1}, P.HOLD, {"deaf_for": 20.1}, P.RETURN),
-    ("12b", P.HOLD, {"few_for": 30.1}, P.RETURN, {"position_bad_for": 6.0}, P.LAND),
-    ("13", P.FLOCK, {"clock_bad_for": 0.1}, P.HOLD, {"battery_home": True}, P.RETURN),
+    ("11b", P.FLOCK, {"nobody_heard_for": 20.1}, P.RETURN, {"battery_critical": True}, P.LAND),
+    ("12", P.FLOCK, {"few_heard_for": 10.1}, P.HOLD, {"nobody_heard_for": 20.1}, P.RETURN),
+    ("12b", P.HOLD, {"few_heard_for": 30.1}, P.RETURN, {"position_bad_for": 6.0}, P.LAND),
+    ("13", P.FLOCK, {"clock_bad_for": 0.1}, P.HOLD, {"battery_needed_home": True}, P.RETURN),
     ("13b", P.HOLD, {"clock_bad_for": 10.1}, P.RETURN, {"outside_for": 11.0}, P.LAND),
-    ("14", P.FLOCK, {"operator_lost": True, "says": "hold"}, P.HOLD, {"battery_home": True}, P.RETURN),
+    ("14", P.FLOCK, {"operator_lost": True, "says": "hold"}, P.HOLD, {"battery_needed_home": True}, P.RETURN),
     ("14b", P.FLOCK, {"operator_lost": True, "says": "return"}, P.RETURN, {"clock_bad_for": 1.0}, P.HOLD),
-    ("15", P.FLOCK, {"overload": True}, P.HOLD, {"deaf_for": 21.0}, P.RETURN),
-    ("15b", P.HOLD, {"overloads": 3}, P.RETURN, {"battery_critical": True}, P.LAND),
-    ("16", P.BOOT, {"armed": False, "landed": True}, P.READY, {"fault": "another kind"}, P.FAULT),
+    ("15", P.FLOCK, {"is_overloaded": True}, P.HOLD, {"nobody_heard_for": 21.0}, P.RETURN),
+    ("15b", P.HOLD, {"overload_count": 3}, P.RETURN, {"battery_critical": True}, P.LAND),
+    ("16", P.BOOT, {"armed": False, "is_landed": True}, P.READY, {"fault": "another kind"}, P.FAULT),
     ("16b", P.READY, {"fault": "another system", "armed": False}, P.FAULT, None, None),
     ("17", P.READY, {"armed": False}, P.CLEARED, {"fault": "another kind"}, P.FAULT),
-    ("17b", P.CLEARED, {"armed": False, "misses": ("no position",)}, P.READY, {"fault": "x"}, P.FAULT),
-    ("18", P.CLEARED, {"armed": False, "due": True}, P.ARMING, {"misses": ("battery",)}, P.READY),
-    ("19", P.ARMING, {"streamed_for": 2.0}, P.TAKEOFF, {"killed": True}, P.DONE),
-    ("19c", P.ARMING, {"order": OrderKind.LAND}, P.READY, {"killed": True}, P.DONE),
+    ("17b", P.CLEARED, {"armed": False, "missing": ("no position",)}, P.READY, {"fault": "x"}, P.FAULT),
+    ("18", P.CLEARED, {"armed": False, "due": True}, P.ARMING, {"missing": ("battery",)}, P.READY),
+    ("19", P.ARMING, {"setpoints_for": 2.0}, P.TAKEOFF, {"kill_confirmed": True}, P.DONE),
+    ("19c", P.ARMING, {"order": OrderKind.LAND}, P.READY, {"kill_confirmed": True}, P.DONE),
     ("19c", P.ARMING, {"armed": False, "order": OrderKind.HOLD}, P.READY, None, None),
-    ("19b", P.ARMING, {"armed": False, "phase_for": 11.0}, P.READY, {"killed": True}, P.DONE),
+    ("19b", P.ARMING, {"armed": False, "phase_for": 11.0}, P.READY, {"kill_confirmed": True}, P.DONE),
     ("20", P.TAKEOFF, {"at_layer": True}, P.GATHER, {"gnss_bad_for": 1.0}, P.HOLD),
     ("21", P.TAKEOFF, {"neighbour_near": True}, P.HOLD, {"at_layer": True}, P.GATHER),
-    ("21b", P.TAKEOFF, {"climbing": False, "phase_for": 6.0}, P.LAND, PILOT, P.MANUAL),
-    ("22", P.GATHER, {"gathered": True}, P.FLOCK, {"few_for": 11.0}, P.HOLD),
+    ("21b", P.TAKEOFF, {"is_climbing": False, "phase_for": 6.0}, P.LAND, PILOT, P.MANUAL),
+    ("22", P.GATHER, {"have_gathered": True}, P.FLOCK, {"few_heard_for": 11.0}, P.HOLD),
     ("22", P.GATHER, {"order": OrderKind.GO}, P.FLOCK, {"clock_bad_for": 1.0}, P.HOLD),
-    ("23", P.FLOCK, {"order": OrderKind.LAND}, P.LAND, {"battery_home": True}, P.RETURN),
+    ("23", P.FLOCK, {"order": OrderKind.LAND}, P.LAND, {"battery_needed_home": True}, P.RETURN),
     ("23", P.GOTO, {"order": OrderKind.RETURN}, P.RETURN, {"position_bad_for": 1.0}, P.HOLD),
     ("23", P.FLOCK, {"time_over": True}, P.RETURN, PILOT, P.MANUAL),
     ("23", P.FLOCK, {"order": OrderKind.HOLD}, P.HOLD, {"outside_for": 1.0}, P.RETURN),
-    ("23", P.FLOCK, {"order": OrderKind.GOTO}, P.GOTO, {"battery_home": True}, P.RETURN),
-    ("23", P.GOTO, {"order": OrderKind.RESUME}, P.FLOCK, {"overload": True}, P.HOLD),
-    ("24", P.FLOCK, {"joined": True}, None, {"order": OrderKind.HOLD}, P.HOLD),
-    ("25", P.HOLD, {"calm_for": 3.0, "before": P.GOTO}, P.GOTO, {"order": OrderKind.LAND}, P.LAND),
+    ("23", P.FLOCK, {"order": OrderKind.GOTO}, P.GOTO, {"battery_needed_home": True}, P.RETURN),
+    ("23", P.GOTO, {"order": OrderKind.RESUME}, P.FLOCK, {"is_overloaded": True}, P.HOLD),
+    ("24", P.FLOCK, {"member_joined": True}, None, {"order": OrderKind.HOLD}, P.HOLD),
+    ("25", P.HOLD, {"calm_for": 3.0, "phase_before_hold": P.GOTO}, P.GOTO, {"order": OrderKind.LAND}, P.LAND),
     ("26", P.RETURN, {"at_home": True}, P.LAND, {"position_bad_for": 1.0}, P.HOLD),
-    ("27", P.LAND, {"landed": True, "mode_land": True}, P.DONE, {"landed": False, "killed": True}, P.DONE),
-    ("28", P.BOOT, {"landed": False}, P.MANUAL, None, None),
+    (
+        "27",
+        P.LAND,
+        {"is_landed": True, "in_land_mode": True},
+        P.DONE,
+        {"is_landed": False, "kill_confirmed": True},
+        P.DONE,
+    ),
+    ("28", P.BOOT, {"is_landed": False}, P.MANUAL, None, None),
 ]
 
 
@@ -109,7 +116,7 @@ def test_whatever_goes_wrong_the_pilot_comes_first_and_nothing_on_the_ground_fli
     }
     odd["order"] = data.draw(st.sampled_from([None, *OrderKind]))
     step = at(phase, odd)
-    if phase in FLYING_PHASES and not odd["mode_ours"]:
+    if phase in FLYING_PHASES and not odd["in_guided_mode"]:
         assert step.next_phase == P.MANUAL
     if phase in (P.BOOT, P.READY, P.CLEARED, P.DONE, P.FAULT):
         assert step.next_phase not in FLYING_PHASES
@@ -117,7 +124,7 @@ def test_whatever_goes_wrong_the_pilot_comes_first_and_nothing_on_the_ground_fli
     if phase in (P.DONE, P.FAULT):
         assert step.next_phase == phase
     if phase == P.MANUAL and step.next_phase == P.HOLD:
-        assert odd["mode_ours"] and odd["resume"] and odd["healthy"]
+        assert odd["in_guided_mode"] and odd["resume_ordered"] and odd["has_good_navigation"]
 
 
 # -------------------------------------------------------------------------------------------------------- limiter

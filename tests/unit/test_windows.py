@@ -103,7 +103,7 @@ def test_what_was_left_of_a_file_is_removed_and_a_serial_line_is_refused_in_one_
 import os
 from airflock.support import atomic
 from airflock.support.errors import LinkError
-from airflock.drones.onboard.ports import open_port
+from airflock.drones.onboard.node_program import open_port
 left = ".a.airflock-12345678.txt"
 open(left, "w").close()
 os.utime(left, (0, 0))
@@ -147,4 +147,4 @@ def test_only_the_module_of_locks_asks_for_what_posix_alone_has():
         for line in path.read_text(encoding="utf-8").splitlines()
         if line.strip() in ("import fcntl", "import termios", "import resource", "import pwd")
     }
-    assert asking == {"locks.py", "ports.py", "isolated.py"}
+    assert asking == {"locks.py", "node_program.py", "isolated.py"}

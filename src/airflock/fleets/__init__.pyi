@@ -4,29 +4,27 @@ from . import (
     flying as flying,
     realtime as realtime,
 )
-from .compare import fleet_recording as fleet_recording
-from .faults import (
-    INJECTED_KINDS as INJECTED_KINDS,
-    read_injected_faults as read_injected_faults,
-)
-from .flying import (
-    VEHICLE_BODIES as VEHICLE_BODIES,
-    VEHICLE_KINDS as VEHICLE_KINDS,
-)
-from .observer import (
-    FleetObserver as FleetObserver,
-    is_on_ground as is_on_ground,
-)
-from .prepare import (
+from .card_document import (
     DEFAULT_FENCE_MARGIN as DEFAULT_FENCE_MARGIN,
     default_safety as default_safety,
     deviation_notes as deviation_notes,
     make_card_document as make_card_document,
     omission_notes as omission_notes,
 )
-from .realtime import FLEET_MODES as FLEET_MODES
-from .starting import SECONDS_BEFORE_START as SECONDS_BEFORE_START
-from .teller import (
+from .compare import fleet_recording as fleet_recording
+from .drone_faults import (
+    INJECTED_KINDS as INJECTED_KINDS,
+    read_injected_faults as read_injected_faults,
+)
+from .fleet_observer import (
     DEFAULT_WATCH_ADDRESS as DEFAULT_WATCH_ADDRESS,
     SCENARIO_FAULT_NAMES as SCENARIO_FAULT_NAMES,
+    FleetObserver as FleetObserver,
+    is_on_ground as is_on_ground,
 )
+from .flying import (
+    VEHICLE_BODIES as VEHICLE_BODIES,
+    VEHICLE_KINDS as VEHICLE_KINDS,
+)
+from .lockstep import SECONDS_BEFORE_START as SECONDS_BEFORE_START
+from .realtime import FLEET_MODES as FLEET_MODES

@@ -10,11 +10,10 @@ import xarray as xr
 
 from airflock.core import State
 from airflock.drones import FlightCard, card_hash, parse_card
-from airflock.fleets.faults import InjectedFault
-from airflock.fleets.flown import RealtimeFleet
-from airflock.fleets.lockstep import LockstepFleet, states_from_arrays
-from airflock.fleets.prepare import default_safety, make_card_document
-from airflock.fleets.starting import SECONDS_BEFORE_START
+from airflock.fleets.card_document import default_safety, make_card_document
+from airflock.fleets.drone_faults import InjectedFault
+from airflock.fleets.lockstep import SECONDS_BEFORE_START, LockstepFleet, states_from_arrays
+from airflock.fleets.realtime import RealtimeFleet
 from airflock.recordings import make_dataset, measure_recording, provenance, simulate
 from airflock.scenarios import Scenario, group_names
 from airflock.support import holm_correction

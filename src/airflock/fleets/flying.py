@@ -10,10 +10,11 @@ import pandas as pd
 import xarray as xr
 
 from airflock.drones import FlightCard
-from airflock.fleets import compare, realtime
-from airflock.fleets.faults import InjectedFault, read_injected_faults
-from airflock.fleets.starting import write_card_and_key
-from airflock.fleets.teller import DEFAULT_WATCH_ADDRESS
+from airflock.fleets import compare
+from airflock.fleets.drone_faults import InjectedFault, read_injected_faults
+from airflock.fleets.fleet_observer import DEFAULT_WATCH_ADDRESS
+from airflock.fleets.lockstep import write_card_and_key
+from airflock.fleets.realtime import DEFAULT_CLIENT, FLEET_MODES, fly_in_realtime, lockstep_only_errors
 from airflock.parts.metrics import reported_values
 from airflock.recordings import measure_recording, with_units
 from airflock.scenarios import Scenario, check_seeds, scenario_variant
@@ -21,7 +22,7 @@ from airflock.support import ScenarioError, collect_errors, expand_path, suggest
 
 VEHICLE_KINDS = ("px4", "ardupilot")
 VEHICLE_BODIES = ("multirotor", "quadrotor")
-LOCKSTEP_MODE = realtime.FLEET_MODES[0]
+LOCKSTEP_MODE = FLEET_MODES[0]
 FIRST_CLIENT_PORT = 14540  # port where the first vehicle contacts a client
 
 
@@ -156,7 +157,7 @@ def fleet(
         for name, word, known in (
             ("vehicle", vehicle, VEHICLE_KINDS),
             ("body", body, VEHICLE_BODIES),
-            ("mode", mode, realtime.FLEET_MODES),
+            ("mode", mode, FLEET_MODES),
         )
         if word is not None and word not in known
     ]
@@ -170,7 +171,7 @@ def fleet(
         known = compare.with_metric_period(found, found.sensors.period or found.flight.dt)
         if faults is not None:
             injected = read_injected_faults(expand_path(faults), tuple(range(1, known.agents + 1)))
-        mistakes += realtime.lockstep_only_errors(injected) if mode != LOCKSTEP_MODE else []
+        mistakes += lockstep_only_errors(injected) if mode != LOCKSTEP_MODE else []
     if card is not None and known is not None and known.varied and len(numbers) > 1:
         mistakes.append(f"card = {card}: with tolerances each seed has its own card; give one seed")
     if mistakes or known is None:
@@ -228,8 +229,8 @@ def fly_seeds(
         common: dict[str, Any] = {"faults": faults, "operator": private, "on_done": on_done}
         if live:
             start = None if from_ground else compare.simulated_start(scenario, seed)
-            calls, watcher = (realtime.DEFAULT_CLIENT[0], join), DEFAULT_WATCH_ADDRESS if card_file else None
-            yield realtime.fly_in_realtime(
+            calls, watcher = (DEFAULT_CLIENT[0], join), DEFAULT_WATCH_ADDRESS if card_file else None
+            yield fly_in_realtime(
                 scenario, card, seed, mode, start=start, first_client=calls, watcher=watcher, **common
             )
         else:

@@ -7,37 +7,190 @@ import hashlib
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core import SensorState, State
-from airflock.drones import FLYING_PHASES, FlightCard, MissionPhase, Node, OrderKind
-from airflock.fleets.ailing import FaultyNode
-from airflock.fleets.befalling import DroneFaults
-from airflock.fleets.dice import MotionNoise, SensorWords
-from airflock.fleets.ether import RadioChannel
-from airflock.fleets.faults import InjectedFault, initial_clock_offset
-from airflock.fleets.individuals import agent_records, agent_sensors
-from airflock.fleets.starting import (
-    ACCEPTED_BEFORE_START,
-    DROPS_OUT_NOTE,
-    SOFTWARE_KEY,
-    OperatorStation,
-    is_clear_between,
-    law_zero_height,
-    make_vehicle,
-    put_in_air,
+from airflock.core import SensorState, State, number_names, random
+from airflock.drones import (
+    FLYING_PHASES,
+    FlightCard,
+    MissionPhase,
+    Node,
+    OperatorOrder,
+    OrderKind,
+    PacketSigner,
+    orders,
+    read_key,
+    write_card,
+    write_key,
 )
-from airflock.fleets.vehicle import VEHICLE_FAULTS
+from airflock.fleets.card_document import agent_records, agent_sensors
+from airflock.fleets.drone_faults import DroneFaults, InjectedFault, initial_clock_offset
+from airflock.fleets.radio_channel import SOFTWARE_KEY, FaultyNode, RadioChannel
+from airflock.fleets.vehicle import GUIDED, VEHICLE_FAULTS, SoftwareVehicle
 from airflock.scenarios import Scenario
-from airflock.support import Geodetic
+from airflock.support import CardError, Geodetic
+
+# ---- Random numbers
+
+STEPS_PER_BLOCK = 256  # motion steps that are drawn together
+MEASUREMENTS_PER_BLOCK = 16  # measurements that are drawn together
+NormalTriple = tuple[float, float, float]
+
+
+class MotionNoise:
+    """Normal random numbers of every drone at every motion step, to be asked in the order of time.
+
+    seed : of the flight; count: of drones; three: in space, where a draw serves one step; in a plane it serves two
+    first : of the drones that are asked for, where not all are
+    """
+
+    def __init__(self, seed: int, count: int, in_space: bool, first_drone: int = 0):
+        self._seed, self._count, self._in_space, self._drone = seed, count, in_space, first_drone
+        self._first_step = -STEPS_PER_BLOCK
+        self._numbers: tuple[list[float], list[float]] = ([], [])  # first and second half of each draw, flat
+
+    def __call__(self, step: int, drone: int) -> NormalTriple:
+        """Three numbers N(0, 1) of a drone at a step; in a plane the third is zero."""
+        if not self._first_step <= step < self._first_step + STEPS_PER_BLOCK:
+            self._first_step = step - step % STEPS_PER_BLOCK
+            self._numbers = self._drawn(self._first_step)
+        place, column, (one, two) = step - self._first_step, drone - self._drone, self._numbers
+        if self._in_space:
+            at = 2 * (place * self._count + column)
+            return one[at], one[at + 1], two[at]
+        at = 2 * ((place >> 1) * self._count + column)
+        numbers = two if place & 1 else one
+        return numbers[at], numbers[at + 1], 0.0
+
+    def _drawn(self, first: int) -> tuple[list[float], list[float]]:
+        """Numbers of BLOCK steps; the words come as arrays, what is made of them by the function of one pair."""
+        steps = np.arange(first, first + STEPS_PER_BLOCK, 1 if self._in_space else 2, dtype=np.uint64)
+        if not self._in_space:
+            steps //= np.uint64(2)
+        drones = np.arange(self._drone, self._drone + self._count, dtype=np.uint64)
+        drawn = random.random_words(self._seed, random.OUTER, 0, steps[:, None], drones[None, :])
+        a, b, c, d = (np.broadcast_to(words, (len(steps), self._count)).ravel().tolist() for words in drawn)
+        one = [number for pair in map(random.normal_pair, a, b) for number in pair]
+        two = [number for pair in map(random.normal_pair, c, d) for number in pair]
+        return one, two
+
+
+class SensorWords:
+    """Random words of the errors of every drone's navigation, to be asked in the order of time.
+
+    seed : of the flight; count: of drones
+    """
+
+    def __init__(self, seed: int, count: int):
+        self._seed, self._count = seed, count
+        self._first_measurement, self._tables = -MEASUREMENTS_PER_BLOCK, {}  # type: ignore[var-annotated]
+
+    def __call__(self, measurement: int, draw: int, drone: int) -> tuple[int, int, int, int]:
+        """Four words of a measurement, a draw and a drone."""
+        if not self._first_measurement <= measurement < self._first_measurement + MEASUREMENTS_PER_BLOCK:
+            self._first_measurement, self._tables = measurement - measurement % MEASUREMENTS_PER_BLOCK, {}
+        if draw not in self._tables:
+            first = self._first_measurement
+            numbers = np.arange(first, first + MEASUREMENTS_PER_BLOCK, dtype=np.uint64)[:, None]
+            drones = np.arange(self._count, dtype=np.uint64)[None, :]
+            drawn = random.random_words(self._seed, random.SENSOR, 0, numbers, drones, draw)
+            self._tables[draw] = np.stack(drawn, axis=-1).tolist()
+        a, b, c, d = self._tables[draw][measurement - self._first_measurement][drone]
+        return a, b, c, d
+
+
+# ---- Start of a fleet
+
+SECONDS_BEFORE_START = 12.0  # s on the ground before a start is ordered
+DROPS_OUT_NOTE = "drops out by a fault: node and motors are off"
+ACCEPTED_BEFORE_START = (
+    60_000_000  # µs; packets sent so long before a node began are accepted, for its clock may be wrong
+)
+
+
+def make_vehicle(
+    scenario: Scenario, card: FlightCard, index: int, body: Any, noise: MotionNoise, started: int
+) -> SoftwareVehicle:
+    """A vehicle on the ground; grounds are a square of places 4 m apart.
+
+    place : among the members; body: numbers of its own; started: Unix time of its time 0, µs
+    """
+    side = max(1, round(len(card.members) ** 0.5))
+    at = (4.0 * (index % side) - 2.0 * (side - 1), 4.0 * (index // side) - 2.0 * (side - 1), 0.0)
+    noisy = "noise" in number_names(body) and body.noise > 0.0
+    draw = partial(noise, drone=index) if noisy else lambda step: (0.0, 0.0, 0.0)
+    made = SoftwareVehicle(
+        card.autopilot.name, card.members[index], card.site, at, scenario.vehicle, body, draw, started
+    )
+    made.place = index
+    return made
+
+
+def write_card_and_key(path: Path, card: FlightCard) -> None:
+    """Write the card of a fleet in software, and its key beside it, so that `airflock watch` shows the fleet.
+
+    Over such files of an earlier fleet in software only: raises CardError where a mission's own would be lost.
+    """
+    key = path.with_suffix(".key")
+    if key.exists() and read_key(key) != SOFTWARE_KEY:
+        raise CardError([f"{key}: exists and is of a real mission; give another name with --card"])
+    if path.exists() and not key.exists():
+        raise CardError([f"{path}: exists without a key of a fleet in software; give another name with --card"])
+    write_card(path, card.document)
+    if not key.exists():
+        write_key(key, SOFTWARE_KEY)
+
+
+def law_zero_height(card: FlightCard) -> float:
+    """Height (m) above the site at which the law counts zero."""
+    return -card.law_state(State(*(0.0,) * 6)).z
+
+
+def is_clear_between(card: FlightCard, here: tuple[float, float, float], there: tuple[float, float, float]) -> bool:
+    """Whether nothing stands between two places of vehicles, m."""
+    a, b = (card.law_state(State(*place, 0.0, 0.0, 0.0)) for place in (here, there))
+    return not card.place.is_blocked(*a[:3], *b[:3])
+
+
+def put_in_air(vehicle: SoftwareVehicle, card: FlightCard, start: State) -> None:
+    """Put a vehicle in the air, where it obeys its node as if it had for long."""
+    vehicle.state = start._replace(z=start.z + (card.height if card.flat else law_zero_height(card)))
+    vehicle.armed, vehicle.mode, vehicle.setpoint_at, vehicle.stream_since = True, GUIDED, 0.0, -9.0
+
+
+class OperatorStation:
+    """An operator of a fleet in software: signs orders.
+
+    card : of the fleet; private: key of the operator
+    """
+
+    def __init__(self, card: FlightCard, private: bytes):
+        self._card, self._private, self._sign, self._last_order_time = (
+            card,
+            private,
+            PacketSigner(SOFTWARE_KEY, orders.OPERATOR_SYSTEM),
+            0,
+        )
+
+    def order(self, do: OrderKind, utc: int, *, target: int = 0, at: int = 0, point: Geodetic | None = None) -> bytes:
+        """Datagram of an order given at utc for a time `at`, µs of Unix time; no two are given at one time."""
+        self._last_order_time = max(utc, self._last_order_time + 1)
+        p = point or Geodetic(0.0, 0.0, 0.0)
+        place = (round(p.latitude * 1e7), round(p.longitude * 1e7), round(p.altitude * 1e3))
+        given = OperatorOrder(do, target, self._card.mission, self._last_order_time, at, place)
+        return self._sign(orders.order_message(given, self._private), self._last_order_time)
+
+
+# ---- Lock-step
 
 START_TIME = 1_800_000_000_000_000  # virtual Unix time of 0 s, µs
 UNREAD_MESSAGES = ("attitude", "home", "battery")  # messages that no node reads; in lock-step nobody else is there
 ABSENT_ROW = (math.nan,) * 15  # a row of a drone that has dropped out
-NEVER_HEARD = -1e8  # s; a peer whose last state held before this has not been heard
+HEARD_SINCE = -1e8  # s; a peer whose last state held before this has not been heard
 
 
 class LockstepFleet:
@@ -238,7 +391,7 @@ class LockstepFleet:
         """(time, receiver, sender): s since the state that a node has of another one held; nan: it has none."""
         times = self._steps_per_period * self._dt * np.arange(len(self.state_times))
         stamps = np.array(self.state_times)
-        return np.where(stamps > NEVER_HEARD, times[:, None, None] - stamps, np.nan)
+        return np.where(stamps > HEARD_SINCE, times[:, None, None] - stamps, np.nan)
 
     def digest(self) -> str:
         """SHA-256 of all that was flown."""

@@ -13,25 +13,169 @@ from collections.abc import Callable, Sequence
 from operator import itemgetter
 from typing import Any
 
-from airflock.core import Body, State, argument_names, choices
-from airflock.drones import AUTOPILOTS, FramePacker, FrameStream, dialect, px4_mode
-from airflock.fleets import telemetry
-from airflock.fleets.befalling import DroneFaults
-from airflock.fleets.faults import InjectedFault
-from airflock.fleets.holding import HoldPosition
-from airflock.fleets.modes import (
-    DEFAULT_PARAMETERS,
-    GUIDED,
-    HOLD_MODE,
-    LAND_MODE,
-    LOST_SETPOINT_MODES,
-    LOST_STATION_MODES,
-    MODE_NUMBERS,
-    PILOT_MODE,
-    RETURN_MODE,
-    TAKEOFF_MODE,
-)
+from airflock.core import Body, State, argument_names, choices, shorten
+from airflock.drones import ARMED_FLAG, AUTOPILOTS, FramePacker, FrameStream, common_dialect, px4_mode
+from airflock.fleets.drone_faults import DroneFaults, InjectedFault
 from airflock.support import FlightSite, RuleError, swap_enu_ned
+
+# ---- Modes and parameters
+
+GUIDED, LAND_MODE, RETURN_MODE, HOLD_MODE, TAKEOFF_MODE, PILOT_MODE = "OURS", "LAND", "RTL", "HOLD", "TAKEOFF", "PILOT"
+MODE_NUMBERS = {
+    "px4": {GUIDED: px4_mode(6), LAND_MODE: px4_mode(4, 6), RETURN_MODE: px4_mode(4, 5), HOLD_MODE: px4_mode(4, 3),
+            TAKEOFF_MODE: px4_mode(4, 2), PILOT_MODE: px4_mode(3)},
+    "ardupilot": {GUIDED: 4, LAND_MODE: 9, RETURN_MODE: 6, HOLD_MODE: 17, PILOT_MODE: 5},
+}  # fmt: skip
+DEFAULT_PARAMETERS: dict[str, dict[str, float | int]] = {
+    "px4": {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 4, "GF_ACTION": 3, "MIS_TAKEOFF_ALT": 10.0, "MAV_SYS_ID": 1},
+    "ardupilot": {
+        "GUID_TIMEOUT": 1.0, "FENCE_ENABLE": 1, "FENCE_ACTION": 1, "FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 5.0,
+        "SYSID_MYGCS": 255, "SYSID_THISMAV": 1,
+    },
+}  # fmt: skip
+LOST_SETPOINT_MODES = {3: RETURN_MODE, 4: LAND_MODE, 5: HOLD_MODE}  # COM_OBL_RC_ACT of PX4
+LOST_STATION_MODES = {
+    5: LAND_MODE,
+    7: HOLD_MODE,
+}  # FS_GCS_ENABLE of ArduPilot; all others return, by the way they came or straight
+
+
+# ---- Holding a position
+
+STANDING_SPEED = 0.5  # m/s; our choice: slower than this it has come to stand, and holds that place
+POSITION_GAIN = 0.5  # 1/s; our choice, about half of PX4's MPC_XY_P: a metre off is half a metre a second back
+MAX_RETURN_SPEED = 1.0  # m/s; our choice
+
+
+class HoldPosition:
+    """The place that is held, from when the drone has come to stand there."""
+
+    def __init__(self) -> None:
+        self._held_position: tuple[float, float] | None = None
+
+    def release(self) -> None:
+        """Hold no place any more."""
+        self._held_position = None
+
+    def velocity(self, at: State | None, up: float) -> tuple[float, float, float]:
+        """Velocity (m/s) that brakes, and then goes back to the place; `up` is kept.
+
+        at : where the drone is by its own navigation; None where that stands still: then it only brakes
+        """
+        if at is not None and self._held_position is None and math.hypot(at.vx, at.vy) < STANDING_SPEED:
+            self._held_position = at.x, at.y
+        if at is None or self._held_position is None:
+            return 0.0, 0.0, up
+        vx, vy, _ = shorten(
+            POSITION_GAIN * (self._held_position[0] - at.x),
+            POSITION_GAIN * (self._held_position[1] - at.y),
+            0.0,
+            MAX_RETURN_SPEED,
+        )
+        return vx, vy, up
+
+
+# ---- Telemetry
+
+MESSAGE_RATES = {
+    "heartbeat": 2.0, "sys_status": 1.0, "system_time": 1.0, "gps": 5.0, "local": 20.0, "global": 20.0, "landed": 5.0,
+    "attitude": 5.0, "home": 0.5, "battery": 0.5,
+}  # fmt: skip
+MESSAGE_NAMES = {
+    0: "heartbeat", 1: "sys_status", 2: "system_time", 24: "gps", 32: "local", 33: "global", 245: "landed",
+    30: "attitude", 242: "home", 147: "battery", 49: "origin", 148: "version",
+}  # fmt: skip
+ALL_SENSORS = 0x0FFFFFFF
+CUSTOM_MODE_FLAG, GUIDED_FLAG = 1, 8  # MAV_MODE_FLAG
+CAPABILITY_FLAGS = 0x1 | 0x2 | 0x8 | 0x10 | 0x80 | 0x100 | 0x2000
+
+
+def _heartbeat(v: Any) -> Any:
+    base = CUSTOM_MODE_FLAG | (ARMED_FLAG if v.armed else 0) | (GUIDED_FLAG if v.mode == "OURS" else 0)
+    return common_dialect().MAVLink_heartbeat_message(
+        2, v.autopilot.number, base, v.mode_numbers.get(v.mode, 0), 4 if v.armed else 3, 3
+    )
+
+
+def _sys_status(v: Any) -> Any:
+    on = ALL_SENSORS
+    return common_dialect().MAVLink_sys_status_message(on, on, on, 200, 15800, 1000, int(v.battery), 0, 0, 0, 0, 0, 0)
+
+
+def _system_time(v: Any) -> Any:
+    return common_dialect().MAVLink_system_time_message(v.start_time + round(v.now * 1e6), _boot_ms(v))
+
+
+def _gps(v: Any) -> Any:
+    at = v.site.to_geodetic(*v.measured[:3])
+    return common_dialect().MAVLink_gps_raw_int_message(
+        round((v.now - v.booted_at) * 1e6), 3, round(at.latitude * 1e7), round(at.longitude * 1e7),
+        round(at.altitude * 1e3), 80, 120, 0, 0, 14, 0, round(v.accuracy * 1e3),
+    )  # fmt: skip
+
+
+def _local(v: Any) -> Any:
+    s = v.measured
+    lat, lon, alt = _origin_integers(v)
+    ox, oy, oz = v.site.local(lat * 1e-7, lon * 1e-7, alt * 1e-3)
+    north, east, down = swap_enu_ned(s.x - ox, s.y - oy, s.z - oz)
+    return common_dialect().MAVLink_local_position_ned_message(_boot_ms(v), north, east, down, *swap_enu_ned(*s[3:]))
+
+
+def _global(v: Any) -> Any:
+    s = v.measured
+    at = v.site.to_geodetic(*s[:3])
+    return common_dialect().MAVLink_global_position_int_message(
+        _boot_ms(v), round(at.latitude * 1e7), round(at.longitude * 1e7), round(at.altitude * 1e3),
+        round((s.z - v.home[2]) * 1e3), *(round(100.0 * u) for u in swap_enu_ned(*s[3:])), 0,
+    )  # fmt: skip
+
+
+def _landed(v: Any) -> Any:
+    return common_dialect().MAVLink_extended_sys_state_message(0, 2 if v.flying else 1)
+
+
+def _attitude(v: Any) -> Any:
+    return common_dialect().MAVLink_attitude_message(_boot_ms(v), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _home(v: Any) -> Any:
+    return common_dialect().MAVLink_home_position_message(
+        *_origin_integers(v), 0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0
+    )
+
+
+def _battery(v: Any) -> Any:
+    cells = [3950] * 4 + [65535] * 6
+    return common_dialect().MAVLink_battery_status_message(0, 0, 3, 2500, cells, 100, -1, -1, int(v.battery))
+
+
+def _gps_origin(v: Any) -> Any:
+    return common_dialect().MAVLink_gps_global_origin_message(*_origin_integers(v))
+
+
+def _version(v: Any) -> Any:
+    return common_dialect().MAVLink_autopilot_version_message(
+        CAPABILITY_FLAGS, 0x010F00FF, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 4711 + v.system, [0] * 18
+    )
+
+
+def _boot_ms(v: Any) -> int:
+    return int(round((v.now - v.booted_at) * 1e3)) & 0xFFFFFFFF
+
+
+def _origin_integers(v: Any) -> tuple[int, int, int]:
+    return round(v.origin.latitude * 1e7), round(v.origin.longitude * 1e7), round(v.origin.altitude * 1e3)
+
+
+MESSAGE_MAKERS: dict[str, Callable[[Any], Any]] = {
+    "heartbeat": _heartbeat, "sys_status": _sys_status, "system_time": _system_time, "gps": _gps, "local": _local,
+    "global": _global, "landed": _landed, "attitude": _attitude, "home": _home, "battery": _battery,
+    "origin": _gps_origin, "version": _version,
+}  # fmt: skip
+
+
+# ---- Vehicle
 
 RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED = 0, 2, 3
 POSITION_IGNORED_MASK = 0x0007
@@ -79,7 +223,7 @@ class SoftwareVehicle:
         self.setpoint_at, self.stream_since, self.takeoff_height = -1e9, -1e9, 0.0
         self.booted_at = 0.0  # s
         self.heartbeat_at: float | None = None  # when the last heartbeat of its station came; None: none ever
-        self.now, self.due, self.rates = 0.0, dict.fromkeys(telemetry.MESSAGE_RATES, 0.0), dict(telemetry.MESSAGE_RATES)
+        self.now, self.due, self.rates = 0.0, dict.fromkeys(MESSAGE_RATES, 0.0), dict(MESSAGE_RATES)
         self.error: tuple[float, ...] = (0.0,) * 6
         self.accuracy, self.motor, self.steps = 0.7, True, 0
         self.off = False  # for good: it has dropped out of the flight
@@ -116,13 +260,11 @@ class SoftwareVehicle:
 
     def origin_frame(self) -> bytes:
         """GPS_GLOBAL_ORIGIN, as it is sent on request."""
-        return self.frame(telemetry.MESSAGE_MAKERS["origin"](self))
+        return self.frame(MESSAGE_MAKERS["origin"](self))
 
     def state_frames(self) -> bytes:
         """LOCAL_POSITION_NED and what else a node needs, now."""
-        return b"".join(
-            self.frame(telemetry.MESSAGE_MAKERS[name](self)) for name in ("heartbeat", "gps", "landed", "local")
-        )
+        return b"".join(self.frame(MESSAGE_MAKERS[name](self)) for name in ("heartbeat", "gps", "landed", "local"))
 
     @property
     def flying(self) -> bool:
@@ -137,7 +279,7 @@ class SoftwareVehicle:
             if rate <= 0.0 or now < self.due[name] - 1e-9:
                 continue
             self.due[name] = max(self.due[name] + 1.0 / rate, now)
-            out += self.frame(telemetry.MESSAGE_MAKERS[name](self))
+            out += self.frame(MESSAGE_MAKERS[name](self))
         return out
 
     # -------------------------------------------------------------------------------------------------- frames in
@@ -161,7 +303,7 @@ class SoftwareVehicle:
     def _timesync(self, v: dict[str, Any], sender: tuple[int, int]) -> list[Any]:
         if v["tc1"] != 0:
             return []
-        return [dialect.common_dialect().MAVLink_timesync_message(round(self.now * 1e9), v["ts1"])]
+        return [common_dialect().MAVLink_timesync_message(round(self.now * 1e9), v["ts1"])]
 
     def _list(self, v: dict[str, Any], sender: tuple[int, int]) -> list[Any]:
         return [self._parameter_message(name) for name in self.parameters]
@@ -184,7 +326,7 @@ class SoftwareVehicle:
         value, names = self.parameters[name], list(self.parameters)
         whole = isinstance(value, int)
         told = struct.unpack("<f", struct.pack("<i", value))[0] if whole and self.kind == "px4" else float(value)
-        return dialect.common_dialect().MAVLink_param_value_message(
+        return common_dialect().MAVLink_param_value_message(
             name.encode(), told, 6 if whole else 9, len(names), names.index(name)
         )
 
@@ -214,7 +356,7 @@ class SoftwareVehicle:
         if v["target_system"] not in (0, self.system):
             return []
         result, more = self.run_command(v["command"], v)
-        ack = dialect.common_dialect().MAVLink_command_ack_message(v["command"], result, 0, 0, *sender)
+        ack = common_dialect().MAVLink_command_ack_message(v["command"], result, 0, 0, *sender)
         return [ack, *more]
 
     def run_command(self, number: int, v: dict[str, Any]) -> tuple[int, list[Any]]:
@@ -231,10 +373,10 @@ class SoftwareVehicle:
             wanted = px4_mode(main, sub) if self.kind == "px4" else main
             return (RESULT_ACCEPTED if self.set_mode(wanted) else RESULT_DENIED), []
         if number in (512, 520):
-            name = "version" if number == 520 else telemetry.MESSAGE_NAMES.get(int(v["param1"]), "")
-            return (RESULT_ACCEPTED, [telemetry.MESSAGE_MAKERS[name](self)]) if name else (RESULT_UNSUPPORTED, [])
+            name = "version" if number == 520 else MESSAGE_NAMES.get(int(v["param1"]), "")
+            return (RESULT_ACCEPTED, [MESSAGE_MAKERS[name](self)]) if name else (RESULT_UNSUPPORTED, [])
         if number == 511:
-            name = telemetry.MESSAGE_NAMES.get(int(v["param1"]), "")
+            name = MESSAGE_NAMES.get(int(v["param1"]), "")
             if name in self.rates and v["param2"] > 0.0:
                 self.rates[name] = min(1e6 / v["param2"], 50.0)
             return (RESULT_ACCEPTED if name in self.rates else RESULT_UNSUPPORTED), []

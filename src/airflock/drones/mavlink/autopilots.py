@@ -8,8 +8,7 @@ import struct
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from airflock.drones.mavlink import dialect
-from airflock.drones.mavlink.frames import FramePacker
+from airflock.drones.mavlink.frames import FramePacker, common_dialect
 from airflock.support import swap_enu_ned
 
 ARM_COMMAND = 400
@@ -162,13 +161,13 @@ class AutopilotCommands:
 
     def heartbeat(self) -> bytes:
         """A sign of life of an onboard computer (MAV_TYPE 18)."""
-        return self._pack(dialect.common_dialect().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+        return self._pack(common_dialect().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
 
     def velocity(self, velocity: tuple[float, float, float], boot_ms: int) -> bytes:
         """A setpoint: velocity east, north, up, m/s."""
         vx, vy, vz = swap_enu_ned(*velocity)
         return self._pack(
-            dialect.common_dialect().MAVLink_set_position_target_local_ned_message(
+            common_dialect().MAVLink_set_position_target_local_ned_message(
                 boot_ms & 0xFFFFFFFF,
                 self.system,
                 1,
@@ -191,7 +190,7 @@ class AutopilotCommands:
     def command(self, number: int, *parameters: float) -> bytes:
         """A command with up to seven parameters."""
         seven = (*parameters, *(0.0,) * (7 - len(parameters)))
-        return self._pack(dialect.common_dialect().MAVLink_command_long_message(self.system, 1, number, 0, *seven))
+        return self._pack(common_dialect().MAVLink_command_long_message(self.system, 1, number, 0, *seven))
 
     def set_mode(self, mode: int) -> bytes:
         """Ask for a custom mode."""
@@ -203,7 +202,7 @@ class AutopilotCommands:
 
     def request_parameter(self, name: str) -> bytes:
         """Ask for the value of one parameter."""
-        kind: Any = dialect.common_dialect().MAVLink_param_request_read_message
+        kind: Any = common_dialect().MAVLink_param_request_read_message
         return self._pack(kind(self.system, 1, name.encode("ascii"), -1))
 
     def request_message(self, number: int) -> bytes:

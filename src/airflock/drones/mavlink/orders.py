@@ -9,7 +9,7 @@ import struct
 from enum import IntEnum
 from typing import Any, NamedTuple
 
-from airflock.drones.mavlink import dialect
+from airflock.drones.mavlink.frames import common_dialect
 from airflock.support import LinkError
 
 TUNNEL_MESSAGE = 385  # TUNNEL
@@ -73,7 +73,7 @@ def order_message(order: OperatorOrder, private_key: bytes) -> Any:
     data = order_bytes(order)
     sealed = data + _ed25519().Ed25519PrivateKey.from_private_bytes(private_key).sign(data)
     padded = list(sealed.ljust(128, b"\0"))
-    return dialect.common_dialect().MAVLink_tunnel_message(order.target, 0, 0, len(sealed), padded)
+    return common_dialect().MAVLink_tunnel_message(order.target, 0, 0, len(sealed), padded)
 
 
 def parse_order(values: dict[str, Any], public_key: bytes) -> OperatorOrder | None:

@@ -9,19 +9,64 @@ pymavlink's check keeps the stamp first, so that one forged datagram locks a nei
 
 import hashlib
 import hmac
+import os
 from collections import deque
 from collections.abc import Collection, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock.drones.mavlink import dialect
 from airflock.drones.mavlink.frames import (
     CHECKSUM_LENGTH,
     FRAME_MAGIC,
     HEADER_LENGTH,
     SIGNATURE_LENGTH,
     SIGNED_FLAG,
+    common_dialect,
+    message_fields,
+    message_layout,
     message_number,
 )
+from airflock.support import LinkError, os_error_message
+
+# ---- Key files
+
+KEY_LENGTH = 32  # bytes
+
+
+def write_key(path: Path, key: bytes) -> None:
+    """Write a key to a new file of mode 0600; never over another."""
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError as fault:
+        raise LinkError(f"{path}: exists; a key is never overwritten") from fault
+    try:
+        with os.fdopen(handle, "w", encoding="ascii") as file:
+            file.write(key.hex() + "\n")
+    except OSError as fault:  # a full disk; half a key is none
+        path.unlink(missing_ok=True)
+        raise LinkError(f"{path}: cannot be written: {os_error_message(fault)}") from fault
+
+
+def read_key(path: Path) -> bytes:
+    """Key from its file; refused if others can read it."""
+    try:
+        mode, text = path.stat().st_mode, path.read_text(encoding="ascii").strip()
+    except OSError as fault:
+        raise LinkError(f"{path}: the key cannot be read: {os_error_message(fault)}") from fault
+    except UnicodeDecodeError as fault:
+        raise LinkError(f"{path}: is not a key; give {2 * KEY_LENGTH} hexadecimal digits") from fault
+    if mode & 0o077:
+        raise LinkError(f"{path}: is readable by others (mode {mode & 0o777:04o}); chmod 600 {path}")
+    try:
+        key = bytes.fromhex(text)
+    except ValueError:
+        key = b""
+    if len(key) != KEY_LENGTH:
+        raise LinkError(f"{path}: is not a key; give {2 * KEY_LENGTH} hexadecimal digits")
+    return key
+
+
+# ---- Signatures
 
 SIGNING_EPOCH = 1_420_070_400_000_000  # 2015-01-01 in µs of Unix time
 STAMPS_PER_SECOND = 100_000
@@ -42,7 +87,7 @@ class PacketSigner:
     """
 
     def __init__(self, key: bytes, system: int, component: int = 191, last: int = 0):
-        self._mav = dialect.common_dialect().MAVLink(None, srcSystem=system, srcComponent=component)
+        self._mav = common_dialect().MAVLink(None, srcSystem=system, srcComponent=component)
         signing = self._mav.signing
         signing.secret_key, signing.sign_outgoing, signing.link_id = key, True, 0
         self.last = last
@@ -53,7 +98,7 @@ class PacketSigner:
         self.last = max(stamp_of_time(utc), self.last + 1)
         self.recent_stamps.append(self.last)
         self._mav.signing.timestamp = self.last
-        data = bytes(message._packer(self._mav))
+        data = bytes(message.pack(self._mav))
         self._mav.seq = (self._mav.seq + 1) & 0xFF
         return data
 
@@ -69,7 +114,7 @@ class ReceivedMessage(NamedTuple):
     @property
     def values(self) -> dict[str, Any]:
         """Its fields by name."""
-        return dialect.message_fields(self.message, self.payload)
+        return message_fields(self.message, self.payload)
 
 
 class PacketReceiver:
@@ -128,7 +173,7 @@ class PacketReceiver:
         message = message_number(data)
         if data[0] != FRAME_MAGIC or data[2] != SIGNED_FLAG or message not in self._senders:
             return "header"
-        known = dialect.message_layout(message)
+        known = message_layout(message)
         length = data[1]
         if (
             known is None

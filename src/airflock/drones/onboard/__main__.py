@@ -2,6 +2,6 @@
 
 import sys
 
-from airflock.drones.onboard.run import main
+from airflock.drones.onboard.node_program import main
 
 sys.exit(main())

@@ -6,28 +6,355 @@ travels in every packet: drones with different cards do not flock.
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from airflock.core import FAR, Model, PacketPolicy, Pilot, SilenceParameters, State
-from airflock.drones.mavlink.autopilots import AUTOPILOTS, Autopilot
-from airflock.drones.onboard.fence import Fence
-from airflock.drones.onboard.fields import (
-    are_valid_shapes,
-    is_ring,
-    read_numbers,
-    read_public_key,
-    read_record,
-    to_tuples,
+from airflock.core import (
+    FAR,
+    Model,
+    PacketPolicy,
+    Parameters as Record,
+    Pilot,
+    SilenceParameters,
+    State,
+    choice,
+    model,
+    quantity,
 )
-from airflock.drones.onboard.laws import read_body, read_law, read_member_parts, wall_reach
-from airflock.drones.onboard.safety import SafetyLimits
+from airflock.drones.mavlink.autopilots import AUTOPILOTS, Autopilot
+from airflock.parts.bodies import BODIES
 from airflock.parts.topologies import TOPOLOGIES, parameters as topologies
-from airflock.support import CardError, FlightSite, as_error, atomic, collect_errors, parse_json, read_text, suggest
-from airflock.world import Shapes, WorldMap, arena, polygon_error
+from airflock.support import (
+    AirflockError,
+    CardError,
+    FlightSite,
+    ParameterError,
+    as_error,
+    atomic,
+    collect_errors,
+    parse_json,
+    read_text,
+    suggest,
+)
+from airflock.world import (
+    COLUMNS,
+    Shapes,
+    WorldMap,
+    arena,
+    counter_clockwise,
+    inward_plane,
+    is_convex,
+    polygon,
+    polygon_error,
+)
+
+# ---- Fields of a document
+
+
+def read_record(record_class: Any, table: Any, section: str, errors: list[str]) -> Any:
+    """A record of parameters from a table, its faults noted."""
+    if not isinstance(table, dict):
+        errors.append(f"{section} = {table!r} is not a table")
+        return None
+    known = record_class.__dataclass_fields__
+    for key in table:
+        if key not in known:
+            errors.append(
+                f"{section}.{key} is not known{suggest(key, known, lead='; ', prefix=f'{section}.', cutoff=0.6)}"
+            )
+    try:
+        return record_class(**to_tuples({key: value for key, value in table.items() if key in known}))
+    except ParameterError as fault:
+        errors += [f"{section}.{line.partition('.')[2]}" for line in str(fault).splitlines()]
+    except (TypeError, ValueError) as fault:
+        errors.append(f"{section}: {fault}")
+    return None
+
+
+def to_tuples(table: Any) -> Any:
+    """A table whose lists are tuples."""
+    if isinstance(table, dict):
+        return {key: to_tuples(value) for key, value in table.items()}
+    return tuple(to_tuples(value) for value in table) if isinstance(table, list) else table
+
+
+def read_numbers(
+    table: Any,
+    key_prefix: str,
+    ranges: Mapping[str, tuple[float, float]],
+    errors: list[str],
+    other_keys: tuple[str, ...] = (),
+) -> dict[str, float]:
+    """Numbers of a table within their ranges; what is wrong is noted."""
+    found = {}
+    if not isinstance(table, dict):
+        errors.append(f"{key_prefix} = {table!r} is not a table")
+        return {}
+    at = f"{key_prefix}." if key_prefix else ""
+    errors += [f"{at}{key} is not known" for key in table if key not in ranges and key not in other_keys]
+    errors += [f"{at}{key} is missing" for key in other_keys if key not in table]
+    for key, (low, high) in ranges.items():
+        value = table.get(key)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+            errors.append(f"{at}{key} = {value!r} is not a number")
+        elif not low <= value <= high:
+            errors.append(f"{at}{key} = {value:g} lies outside [{low:g}, {high:g}]")
+        else:
+            found[key] = value
+    return found
+
+
+def are_valid_shapes(rows: Any) -> bool:
+    """Whether the rows of a scene can be read: `world.shapes` and the tree of `world.bvh`."""
+    if not isinstance(rows, dict) or set(rows) != {"shapes", "nodes", "links"}:
+        return False
+    wide = {"shapes": COLUMNS, "nodes": 6, "links": 3}
+    for name, width in wide.items():
+        for row in rows[name] if isinstance(rows[name], list) else [None]:
+            if not isinstance(row, list) or len(row) != width or not all(type(v) in (int, float) for v in row):
+                return False
+    count, last = len(rows["nodes"]), len(rows["shapes"])
+    if len(rows["links"]) != count:
+        return False
+    return all(k < s <= count and 0 <= a <= b <= last for k, (s, a, b) in enumerate(rows["links"]))
+
+
+def is_ring(corners: Any) -> bool:
+    """Whether it is a list of points."""
+    return isinstance(corners, list) and all(
+        isinstance(c, list) and len(c) == 2 and all(type(v) in (int, float) and isfinite(v) for v in c) for c in corners
+    )
+
+
+def read_public_key(text: Any, errors: list[str]) -> bytes:
+    """A public key from its digits; empty for none."""
+    try:
+        key = bytes.fromhex(text)
+    except (TypeError, ValueError):
+        key = b"?"
+    if len(key) not in (0, 32):
+        errors.append("operator: is not a public key of 64 hexadecimal digits")
+    return key
+
+
+# ---- Safety limits
+
+OWN_CHOICE = "our choice"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SafetyLimits(Record):
+    """What the limiter allows, and when the mission gives up what it does."""
+
+    speed_max: float = quantity(6.0, "m/s", low=0.1, high=60.0, source=OWN_CHOICE, meaning="largest commanded speed")
+    climb_max: float = quantity(2.0, "m/s", low=0.1, high=10.0, source=OWN_CHOICE, meaning="largest vertical speed")
+    accel: float = quantity(
+        6.0, "m/s^2", low=0.1, high=50.0, source="Vásárhelyi et al. 2018, Table S5",
+        meaning="a command differs from the own velocity by at most accel (response + tick)",
+    )  # fmt: skip
+    response: float = quantity(
+        1.0, "s", low=0.01, high=60.0, source="Vásárhelyi et al. 2018, Table S5", meaning="relaxation time of the drone"
+    )
+    brake: float = quantity(
+        2.5, "m/s^2", low=0.1, high=20.0, source=OWN_CHOICE, meaning="deceleration of the braking curve at the fence"
+    )
+    brake_gain: float = quantity(1.0, "1/s", low=0.05, high=10.0, source=OWN_CHOICE, meaning="its gain near the fence")
+    soft_margin: float = quantity(
+        3.0, "m", low=0.0, high=1000.0, source=OWN_CHOICE, meaning="distance from the fence at which outward speed is 0"
+    )
+    base: float = quantity(10.0, "m", low=2.0, high=500.0, source=OWN_CHOICE, meaning="height of the lowest layer")
+    uneven: float = quantity(
+        5.0, "m", low=0.5, high=500.0, source=OWN_CHOICE,
+        meaning="largest height of a drone on the ground above or below the site",
+    )  # fmt: skip
+    layer: float = quantity(3.0, "m", low=0.5, high=50.0, source=OWN_CHOICE, meaning="distance of two layers")
+    start_step: float = quantity(2.0, "s", low=0.0, high=60.0, source=OWN_CHOICE, meaning="from one start to the next")
+    start_apart: float = quantity(
+        3.0, "m", low=0.5, high=100.0, source=OWN_CHOICE, meaning="smallest distance on the ground"
+    )
+    home_radius: float = quantity(
+        2.0, "m", low=0.5, high=50.0, source=OWN_CHOICE, meaning="within this distance: above home"
+    )
+    gather: float = quantity(
+        200.0, "m", low=1.0, high=5000.0, source=OWN_CHOICE, meaning="farthest a member may be to flock"
+    )
+    yield_range: float = quantity(
+        8.0, "m", low=0.5, high=100.0, source=OWN_CHOICE, meaning="on the way home, neighbours nearer than this repel"
+    )
+    near: float = quantity(
+        2.0, "m", low=0.1, high=50.0, source=OWN_CHOICE, meaning="a take-off waits for a neighbour within"
+    )
+    stream: float = quantity(1.5, "s", low=1.0, high=10.0, source="PX4: more than 1 s", meaning="setpoints before use")
+    arm_time: float = quantity(
+        10.0, "s", low=2.0, high=120.0, source=OWN_CHOICE, meaning="for arming, before it gives up"
+    )
+    climb_time: float = quantity(5.0, "s", low=1.0, high=60.0, source=OWN_CHOICE, meaning="to begin climbing")
+    stale: float = quantity(0.5, "s", low=0.1, high=5.0, source=OWN_CHOICE, meaning="age of the own position: hold")
+    stale_land: float = quantity(5.0, "s", low=0.5, high=60.0, source=OWN_CHOICE, meaning="without a position: land")
+    h_acc: float = quantity(3.0, "m", low=0.1, high=100.0, source=OWN_CHOICE, meaning="worst accuracy of a position")
+    jump: float = quantity(
+        5.0, "m", low=0.5, high=100.0, source=OWN_CHOICE, meaning="largest plausible jump of a position"
+    )
+    gnss_land: float = quantity(10.0, "s", low=1.0, high=120.0, source=OWN_CHOICE, meaning="with bad navigation: land")
+    battery_low: float = quantity(
+        25.0, "%", low=0.0, high=100.0, source=OWN_CHOICE, meaning="left when home is reached"
+    )
+    battery_critical: float = quantity(12.0, "%", low=0.0, high=100.0, source=OWN_CHOICE, meaning="land here")
+    battery_way: float = quantity(
+        10.0, "%/km", low=0.0, high=1000.0, source=OWN_CHOICE, meaning="what the way home takes"
+    )
+    outside_land: float = quantity(10.0, "s", low=1.0, high=300.0, source=OWN_CHOICE, meaning="beyond the fence: land")
+    peers_least: float = quantity(1.0, "1", low=0.0, high=250.0, source=OWN_CHOICE, meaning="neighbours to be heard")
+    peers_hold: float = quantity(10.0, "s", low=1.0, high=600.0, source=OWN_CHOICE, meaning="with fewer: hold")
+    peers_return: float = quantity(30.0, "s", low=2.0, high=600.0, source=OWN_CHOICE, meaning="with fewer: return")
+    deaf_return: float = quantity(
+        20.0, "s", low=2.0, high=600.0, source=OWN_CHOICE, meaning="with nobody heard: return"
+    )
+    clock_error: float = quantity(
+        0.2, "s", low=0.01, high=5.0, source=OWN_CHOICE, meaning="suspicious error of a clock"
+    )
+    clock_return: float = quantity(
+        10.0, "s", low=1.0, high=300.0, source=OWN_CHOICE, meaning="with a bad clock: return"
+    )
+    clock_spread: float = quantity(
+        1.0, "s", low=0.1, high=10.0, source=OWN_CHOICE, meaning="stamps farther off than this are refused"
+    )
+    late: float = quantity(1.0, "s", low=0.1, high=10.0, source=OWN_CHOICE, meaning="a tick this late is an overload")
+    overloads: float = quantity(
+        3.0, "1", low=1.0, high=100.0, source=OWN_CHOICE, meaning="overloads after which it returns"
+    )
+    calm: float = quantity(3.0, "s", low=0.5, high=60.0, source=OWN_CHOICE, meaning="all well for this long: go on")
+    operator_time: float = quantity(
+        10.0, "s", low=1.0, high=3600.0, source=OWN_CHOICE, meaning="silence that counts as lost"
+    )
+    operator_lost: str = choice("ignore", ("ignore", "hold", "return"), meaning="what to do without the operator")
+    mission_time: float = quantity(
+        600.0, "s", low=1.0, high=36000.0, source=OWN_CHOICE, meaning="in the air, then return"
+    )
+    status_period: float = quantity(
+        0.1, "s", low=0.02, high=5.0, source=OWN_CHOICE, meaning="between packets, fast radio"
+    )
+    slow_period: float = quantity(
+        1.0, "s", low=0.1, high=60.0, source=OWN_CHOICE, meaning="between packets, slow radio"
+    )
+    tick: float = quantity(0.05, "s", low=0.01, high=0.2, source=OWN_CHOICE, meaning="between setpoints")
+
+
+# ---- Fence
+
+FenceSide = tuple[float, float, float, float]
+
+
+class Fence:
+    """Sides of a polygon as the limiter reads them.
+
+    corners : of a simple polygon, m
+    """
+
+    def __init__(self, corners: Sequence[Sequence[float]]):
+        ring = counter_clockwise(corners)
+        pairs = list(zip(ring, [*ring[1:], ring[0]], strict=True))
+        self.edges = [[*a[:2], *b[:2]] for a, b in pairs]
+        self.convex_planes = [inward_plane(a, b) for a, b in pairs] if is_convex(corners) else []
+
+    def sides(self, x: float, y: float) -> list[FenceSide]:
+        """Distance (m, negative beyond) and inward unit normal of each side that can be met from a position.
+
+        All of a convex fence; of any other those that can be seen, and the nearest point for who is outside.
+        """
+        if self.convex_planes:
+            return [(a * x + b * y + d, a, b, 0.0) for a, b, _, d in self.convex_planes]
+        count = len(self.edges)
+        found = [polygon.wall(x, y, 0.0, self.edges, e, count, FAR) for e in range(count)]
+        found.append(polygon.outside(x, y, 0.0, self.edges, count))
+        return [(s.distance, s.nx, s.ny, 0.0) for s in found if s.distance < FAR]
+
+    def outside(self, x: float, y: float) -> float:
+        """Distance beyond the fence, m; negative inside."""
+        if self.convex_planes:
+            return -min([a * x + b * y + d for a, b, _, d in self.convex_planes])
+        return float(polygon.obstacle(x, y, 0.0, self.edges, 0, len(self.edges)).distance)
+
+
+# ---- Law, body and their numbers
+
+MEMBER_PARTS = ("law", "body")  # of which members may have numbers of their own
+
+
+def law_of_package(name: str) -> Model:
+    """A law of the package by its name."""
+    if not name.isidentifier():
+        raise CardError([f"law.kind = {name!r} is not a law of this version"])
+    try:
+        return model(import_module(f"airflock.parts.laws.{name}"))
+    except ModuleNotFoundError as fault:
+        raise CardError([f"law.kind = {name!r} is not a law of this version"]) from fault
+
+
+def read_law(table: Any, errors: list[str], section: str = "law") -> tuple[Model | None, Any]:
+    """Law and parameters of a card; what is wrong is added to the faults."""
+    try:
+        found = law_of_package(str(table["kind"]))
+    except (AirflockError, KeyError, TypeError) as fault:
+        errors.append(str(fault) if isinstance(fault, AirflockError) else f"{section}.kind is missing")
+        return None, None
+    return found, read_record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, section, errors)
+
+
+def read_body(table: Any, errors: list[str]) -> tuple[Any, Any]:
+    """Body and parameters of a card; what is wrong is added to the faults."""
+    kind = table.get("kind") if isinstance(table, dict) else None
+    if not isinstance(kind, str) or kind not in BODIES:
+        errors.append(f"body.kind = {kind!r} is none of {', '.join(BODIES)}")
+        return None, None
+    return BODIES[kind], read_record(
+        BODIES[kind].Parameters, {k: v for k, v in table.items() if k != "kind"}, "body", errors
+    )  # fmt: skip
+
+
+def read_member_parts(
+    d: Mapping[str, Any], law: Model | None, body: Any, errors: list[str]
+) -> tuple[tuple[Model, Any, Any], ...]:
+    """Law, its numbers and those of the body of each member; none where all are alike."""
+    rows = d["own"]
+    if rows == [] or law is None or body is None:
+        return ()
+    if not isinstance(rows, list) or not isinstance(d["members"], list) or len(rows) != len(d["members"]):
+        errors.append("own: give a table with law and body for each member, or an empty list")
+        return ()
+    found = []
+    for number, row in enumerate(rows):
+        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in MEMBER_PARTS)
+        if not sound:
+            errors.append(f"own[{number}] = {row!r}: give the tables law and body")
+            continue
+        where, usual = (
+            f"own[{number}]",
+            {part: {k: v for k, v in d[part].items() if k != "kind"} for part in MEMBER_PARTS},
+        )
+        b = read_record(body.Parameters, usual["body"] | row["body"], f"{where}.body", errors)
+        if "kind" in row["law"]:
+            other, p = read_law(row["law"], errors, f"{where}.law")
+            if other is not None and other.command != law.command:
+                errors.append(f"{where}.law commands {other.command}, and law {law.command}; one body carries all")
+        else:
+            other, p = law, read_record(law.Parameters, usual["law"] | row["law"], f"{where}.law", errors)
+        if other is not None:
+            found.append((other, p, b))
+    return tuple(found)
+
+
+def wall_reach(law: Model, p: Any) -> float:
+    """How far (m) a law with these numbers looks for what stands in the world."""
+    return FAR if law.wall_reach is None else float(law.wall_reach(p))
+
+
+# ---- Card
 
 CARD_VERSION = 2  # a card of version 1 does not name its rule of silence
 CARD_KEYS = (
@@ -241,10 +568,11 @@ def _made(d: Mapping[str, Any], errors: list[str]) -> FlightCard | None:
     )
 
 
-def _packet_policy(extrapolate: bool, max_age: float, use_once: bool = False, any_stamp: bool = False) -> PacketPolicy:
+def _packet_policy(extrapolate: bool, max_age: float, once: bool = False, any_stamp: bool = False) -> PacketPolicy:
     """What is done with neighbours' data; any_stamp: they count whatever time they say that they are of."""
-    stamps = {"early": FAR, "in_order": False} if any_stamp else {}
-    return PacketPolicy(extrapolate, max_age, use_once, **stamps)  # type: ignore[arg-type]
+    if any_stamp:
+        return PacketPolicy(extrapolate, max_age, once, early=FAR, drop_reordered=False)
+    return PacketPolicy(extrapolate, max_age, once)
 
 
 def _member_errors(members: Any) -> list[str]:

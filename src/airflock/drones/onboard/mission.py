@@ -9,7 +9,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from airflock.drones.mavlink.orders import CALL_OFF_ORDERS, OrderKind
-from airflock.drones.onboard.safety import SafetyLimits
+from airflock.drones.onboard.card import SafetyLimits
 
 
 class MissionPhase(IntEnum):

@@ -6,19 +6,59 @@ give the same outputs to the bit, so that a log can be flown again.
 
 from typing import NamedTuple
 
-from airflock.drones.mavlink import orders, status
-from airflock.drones.mavlink.autopilots import TAKE_OFF_COMMAND, AutopilotCommands
+from airflock.core import State
+from airflock.drones.mavlink import orders
+from airflock.drones.mavlink.autopilots import TAKE_OFF_COMMAND, Autopilot, AutopilotCommands
+from airflock.drones.mavlink.messages import STATUS_MESSAGE, DroneStatus, parse_status_payload, status_message
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.mavlink.signing import PacketReceiver, PacketSigner
-from airflock.drones.onboard import saying
 from airflock.drones.onboard.card import FlightCard
-from airflock.drones.onboard.limiter import NO_VELOCITY, Velocity
 from airflock.drones.onboard.mission import FLYING_PHASES, NOT_FLOCKING_PHASES, MissionFacts, MissionPhase, next_step
-from airflock.drones.onboard.operator import OperatorOrders
-from airflock.drones.onboard.peers import Peers
+from airflock.drones.onboard.peers import AutopilotLink, OperatorOrders, Peers
 from airflock.drones.onboard.situation import ConditionTimers, NodeTick, mission_facts
-from airflock.drones.onboard.steering import TIME_TOLERANCE, PhaseVelocity, SteeringInput
-from airflock.drones.onboard.wire import AutopilotLink
+from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseVelocity, SteeringInput, Velocity
+
+# ---- Outgoing messages
+
+ORIGIN_MESSAGE = 49
+UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, as large as a packet can tell
+
+
+def requests(commands: AutopilotCommands, autopilot: Autopilot, link: AutopilotLink) -> list[bytes]:
+    """What is still to be asked of the autopilot: parameters, origin, streams."""
+    asked = [
+        commands.request_parameter(guard.name)
+        for guard in autopilot.parameter_checks
+        if guard.name not in link.parameters
+    ]
+    if link.origin is None:
+        asked.append(commands.request_message(ORIGIN_MESSAGE))
+    if link.state is None or link.is_landed is None or not link.clock_offsets:
+        asked += commands.request_streams()
+    return asked
+
+
+def own_status(
+    card: FlightCard, link: AutopilotLink, own: State, time: int, phase: MissionPhase, *, peers: int
+) -> DroneStatus:
+    """The own status at a time (µs of Unix time), with how many peers are heard."""
+    offset = link.clock_offset()
+    return DroneStatus(
+        time=time,
+        position=own[:3],
+        velocity=own[3:],
+        accuracy=min(link.horizontal_accuracy, 65.0),
+        phase=int(phase),
+        is_airborne=link.is_landed is False,
+        mission=card.mission,
+        card=bytes.fromhex(card.hash)[:4],
+        battery=round(link.battery or 0.0),
+        clock_error=UNKNOWN_CLOCK_ERROR if offset is None else abs(offset),
+        peers=peers,
+    )
+
+
+# ---- Node
 
 RETRY_PERIOD = 1.0  # s between two tries of a command
 KILL_SECONDS = 3.0  # s at least for which a kill is repeated to an autopilot that is armed
@@ -63,7 +103,7 @@ class Node:
         self._signer = PacketSigner(key, member, last=kept.sent)
         others = [who for who in card.members if who != member]
         self._receiver = PacketReceiver(
-            key, member, {status.STATUS_MESSAGE: others, orders.TUNNEL_MESSAGE: (orders.OPERATOR_SYSTEM,)}, 
+            key, member, {STATUS_MESSAGE: others, orders.TUNNEL_MESSAGE: (orders.OPERATOR_SYSTEM,)}, 
             started=self.accepted_since, last_stamps=kept.heard,
             max_clock_difference=card.safety.clock_spread + card.delay,
         )  # fmt: skip
@@ -114,7 +154,7 @@ class Node:
         if got.message == orders.TUNNEL_MESSAGE:
             self.operator.take(got.values, now, utc)
             return
-        told = status.parse_status_payload(got.payload, self.card.site)
+        told = parse_status_payload(got.payload, self.card.site)
         if told is None:
             return
         at = (told.time - self._clock_zero) * 1e-6
@@ -308,7 +348,7 @@ class Node:
             out.autopilot.append(self._speaker.heartbeat())
         if now - self._request_at >= RETRY_PERIOD - TIME_TOLERANCE and self.phase in PREFLIGHT_PHASES:
             self._request_at = now
-            out.autopilot.extend(saying.requests(self._speaker, self.card.autopilot, self.autopilot_link))
+            out.autopilot.extend(requests(self._speaker, self.card.autopilot, self.autopilot_link))
         due = [k for k, at in enumerate(self._next_status) if now >= at - TIME_TOLERANCE]
         if not due:
             return
@@ -322,7 +362,7 @@ class Node:
         own = self.autopilot_link.state
         if own is None:
             return []
-        told = saying.own_status(
+        told = own_status(
             self.card,
             self.autopilot_link,
             own,
@@ -330,4 +370,4 @@ class Node:
             self.phase,
             peers=self.peers.heard(now),
         )
-        return [self._signer(status.status_message(told, self.card.site), self.utc(now))]
+        return [self._signer(status_message(told, self.card.site), self.utc(now))]

@@ -7,9 +7,7 @@ from airflock.core import State, norm
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.card import FlightCard
 from airflock.drones.onboard.mission import FLYING_PHASES, MissionFacts, MissionPhase
-from airflock.drones.onboard.operator import OperatorOrders
-from airflock.drones.onboard.peers import HEARD_WITHIN, Peer, Peers
-from airflock.drones.onboard.wire import AutopilotLink
+from airflock.drones.onboard.peers import HEARD_WITHIN, AutopilotLink, OperatorOrders, Peer, Peers
 
 STANDING_SPEED = 0.5  # m/s; faster than this a drone does not stand, nor begin to land
 MAX_HEARTBEAT_AGE = 3.0  # s; an autopilot that says nothing for longer is not there

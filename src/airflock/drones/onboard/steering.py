@@ -1,15 +1,130 @@
 """Steering: the velocity that each phase of a mission wishes to fly, and what the limiter makes of it."""
 
+from collections.abc import Iterable
 from math import isfinite
 from typing import NamedTuple
 
-from airflock.core import Pilot, State, norm
-from airflock.drones.onboard import guidance
-from airflock.drones.onboard.card import FlightCard
-from airflock.drones.onboard.limiter import NO_VELOCITY, Velocity, limit_velocity
+from airflock.core import Pilot, State, braking_curve, clamp, norm, shorten
+from airflock.drones.onboard.card import FlightCard, SafetyLimits
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.situation import STANDING_SPEED
 from airflock.support import AirflockError
+
+# ---- Limiter
+
+Velocity = tuple[float, float, float]
+NO_VELOCITY: Velocity = (0.0, 0.0, 0.0)
+
+
+class LimitedVelocity(NamedTuple):
+    """A velocity that may be flown (m/s), and whether the fence or an obstacle turned it."""
+
+    velocity: Velocity
+    is_fenced: bool
+
+
+def limit_velocity(
+    wanted_velocity: Velocity,
+    own: State,
+    surfaces: Iterable[tuple[float, float, float, float]],
+    heights: tuple[float, float],
+    safety: SafetyLimits,
+) -> LimitedVelocity:
+    """The velocity nearest to a wish that may be flown.
+
+    own      : state as measured; surfaces: distance (m, negative beyond) and inward unit normal of the fence's sides
+               and of obstacles; heights: lowest and highest, m
+    """
+    if not all(map(isfinite, wanted_velocity)):
+        wanted_velocity = NO_VELOCITY
+    vx, vy, _ = shorten(wanted_velocity[0], wanted_velocity[1], 0.0, safety.speed_max)
+    vz = clamp(wanted_velocity[2], -safety.climb_max, safety.climb_max)
+    # As far ahead of the own velocity as the drone can follow until the next setpoint, so that nothing is lost.
+    dx, dy, dz = shorten(vx - own.vx, vy - own.vy, vz - own.vz, safety.accel * (safety.response + safety.tick))
+    vx, vy, vz = own.vx + dx, own.vy + dy, own.vz + dz
+    fenced = False
+    walls = list(surfaces)
+    for _ in range(2):  # a corner: what one side turns, another may have to turn again
+        for distance, nx, ny, nz in walls:
+            outward = -(vx * nx + vy * ny + vz * nz)
+            if outward <= 0.0:
+                continue
+            lag = max(-(own.vx * nx + own.vy * ny + own.vz * nz), 0.0) * safety.response  # flown before it slows down
+            most = braking_curve(distance - safety.soft_margin - lag, safety.brake, safety.brake_gain)
+            if outward > most:
+                k = outward - most
+                vx, vy, vz, fenced = vx + k * nx, vy + k * ny, vz + k * nz, True
+    for distance, nx, ny, nz in walls:
+        if -(vx * nx + vy * ny + vz * nz) > braking_curve(distance, safety.brake, safety.brake_gain) + 1e-9:
+            vx, vy, vz, fenced = 0.0, 0.0, 0.0, True  # sides that contradict each other: stop
+    low, high = heights
+    vz = clamp(
+        vz,
+        -braking_curve(own.z - low, safety.brake, safety.brake_gain),
+        braking_curve(high - own.z, safety.brake, safety.brake_gain),
+    )
+    speed = norm(vx, vy, 0.0)
+    k = min(1.0, safety.speed_max / speed)
+    return LimitedVelocity((k * vx, k * vy, clamp(vz, -safety.climb_max, safety.climb_max)), fenced)
+
+
+# ---- Guidance
+
+HEIGHT_GAIN = 1.0  # 1/s; our choice: a metre off is a metre per second
+KEEP_GAIN = 0.5  # 1/s; and half as fast back to a point that is kept
+PASSING_SHARE = 0.8  # of the distance of two layers: farther above each other, two drones pass
+PUSH_GAIN = 1.0  # 1/s; half a spring: a metre too near pushes with a metre per second
+
+
+def climb_rate(own: State, height: float, safety: SafetyLimits) -> float:
+    """Vertical velocity towards a height (m)."""
+    return float(clamp(HEIGHT_GAIN * (height - own.z), -safety.climb_max, safety.climb_max))
+
+
+def velocity_to_hover_point(own: State, point: tuple[float, float, float], safety: SafetyLimits) -> Velocity:
+    """Velocity that keeps a point of the ground plan while climbing to its height."""
+    vx, vy, _ = shorten(KEEP_GAIN * (point[0] - own.x), KEEP_GAIN * (point[1] - own.y), 0.0, 1.0)
+    return vx, vy, climb_rate(own, point[2], safety)
+
+
+def velocity_to_stay(own: State, point: tuple[float, float, float], safety: SafetyLimits) -> Velocity:
+    """Velocity back to a point where the drone came to stand, height and all."""
+    dx, dy, dz = point[0] - own.x, point[1] - own.y, point[2] - own.z
+    vx, vy, _ = shorten(KEEP_GAIN * dx, KEEP_GAIN * dy, 0.0, 1.0)
+    return vx, vy, float(clamp(KEEP_GAIN * dz, -safety.climb_max, safety.climb_max))
+
+
+def velocity_towards(own: State, point: tuple[float, float, float], safety: SafetyLimits) -> Velocity:
+    """Velocity towards a point of the ground plan, with which one can still stop there."""
+    dx, dy = point[0] - own.x, point[1] - own.y
+    far = norm(dx, dy, 0.0)
+    k = min(braking_curve(far, safety.brake, safety.brake_gain), safety.speed_max) / far
+    return k * dx, k * dy, 0.0
+
+
+def velocity_from_neighbours(own: State, neighbours: Iterable[State], safety: SafetyLimits) -> Velocity:
+    """Velocity along the ground plan away from all neighbours within s.yield_range that are on no other layer."""
+    x = y = 0.0
+    for other in neighbours:
+        dx, dy, dz = own.x - other.x, own.y - other.y, own.z - other.z
+        if abs(dz) > PASSING_SHARE * safety.layer:
+            continue
+        near = PUSH_GAIN * max(safety.yield_range - norm(dx, dy, dz), 0.0) / norm(dx, dy, 0.0)
+        x, y = x + near * dx, y + near * dy
+    vx, vy, _ = shorten(x, y, 0.0, safety.speed_max)
+    return vx, vy, 0.0
+
+
+def velocity_home(
+    own: State, home: tuple[float, float, float], neighbours: Iterable[State], safety: SafetyLimits
+) -> Velocity:
+    """Velocity home on the own layer, past neighbours."""
+    gx, gy, _ = velocity_towards(own, home, safety)
+    px, py, _ = velocity_from_neighbours(own, neighbours, safety)
+    return gx + px, gy + py, climb_rate(own, home[2], safety)
+
+
+# ---- Velocity of each phase
 
 TIME_TOLERANCE = 1e-6  # s; two clocks of a lock-step meet within it
 Position = tuple[float, float, float]
@@ -64,14 +179,12 @@ class PhaseVelocity:
         if phase == MissionPhase.HOLD and at.has_navigation:
             if self._hold_position is None and norm(*own[3:]) < STANDING_SPEED:
                 self._hold_position = own[:3]
-            return (
-                NO_VELOCITY if self._hold_position is None else guidance.velocity_to_stay(own, self._hold_position, s)
-            )
+            return NO_VELOCITY if self._hold_position is None else velocity_to_stay(own, self._hold_position, s)
         self._hold_position = None
         if phase in (MissionPhase.TAKEOFF, MissionPhase.GATHER) and at.home is not None:
-            return guidance.velocity_to_hover_point(own, at.home, s)
+            return velocity_to_hover_point(own, at.home, s)
         if phase == MissionPhase.RETURN and at.home is not None:
-            wish = guidance.velocity_home(own, at.home, at.near, s)
+            wish = velocity_home(own, at.home, at.near, s)
             return wish if at.stay is None else (*at.stay[:2], wish[2])
         if phase not in (MissionPhase.FLOCK, MissionPhase.GOTO):
             return NO_VELOCITY
@@ -79,7 +192,7 @@ class PhaseVelocity:
             self._next_decision = max(self._next_decision + self._card.period, at.now)
             self._law_velocity = self._law(own, at.now, self.goal if phase == MissionPhase.GOTO else None)
         x, y, z = self._law_velocity if at.stay is None else at.stay
-        return x, y, guidance.climb_rate(own, self._card.height, s) if self._card.flat else z
+        return x, y, climb_rate(own, self._card.height, s) if self._card.flat else z
 
     def _law(self, own: State, now: float, goal: Position | None) -> Velocity:
         """What the law wishes, m/s; a law that fails or commands what is no velocity counts as an overload."""
@@ -96,6 +209,6 @@ class PhaseVelocity:
             self._notes.append(f"the law commanded {(x, y, z)}, which is not a velocity")
             return NO_VELOCITY
         if goal is not None:
-            gx, gy, _ = guidance.velocity_towards(own, goal, self._card.safety)
+            gx, gy, _ = velocity_towards(own, goal, self._card.safety)
             x, y = 0.5 * (x + gx), 0.5 * (y + gy)
         return x, y, z

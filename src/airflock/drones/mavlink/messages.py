@@ -6,11 +6,14 @@ velocities lost to their whole numbers, a byte each.
 """
 
 import struct
+from collections.abc import Collection
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from airflock.drones.mavlink import dialect
+from airflock.drones.mavlink.frames import common_dialect, message_fields
 from airflock.support import FlightSite, swap_enu_ned
+
+# ---- Status packets
 
 STATUS_MESSAGE = 340  # UTM_GLOBAL_POSITION
 STATUS_VERSION = 2  # version 1 told no parts of whole numbers
@@ -63,7 +66,7 @@ def status_message(status: DroneStatus, site: FlightSite) -> Any:
         _clip(status.peers, 0, 255),
         *parts,
     )
-    return dialect.common_dialect().MAVLink_utm_global_position_message(
+    return common_dialect().MAVLink_utm_global_position_message(
         status.time, list(extra), lat, lon,
         _clip(1000.0 * at.altitude, -(2**31), 2**31 - 1), _clip(1000.0 * status.position[2], -(2**31), 2**31 - 1),
         vx, vy, vz, _clip(1000.0 * status.accuracy, 0, 65535), 0, 0, 0, 0, 0, 0,
@@ -101,8 +104,47 @@ def parse_status(values: dict[str, Any], site: FlightSite) -> DroneStatus | None
 @lru_cache(maxsize=256)
 def parse_status_payload(payload: bytes, site: FlightSite) -> DroneStatus | None:
     """The status in the payload of a message; where many members live in one process, a packet is read once."""
-    return parse_status(dialect.message_fields(STATUS_MESSAGE, payload), site)
+    return parse_status(message_fields(STATUS_MESSAGE, payload), site)
 
 
 def _clip(value: float, low: int, high: int) -> int:
     return min(max(round(value), low), high)
+
+
+# ---- Channel reports
+
+TUNNEL_MESSAGE = 385  # TUNNEL
+CHANNEL_SYSTEM = 254  # system id; below the operator's, above all drones
+REPORT_FORMAT = struct.Struct("<2sBBB32s")
+REPORT_MAGIC, REPORT_VERSION = b"AW", 1
+HEARS_REPORT = 0
+
+
+class ChannelReport(NamedTuple):
+    """One thing that is told.
+
+    what : HEARS, or 1 and more: number of a kind of fault; subject : system id, 0 for none; systems : system ids
+    """
+
+    kind: int
+    subject: int
+    systems: frozenset[int]
+
+
+def report_message(kind: int, subject: int, systems: Collection[int]) -> Any:
+    """The dialect's message."""
+    bits = sum(1 << system for system in set(systems))
+    content = REPORT_FORMAT.pack(REPORT_MAGIC, REPORT_VERSION, kind, subject, bits.to_bytes(32, "little"))
+    return common_dialect().MAVLink_tunnel_message(0, 0, 0, len(content), list(content.ljust(128, b"\0")))
+
+
+def parse_report(values: dict[str, Any]) -> ChannelReport | None:
+    """What the fields of a message tell; None if it is not one of ours."""
+    data = bytes(values["payload"])[: values["payload_length"]]
+    if len(data) != REPORT_FORMAT.size:
+        return None
+    magic, version, what, subject, raw = REPORT_FORMAT.unpack(data)
+    if magic != REPORT_MAGIC or version != REPORT_VERSION:
+        return None
+    bits = int.from_bytes(raw, "little")
+    return ChannelReport(what, subject, frozenset(system for system in range(256) if bits >> system & 1))

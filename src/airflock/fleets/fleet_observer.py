@@ -5,23 +5,92 @@ in software the ether tells, too, who hears whom and which faults hold; real rad
 """
 
 from collections import deque
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from airflock.core import forward
 from airflock.drones import (
+    CHANNEL_SYSTEM,
     HEARD_WITHIN,
+    HEARS_REPORT,
+    STATUS_MESSAGE,
+    ChannelReport,
+    DroneStatus,
     FlightCard,
     MissionPhase,
     PacketReceiver,
+    PacketSigner,
     Peer,
     Peers,
     orders,
     parse_order,
-    status,
-    witness,
+    parse_report,
+    parse_status,
+    report_message,
 )
-from airflock.fleets.teller import FAULT_NUMBERS
+from airflock.fleets.drone_faults import INJECTED_KINDS, InjectedFault
+from airflock.fleets.radio_channel import SOFTWARE_KEY
+from airflock.parts.faults import KINDS as OURS
 from airflock.support import LinkError
+
+# ---- Telemetry broadcast
+
+DEFAULT_WATCH_ADDRESS = ("127.0.0.1", 14600)  # where who watches hears a fleet in software
+REPORT_PERIOD = 0.5  # s between two reports
+NEIGHBOUR_WITHIN = 1.0  # s; a neighbour whose last packet arrived longer ago is not heard
+NEVER_HEARD = -1e9
+SCENARIO_FAULT_NAMES = {
+    kind: f"{kind} of the scenario" if kind in INJECTED_KINDS else kind for kind in OURS
+}  # by kind how it is told
+FAULT_NUMBERS = {
+    kind: number
+    for number, kind in enumerate((*INJECTED_KINDS, *SCENARIO_FAULT_NAMES.values()), start=HEARS_REPORT + 1)
+}
+
+
+class TelemetryBroadcast:
+    """Keeps whose packets arrived, and reports it with the faults twice a second.
+
+    members : system ids
+    """
+
+    def __init__(self, members: Sequence[int], faults: Sequence[InjectedFault]):
+        self._members, self._faults = tuple(members), tuple(faults)
+        self._arrival_times = {member: dict.fromkeys(members, NEVER_HEARD) for member in members}
+        self._sign, self._next_report = PacketSigner(SOFTWARE_KEY, CHANNEL_SYSTEM), NEVER_HEARD
+
+    def note_arrival(self, receiver: int, datagram: bytes, now: float) -> None:
+        """Note a datagram that arrived at a drone, by its place among the members."""
+        sender = datagram[5] if len(datagram) > 5 else 0
+        if sender in self._arrival_times:
+            self._arrival_times[self._members[receiver]][sender] = now
+
+    def report(self, now: float, utc: int, active_faults: Mapping[str, Collection[int]] | None = None) -> list[bytes]:
+        """Signed datagrams for who watches, where they are due.
+
+        now      : time of the flight, s; utc: µs of Unix time
+        befallen : kinds of fault of the scenario that hold, each with the places of whom they have befallen; a user's
+                   own has no number, and is not told
+        """
+        if now < self._next_report:
+            return []
+        self._next_report = now + REPORT_PERIOD
+        told = [
+            report_message(HEARS_REPORT, member, [who for who, at in known.items() if now - at <= NEIGHBOUR_WITHIN])
+            for member, known in self._arrival_times.items()
+        ]
+        holding: dict[str, set[int]] = {}  # several faults of one kind are told as one
+        for fault in self._faults:
+            if fault.begin <= now < fault.end:
+                holding.setdefault(fault.kind, set()).update(fault.who or self._members)
+        for kind, places in (active_faults or {}).items():
+            if kind in SCENARIO_FAULT_NAMES:
+                holding[SCENARIO_FAULT_NAMES[kind]] = {self._members[place] for place in places}
+        told += [report_message(FAULT_NUMBERS[kind], 0, who) for kind, who in holding.items()]
+        return [self._sign(each, utc) for each in told]
+
+
+# ---- Observer
 
 LISTENER_ID = 0  # system id of who only listens
 MAX_NOTES = 200  # notes
@@ -49,8 +118,8 @@ class FleetObserver:
         self.card, self.begun = card, now
         self._clock_zero = utc - round(now * 1e6)
         senders = {
-            status.STATUS_MESSAGE: card.members,
-            orders.TUNNEL_MESSAGE: (orders.OPERATOR_SYSTEM, witness.CHANNEL_SYSTEM),
+            STATUS_MESSAGE: card.members,
+            orders.TUNNEL_MESSAGE: (orders.OPERATOR_SYSTEM, CHANNEL_SYSTEM),
         }
         spread = card.safety.clock_spread + card.delay
         self._receive = PacketReceiver(key, LISTENER_ID, senders, started=utc, max_clock_difference=spread)
@@ -68,16 +137,16 @@ class FleetObserver:
         got = self._receive(datagram, self._clock_zero + round(now * 1e6))
         if got is None:
             return
-        if got.message == status.STATUS_MESSAGE:
-            told = status.parse_status(got.values, self.card.site)
+        if got.message == STATUS_MESSAGE:
+            told = parse_status(got.values, self.card.site)
             if told is not None:
                 self._state(got.system, told, now)
-        elif got.system == witness.CHANNEL_SYSTEM:
-            self._take_report(witness.parse_report(got.values), now)
+        elif got.system == CHANNEL_SYSTEM:
+            self._take_report(parse_report(got.values), now)
         else:
             self._order(got.values, now)
 
-    def _state(self, member: int, drone_status: status.DroneStatus, now: float) -> None:
+    def _state(self, member: int, drone_status: DroneStatus, now: float) -> None:
         peer = self.peers[member]
         new, was = peer.status is None, peer.phase
         if not self._peers.take(member, drone_status, (drone_status.time - self._clock_zero) * 1e-6, now):
@@ -87,10 +156,10 @@ class FleetObserver:
         elif was != peer.phase:
             self._note(now, member, f"{was.name} → {peer.phase.name}")
 
-    def _take_report(self, report: witness.ChannelReport | None, now: float) -> None:
+    def _take_report(self, report: ChannelReport | None, now: float) -> None:
         if report is None:
             return
-        if report.kind == witness.HEARS_REPORT and report.subject in self.peers:
+        if report.kind == HEARS_REPORT and report.subject in self.peers:
             self._heard_reports[report.subject] = now, report.systems & self.peers.keys()
         elif report.kind in KIND_OF_NUMBER:
             kind = KIND_OF_NUMBER[report.kind]

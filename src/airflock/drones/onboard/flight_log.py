@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 from airflock.core import State
 from airflock.drones.onboard.card import FlightCard
-from airflock.drones.onboard.limiter import Velocity
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.node import Node, NodeMemory, NodeOutput
+from airflock.drones.onboard.steering import Velocity
 from airflock.support import FormatError, LinkError, TextError, as_error, parse_json, parse_json_object, read_text
 
 LOG_VERSION = 1

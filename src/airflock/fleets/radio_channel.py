@@ -4,17 +4,104 @@ The dice are those of the simulator: the same streams with the number of the arr
 fleet whose packets arrive once per decision loses the very packets that the simulated flock loses.
 """
 
+import hashlib
 import heapq
 import math
 import random as dice
+import struct
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from airflock.core import PacketReception, Radio, loss_probability
-from airflock.fleets.dice import PacketNumbers
-from airflock.fleets.faults import InjectedFault
-from airflock.fleets.rogue import forge_packet
+import numpy as np
+
+from airflock.core import PacketReception, Radio, State, loss_probability, random
+from airflock.drones import (
+    HEADER_LENGTH,
+    SIGNING_EPOCH,
+    STATUS_MESSAGE,
+    DroneStatus,
+    Node,
+    NodeOutput,
+    PacketSigner,
+    message_fields,
+    parse_status,
+    status_message,
+)
+from airflock.fleets.drone_faults import DroneFaults, InjectedFault
 from airflock.support import FlightSite
+
+# ---- Packet loss
+
+PERIODS_PER_BLOCK = 16  # periods of the radio that are drawn together
+
+
+class PacketNumbers:
+    """Uniform random numbers by which packets are lost, of every pair in every period, to be asked in order of time.
+
+    seed : of the flight; count: of drones
+    """
+
+    def __init__(self, seed: int, count: int):
+        self._seed, self._count = seed, count
+        self._first_period, self._tables = -PERIODS_PER_BLOCK, []  # type: ignore[var-annotated]
+
+    def __call__(self, period: int, receiver: int, sender: int) -> float:
+        """Number between 0 and 1 of a period, a receiver and a sender, by their places among the drones."""
+        if not self._first_period <= period < self._first_period + PERIODS_PER_BLOCK:
+            self._first_period = period - period % PERIODS_PER_BLOCK
+            self._tables = self._drawn(self._first_period)
+        drawn: float = self._tables[period - self._first_period][receiver][sender]
+        return drawn
+
+    def _drawn(self, first: int) -> list[list[list[float]]]:
+        """A table of receivers and senders for each of PERIODS periods."""
+        periods = np.arange(first, first + PERIODS_PER_BLOCK, dtype=np.uint64)[:, None, None]
+        to = np.arange(0, self._count, 4, dtype=np.uint64)[None, :, None]  # four receivers share their words
+        who = np.arange(self._count, dtype=np.uint64)[None, None, :]
+        words = random.random_words(self._seed, random.PACKET, 0, periods, random.pair_number(to, who, self._count))
+        table = random.uniform(np.stack(words, axis=2)).reshape(PERIODS_PER_BLOCK, -1, self._count)
+        found: list[list[list[float]]] = table[:, : self._count].tolist()
+        return found
+
+
+# ---- Attackers
+
+SOFTWARE_KEY = hashlib.sha256(b"a fleet in software has no secret").digest()
+WRONG_KEY = bytes(32)  # a key that no fleet has
+NEWER_BY = 1000  # µs; by which a false state is newer than the true one: of one age, the first counts
+STAMP_FORMAT = struct.Struct("<Q")
+
+
+def forge_packet(genuine: bytes, site: FlightSite, *, east: float, with_key: bool) -> bytes:
+    """A packet that says that the sender of a genuine one is elsewhere.
+
+    east : how far east of where it is, m; with_key: signed as its sender would, one stamp later
+    """
+    told, stamp = _status_and_stamp(genuine, site)
+    x, y, z = told.position
+    sign = PacketSigner(SOFTWARE_KEY if with_key else WRONG_KEY, genuine[5], last=stamp)
+    false = told._replace(position=(x + east, y, z), time=told.time + NEWER_BY)
+    return sign(status_message(false, site), SIGNING_EPOCH + 10 * stamp)
+
+
+def falsify_packet(genuine: bytes, site: FlightSite, tell: Callable[[State], State]) -> bytes:
+    """What a drone sends in place of a genuine packet of its own: another state of the same time, signed as that is."""
+    told, stamp = _status_and_stamp(genuine, site)
+    false = tell(State(*told.position, *told.velocity))
+    if false == (*told.position, *told.velocity):
+        return genuine
+    sign = PacketSigner(SOFTWARE_KEY, genuine[5], last=stamp - 1)
+    return sign(status_message(told._replace(position=false[:3], velocity=false[3:]), site), SIGNING_EPOCH + 10 * stamp)
+
+
+def _status_and_stamp(genuine: bytes, site: FlightSite) -> tuple[DroneStatus, int]:
+    """What a packet of a node of this fleet says, and its stamp."""
+    told = parse_status(message_fields(STATUS_MESSAGE, genuine[HEADER_LENGTH : HEADER_LENGTH + genuine[1]]), site)
+    assert told is not None, "what a node of this fleet sent"
+    return told, STAMP_FORMAT.unpack(genuine[-12:-6] + b"\0\0")[0]
+
+
+# ---- Channel
 
 TIME_TOLERANCE = 1e-6  # s
 Position = tuple[float, float, float]
@@ -162,3 +249,57 @@ class RadioChannel:
                 bent[bit // 8] ^= 1 << bit % 8
                 return bytes(bent)
         return datagram
+
+
+# ---- Faulty nodes
+
+
+class FaultyNode:
+    """A node with the faults that befall it, used like the node itself.
+
+    It sends what they tell, and its clock is as far ahead as they say; all else is left to the node.
+
+    node  : gives the node; asked each time, so that it may be exchanged for one that keeps a log
+    place : of the drone among the members
+    time  : of the flight (s) at a time of the node's own clock
+    """
+
+    def __init__(
+        self,
+        node: Callable[[], Node],
+        faults: DroneFaults,
+        index: int,
+        site: FlightSite,
+        flight_time: Callable[[float], float] = lambda now: now,
+    ):
+        self._node, self._faults, self._index, self._site, self._flight_time = node, faults, index, site, flight_time
+        self._clock_offset = 0
+
+    def autopilot(self, data: bytes, now: float) -> None:
+        """Take bytes that came from the autopilot."""
+        self._node().autopilot(data, now)
+
+    def radio(self, datagram: bytes, now: float) -> None:
+        """Take a datagram that came by radio."""
+        self._node().radio(datagram, now)
+
+    def tick(self, now: float) -> NodeOutput:
+        """Let the node decide."""
+        at = self._flight_time(now)
+        self.update_clock(at)
+        out = self._node().tick(now)
+        radios = tuple([self.told(datagram, at) for datagram in sent] for sent in out.radios)
+        return out._replace(radios=radios)
+
+    def update_clock(self, time: float) -> None:
+        """Set the node's clock as its faults say at a time of the flight, s."""
+        ahead = round(1e6 * self._faults.ahead(self._index, time))
+        if ahead != self._clock_offset:
+            self._node().shift_clock(ahead - self._clock_offset)
+            self._clock_offset = ahead
+
+    def told(self, datagram: bytes, time: float) -> bytes:
+        """What is sent in place of a packet of the node at a time of the flight, s."""
+        if not self._faults.can_falsify:
+            return datagram
+        return falsify_packet(datagram, self._site, lambda state: self._faults.told(self._index, time, state))
