@@ -17,7 +17,7 @@ from airflock.fleets.ailing import FaultyNode
 from airflock.fleets.befalling import DroneFaults
 from airflock.fleets.lockstep import LockstepFleet
 from airflock.parts.faults.registry import KINDS
-from airflock.recordings.flights import simulate
+from airflock.recordings.simulation import simulate
 from airflock.support.errors import CardError
 from fleets import card, document, scenario
 from flocks import ISLANDS
