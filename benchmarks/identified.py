@@ -23,9 +23,15 @@ from scipy.stats import ttest_ind, ttest_rel
 
 import airflock
 from airflock.engine import score_flights
-from airflock.estimate.identification import body, packets, periods, sensors, synthetic
-from airflock.estimate.identification.logs import FlightLogs
-from airflock.estimate.identification.run import identify
+from airflock.estimate.identification import (
+    body_and_sensor as body,
+    body_and_sensor as sensors,
+    log_check as synthetic,
+    radio_links as packets,
+    vehicle_logs as periods,
+)
+from airflock.estimate.identification.vehicle_identification import identify
+from airflock.estimate.identification.vehicle_logs import FlightLogs
 from airflock.support.many_tests import holm_correction
 
 PRESET, DRONES, SECONDS, STEP, GROUND = "vasarhelyi_2018/real_6ms", 10, 300.0, 0.05, 120.0

@@ -11,8 +11,13 @@ import numpy as np
 import pandas as pd
 
 import airflock
-from airflock.estimate.identification import body, packets, sensors, synthetic
-from airflock.estimate.identification.hills import CURVE_PARAMETERS
+from airflock.estimate.identification import (
+    body_and_sensor as body,
+    body_and_sensor as sensors,
+    log_check as synthetic,
+    radio_links as packets,
+)
+from airflock.estimate.identification.radio_links import CURVE_PARAMETERS
 
 KEYS = {"tau": "body.tau", "a_max": "body.a_max", "noise": "body.noise"}
 

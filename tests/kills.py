@@ -119,9 +119,9 @@ def tracks(folder):
     import numpy as np
     import pandas as pd
 
-    from airflock.recordings.exports.export import export
-    from airflock.recordings.files import save
-    from airflock.recordings.imports.load import load_tracks
+    from airflock.recordings.exports import export
+    from airflock.recordings.imports.load_tracks import load_tracks
+    from airflock.recordings.recording_files import save
 
     folder.mkdir(exist_ok=True)
     os.chdir(folder)  # recordings tell the names of their sources

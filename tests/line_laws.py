@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from airflock.estimate.inference.candidates import FitParameter
-from airflock.estimate.inference.likelihood import FitModel
+from airflock.estimate.inference.innovation_filter import FitModel
+from airflock.estimate.inference.law_candidates import FitParameter
 
 STEPS, NOISE = 400, 0.05
 

@@ -9,7 +9,7 @@ published sets, what does more delay cost, and which flight is worth a look?
 from pathlib import Path
 
 import airflock
-from airflock.recordings.rare import upper_probability_bound
+from airflock.recordings.rare_events import upper_probability_bound
 
 FIELD = """
 extends = "vasarhelyi_2018/6ms"

@@ -21,27 +21,27 @@ from .core.parameters import (
 )
 from .core.radio import radio as radio
 from .core.sensor import sensor as sensor
-from .displays.displays import display as display
+from .displays.shows import display as display
 from .engine import Flight as Flight
-from .estimate.identification.run import identify as identify
-from .estimate.inference.run import infer as infer
+from .estimate.identification.vehicle_identification import identify as identify
+from .estimate.inference.law_inference import infer as infer
 from .fleets.flying import fleet as fleet
 from .parts.metrics.registry import metric_set as metric_set
 from .recordings import measures as measures
-from .recordings.exports.export import export as export
-from .recordings.files import (
+from .recordings.exports import export as export
+from .recordings.health import doctor as doctor
+from .recordings.imports.load_tracks import load_tracks as load_tracks
+from .recordings.recording_files import (
     load_recording as load_recording,
     save as save,
 )
-from .recordings.flights import (
-    recording_of as recording_of,
-    simulate as simulate,
-)
-from .recordings.health import doctor as doctor
-from .recordings.imports.load import load_tracks as load_tracks
 from .recordings.scores import (
     over_time as over_time,
     score as score,
+)
+from .recordings.simulation import (
+    recording_of as recording_of,
+    simulate as simulate,
 )
 from .recordings.sweeps import sweep as sweep
 from .scenarios.files import (

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from airflock.recordings.dataset import make_dataset
 from airflock.recordings.flown_scenario import power_settings
-from airflock.recordings.layout import make_dataset
 from airflock.recordings.scores import measure_recording
 from formations import FOOT, drags, vee, wing_of
 

@@ -8,7 +8,7 @@ from scipy import stats
 
 from airflock.core import random
 from airflock.engine.text.generate import DriverSource
-from airflock.recordings.perception import packet_uniforms
+from airflock.recordings.simulation import packet_uniforms
 from inside import HEAD, load_driver, primitives
 
 # Random123 (Salmon et al. 2011), kat_vectors, philox4x32 with 10 rounds: counter, key, answer

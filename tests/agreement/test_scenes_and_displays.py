@@ -7,12 +7,12 @@ import pytest
 from scipy.spatial.distance import pdist
 
 from airflock.displays import fly_show, shape_points
-from airflock.displays.assignment import assign_points
-from airflock.displays.show import display_scenario, recording_of, waiting_points
+from airflock.displays.show_control import assign_points
+from airflock.displays.shows import display_scenario, recording_of, waiting_points
 from airflock.engine import plan_of
-from airflock.recordings.flights import simulate
+from airflock.recordings.dataset import check_recording
 from airflock.recordings.flown_scenario import scenario_of_recording as of_recording
-from airflock.recordings.layout import check_recording
+from airflock.recordings.simulation import simulate
 from airflock.scenarios.files import load
 from inside import cpu, tables
 from reference.flight import fly_plainly

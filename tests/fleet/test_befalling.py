@@ -18,7 +18,7 @@ from airflock.fleets.lockstep import LockstepFleet, is_clear_between
 from airflock.fleets.radio_channel import FaultyNode
 from airflock.fleets.realtime import fly_in_realtime, lockstep_only_errors
 from airflock.parts.faults.registry import KINDS
-from airflock.recordings.flights import simulate
+from airflock.recordings.simulation import simulate
 from airflock.support.errors import CardError
 from fleets import card, document, scenario
 from flocks import ISLANDS

@@ -32,8 +32,8 @@ from airflock.fleets.radio_channel import SOFTWARE_KEY, PacketNumbers, RadioChan
 from airflock.fleets.vehicle import POSITION_GAIN, STANDING_SPEED, SoftwareVehicle
 from airflock.parts.radios import jitter, links
 from airflock.parts.radios.registry import RADIOS
-from airflock.recordings.flights import simulate
 from airflock.recordings.scores import measure_recording
+from airflock.recordings.simulation import simulate
 from airflock.support.coordinates import FlightSite
 from airflock.support.errors import ScenarioError
 from fleets import card, fleet, scenario
@@ -77,7 +77,7 @@ def test_ten_drones_are_within_a_centimetre_after_five_seconds(seed):
 
 @pytest.mark.usefixtures("scored_plainly")
 def test_the_recording_of_a_fleet_is_measured_like_any_other(tmp_path):
-    from airflock.recordings.files import load_recording, save
+    from airflock.recordings.recording_files import load_recording, save
 
     flown = in_the_air(4, 4.0, noisy=True)
     made = compare.fleet_recording(flown)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.recordings.layout import make_dataset, recording_frames
+from airflock.recordings.dataset import make_dataset, recording_frames
 from airflock.recordings.scores import measure_recording
 from airflock.scenarios.files import load
 from airflock.support.errors import RecordingError

@@ -5,12 +5,12 @@ import pytest
 import xarray as xr
 from hypothesis import given, settings, strategies as st
 
-from airflock.recordings.flights import simulate
-from airflock.recordings.imports.load import load_tracks
-from airflock.recordings.layout import make_dataset, recording_frames
+from airflock.recordings.dataset import make_dataset, recording_frames
+from airflock.recordings.imports.load_tracks import load_tracks
 from airflock.recordings.measures import bursts, correlation, delays, milling, neighbours, shape, surroundings, turning
 from airflock.recordings.measures.states import track_arrays
 from airflock.recordings.scores import score
+from airflock.recordings.simulation import simulate
 from airflock.scenarios.files import load
 from airflock.support.errors import ParameterError
 

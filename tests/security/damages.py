@@ -87,7 +87,7 @@ def results():
     """What is written: a recording, figures, tables, documents, a page, a flight of a preset."""
     import pandas as pd
 
-    from airflock.recordings.files import load_recording
+    from airflock.recordings.recording_files import load_recording
     from airflock.view.plots.trajectories import trajectories
     from airflock.view.replays.build import replay
 
@@ -146,7 +146,7 @@ def full_disk(seed, number, folder, tell=False):
 
 
 def _recording(target):
-    from airflock.recordings.files import save
+    from airflock.recordings.recording_files import save
 
     save(results()[0], target)
 
@@ -164,7 +164,7 @@ def _video(target):
 
 
 def _export(target):
-    from airflock.recordings.exports.export import export
+    from airflock.recordings.exports import export
 
     export(results()[0], target)
 

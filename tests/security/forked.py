@@ -1,7 +1,7 @@
 """A reader of files that is forked from this process instead of started, so that a case takes milliseconds.
 
-It is what `recordings.isolated` makes of `subprocess.Popen`, as far as that is used there. That a reader of its own is
-started as it should be is tested elsewhere (test_recordings_apart.py).
+It is what `recordings.reader_process` makes of `subprocess.Popen`, as far as that is used there. That a reader of its
+own is started as it should be is tested elsewhere (test_recordings_apart.py).
 """
 
 import json
@@ -9,7 +9,7 @@ import os
 import signal
 import time
 
-from airflock.recordings import isolated
+from airflock.recordings import reader_process as isolated
 
 SHORT = 2.0  # s of a processor that a small file may take, without the start of an interpreter
 
@@ -52,7 +52,7 @@ class Forked:
 
 
 class Started:
-    """The part of the module subprocess that `recordings.isolated` uses."""
+    """The part of the module subprocess that `recordings.reader_process` uses."""
 
     PIPE = DEVNULL = None
     Popen = Forked

@@ -239,7 +239,7 @@ def _judged(use, path, tell=False):
 def undamaged():
     """Bytes and scores of the recording that is damaged: one of today's, made of the golden one."""
     from airflock.recordings.attributes import CHECKSUM_ATTRIBUTE, recording_checksum
-    from airflock.recordings.files import load_recording
+    from airflock.recordings.recording_files import load_recording
     from airflock.recordings.scores import measure_recording
 
     recording = load_recording(GOLDEN / "recording.nc")
@@ -252,7 +252,7 @@ def recording(seed, number, folder, tell=False):
     """Load and score a damaged recording: its score is that of the undamaged one, or it was said to be changed."""
     import warnings
 
-    from airflock.recordings.files import load_recording
+    from airflock.recordings.recording_files import load_recording
     from airflock.recordings.scores import measure_recording
 
     rng, path = random.Random(f"recording {seed} {number}"), folder / "damaged.nc"
@@ -392,6 +392,8 @@ def no_flights():
     """Whatever would compile or fly in this process ends there."""
     from airflock.displays import show
     from airflock.fleets.lockstep import LockstepFleet
+    from airflock.displays import shows as show
+    from airflock.fleets import lockstep
     from inside import drivers, interpreted, measuring, simulate, store
 
     def flown(*_, **__):
@@ -413,7 +415,7 @@ def warm(what):
         studies()
     elif what == "commands":
         import airflock.cli.main
-        import airflock.recordings.files  # noqa: F401
+        import airflock.recordings.recording_files  # noqa: F401
     elif what == "files":
         import other_files
 

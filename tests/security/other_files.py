@@ -133,8 +133,8 @@ def _tracks():
     import trimesh
 
     import autopilots
-    from airflock.recordings.exports.movement import to_movement
-    from airflock.recordings.files import load_recording
+    from airflock.recordings.exports import to_movement
+    from airflock.recordings.recording_files import load_recording
 
     time = 12.0 + 0.1 * np.arange(60)
     ned = np.stack([10 * np.sin(time), 10 * np.cos(time), np.full_like(time, -20.0)], axis=1)
@@ -234,7 +234,7 @@ def _without_dates(value):
 
 
 def _tracks_of(path):
-    from airflock.recordings.imports.load import load_tracks
+    from airflock.recordings.imports.load_tracks import load_tracks
 
     load_tracks(path, unit="m", fps=10.0)
 

@@ -10,7 +10,7 @@ import airflock
 from airflock.certificates.certificate import certificate_checksum
 from airflock.certificates.check import check_certificate
 from airflock.drones.onboard.card import read_card
-from airflock.recordings.files import replay_recording
+from airflock.recordings.recording_files import replay_recording
 from airflock.search.study import load_study
 from airflock.support.errors import CardError, RecordingError, StudyError
 

@@ -12,8 +12,8 @@ import xarray as xr
 from mutations import GOLDEN
 
 import airflock
-from airflock.recordings.flights import bare_document
-from airflock.recordings.isolated import ReaderProcess
+from airflock.recordings.reader_process import ReaderProcess
+from airflock.recordings.simulation import bare_document
 from airflock.support.errors import RecordingError
 
 

@@ -17,7 +17,7 @@ import pytest
 from raising import raised
 
 import airflock
-from airflock.displays import master
+from airflock.displays import show_control as master
 from airflock.support import errors
 
 PAGE = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8")

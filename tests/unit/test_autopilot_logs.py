@@ -39,7 +39,7 @@ def test_ulog_is_read_as_it_was_written(tmp_path):
 def test_drones_with_boot_clocks_and_origins_of_their_own_meet(tmp_path):
     """Two logs of one motion: another boot, another origin 1 km away; read together they coincide."""
     pytest.importorskip("pyulog")
-    from airflock.recordings.imports import geodesy
+    from airflock.recordings.imports import common_frame as geodesy
 
     ned, speed = motion()
     near, far = (47.0, 19.0, 100.0), (47.009, 19.001, 130.0)
@@ -133,7 +133,7 @@ def test_a_table_that_may_be_of_px4_is_asked_about_its_axes(tmp_path):
 
 
 def test_tables_of_px4_with_origins_of_their_own_meet_and_invalid_rows_are_left_out(tmp_path):
-    from airflock.recordings.imports import geodesy
+    from airflock.recordings.imports import common_frame as geodesy
 
     ned, speed = motion()
     near, far = (47.0, 19.0, 100.0), (47.009, 19.001, 130.0)

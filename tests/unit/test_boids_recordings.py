@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.recordings.layout import make_dataset
+from airflock.recordings.dataset import make_dataset
 from airflock.recordings.scores import measure_recording
 from airflock.support.errors import RecordingError
 

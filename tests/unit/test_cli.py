@@ -136,7 +136,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path):
 
 def test_a_disk_that_fills_up_takes_no_score_away(tmp_path, monkeypatch, capsys):
     from airflock.cli.main import app
-    from airflock.recordings import files
+    from airflock.recordings import recording_files as files
     from airflock.support.errors import RecordingError
 
     def full(recording, path):

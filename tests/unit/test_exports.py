@@ -6,14 +6,14 @@ import pytest
 import xarray as xr
 
 import airflock
-from airflock.recordings.exports import movement, tables
+from airflock.recordings import exports as movement, exports as tables
 
 
 @pytest.fixture(scope="module")
 def recording():
     """Five agents with the layout of a flight; one is absent for a while."""
     generator = np.random.default_rng(7)
-    from airflock.recordings.layout import make_dataset
+    from airflock.recordings.dataset import make_dataset
 
     time = np.arange(200) * 0.1
     phase = generator.uniform(0, 6, 5)[None, :] + 0.4 * time[:, None]
@@ -53,7 +53,7 @@ def test_what_is_commanded_is_no_velocity_because_it_was_a_table(recording, tmp_
 
 @pytest.mark.parametrize("space", [2, 3])
 def test_a_table_like_a_log_of_px4_comes_back_by_its_axes(recording, tmp_path, space):
-    from airflock.recordings.layout import make_dataset
+    from airflock.recordings.dataset import make_dataset
 
     flat = np.concatenate([recording[name].values[:, :, 0] for name in ("position", "velocity", "command")], axis=1)
     climb = np.linspace(20.0, 30.0, 200)[:, None, None] + 0.0 * flat[:, :1]

@@ -11,12 +11,24 @@ import pytest
 import airflock
 from airflock.core import random
 from airflock.core.parameters import Quantity, declarations
-from airflock.estimate.identification import body, hills, packets, periods, sensors as standing, synthetic
-from airflock.estimate.identification.hills import CURVE_PARAMETERS
-from airflock.estimate.identification.logs import FlightLogs, logs_from_recording
-from airflock.estimate.identification.numbers import HARDER, KEY_UNITS, IdentifiedParameter
-from airflock.estimate.identification.plan import flight_card
-from airflock.estimate.identification.run import identify, read_heard
+from airflock.estimate.identification import (
+    body_and_sensor as body,
+    body_and_sensor as standing,
+    log_check as synthetic,
+    radio_links as hills,
+    radio_links as packets,
+    vehicle_logs as periods,
+)
+from airflock.estimate.identification.radio_links import CURVE_PARAMETERS
+from airflock.estimate.identification.vehicle_identification import (
+    HARDER,
+    KEY_UNITS,
+    IdentifiedParameter,
+    flight_card,
+    identify,
+    read_heard,
+)
+from airflock.estimate.identification.vehicle_logs import FlightLogs, logs_from_recording
 from airflock.parts.radios import links
 from airflock.parts.sensors import langevin
 from airflock.support.errors import RecordingError, ScenarioError
@@ -177,7 +189,7 @@ def test_where_a_drone_stands_says_nothing_of_its_sensor():
     q, u = 7.0 + np.cumsum(g.normal(0.0, 0.02, 40)), g.normal(0.0, 0.1, 40)
     first = np.arange(40) == 0
     here, there = (0.004, 0.1, 3.0, 0.05), (0.02, 0.2, 2.0, 0.1)
-    ours = [standing._kernel()(q, u, first, 0.2, *numbers, 0.01) for numbers in (here, there)]
+    ours = [standing._sensor_kernel()(q, u, first, 0.2, *numbers, 0.01) for numbers in (here, there)]
     truth = [differences_loss(q, u, 0.2, *numbers, 0.01) for numbers in (here, there)]
     assert ours[0] - ours[1] == pytest.approx(truth[0] - truth[1], abs=1e-3)
 

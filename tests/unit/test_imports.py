@@ -14,7 +14,7 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 
 import airflock
-from airflock.recordings.imports import expressions, geodesy, motion
+from airflock.recordings.imports import common_frame as geodesy, table_columns as expressions, track_checks as motion
 from airflock.recordings.imports.track import ImportedTrack
 from airflock.support.errors import RecordingError
 

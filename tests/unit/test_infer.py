@@ -9,9 +9,19 @@ import pytest
 import xarray as xr
 
 import airflock
-from airflock.estimate.inference import bootstrap, candidates, flights, noise, predictive, ridges, search, select
-from airflock.estimate.inference.result import InferResult, LawResult, judge_laws
-from airflock.estimate.inference.tracks import (
+from airflock.estimate.inference import (
+    fit_checks as predictive,
+    identifiability as ridges,
+    law_candidates as candidates,
+    law_selection as select,
+    likelihood_fit as search,
+    parametric_bootstrap as bootstrap,
+    parametric_bootstrap as flights,
+    parametric_bootstrap as noise,
+)
+from airflock.estimate.inference.innovation_filter import FilterGains, InnovationFilter
+from airflock.estimate.inference.law_inference import InferResult, LawResult, judge_laws
+from airflock.estimate.inference.observed_tracks import (
     ABSENT,
     COUNTED,
     ENTERS,
@@ -20,7 +30,6 @@ from airflock.estimate.inference.tracks import (
     tracks_from_recording,
     tracks_scale,
 )
-from airflock.estimate.inference.walk import FilterGains, InnovationFilter
 from airflock.support.errors import AirflockError, RecordingError
 from processes import called
 

@@ -5,10 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airflock.estimate.inference.fit import FINE_SLOPES, climb_to_maximum
-from airflock.estimate.inference.given_up import restore_parameters, ridges_from_point
-from airflock.estimate.inference.ridges import Ridges
-from airflock.estimate.inference.run import _Comparison
+from airflock.estimate.inference.identifiability import Ridges, restore_parameters, ridges_from_point
+from airflock.estimate.inference.law_inference import _Comparison
+from airflock.estimate.inference.likelihood_fit import FINE_SLOPES, climb_to_maximum
 from line_laws import Line, quietly
 
 DROP = 4.0

@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock.estimate.inference.fit import FINE_SLOPES, climb_to_maximum
-from airflock.estimate.inference.hills import (
+from airflock.estimate.inference.identifiability import profile_ridges
+from airflock.estimate.inference.likelihood_fit import (
+    FINE_SLOPES,
     climb_beyond,
+    climb_to_maximum,
     distinct_points,
     parameter_groups,
+    profile_ranges,
     redraw_group,
     search_modes,
     sort_groups,
 )
-from airflock.estimate.inference.ridges import profile_ridges
-from airflock.estimate.inference.search import profile_ranges
 from line_laws import Line, quietly
 
 

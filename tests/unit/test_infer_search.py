@@ -6,27 +6,35 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airflock.estimate.inference import noise as noises, select
-from airflock.estimate.inference.candidates import FitParameter
-from airflock.estimate.inference.fit import (
+from airflock.estimate.inference import law_selection as select, parametric_bootstrap as noises
+from airflock.estimate.inference.identifiability import (
+    canonical_model,
+    droppable_parameters,
+    fit_at_end,
+    identifiable_indices,
+    profile_ridges,
+)
+from airflock.estimate.inference.innovation_filter import SOFT, huber_differences, robust_deviation
+from airflock.estimate.inference.law_candidates import FitParameter
+from airflock.estimate.inference.likelihood_fit import (
     FINE_SLOPES,
     WIDE_SLOPES,
     Fit,
     climb_to_maximum,
     conditional_point,
     curvature,
+    default_is_off,
     distance_to_worse,
+    draw_points,
     loss_at,
     open_ends,
     power_law_point,
+    profile_ranges,
+    race_from_points,
     settle_fit,
     standard_errors,
 )
-from airflock.estimate.inference.flights import FitNoise
-from airflock.estimate.inference.identifiability import canonical_model, droppable_parameters, identifiable_indices
-from airflock.estimate.inference.likelihood import SOFT, huber_differences, robust_deviation
-from airflock.estimate.inference.ridges import fit_at_end, profile_ridges
-from airflock.estimate.inference.search import default_is_off, draw_points, profile_ranges, race_from_points
+from airflock.estimate.inference.parametric_bootstrap import FitNoise
 from line_laws import STEPS, Line, quietly
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from test_infer import PERIOD, SPEED, dataset
 
-from airflock.estimate.inference.lack_of_fit import SHELLS, lack_of_fit
-from airflock.estimate.inference.likelihood import FitModel
-from airflock.estimate.inference.tracks import tracks_from_recording, tracks_scale
+from airflock.estimate.inference.fit_checks import SHELLS, lack_of_fit
+from airflock.estimate.inference.innovation_filter import FitModel
+from airflock.estimate.inference.observed_tracks import tracks_from_recording, tracks_scale
 
 AGENTS, FRAMES, TURN = 10, 400, 0.15
 

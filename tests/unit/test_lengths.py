@@ -7,8 +7,7 @@ import pytest
 import airflock
 from airflock.parts.metrics.registry import SETS
 from airflock.recordings.flown_scenario import scenario_of_recording
-from airflock.recordings.lengths import IN_BODIES, body_length_settings
-from airflock.recordings.scores import measure_recording, undefined_metrics_of
+from airflock.recordings.scores import IN_BODIES, body_length_settings, measure_recording, undefined_metrics_of
 from airflock.support.errors import RecordingError
 from processes import called
 

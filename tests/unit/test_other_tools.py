@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 import airflock
-from airflock.recordings.exports.movement import write_movement
-from airflock.recordings.layout import make_dataset
+from airflock.recordings.dataset import make_dataset
+from airflock.recordings.exports import write_movement
 
 
 def straight(frames=50, n=3):

@@ -25,9 +25,9 @@ from airflock.certificates.bounds import take_look
 from airflock.cli.main import app
 from airflock.core.maths import bell, braking_curve, excess, peak, rising
 from airflock.parts.laws import vasarhelyi_2018
-from airflock.recordings.files import save
+from airflock.recordings.dataset import make_dataset
 from airflock.recordings.flown_scenario import scenario_of_recording
-from airflock.recordings.layout import make_dataset
+from airflock.recordings.recording_files import save
 from airflock.recordings.scores import time_series_names
 from airflock.scenarios.families import CallerParts
 from airflock.scenarios.making import build_scenario

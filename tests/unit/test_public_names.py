@@ -16,9 +16,9 @@ from airflock.cli.main import app
 PACKAGES = {"plots", "measures"}
 CLASSES = {"AirflockError", "Scenario", "Flight", "Parameters"}
 HOMES = {
-    "evolve": "airflock.search.run", "certify": "airflock.certificates.run", "display": "airflock.displays.displays",
-    "tune": "airflock.search.tune.run", "identify": "airflock.estimate.identification.run",
-    "infer": "airflock.estimate.inference.run",
+    "evolve": "airflock.search.run", "certify": "airflock.certificates.run", "display": "airflock.displays.shows",
+    "tune": "airflock.search.tune.run", "identify": "airflock.estimate.identification.vehicle_identification",
+    "infer": "airflock.estimate.inference.law_inference",
     "body": "airflock.core.contract", "fleet": "airflock.fleets.flying",
 }  # fmt: skip
 UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "s", "body_length": "m"}

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.stats import binom
 
-from airflock.recordings.rare import rare_event_notes, upper_probability_bound
+from airflock.recordings.rare_events import rare_event_notes, upper_probability_bound
 
 
 @given(st.integers(1, 2000).flatmap(lambda n: st.tuples(st.integers(0, n - 1), st.just(n))))

@@ -6,7 +6,7 @@ import pytest
 
 import airflock
 from airflock.core.radio import lost
-from airflock.recordings.reception import packet_age
+from airflock.recordings.packet_ages import packet_age
 from airflock.support.errors import RecordingError
 from airflock.view.plots.reception import received
 

@@ -11,7 +11,7 @@ import xarray as xr
 import airflock
 from airflock.engine import driver_text, plan_of
 from airflock.recordings.attributes import recording_name
-from airflock.recordings.layout import make_dataset, recording_frames
+from airflock.recordings.dataset import make_dataset, recording_frames
 from airflock.recordings.scores import measure_recording, over_time
 from airflock.support.errors import AirflockError, RecordingError
 from inside import drivers, measuring, passes_driver, tables
@@ -114,7 +114,7 @@ def test_flight_with_a_law_given_directly_can_still_be_scored(tmp_path):
 
 def test_a_recording_of_a_law_of_ones_own_is_scored_anywhere_without_it_and_flown_again_with_it(tmp_path, monkeypatch):
     from airflock.parts.laws import viragh_2014
-    from airflock.recordings.files import replay_recording
+    from airflock.recordings.recording_files import replay_recording
 
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "mine.py").write_text(Path(viragh_2014.__file__).read_text())

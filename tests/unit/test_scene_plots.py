@@ -11,8 +11,8 @@ from matplotlib.collections import LineCollection
 import airflock
 from airflock.cli import tables
 from airflock.parts.aero.wing import pitch
-from airflock.recordings.flights import to_plain_values
-from airflock.recordings.layout import make_dataset
+from airflock.recordings.dataset import make_dataset
+from airflock.recordings.simulation import to_plain_values
 from airflock.support.errors import RecordingError
 from airflock.view.plots.film_stage import VideoFrame
 from airflock.view.plots.flight import paths_in_window, projection

@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.displays import fly_show, master, shape_points
-from airflock.displays.assignment import assign_points
-from airflock.displays.detours import BESIDE, CLEARANCE, detour_lengths, detour_point, hulls_in_the_way
-from airflock.displays.show import display_scenario, recording_of, waiting_points
+from airflock.displays import fly_show, shape_points, show_control as master
+from airflock.displays.show_control import (
+    BESIDE,
+    CLEARANCE,
+    assign_points,
+    detour_lengths,
+    detour_point,
+    hulls_in_the_way,
+)
+from airflock.displays.shows import display_scenario, recording_of, waiting_points
 from airflock.engine import Flight
 from airflock.parts.bodies.falling import GRAVITY, fall
 from airflock.recordings.scores import measure_recording

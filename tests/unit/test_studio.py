@@ -18,7 +18,7 @@ from airflock.core.contract import model
 from airflock.core.parameters import Quantity, declarations, quantity
 from airflock.engine import Flight
 from airflock.parts.laws import vasarhelyi_2018
-from airflock.recordings.files import load_recording
+from airflock.recordings.recording_files import load_recording
 from airflock.scenarios.files import presets
 from airflock.search.bounds import shipped_study_axes
 from airflock.search.study import load_study

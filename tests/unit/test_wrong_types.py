@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import airflock
-from airflock.recordings.imports.load import load_tracks
+from airflock.recordings.imports.load_tracks import load_tracks
 from airflock.scenarios.files import load
 
 PAPER = "vasarhelyi_2018/4ms"

@@ -1,21 +1,19 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from .identification.check import (
+from .identification.log_check import (
     LogCheck as LogCheck,
     check_against_logs as check_against_logs,
 )
-from .identification.logs import FlightLogs as FlightLogs
-from .identification.numbers import (
+from .identification.vehicle_identification import (
     KEY_UNITS as KEY_UNITS,
     UNIDENTIFIABLE as UNIDENTIFIABLE,
-)
-from .identification.plan import flight_card as flight_card
-from .identification.run import (
     IdentifyResult as IdentifyResult,
+    flight_card as flight_card,
     identify as identify,
     read_heard as read_heard,
 )
-from .inference.result import (
+from .identification.vehicle_logs import FlightLogs as FlightLogs
+from .inference.law_inference import (
     InferResult as InferResult,
     ends_text as ends_text,
+    infer as infer,
 )
-from .inference.run import infer as infer

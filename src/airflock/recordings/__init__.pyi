@@ -8,32 +8,23 @@ from .attributes import (
     faults_line as faults_line,
     recorded_faults as recorded_faults,
 )
-from .differences import differentiated_velocity as differentiated_velocity
-from .exports.export import (
+from .dataset import (
+    DIMENSIONS as DIMENSIONS,
+    check_recording as check_recording,
+    differentiated_velocity as differentiated_velocity,
+    make_dataset as make_dataset,
+    recording_frames as recording_frames,
+)
+from .exports import (
     SUFFIXES as SUFFIXES,
     export as export,
-)
-from .files import (
-    load_recording as load_recording,
-    replay_recording as replay_recording,
-    save as save,
-)
-from .flights import (
-    provenance as provenance,
-    recording_of as recording_of,
-    simulate as simulate,
-    to_plain_values as to_plain_values,
 )
 from .flown_scenario import (
     power_settings as power_settings,
     scenario_of_recording as scenario_of_recording,
 )
-from .groups import (
-    PAIR_METRICS as PAIR_METRICS,
-    group_scores as group_scores,
-)
 from .health import doctor as doctor
-from .imports.load import (
+from .imports.load_tracks import (
     load_tracks as load_tracks,
     read_tracks as read_tracks,
 )
@@ -45,34 +36,38 @@ from .imports.track import (
     ImportOptions as ImportOptions,
     ImportReport as ImportReport,
 )
-from .isolated import ReaderProcess as ReaderProcess
-from .layout import (
-    DIMENSIONS as DIMENSIONS,
-    check_recording as check_recording,
-    make_dataset as make_dataset,
-    recording_frames as recording_frames,
-)
-from .lengths import (
-    body_length_settings as body_length_settings,
-    missing_lengths_note as missing_lengths_note,
-)
-from .packed import refuse_archive as refuse_archive
-from .perception import packet_uniforms as packet_uniforms
-from .rare import (
-    rare_event_notes as rare_event_notes,
-    upper_probability_bound as upper_probability_bound,
-)
-from .reception import (
+from .packet_ages import (
     BINS as BINS,
     packet_age as packet_age,
 )
-from .score_table import with_units as with_units
+from .rare_events import (
+    rare_event_notes as rare_event_notes,
+    upper_probability_bound as upper_probability_bound,
+)
+from .reader_process import ReaderProcess as ReaderProcess, refuse_archive as refuse_archive
+from .recording_files import (
+    load_recording as load_recording,
+    replay_recording as replay_recording,
+    save as save,
+)
 from .scores import (
+    PAIR_METRICS as PAIR_METRICS,
     between_frames_note as between_frames_note,
+    body_length_settings as body_length_settings,
+    group_scores as group_scores,
     measure_recording as measure_recording,
+    missing_lengths_note as missing_lengths_note,
     over_time as over_time,
     time_series_names as time_series_names,
     undefined_metrics_of as undefined_metrics_of,
+    with_units as with_units,
+)
+from .simulation import (
+    packet_uniforms as packet_uniforms,
+    provenance as provenance,
+    recording_of as recording_of,
+    simulate as simulate,
+    to_plain_values as to_plain_values,
 )
 from .sweeps import (
     fly_points as fly_points,

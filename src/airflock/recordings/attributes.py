@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from airflock.parts.faults import KINDS
-from airflock.recordings.layout import EAST_NORTH_UP, FRAME_ATTRIBUTE, check_dataset
+from airflock.recordings.dataset import EAST_NORTH_UP, FRAME_ATTRIBUTE, check_dataset
 from airflock.scenarios import MODELS
 from airflock.support import RecordingError, as_error, parse_json_object, shortened
 

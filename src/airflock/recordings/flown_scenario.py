@@ -1,4 +1,4 @@
-"""The scenario that a recording was flown with, or of a log one that only says how to score it."""
+"""Rebuild the scenario that a recording was flown with, with the user's own laws and kinds of parts."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,9 +10,8 @@ from airflock.core import Model, Own, PacketParameters, Parameters, argument_nam
 from airflock.parts.aero import descent
 from airflock.parts.metrics import POWER_SETTINGS, SETS
 from airflock.recordings.attributes import check_format, metrics_settings, scenario_document, uses_user_law
-from airflock.recordings.layout import recording_frames
-from airflock.recordings.own_kinds import missing_user_parts, with_user_files
-from airflock.scenarios import SECTIONS, CallerParts, Scenario, build_scenario, settings_dict
+from airflock.recordings.dataset import recording_frames
+from airflock.scenarios import PART_KINDS, SECTIONS, CallerParts, Scenario, build_scenario, settings_dict
 from airflock.support import RecordingError, as_error
 
 
@@ -106,3 +105,44 @@ def _usual_metrics(table: Mapping[str, Any]) -> dict[str, Any]:
     """The keys of a section metrics that every set has."""
     known = {key for key, _, _ in declarations(SECTIONS["metrics"])} - {"kind"}
     return {key: value for key, value in table.items() if key in known}
+
+
+def user_parts(document: Mapping[str, Any]) -> dict[str, str]:
+    """Section → name of what the user's own was there, of the scenario that a recording was flown with."""
+    found = {}
+    for family in PART_KINDS:
+        table = document.get(family.section)
+        kind = str(table.get("kind") or "") if isinstance(table, Mapping) else ""
+        if kind and kind not in family.shipped:
+            found[family.section] = kind
+    return found
+
+
+def missing_user_parts(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, str]:
+    """Those of them for which settings give no file."""
+    return {s: kind for s, kind in user_parts(document).items() if not str(settings.get(f"{s}.kind")).endswith(".py")}
+
+
+def with_user_files(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The document with the files that settings give for such kinds, whose numbers stay; and all other settings."""
+    found, rest = dict(document), dict(settings)
+    for section in user_parts(document).keys() - missing_user_parts(document, settings).keys():
+        found[section] = {**found[section], "kind": rest.pop(f"{section}.kind")}
+    return found, rest
+
+
+def require_user_files(document: Mapping[str, Any], settings: Mapping[str, Any]) -> None:
+    """Raise RecordingError, one line with the remedy, where a recording cannot be flown again by what is at hand."""
+    missing = missing_user_parts(document, settings)
+    if missing:
+        what = " and ".join(f"{section}.kind = {kind!r}" for section, kind in missing.items())
+        options = " ".join(f"--set {section}.kind={kind}.py" for section, kind in missing.items())
+        given = ", ".join(f'"{section}.kind": "{kind}.py"' for section, kind in missing.items())
+        raise RecordingError(
+            f"recording: was flown with {what}, which {'is' if len(missing) == 1 else 'are'} not in the file; give "
+            f"{'its file' if len(missing) == 1 else 'their files'} with {options} --trust "
+            f"(in Python: settings={{{given}}}, trust=True)"
+        )
+    other = [key for key in settings if key not in {f"{section}.kind" for section in user_parts(document)}]
+    if other:
+        raise RecordingError(f"recording: {other[0]}: it can only be flown again as it was, so no key can change")

@@ -1,25 +1,30 @@
-"""Scores: order parameters of scenarios over many seeds, and of any recording, by the same rules."""
+"""Score scenarios over many seeds, and any recording by the same rules: a table of order parameters.
+
+Groups of a recording, and lengths that a recording of tracks does not have, are treated here, too.
+"""
 
 import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from html import escape
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 
 from airflock.core import FAR
 from airflock.engine import measure_frames, plan_of
 from airflock.parts.metrics import nearest, reported_values
+from airflock.recordings import dataset
 from airflock.recordings.attributes import scenario_document
+from airflock.recordings.dataset import recording_frames
 from airflock.recordings.flown_scenario import power_settings, scenario_of_recording
-from airflock.recordings.layout import recording_frames
-from airflock.recordings.lengths import body_length_settings, undefined_metrics
-from airflock.recordings.score_table import with_units
 from airflock.runs import score_scenarios
 from airflock.scenarios import Scenario, check_seeds, scenario_variant, settings_dict
-from airflock.support import RecordingError
+from airflock.support import RecordingError, is_number
 
 
 def score(
@@ -66,7 +71,7 @@ def score(
     groups : bool
         For a recording, one row for all, one for each group of its scenario, and one for what is between each two.
     body_length : float, optional
-        For tracks, length of a body in m, by which it is judged who is near; see `airflock.recordings.lengths`.
+        For tracks, length of a body in m, by which it is judged who is near; see `airflock.recordings.scores`.
     trust : bool
         Whether code that a file or settings name may run, such as {"metrics.kind": "mine.py"}.
 
@@ -131,8 +136,6 @@ def _of_recording(
     settings = power_settings(recording, settings) if aero else settings
     scenario = scenario_of_recording(recording, settings, trust=trust)
     if groups:
-        from airflock.recordings.groups import PAIR_METRICS, group_scores
-
         table = _about(group_scores(recording, settings, trust=trust), scenario)
         for place, about in (("units", 0), ("meanings", 1)):
             table.attrs[place] |= {name: told[about] for name, told in PAIR_METRICS.items()}
@@ -249,3 +252,177 @@ def measure_recording(
     untold = undefined_metrics_of(recording, scenario, settings)
     kept = {name: value for name, value in scores.items() if name not in untold}
     return kept, course[[name for name in course if name not in untold]]
+
+
+PAIR_METRICS = {
+    "r_centres": ("m", "mean distance between the centres of two groups; nan in a periodic world"),
+    "r_between": ("m", "smallest distance between agents of the two groups"),
+    "phi_between": ("", "velocity correlation between agents of the two groups"),
+}
+PART = 200  # instants at once
+
+
+def group_scores(
+    recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False
+) -> pd.DataFrame:
+    """Order parameters as a table: a row for all agents, one for each group, and one for each two groups.
+
+    A group is measured as if the others were not there. What is between two groups, `PAIR_METRICS`, stands in rows
+    named "one to other"; an instant counts where both have somebody there. Of a group that is never there all but
+    `present` is nan. Raises RecordingError where the recording's scenario has no groups.
+    """
+    scenario = scenario_of_recording(recording, settings, trust=trust)
+    groups = [group for group in scenario.groups if group.agents]
+    if not groups:
+        raise RecordingError("recording: its scenario has no [[groups]]")
+    rows: dict[str, dict[str, Any]] = {"all": measure_recording(recording, settings, trust=trust)[0]}
+    frames, _, present = recording_frames(recording)
+    for group in groups:
+        members = list(group.agents)
+        rows[group.name] = {"present": 0.0}
+        if present[:, members].any():
+            rows[group.name] = measure_recording(recording.isel(individual=members), settings, trust=trust)[0]
+    dims, world = frames.shape[1] // 2, scenario.world
+    box = dataset.box_sides(world, dims)
+    for one, other in combinations(groups, 2):
+        pair = (list(one.agents), list(other.agents))
+        rows[f"{one.name} to {other.name}"] = _between(frames, present, pair, dims, box)
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("group")
+
+
+def _between(
+    frames: NDArray[Any],
+    present: NDArray[np.bool_],
+    pair: tuple[list[int], list[int]],
+    dims: int,
+    box: NDArray[Any] | None,
+) -> dict[str, float]:
+    """What is between two groups of agents; box : sides of a periodic world, m."""
+    x, v = frames[:, :dims].astype(float), frames[:, dims : 2 * dims].astype(float)
+    heading = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12)
+    both = np.logical_and(np.any(present[:, pair[0]], axis=1), np.any(present[:, pair[1]], axis=1))
+    apart, nearest, cosines = [], np.inf, []
+    for first in range(0, len(x), PART):
+        part = np.flatnonzero(both[first : first + PART]) + first
+        if not len(part):
+            continue
+        (xa, xb), (ha, hb) = ([array[part][:, :, who] for who in pair] for array in (x, heading))
+        gap = dataset.nearest_image(xb[:, :, None, :] - xa[:, :, :, None], box, axis=1)
+        nearest = min(nearest, float(np.nanmin(np.linalg.norm(gap, axis=1))))
+        apart += np.linalg.norm(np.nanmean(xb, axis=2) - np.nanmean(xa, axis=2), axis=1).tolist()
+        cosines += np.nanmean((hb[:, :, None, :] * ha[:, :, :, None]).sum(axis=1), axis=(1, 2)).tolist()
+    if not apart:
+        return dict.fromkeys(PAIR_METRICS, np.nan)
+    return {
+        "r_centres": float(np.mean(apart)) if box is None else np.nan,
+        "r_between": nearest,
+        "phi_between": float(np.mean(cosines)),
+    }
+
+
+FITNESS = "r_cluster", "r_coll", "r_comm", "v_flock"
+# Order parameter: keys of `metrics` that it depends on.
+NEEDS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("phi_coll", "n_coll", "f_coll"), ("r_coll",)),
+    **dict.fromkeys(("phi_corr", "f_corr", "n_min", "f_cluster", "n_clusters", "n_stragglers"), ("r_cluster",)),
+    **dict.fromkeys(("n_groups", "share_alone", "share_largest", "local_density"), ("r_cluster",)),
+    **dict.fromkeys(("extension_groups_cm", "polarization_groups_deg"), ("r_cluster",)),
+    **dict.fromkeys(("n_disc", "f_disc"), ("r_comm",)),
+    **dict.fromkeys(("f_collision", "cns_pol"), ("r_b",)),
+    **dict.fromkeys(("cns_ext", "quality"), ("max_e", "r_b")),
+    **dict.fromkeys(("cns_ext_groups", "quality_groups"), ("max_e", "r_b", "r_cluster")),
+    "cns_pol_groups": ("r_b", "r_cluster"),
+    **dict.fromkeys(("flocked", "time_to_flock"), ("r_flock",)),
+    **dict.fromkeys(("n_contacts", "touching", "n_env_coll", "f_env"), ("r_body",)),
+    "crowding": ("r_safe",),
+    "f_speed": ("v_flock",),
+    "f_wall": ("r_tol",),
+    **dict.fromkeys(("phi_lap", "phi_lap_abs"), ("centre_x", "centre_y")),
+}
+FITNESSES = {"vasarhelyi": FITNESS, "kidger": ("r_coll", "r_flock"), "dimock": ("r_coll",)}
+IN_BODIES = {"r_coll": 0.5, "r_body": 0.5, "r_b": 0.5, "r_safe": 1.0, "r_cluster": 5.0, "r_comm": 5.0}
+
+
+def body_length_settings(length: float) -> dict[str, float]:
+    """Settings that measure in lengths of a body.
+
+    Two bodies touch where their centres are half a length apart, and belong together up to five lengths: our choice,
+    since nothing that is published fits all animals. Say `metrics.r_cluster` and the like where you know better.
+
+    Parameters
+    ----------
+    length : float
+        Length of a body, m.
+
+    Returns
+    -------
+    dict
+        Keys of a scenario and lengths in m.
+
+    Raises
+    ------
+    RecordingError
+        If the length is not a positive number.
+    """
+    if not is_number(length):
+        raise RecordingError(f"body_length = {length!r} is not a number; give (0, 1000] m")
+    if not 0.0 < length <= 1000.0:
+        raise RecordingError(f"body_length = {length:g} m lies outside (0, 1000] m")
+    return {f"metrics.{key}": share * length for key, share in IN_BODIES.items()}
+
+
+def undefined_metrics(
+    names: Iterable[str], kind: str, settings: Mapping[str, Any], *, arena: bool
+) -> dict[str, tuple[str, ...]]:
+    """Order parameters of a metric set that depend on keys which settings do not give, and these keys.
+
+    arena : whether settings give one, without which nobody is ever outside
+    """
+    needs = {**NEEDS, "fitness": FITNESSES.get(kind, ())}
+    missing = {name: tuple(key for key in needs.get(name, ()) if f"metrics.{key}" not in settings) for name in names}
+    outside = {"phi_wall": ("world.arena",)} if "phi_wall" in missing and not arena else {}
+    return {name: keys for name, keys in missing.items() if keys} | outside
+
+
+def missing_lengths_note(undefined: Mapping[str, tuple[str, ...]]) -> str:
+    """One line that names what is not told and what to give."""
+    keys = sorted({key for needed in undefined.values() for key in needed})
+    lengths = " or ".join(filter(None, (
+        "--body-length 0.04" if set(keys) & IN_BODIES.keys() else "",
+        " ".join(f"--set {key if '.' in key else f'metrics.{key}'}=..." for key in keys),
+    )))  # fmt: skip
+    return f"not shown, as tracks do not say what is near, fast or the centre: {', '.join(undefined)}; give {lengths}"
+
+
+class ScoreTable(pd.DataFrame):  # type: ignore[misc]  # pandas has no types here
+    """Order parameters, a column each; `attrs["units"]` and `attrs["meanings"]` say what they are.
+
+    It is a DataFrame in all but its heads in a notebook: below each name stands the unit, and pointing at a name shows
+    the meaning. What pandas makes of it is such a table, too, as long as it keeps the attributes.
+    """
+
+    @property
+    def _constructor(self) -> Callable[..., "ScoreTable"]:
+        return ScoreTable
+
+    def _repr_html_(self) -> str | None:
+        """As pandas writes it, with units and meanings in the heads."""
+        page: Any = super()._repr_html_()
+        if page is None:  # pandas was told to show text
+            return None
+        head, end, rest = str(page).partition("</thead>")
+        meanings = self.attrs.get("meanings", {})
+        for name, unit in self.attrs.get("units", {}).items():
+            written = escape(str(name))
+            told = f'<th title="{escape(meanings.get(name, ""))}">{written}<br>{escape(unit) or "&nbsp;"}</th>'
+            head = head.replace(f"<th>{written}</th>", told, 1)
+        return head + end + rest
+
+
+def with_units(table: pd.DataFrame, descriptions: dict[str, tuple[str, str]]) -> ScoreTable:
+    """A table with the units and meanings of those of its columns that are known: name → unit, meaning."""
+    made = ScoreTable(table)
+    made.attrs |= table.attrs
+    for place, about in (("units", 0), ("meanings", 1)):
+        made.attrs[place] = {name: descriptions[name][about] for name in table.columns if name in descriptions}
+    return made

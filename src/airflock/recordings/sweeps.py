@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from airflock.parts.metrics import reported_values, scalar_names
-from airflock.recordings.score_table import with_units
+from airflock.recordings.scores import with_units
 from airflock.runs import score_scenarios
 from airflock.scenarios import Scenario, check_seeds, scenario_variant, short_keys
 from airflock.support import ScenarioError, collect_errors, suggest

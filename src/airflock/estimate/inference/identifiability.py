@@ -1,14 +1,18 @@
 """Identifiability: which numbers of a law tracks can identify, and for which of them other numbers make up."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.estimate.inference.candidates import LawCandidate
-from airflock.estimate.inference.fit import (
+from airflock.estimate.inference.innovation_filter import FitModel
+from airflock.estimate.inference.law_candidates import LawCandidate
+from airflock.estimate.inference.likelihood_fit import (
+    CENTRAL_SLOPES,
     CHI2_HALF_95,
+    FINE_SLOPES,
+    MIN_FINE_STEP,
     WIDE_CENTRAL_SLOPES,
     WIDE_SLOPES,
     Fit,
@@ -19,13 +23,13 @@ from airflock.estimate.inference.fit import (
     jacobian,
     loss_at,
     power_law_point,
+    scan_ranges,
+    with_coordinate,
 )
-from airflock.estimate.inference.likelihood import FitModel
-from airflock.estimate.inference.search import scan_ranges
 
 Array = NDArray[np.float64]
 DEPENDENT = 0.2  # share of a slope that other numbers do not explain; below it a number is not identifiable
-LOOKS = 6  # best places at which the effect of a number is looked for
+EFFECT_POINTS = 6  # best places at which the effect of a number is looked for
 ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where the effect of a number is looked for
 FINE = 0.005  # of a range: step by which numbers are tested for depending on each other
 APART = 0.1  # of a range, from the default
@@ -41,7 +45,7 @@ def identifiable_indices(model: FitModel, start: Array, start_points: Array, spa
     all weights. A radius within which nobody is at these places has no slope, but an effect along its range: kept.
     """
     places = []
-    for x in start_points[:LOOKS]:
+    for x in start_points[:EFFECT_POINTS]:
         u = start.copy()
         u[: model.named] = x
         places.append(u)
@@ -182,3 +186,292 @@ def _given_up(model: FitModel, fit: Fit, curved: Array, number: int, spans: Sequ
         starts.append(fit.place.copy())
         starts[-1][other] = model.numbers[other].place(one.value(fit.place[number]))
     return min(starts, key=lambda u: loss_at(model, u, rest, spans))
+
+
+RidgePath = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
+WORST, WALKED = 4, 8  # least certain numbers, and numbers that are walked, at most
+TIED = 0.9  # correlation of the slopes of two numbers, from which both are walked, however certain they seem
+NESTED = 3  # numbers that act most like the moved one, which follow before all do
+WINDOW, LINE_STEPS = (
+    0.05,
+    14,
+)  # of a range: on which one of them looks for its place alone, at least; and how often it looks
+ALIKE = 0.5  # correlation of the slopes of two numbers, from which they act alike
+SHORTEST = 0.03  # of a range: ends nearer than this by the curvature are not looked for
+FIRST = 0.4  # of the way to the end that the curvature tells: first step
+STRIDE = (0.01, 0.15)  # of a range: least step, but for a first one that is shorter, and longest
+FASTER = 1.6  # each step is so much longer than the one before, while the likelihood hardly falls
+PLACES = 16  # that are looked at, on each side of a ridge
+FOLLOWS = 4  # steps of the climb by which the others follow
+SHORTER = 3.0  # a step is so much shorter where the likelihood has fallen too far: the others could not follow
+# log-likelihood by which a place must be better than the fit, to begin again from there: climbs that begin beside each
+# other end several units apart, and from the top of a spike every way falls
+HIGHER = 6.0
+AGAIN = 2  # times
+UNLIKELY_END = 20.0  # fall at the end of a range, the others where they are, beyond which they are not asked to follow
+
+
+@dataclass(frozen=True)
+class Ridges:
+    """Places along ridges, each way from the fit, and by how much the log-likelihood has fallen there."""
+
+    paths: tuple[RidgePath, ...]
+
+    def ends(self, point: Array, drop: float) -> tuple[Array, Array]:
+        """Least and largest places of all numbers where the log-likelihood has fallen by at most `drop`."""
+        low, high = point.copy(), point.copy()
+        for way in self.paths:
+            for (inner, less), (outer, more) in zip(way[:-1], way[1:], strict=True):
+                if less > drop:
+                    break
+                share = 1.0
+                if more > drop:  # a parabola between the two
+                    share = (drop**0.5 - less**0.5) / (more**0.5 - less**0.5)
+                reached = inner + share * (outer - inner)
+                low, high = np.minimum(low, reached), np.maximum(high, reached)
+        return low, high
+
+
+def profile_ridges(
+    model: FitModel, fit: Fit, spans: Sequence[int], drop: float, on_progress: Callable[[], None] = lambda: None
+) -> tuple[Fit, Ridges]:
+    """Ridges through a fit, or through a better one that was met on the way, down to a fall of the likelihood.
+
+    Other ends that the search has met, and places on the way to a better fit, are added where they are as likely: each
+    by itself, for a valley may lie between.
+    """
+    ways: list[RidgePath] = []
+    met = list(fit.others)
+    for turn in range(AGAIN + 1):
+        ways, better = _ways(model, fit, spans, drop, turn < AGAIN)
+        on_progress()
+        if better is None:
+            break
+        met += [fit.place, *(place for way in ways for place, _ in way)]
+        fit = climb_to_maximum(model, better, fit.free, spans, slopes=(FINE_SLOPES, CENTRAL_SLOPES))
+    falls = [max(model.score(u, spans).loss() - fit.score.loss(), 0.0) for u in met]
+    alone = [((u, fall), (u, fall)) for u, fall in zip(met, falls, strict=True) if fall <= drop]
+    return fit, Ridges((*ways, *alone))
+
+
+def _ways(
+    model: FitModel, fit: Fit, spans: Sequence[int], drop: float, leave: bool
+) -> tuple[list[RidgePath], Array | None]:
+    """Ways along all ridges; and, where it may be left for it, a better place."""
+    view = CurvatureView(model, fit, spans, drop)
+    named = [k for k, f in enumerate(fit.free) if f < model.named]
+    worst = [k for k in sorted(named, key=lambda k: -view.reach[k]) if view.reach[k] >= SHORTEST][:WORST]
+    tied = [k for k in sorted(named, key=lambda k: -view.alike[k, named].max()) if view.alike[k, named].max() > TIED]
+    ways: list[RidgePath] = []
+    for k, end in ((fit.free[k], end) for k in named for end in (0.0, 1.0)):
+        found, fell = fit_at_end(model, fit, spans, k, end)
+        if leave and fell < -HIGHER:
+            return ways, found
+        if fell <= drop:
+            ways.append(((found, max(fell, 0.0)), (found, max(fell, 0.0))))
+    for k in list(dict.fromkeys([*worst, *tied]))[:WALKED]:
+        for side in (-1.0, 1.0):
+            way, better = view.walk(k, side, leave)
+            if better is not None:
+                return ways, better
+            ways.append(way)
+    return ways, None
+
+
+class CurvatureView:
+    """What the curvature about a fit says of the ways along its numbers, by their places among the free.
+
+    reach : how far each goes by the curvature until the likelihood has fallen by `drop`
+    alike : how much any two act alike
+    """
+
+    def __init__(self, model: FitModel, fit: Fit, spans: Sequence[int], drop: float):
+        curved = [curvature(model, fit, spans, way) for way in (WIDE_SLOPES, CENTRAL_SLOPES)]
+        covariances = [np.linalg.inv(each) for each in curved]
+        self.model, self.fit, self.spans, self.drop = model, fit, spans, drop
+        self.covariance, self.alike = covariances[1], _alike(curved[1])
+        self.reach: Array = np.sqrt(2.0 * drop * np.maximum(*(np.diag(each) for each in covariances)))
+
+    def walk(self, k: int, side: float, leave: bool) -> tuple[RidgePath, Array | None]:
+        """One way along the ridge of a number, down (-1) or up (1); and a better place, where it may be left for it."""
+        fit, covariance = self.fit, self.covariance
+        slope = np.zeros(len(fit.place))
+        slope[fit.free] = covariance[k] / covariance[k, k]
+        near = [g for g in np.argsort(-self.alike[k]).tolist() if self.alike[k, g] > ALIKE]
+        follow = [fit.free[g] for g in near if fit.free[g] < self.model.named]
+        first = FIRST * float(self.reach[k])
+        return _walk(self.model, fit, self.spans, fit.free[k], follow, side * slope, first, self.drop, leave)
+
+
+def fit_at_end(model: FitModel, fit: Fit, spans: Sequence[int], index: int, end: float) -> tuple[Array, float]:
+    """The fit with one number at an end of its range, the others following; and the fall of the log-likelihood."""
+    u = with_coordinate(fit.place, index, end)
+    fell = model.score(u, spans).loss() - fit.score.loss()
+    if fell > UNLIKELY_END:
+        return u, fell
+    rest = [f for f in fit.free if f != index]
+    followed = climb_to_maximum(model, u, rest, spans, FOLLOWS, slopes=(FINE_SLOPES, CENTRAL_SLOPES))
+    return followed.place, followed.score.loss() - fit.score.loss()
+
+
+def _slid(model: FitModel, u: Array, number: int, spans: Sequence[int], far: float) -> tuple[Array, float]:
+    """A place with one number where the tracks are explained best, as far again as it has come; and the loss.
+
+    Where single individuals are lost, the likelihood has edges, at which slopes lead nowhere.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def loss(x: float) -> float:
+        return model.score(with_coordinate(u, number, x), spans).loss()
+
+    ends = np.clip([u[number] - far - WINDOW, u[number] + far + WINDOW], 0.0, 1.0)
+    found = minimize_scalar(
+        loss, bounds=ends, method="bounded", options={"maxiter": LINE_STEPS, "xatol": MIN_FINE_STEP}
+    )
+    here = loss(float(u[number]))
+    return (with_coordinate(u, number, float(found.x)), float(found.fun)) if found.fun < here else (u, here)
+
+
+def _alike(curved: Array) -> Array:
+    """How much any two numbers act alike: correlations of their slopes, 0 of each with itself."""
+    sizes = np.sqrt(np.diag(curved))
+    found: Array = np.abs(curved) / np.outer(sizes, sizes)
+    np.fill_diagonal(found, 0.0)
+    return found
+
+
+def _walk(
+    model: FitModel,
+    fit: Fit,
+    spans: Sequence[int],
+    number: int,
+    near: Sequence[int],
+    slope: Array,
+    step: float,
+    drop: float,
+    leave: bool,
+) -> tuple[RidgePath, Array | None]:
+    """One way along a ridge; and, where it may be left for it, the best place that was met, if it is a better one.
+
+    Where the way leads higher it is gone on: what leads along a ridge is a walk, not a climb.
+
+    near  : numbers that act as the moved one does, which follow first
+    slope : moves of all numbers at first, that of the moved one is 1 or -1; step : first move
+    """
+    rest = [f for f in fit.free if f != number]
+    way = [(fit.place, 0.0)]
+    best: tuple[Array | None, float] = (None, -HIGHER)
+    step = float(np.clip(step, MIN_FINE_STEP, STRIDE[1]))
+    least = min(step, STRIDE[0])
+    for _ in range(PLACES):
+        last = way[-1][0]
+        start = np.clip(last + step * slope, 0.0, 1.0)
+        if near:
+            # all along the way so far, or none but the moved one and one that makes up for it
+            beside = with_coordinate(last, number, float(start[number]))
+            asked = [(start, near[0]), *((beside, f) for f in near[:NESTED])]
+            alone = [_slid(model, u, f, spans, abs(float(start[f] - last[f]))) for u, f in asked]
+            start = min(alone, key=lambda each: each[1])[0]
+            start = climb_to_maximum(
+                model, start, near[:NESTED], spans, FOLLOWS, slopes=(FINE_SLOPES, CENTRAL_SLOPES)
+            ).place
+        found = climb_to_maximum(model, start, rest, spans, FOLLOWS, slopes=(FINE_SLOPES,))
+        down = found.score.loss() - fit.score.loss()
+        if leave and down < best[1]:
+            best = found.place, down
+        fell = max(down, 0.0)
+        moved = abs(found.place[number] - last[number])
+        if moved == 0.0:
+            break
+        if fell - way[-1][1] > 0.5 * drop and step > least:
+            step = max(step / SHORTER, least)
+            continue
+        way.append((found.place, fell))
+        if fell >= drop or not 0.0 < found.place[number] < 1.0:
+            break
+        slope = (found.place - last) / moved
+        if fell - way[-2][1] < 0.1 * drop:
+            step = min(FASTER * step, STRIDE[1])
+    return tuple(way), best[0]
+
+
+AWAY = 0.2  # of a range: move of a number of which is asked whether the others make up for it exactly
+DROP = 12.0  # fall of the log-likelihood at which a walk ends that looks for a higher place
+EXACT = 0.05  # change of the log-likelihood by such a move, below which they do
+
+
+def restore_parameters(
+    law: LawCandidate, model: FitModel, fit: Fit, spans: Sequence[int], on_progress: Callable[[], None]
+) -> tuple[FitModel, Fit]:
+    """The model with those numbers again that explain something far from their defaults, the others elsewhere.
+
+    A number is given up where no climb from the fit says anything for it. A walk may lead higher all the same.
+
+    law : with all its numbers
+    """
+    for number in model.dropped_parameters(law):
+        fuller, i = model.with_parameter(law, number)
+        view = _view(fuller, fit, i, number.place(number.default), spans, DROP)
+        if view is None:
+            continue
+        for side in (-1.0, 1.0):
+            better = view.walk(view.fit.free.index(i), side, True)[1]
+            on_progress()
+            if better is not None:
+                higher = climb_to_maximum(fuller, better, view.fit.free, spans, slopes=(FINE_SLOPES, CENTRAL_SLOPES))
+                return restore_parameters(law, fuller, higher, spans, on_progress)
+    return model, fit
+
+
+def ridges_of_dropped(
+    law: LawCandidate, model: FitModel, fit: Fit, spans: Sequence[int], drop: float, on_progress: Callable[[], None]
+) -> tuple[RidgePath, ...]:
+    """Ways of a fit's numbers on which one that was given up leaves its default, and all others follow.
+
+    law : with all its numbers; drop : fall of the log-likelihood at which a way ends
+    """
+    found: list[RidgePath] = []
+    for number in model.dropped_parameters(law):
+        fuller, i = model.with_parameter(law, number)
+        ways = ridges_from_point(fuller, fit, i, number.place(number.default), spans, drop)
+        found += [tuple((np.delete(place, i), fell) for place, fell in way) for way in ways]
+        on_progress()
+    return tuple(found)
+
+
+def ridges_from_point(
+    model: FitModel, fit: Fit, index: int, coordinate: float, spans: Sequence[int], drop: float
+) -> list[RidgePath]:
+    """Ways on which a number leaves a place; none where that would say nothing about the others.
+
+    They say nothing of a number that changes nothing; nor of one that the others make up for exactly, such as the unit
+    of all weights: no tracks could identify it, and its default is the unit of the others.
+
+    model : with the number; fit : without it
+    """
+    view = _view(model, fit, index, coordinate, spans, drop)
+    return [] if view is None else [view.walk(view.fit.free.index(index), side, False)[0] for side in (-1.0, 1.0)]
+
+
+def _view(
+    model: FitModel, fit: Fit, number: int, place: float, spans: Sequence[int], drop: float
+) -> CurvatureView | None:
+    """The view from a fit along a number that it does without; None where that would say nothing about the others."""
+    full = fit_with_parameter(model, fit, number, place, spans)
+    far = full.score.loss() > fit.score.loss() + drop  # its default lies beyond what is sought
+    if far or not has_effect(model, [full.place], number, spans) or is_compensated(model, full, number, spans):
+        return None
+    return CurvatureView(model, replace(full, score=fit.score), spans, drop)  # falls are counted from the fit
+
+
+def is_compensated(model: FitModel, fit: Fit, index: int, spans: Sequence[int]) -> bool:
+    """Whether the others make up for a number exactly, by powers of it or along a line."""
+    x = float(fit.place[index])
+    moved = conditional_point(
+        fit, curvature(model, fit, spans, CENTRAL_SLOPES), index, x + (AWAY if x < 0.5 else -AWAY)
+    )
+    here = model.score(fit.place, spans).loss()
+    return any(
+        abs(model.score(u, spans).loss() - here) < EXACT
+        for u in (np.clip(moved, 0.0, 1.0), power_law_point(model, fit, moved, index, spans))
+    )

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings import images
+from airflock.recordings import dataset
 from airflock.recordings.measures.states import check_numbers, track_arrays
 from airflock.support import ParameterError
 
@@ -47,7 +47,7 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
         u = u - u.mean(axis=1, keepdims=True)
         alone, count = alone + float((u * u).sum()), count + u.shape[1]
         i, j = np.triu_indices(u.shape[1], 1)
-        apart = np.linalg.norm(images.nearest_image(x[:, j] - x[:, i], found.box), axis=0)
+        apart = np.linalg.norm(dataset.nearest_image(x[:, j] - x[:, i], found.box), axis=0)
         bins = np.floor(apart / width).astype(int)
         alike = (u[:, i] * u[:, j]).sum(axis=0)
         number, total = np.bincount(bins), np.bincount(bins, alike)

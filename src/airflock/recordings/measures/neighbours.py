@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings import images
+from airflock.recordings import dataset
 from airflock.recordings.measures.states import check_numbers, track_arrays
 from airflock.support import ParameterError
 
@@ -69,7 +69,7 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
     for place, there in zip(found.position, found.placed, strict=True):
         x = place[:, there]
         i, j = np.triu_indices(x.shape[1], 1)
-        counts += np.histogram(np.linalg.norm(images.nearest_image(x[:, j] - x[:, i], found.box), axis=0), edges)[0]
+        counts += np.histogram(np.linalg.norm(dataset.nearest_image(x[:, j] - x[:, i], found.box), axis=0), edges)[0]
         pairs += len(i)
     index = pd.Index(0.5 * (edges[1:] + edges[:-1]), name="distance")
     density = pd.Series(counts / (max(pairs, 1) * width), index=index, name="density")

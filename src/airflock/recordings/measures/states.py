@@ -6,11 +6,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.recordings import images
+from airflock.recordings import dataset
 from airflock.recordings.attributes import scenario_document
-from airflock.recordings.differences import differentiated_velocity
+from airflock.recordings.dataset import check_recording, differentiated_velocity
 from airflock.recordings.flown_scenario import scenario_of_recording
-from airflock.recordings.layout import check_recording
 from airflock.support import ParameterError, RecordingError, is_number
 
 Array = NDArray[Any]
@@ -33,7 +32,7 @@ class TrackArrays(NamedTuple):
 
     def offsets(self, positions: Array) -> Array:
         """Offsets (axis, from, to), m, between all of some places (axis, individual), to the nearest images."""
-        return images.nearest_image(positions[:, None, :] - positions[:, :, None], self.box)
+        return dataset.nearest_image(positions[:, None, :] - positions[:, :, None], self.box)
 
     @property
     def period(self) -> float:
@@ -66,7 +65,7 @@ def track_arrays(recording: xr.Dataset, keypoint: str | None = None) -> TrackArr
     individuals = [str(name) for name in own["individual"].values]
     position, velocity = np.where(nowhere, np.nan, position), np.where(unknown, np.nan, velocity)
     world = scenario_of_recording(recording).world if scenario_document(recording) is not None else None
-    box = images.box_sides(world, position.shape[1]) if world is not None else None
+    box = dataset.box_sides(world, position.shape[1]) if world is not None else None
     return TrackArrays(time, position, velocity, placed, present, individuals, box)
 
 

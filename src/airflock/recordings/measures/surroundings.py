@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from airflock.recordings import images
+from airflock.recordings import dataset
 from airflock.recordings.measures.states import check_numbers, headings, track_arrays
 from airflock.support import ParameterError
 
@@ -43,7 +43,7 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
     for place, ahead, there in zip(found.position[:, :2], h, found.placed, strict=True):
         x = place[:, there]
         for i in np.flatnonzero(there & np.isfinite(ahead).all(axis=0)):
-            offset = images.nearest_image(x - place[:, i : i + 1], box)
+            offset = dataset.nearest_image(x - place[:, i : i + 1], box)
             others = np.ones(offset.shape[1], bool)
             others[np.searchsorted(np.flatnonzero(there), i)] = False
             cx, cy = ahead[:, i]
@@ -90,7 +90,7 @@ def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> flo
     for place, ahead, there in zip(found.position[:, :2], h, found.placed, strict=True):
         rows = np.flatnonzero(there)
         x = place[:, rows]
-        offset = images.nearest_image(x[:, None, :] - x[:, :, None], box)
+        offset = dataset.nearest_image(x[:, None, :] - x[:, :, None], box)
         apart = np.linalg.norm(offset, axis=0)
         np.fill_diagonal(apart, np.inf)
         for k, i in enumerate(rows):

@@ -1,0 +1,444 @@
+"""Score a law on tracks: a Kalman filter in innovation form, and the likelihood of what it does not predict."""
+
+import math
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.estimate.inference.law_candidates import FitParameter, LawCandidate
+from airflock.estimate.inference.observed_tracks import (
+    ABSENT,
+    COUNTED,
+    ENTERS,
+    UNSEEN,
+    SpanTracks,
+    TrackScale,
+)
+
+Array = NDArray[np.float64]
+AWAY = 1e9  # m; beyond every range
+GAPS = 12  # frames unseen, beyond which gains grow no more
+
+
+@dataclass(frozen=True)
+class FilterGains:
+    """Shares of a difference that go into position (1) and, per period, into velocity (1); along and across.
+
+    keep : share of its own difference from the usual speed that an individual keeps for a period
+    """
+
+    along: tuple[float, float]
+    across: tuple[float, float]
+    keep: float = 1.0
+
+    def table(self, period: float) -> Array:
+        """(along or across, position or velocity, frames unseen): gains, which grow while an individual is unseen."""
+        return np.array([_growing(*self.along, period), _growing(*self.across, period)])
+
+
+def _growing(into_position: float, into_velocity: float, period: float) -> Array:
+    """Gains after 0, 1, 2, ... frames unseen: the variances that the steady gains stand for, carried on."""
+    kp, kv = into_position, into_velocity / period
+    vv = max(kp * kp - 2.0 * period * (1.0 - kp) * kv, 0.0) / period**2 + kv * kv
+    pp, pv, noise = kp, kv, 1.0 - kp
+    found = np.zeros((2, GAPS))
+    for unseen in range(GAPS):
+        found[:, unseen] = pp / (pp + noise), pv / (pp + noise)
+        pp, pv, vv = pp + 2.0 * period * pv + period**2 * vv, pv + period * vv, vv + kv * kv
+    return found
+
+
+def apply_own_speed(rows, before, i, axes, half, pace, mean_speed, keep):  # type: ignore[no-untyped-def]
+    """Let individual i of a law of headings have covered its way at its own speed, which returns to the usual one."""
+    was = 0.0
+    for a in range(axes):
+        was += before[axes + a, i] ** 2
+    k = (mean_speed + keep * (math.sqrt(was) - mean_speed)) / pace
+    for a in range(axes):
+        step = rows[a, i] - before[a, i]
+        if half[a] > 0.0:
+            step -= 2.0 * half[a] * round(step / (2.0 * half[a]))
+        rows[a, i] = before[a, i] + k * step
+        rows[axes + a, i] *= k
+
+
+def correct_state(rows, i, axes, half, seen, gains, h, e, out, counted):  # type: ignore[no-untyped-def]
+    """Compare individual i with where it was seen, and move its state there by a share; h, e: memory of 3 numbers."""
+    size, along = 1e-30, 0.0
+    for a in range(axes):
+        size += rows[axes + a, i] ** 2
+    size = math.sqrt(size)
+    for a in range(axes):
+        h[a] = rows[axes + a, i] / size
+        e[a] = seen[a, i] - rows[a, i]
+        if half[a] > 0.0:
+            e[a] -= 2.0 * half[a] * round(e[a] / (2.0 * half[a]))
+        along += e[a] * h[a]
+    if counted:
+        out[0, i], out[1, i] = along, h[0] * e[1] - h[1] * e[0]
+        if axes == 3:  # to the left, and upwards of heading and left
+            flat = math.sqrt(h[0] * h[0] + h[1] * h[1]) + 1e-30
+            out[1, i] /= flat
+            out[2, i] = flat * e[2] - h[2] * (h[0] * e[0] + h[1] * e[1]) / flat
+    for a in range(axes):
+        across = e[a] - along * h[a]
+        rows[a, i] += gains[0, 0] * along * h[a] + gains[1, 0] * across
+        rows[axes + a, i] += gains[0, 1] * along * h[a] + gains[1, 1] * across
+
+
+@cache
+def _kernel() -> Any:
+    """One frame of the walk, compiled: compare with what was seen and put the flight right."""
+    from numba import njit
+
+    speed_, right_ = njit(apply_own_speed), njit(correct_state)
+
+    @njit
+    def kernel(rows, before, unseen, seen, state, speed, gains, out, axes, half, pace, usual, keep):  # type: ignore[no-untyped-def]
+        h, e = np.zeros(3), np.zeros(3)
+        for i in range(state.shape[0]):
+            what = state[i]
+            if what in (ABSENT, ENTERS):
+                for a in range(axes):
+                    rows[a, i] = seen[a, i] if what == ENTERS else AWAY * (2.0 + i)
+                    rows[axes + a, i] = speed[a, i] if what == ENTERS else 1.0
+                unseen[i] = 0
+            else:
+                if pace > 0.0:
+                    speed_(rows, before, i, axes, half, pace, usual, keep)
+                if what == UNSEEN:
+                    unseen[i] += 1
+                else:
+                    own = gains[:, :, min(unseen[i], gains.shape[2] - 1)]
+                    right_(rows, i, axes, half, seen, own, h, e, out, what == COUNTED)
+                    unseen[i] = 0
+            for a in range(2 * axes):
+                before[a, i] = rows[a, i]
+
+    return kernel
+
+
+class InnovationFilter:
+    """Flights of one candidate, or of nobody's law at all, kept on one record.
+
+    candidate : None for individuals that go straight on at their own speed
+    """
+
+    def __init__(self, law: LawCandidate | None, tracks: SpanTracks):
+        self.law, self.tracks, self.axes = law, tracks, tracks.axes
+        self.seen = np.where(np.isfinite(tracks.seen), tracks.seen, 0.0)
+        n = tracks.individual_count
+        self.out = np.zeros((len(self.seen), tracks.axes, n))
+        self.previous_states, self.frames_unseen = np.zeros((2 * tracks.axes, n)), np.zeros(n, np.int64)
+        self.half_sides = np.array([*tracks.box[: tracks.axes], *[0.0] * (3 - tracks.axes)])
+        self.rows = np.zeros((2 * tracks.axes, n))
+        self.step = 0
+        if law is not None:
+            self.flight = law.state(tracks)
+            self.row = self.flight.arrays["row"].copy()
+            self.fresh = self.flight.buffer.copy()
+            self.steps = max(1, round(tracks.period / law.scenario.flight.dt))
+            rows = self.flight.driver.ROWS
+            places = [rows[name] for name in (*law.plan.axes, *(f"v{axis}" for axis in law.plan.axes))]
+            if places != list(range(places[0], places[0] + len(places))):
+                raise ValueError(f"rows of {law.name} do not lie side by side")
+            self.rows = self.flight.arrays["work"][places[0] : places[0] + len(places)]
+
+    def errors(
+        self,
+        numbers: dict[int, float],
+        gains: FilterGains,
+        mean_speed: float,
+        spans: list[int] | range | None = None,
+        kept_states: Array | None = None,
+        pushes: Array | None = None,
+    ) -> Array:
+        """Differences (frame, along and across, individual), m, between prediction and record; 0 where none counts.
+
+        numbers : values by column; usual : speed to which individuals return, m/s (of laws of headings)
+        spans   : which; all by default
+        kept    : (frame, component, individual), filled with positions (m) and velocities (m/s) as put right
+        pushes  : (frame, axis, individual), filled with the change of velocity by the next frame that is predicted, m/s
+        """
+        kernel, tracks, table = _kernel(), self.tracks, gains.table(self.tracks.period)
+        law = self.law
+        pace = mean_speed if law is None or law.commands_heading else 0.0
+        self.out[:] = 0.0
+        for number in range(len(tracks.spans)) if spans is None else spans:
+            begin, end = tracks.spans[number]
+            self.begin(numbers)
+            for k in range(begin, end):
+                if k > begin:
+                    self.fly(mean_speed)
+                    if pushes is not None:
+                        self._pushes(pushes[k - 1], pace)
+                kernel(
+                    self.rows,
+                    self.previous_states,
+                    self.frames_unseen,
+                    self.seen[k],
+                    tracks.state[k],
+                    tracks.speed[k],
+                    table,
+                    self.out[k],
+                    self.axes,
+                    self.half_sides,
+                    pace,
+                    mean_speed,
+                    gains.keep,
+                )
+                if k == begin:
+                    self.fill_past_states(self.previous_states)
+                if kept_states is not None:
+                    kept_states[k] = self.previous_states
+        return self.out
+
+    def _pushes(self, found: Array, pace: float) -> None:
+        """Changes of velocity in the period that has just been flown."""
+        was, new = self.previous_states[self.axes :], self.now()[self.axes :]
+        scale = np.sqrt((was**2).sum(axis=0)) / pace if pace > 0.0 else 1.0
+        found[:] = new * scale - was
+
+    def begin(self, numbers: dict[int, float], world: int = 0) -> None:
+        """Forget the span before. world : which random numbers are drawn, where there is noise."""
+        self.step = 0
+        if self.law is None:
+            return
+        self.flight.buffer[:] = self.fresh
+        self.flight.set_integer("world", world)
+        row = self.flight.arrays["row"]
+        for column, value in numbers.items():
+            row[column] = value
+
+    def fill_past_states(self, motion: Array) -> None:
+        """Let the driver begin with those who are there: past states that are heard late are filled with them.
+
+        motion : positions (m) and velocities (m/s), (component, individual)
+        """
+        if self.law is not None:
+            self.flight.start[:] = motion
+            self.flight.advance(0, 0)
+        self.now()[:] = motion
+
+    def now(self) -> Array:
+        """Positions and velocities in the flight, (component, individual); a view."""
+        return self.rows[:, : self.tracks.individual_count]
+
+    def fly(self, mean_speed: float) -> None:
+        """Fly for one period of the tracks."""
+        if self.law is None:
+            self._straight(mean_speed)
+            return
+        self.flight.advance(self.step, self.step + self.steps)
+        self.step += self.steps
+
+    def _straight(self, usual: float) -> None:
+        """Everybody goes straight on for a period."""
+        axes = self.axes
+        speed = np.sqrt((self.rows[axes:] ** 2).sum(axis=0)) + 1e-30
+        self.rows[axes:] *= usual / speed
+        self.rows[:axes] += self.rows[axes:] * self.tracks.period
+
+
+SOFT = 1.345  # of a standard deviation: where nothing is wild, estimates are 0.95 as efficient (Huber 1964)
+LOST, TINY = 1e6, 1e-15  # m; somebody who flew off, and less than any difference
+LOOKS = 100  # at most, for a standard deviation; about six do
+# with which normal differences keep their variance: 1 over the mean of twice Huber's function
+_DENSITY, _WITHIN = math.exp(-0.5 * SOFT**2) / math.sqrt(2.0 * math.pi), math.erf(SOFT / math.sqrt(2.0))
+SAME = (_WITHIN + 2.0 * SOFT * _DENSITY - SOFT**2 * (1.0 - _WITHIN)) ** -0.5
+AS_NORMAL = _WITHIN  # mean of min(z², SOFT |z|) of normal numbers
+FIRST_GAINS = (0.6, 0.3, 0.6, 0.3, 0.9)
+SMALL = 360  # frames on which is searched
+KP = FitParameter("gain", -1, "1", 0.01, 0.999, False, 0.6)
+KV = FitParameter("gain", -1, "1", 3e-4, 1.3, True, 0.3)
+KEEP = FitParameter("keep", -1, "1", 0.0, 1.0, False, 0.9)
+
+
+def huber_differences(e: Array) -> Array:
+    """Differences whose squares grow as their size alone where they are large (Huber 1964).
+
+    A law has edges: somebody just within a radius flies on otherwise than somebody just outside. Who is near an edge,
+    and is seen with noise, is now and then predicted on its wrong side, also by the numbers that flew. The square of
+    one such step would outweigh all that thousands of others say of a number. Normal differences keep their variance.
+
+    e : (step, component); differences up to `SOFT` of their `robust_deviation` stay as they are but for a factor, the
+        same for
+        all of a component
+    """
+    if not len(e):
+        return e
+    e = np.clip(np.nan_to_num(e, nan=LOST), -LOST, LOST)
+    size = np.array([robust_deviation(component) for component in e.T])
+    far = np.abs(e) / size
+    rest = np.sqrt(np.maximum(2.0 * SOFT * far - SOFT * SOFT, 0.0))
+    found: Array = np.copysign(SAME * size * np.where(far < SOFT, far, rest), e)
+    return found
+
+
+def robust_deviation(e: Array) -> float:
+    """Standard deviation of differences, by all of them, of which the large ones count less (Huber 1964, proposal 2).
+
+    It is that at which the mean of min(z², SOFT |z|) is what it is of normal numbers z. A median would do as well, but
+    hangs on one difference alone, and with it each slope.
+    """
+    sizes = np.sort(np.abs(e)) + TINY
+    square, linear = np.cumsum(sizes * sizes), np.cumsum(sizes)
+    last, found = -1, float(np.sqrt(square[-1] / len(sizes)))
+    for _ in range(LOOKS):
+        near = int(np.searchsorted(sizes, SOFT * found))
+        if near == last:
+            break
+        last = near
+        within = float(square[near - 1]) if near else 0.0
+        beyond = SOFT * float(linear[-1] - (linear[near - 1] if near else 0.0))
+        found = (beyond + math.sqrt(beyond * beyond + 4.0 * AS_NORMAL * len(sizes) * within)) / (
+            2.0 * AS_NORMAL * len(sizes)
+        )
+    return found
+
+
+@dataclass
+class SpanScore:
+    """Sums over counted steps: number, and squares along and across, m²; one row per span."""
+
+    count: Array
+    along: Array
+    across: Array
+    axes: int
+
+    def loss(self) -> float:
+        """Negative log-likelihood at the likeliest variances."""
+        n = float(self.count.sum())
+        a, b = float(self.along.sum()) / n, float(self.across.sum()) / (n * (self.axes - 1))
+        if not (math.isfinite(a) and math.isfinite(b) and a > 0.0 and b > 0.0):
+            return 1e15
+        return 0.5 * n * (math.log(a) + (self.axes - 1) * math.log(b) + self.axes * (1.0 + math.log(2.0 * math.pi)))
+
+    def variances(self) -> tuple[float, float]:
+        """Variances along and across, m²."""
+        n = float(self.count.sum())
+        return float(self.along.sum()) / n, float(self.across.sum()) / (n * (self.axes - 1))
+
+
+class FitModel:
+    """A law (or none) with the numbers that are fitted, on the tracks.
+
+    numbers : of the law and its body, then four gains and, for a law of headings, what share of its speed one keeps
+    Places are points of a unit cube, one coordinate per number.
+    """
+
+    def __init__(self, law: LawCandidate | None, tracks: Sequence[SpanTracks], scale: TrackScale):
+        self.law, self.tracks, self.scale = law, tuple(tracks), scale
+        self.filters = [InnovationFilter(law, each) for each in tracks]
+        self.axes = tracks[0].axes
+        self.own_speed = law is None or law.commands_heading
+        named = (
+            list(law.numbers)
+            if law
+            else [FitParameter("speed", -1, "m/s", 0.02 * scale.speed, 2.0 * scale.max_speed, True, 0.0)]
+        )
+        self.numbers: list[FitParameter] = [*named, KP, KV, KP, KV, KEEP]
+        self.named = len(named)
+        speeds = [i for i, n in enumerate(named) if n.key in ("speed", "body.speed")]
+        self.speed_index = speeds[0] if self.own_speed else None
+        self.spans = [(t, s) for t, each in enumerate(self.tracks) for s in range(len(each.spans))]
+        self.held: frozenset[int] = frozenset()
+        self.soft = False
+
+    def with_fixed(self, numbers: Sequence[int]) -> "FitModel":
+        """The same model in which some numbers stay at their defaults, whatever the place says."""
+        twin = copy(self)
+        twin.held = frozenset({*self.held, *numbers})
+        return twin
+
+    def with_parameters(self, numbers: Sequence[FitParameter]) -> "FitModel":
+        """The same law on the same tracks, of which only these numbers are fitted."""
+        assert self.law is not None
+        found = FitModel(replace(self.law, numbers=tuple(numbers)), self.tracks, self.scale)
+        return found.robust() if self.soft else found
+
+    def with_parameter(self, law: LawCandidate, parameter: FitParameter) -> tuple["FitModel", int]:
+        """The model with one more number, and its index there; law : with all its numbers, in their order."""
+        assert self.law is not None
+        several = [other for other in law.numbers if other in self.law.numbers or other == parameter]
+        return self.with_parameters(several), several.index(parameter)
+
+    def dropped_parameters(self, law: LawCandidate) -> list[FitParameter]:
+        """Numbers of the law that the model does without; law : with all its numbers."""
+        assert self.law is not None
+        return [number for number in law.numbers if number not in self.law.numbers]
+
+    def first(self) -> Array:
+        """A place to begin with: defaults, usual gains, and of speeds what was seen."""
+        values = [n.default for n in self.numbers[: self.named]] + list(FIRST_GAINS)
+        if self.speed_index is not None:
+            values[self.speed_index] = self.scale.speed
+        return np.array([n.place(v) for n, v in zip(self.numbers, values, strict=True)])
+
+    def split(self, u: Array) -> tuple[dict[int, float], FilterGains, float]:
+        """Values by column, gains, and the usual speed (m/s) at a place."""
+        values = [n.value(float(min(max(x, 0.0), 1.0))) for n, x in zip(self.numbers, u, strict=True)]
+        kpa, kva, kpb, kvb, keep = values[self.named :]
+        named = enumerate(zip(self.numbers[: self.named], values, strict=False))
+        by_column = {n.column: v for k, (n, v) in named if n.column >= 0 and k not in self.held}
+        usual = values[self.speed_index] if self.speed_index is not None else 0.0
+        return by_column, FilterGains((kpa, kva), (kpb, kvb), keep), usual
+
+    def differences(self, u: Array, spans: Sequence[int] | None = None) -> tuple[Array, NDArray[np.int64]]:
+        """What is fitted: innovations, of which large ones may count less (`robust`), and the span of each."""
+        e, owner = self.innovations(u, spans)
+        return (huber_differences(e) if self.soft else e), owner
+
+    def robust(self) -> "FitModel":
+        """The same model, in which a few large differences count less."""
+        twin = copy(self)
+        twin.soft = True
+        return twin
+
+    def innovations(self, u: Array, spans: Sequence[int] | None = None) -> tuple[Array, NDArray[np.int64]]:
+        """Differences of counted steps (step, along and across), m, to where they were predicted; the span of each."""
+        by_column, gains, usual = self.split(u)
+        parts, owners = [], []
+        first = dict(zip(self.spans, range(len(self.spans)), strict=True))
+        for walk, own in self.parts(spans):
+            t = self.filters.index(walk)
+            found = walk.errors(by_column, gains, usual, own)
+            for s in own:
+                begin, end = walk.tracks.spans[s]
+                counted = walk.tracks.state[begin:end] == COUNTED
+                part = found[begin:end].transpose(0, 2, 1)[counted]
+                parts.append(part)
+                owners.append(np.full(len(part), first[t, s]))
+        return np.concatenate(parts), np.concatenate(owners)
+
+    def parts(self, spans: Sequence[int] | None = None) -> list[tuple[InnovationFilter, list[int]]]:
+        """Walks, and which spans of each are meant."""
+        chosen = [self.spans[k] for k in (range(len(self.spans)) if spans is None else spans)]
+        found = [(walk, [s for t, s in chosen if t == number]) for number, walk in enumerate(self.filters)]
+        return [(walk, own) for walk, own in found if own]
+
+    def score(self, u: Array, spans: Sequence[int] | None = None) -> SpanScore:
+        """Sums of squares by span."""
+        return self.score_differences(*self.differences(u, spans))
+
+    def score_differences(self, e: Array, owner: NDArray[np.int64]) -> SpanScore:
+        """Sums of squares by span of differences."""
+        m = len(self.spans)
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = np.nan_to_num(e * e, nan=1e12, posinf=1e12)
+        along = np.bincount(owner, squares[:, 0], m).astype(float)
+        across = np.bincount(owner, squares[:, 1:].sum(axis=1), m).astype(float)
+        return SpanScore(np.bincount(owner, minlength=m).astype(float), along, across, self.axes)
+
+    def few(self, frames: int = SMALL) -> list[int]:
+        """Spans, evenly over all tracks, that hold about so many frames."""
+        lengths = [self.tracks[t].spans[s][1] - self.tracks[t].spans[s][0] for t, s in self.spans]
+        count = int(np.clip(round(frames / np.mean(lengths)), 3, len(self.spans)))
+        if count > 0.7 * len(self.spans):
+            return list(range(len(self.spans)))
+        return sorted({int(k) for k in np.linspace(0, len(self.spans) - 1, count + 2)[1:-1].round()})

@@ -1,0 +1,524 @@
+"""Infer the flocking law of tracks: `infer`, its result, and maps of forces."""
+
+import datetime
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock.estimate.inference import law_selection
+from airflock.estimate.inference.fit_checks import PredictiveCheck, lack_of_fit, run_predictive_check
+from airflock.estimate.inference.innovation_filter import FitModel
+from airflock.estimate.inference.law_candidates import (
+    FitParameter as Sought,
+    LawCandidate,
+    law_scenarios,
+    make_candidate,
+)
+from airflock.estimate.inference.likelihood_fit import Fit
+from airflock.estimate.inference.observed_tracks import (
+    ABSENT,
+    SpanTracks,
+    TrackScale,
+    tracks_from_recording,
+    tracks_scale,
+)
+from airflock.estimate.inference.parametric_bootstrap import CorrectedFit, FitNoise, correct_fit
+from airflock.recordings import load_recording, load_tracks
+from airflock.scenarios import CallerParts, Scenario, build_scenario
+from airflock.support import AirflockError, RecordingError, expand_path
+
+Array = NDArray[np.float64]
+LAG = 0.3  # s; half of the window over which an acceleration is taken
+CELLS = 15  # of a map, along each side
+WIDE = 5.0  # nearest distances from the middle of a map to its edge
+PAIRS = 1_500_000  # of which maps are made, at most
+LEAST = 30  # pairs in a cell that counts
+
+
+@dataclass(frozen=True)
+class ForceMaps:
+    """Mean acceleration by place of a neighbour, (forward or left, front-back, left-right), m/s^2.
+
+    edges : of cells, m; seen, law : of the tracks and of the law; nan where there are too few pairs
+    """
+
+    edges: Array
+    seen: Array
+    law: Array
+
+
+def force_maps(model: FitModel, point: Array, scale: TrackScale, spans: Sequence[int] | None = None) -> ForceMaps:
+    """Maps of the tracks and of a law at a place of its numbers, on some spans."""
+    edge = min(WIDE * scale.near, 0.6 * scale.far)
+    edges = np.linspace(-edge, edge, CELLS + 1)
+    size = CELLS * CELLS
+    count, seen, law = np.zeros(size), np.zeros((2, size)), np.zeros((2, size))
+    for walk, own in model.parts(spans):
+        tracks, axes = walk.tracks, walk.axes
+        kept, pushes = np.zeros((len(walk.seen), 2 * axes, tracks.individual_count)), np.zeros_like(tracks.seen)
+        walk.errors(*model.split(point), own, kept, pushes)
+        lag = max(1, round(LAG / tracks.period))
+        weights = lag - np.abs(np.arange(-lag + 1, lag))
+        frames = np.concatenate([np.arange(tracks.spans[s][0] + lag, tracks.spans[s][1] - lag) for s in own])
+        for k in frames[:: max(1, len(frames) * tracks.individual_count**2 // PAIRS)]:
+            window = tracks.seen[k - lag : k + lag + 1]
+            turned = tracks.nearest(window[-1] - window[lag]) - tracks.nearest(window[lag] - window[0])
+            felt = turned / (lag * tracks.period) ** 2
+            told = np.tensordot(weights, pushes[k - lag + 1 : k + lag], 1) / (lag * lag * tracks.period)
+            there: Any = (tracks.state[k - lag : k + lag + 1] > ABSENT).all(axis=0) & np.isfinite(felt).all(axis=0)
+            cell, who, h, left = _cells(kept[k], there, tracks.state[k] > ABSENT, edge, tracks.nearest)
+            count += np.bincount(cell, minlength=size)
+            for table, force in ((seen, felt), (law, told)):
+                for part, axis in enumerate((h, left)):
+                    own_force = (axis * np.nan_to_num(force)).sum(axis=0)
+                    table[part] += np.bincount(cell, own_force[who], size)
+    shape, enough = (2, CELLS, CELLS), count >= LEAST
+    divisor = np.maximum(count, 1.0)
+    return ForceMaps(
+        edges,
+        np.where(enough, seen / divisor, np.nan).reshape(shape),
+        np.where(enough, law / divisor, np.nan).reshape(shape),
+    )
+
+
+def _cells(
+    motion: Array, there: NDArray[np.bool_], around: NDArray[np.bool_], edge: float, nearest: Callable[[Array], Array]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
+    """Cell of every neighbour, whose it is, and headings and directions to the left (axis, individual)."""
+    axes, n = len(motion) // 2, motion.shape[1]
+    x, v = motion[:axes], motion[axes:]
+    h = v / np.maximum(np.linalg.norm(v, axis=0), 1e-12)
+    flat = np.maximum(np.linalg.norm(h[:2], axis=0), 1e-12)
+    left = np.zeros_like(h)
+    left[0], left[1] = -h[1] / flat, h[0] / flat
+    d = nearest((x[:, None, :] - x[:, :, None]).reshape(axes, -1)).reshape(axes, n, n)
+    places = [np.einsum("ai,aij->ij", axis, d) for axis in (h, left)]
+    row, column = (np.floor((p + edge) / (2.0 * edge) * CELLS).astype(int) for p in places)
+    inside = (row >= 0) & (row < CELLS) & (column >= 0) & (column < CELLS)
+    inside &= there[:, None] & around[None, :] & ~np.eye(n, dtype=bool)
+    who, _ = np.nonzero(inside)
+    return row[inside] * CELLS + column[inside], who, h, left
+
+
+SURE = 2.0  # standard errors by which a law must predict better than going straight on, and
+MOST = 0.75  # share of the spans in which it must
+APART = 2.0  # standard errors by which the best law must be ahead of the second
+SIMPLER = 1.0  # standard errors within which a law of fewer numbers is the better explanation
+EDGE = 0.01  # of a range: an end nearer to the end of the range counts as no limit
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A number of a law with its intervals; an end of one is None where the tracks set no limit.
+
+    low, high   : 95 % interval of this number alone
+    least, most : wider interval; those of all numbers of the law hold together in 95 %
+    """
+
+    key: str
+    value: float
+    low: float | None
+    high: float | None
+    unit: str
+    least: float | None = None
+    most: float | None = None
+
+
+@dataclass
+class LawResult:
+    """How well one law explains the tracks.
+
+    gain, error : log-likelihood of held-out steps above that of going straight on, and its standard error
+    ahead       : share of spans in which it predicts better
+    price       : gain that so many numbers bring by chance: half of each times log(steps) (Schwarz 1978)
+    criterion   : Akaike's, of the fit, below that of going straight on; negative is better
+    inside      : share of held-out differences within the 95 % that are predicted
+    missed      : share of what is explained with a free answer to neighbours beside the law that it leaves over, 0 to 1
+    numbers     : fitted; with intervals for the best law alone
+    """
+
+    name: str
+    gain: float
+    error: float
+    ahead: float
+    parameter_penalty: float
+    aic_difference: float
+    inside: float
+    missed: float
+    numbers: dict[str, ParameterEstimate]
+    candidate: LawCandidate
+    fit: Fit
+    maps: ForceMaps
+    negative_log_likelihoods: Array
+
+
+@dataclass
+class InferResult:
+    """What infer found: laws from best to worst, the one that explains the tracks if any does, and how sure that is.
+
+    best   : None where no law predicts better than going straight on
+    steps  : individual steps that were predicted; fitted: frames on which laws were fitted, of all frames
+    check  : flights of the best law against the tracks
+    """
+
+    laws: list[LawResult]
+    best: LawResult | None
+    verdict: str
+    steps: int
+    fitted: tuple[int, int]
+    scale: TrackScale
+    individual_count: int
+    noise: FitNoise | None = None
+    check: PredictiveCheck | None = None
+    settings: Mapping[str, float] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    def document(self) -> dict[str, Any]:
+        """A scenario file's content: the best law with its numbers; raises AirflockError where there is none."""
+        if self.best is None:
+            raise AirflockError(f"infer: {self.verdict}; nothing can be written")
+        scenario = self.best.candidate.scenario
+        found: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in scenario.document.items()}
+        found.pop("published", None)
+        found["title"] = f"{self.best.name}, inferred from tracks of {self.individual_count} individuals"
+        found |= {"agents": self.individual_count, "duration": 120.0, "dt": scenario.flight.dt}
+        for key, value in self.settings.items():
+            section, _, name = key.partition(".")
+            entry: dict[str, Any] = {"value": _short(value), "source": self.sources[key]}
+            found.setdefault(section, {})[name] = entry
+        if "arena" not in found.get("world", {}) or found["world"]["arena"] == "none":
+            found["start"] = {
+                "kind": "ball", "radius": _short(max(0.5 * self.scale.far, 1e-3)), "speed": _short(self.scale.speed),
+                "separation": 0.0,
+            }  # fmt: skip
+        else:
+            found["start"] = {"kind": "arena", "speed": _short(self.scale.speed), "separation": 0.0}
+        return found
+
+    def scenario(self) -> Scenario:
+        """The best law as a scenario that flies."""
+        document = self.document()
+        assert self.best is not None
+        own = self.best.candidate.scenario
+        given = CallerParts(law=own.model, vehicle=own.vehicle, sensor=own.sensor)
+        return build_scenario(document, f"{self.best.name}, inferred", caller_parts=given)
+
+
+def judge_laws(laws: list[LawResult]) -> tuple[LawResult | None, str]:
+    """The law that explains the tracks, if one does, and the line that says so.
+
+    Of laws that foretell as well within a standard error it is that with the fewest numbers (Breiman et al. 1984).
+    """
+    first = laws[0]
+    if not _explains(first):
+        return None, f"none of these explains the tracks better than going straight on{_perhaps(first)}"
+    as_well = [law for law in indistinguishable_laws(laws, SIMPLER) if _explains(law)]
+    best = min([first, *as_well], key=lambda law: len(law.numbers))  # of equally many the first
+    missed = (
+        f"; a free answer to neighbours would explain {best.missed:.0%} of the whole beside it"
+        if best.missed > 0.05
+        else ""
+    )
+    if best is not first:
+        few, many = f"{best.name} explains the tracks with {len(best.numbers)} numbers", len(first.numbers)
+        return best, f"{few} as well as {first.name} with {many}{missed}"
+    if beside := indistinguishable_laws(laws)[:1]:
+        return best, f"{best.name} explains the tracks best, but {beside[0].name} cannot be told from it{missed}"
+    return best, f"{best.name} explains the tracks best{missed}"
+
+
+def _perhaps(law: LawResult) -> str:
+    """What is said of a law that is ahead in most spans, but by gains that differ too much to be sure of."""
+    if law.gain <= law.parameter_penalty or law.ahead < MOST:
+        return ""
+    return (
+        f" for sure: {law.name} is ahead in {law.ahead:.0%} of the spans, but its gain of {law.gain:.0f} is less than "
+        f"{SURE:g} standard errors ({law.error:.0f}); longer tracks would tell"
+    )
+
+
+def _explains(law: LawResult) -> bool:
+    """Whether a law foretells better than going straight on, and than so many numbers would by chance."""
+    return law.gain > max(SURE * law.error, law.parameter_penalty) and law.ahead >= MOST
+
+
+def indistinguishable_laws(laws: list[LawResult], sigmas: float = APART) -> list[LawResult]:
+    """Laws that cannot be told from the first, which explains the tracks best, by what each foretells.
+
+    apart : standard errors by which the first is ahead of all others
+    """
+    found = []
+    for law in laws[1:]:
+        ahead = law.negative_log_likelihoods - laws[0].negative_log_likelihoods
+        if ahead.sum() < sigmas * float(np.sqrt(len(ahead)) * ahead.std(ddof=1)):
+            found.append(law)
+    return found
+
+
+def set_parameters(result: InferResult, model: FitModel, corrected: CorrectedFit) -> None:
+    """Give the best law its corrected numbers with their intervals, and the scenario file what it is to say of them."""
+    assert result.best is not None
+    numbers: dict[str, ParameterEstimate] = {}
+    for k, n in enumerate(model.numbers[: model.named]):
+        ends = [
+            end for low, high in (corrected.alone, corrected.joint_ends) for end in (_low(n, low[k]), _high(n, high[k]))
+        ]
+        numbers[n.key] = ParameterEstimate(
+            n.key, n.value(corrected.place[k]), ends[0], ends[1], n.unit, ends[2], ends[3]
+        )
+    noise = corrected.noise
+    known = {n.column: (n.key, n.unit) for n in result.best.candidate.noise_parameters}
+    if result.best.candidate.body_noise_column >= 0:
+        known[result.best.candidate.body_noise_column] = ("body.noise", "m^2/s^3")
+    if noise.column in known:
+        key, unit = known[noise.column]
+        (low, high), (least, most) = corrected.noise_ends
+        numbers[key] = ParameterEstimate(key, noise.law, low, high, unit, least, most)
+    result.best.numbers, result.noise = numbers, noise
+    today = datetime.date.today().isoformat()
+    result.settings = {key: number.value for key, number in numbers.items()}
+    result.sources = {key: f"infer, {today}: {interval_text(number)}" for key, number in numbers.items()}
+
+
+def _low(number: Sought, place: float) -> float | None:
+    return number.value(place) if place > EDGE else None
+
+
+def _high(number: Sought, place: float) -> float | None:
+    return number.value(place) if place < 1.0 - EDGE else None
+
+
+def interval_text(estimate: ParameterEstimate) -> str:
+    """The 95 % interval of a number by itself, in words."""
+    return (
+        f"95 % in {ends_text(estimate.low, estimate.high)}"
+        if estimate.low is not None and estimate.high is not None
+        else (ends_text(estimate.low, estimate.high))
+    )
+
+
+def ends_text(low: float | None, high: float | None) -> str:
+    """Two ends in words; None: the tracks set no limit."""
+    if low is None and high is None:
+        return "not told by the tracks"
+    if low is None:
+        return f"at most {high:.4g}"
+    if high is None:
+        return f"at least {low:.4g}"
+    return f"{low:.4g} to {high:.4g}"
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.4g}") if math.isfinite(value) else value
+
+
+RACES = 3  # from places drawn anew, of a law that is searched deeper
+LAWS = ("couzin_2002", "reynolds_1987", "vicsek_1995", "vasarhelyi_2018")
+
+
+def infer(
+    tracks: Any,
+    models: Sequence[str | Scenario] = LAWS,
+    *,
+    settings: Mapping[str, Any] | None = None,
+    check: int = 20,
+    seed: int = 0,
+    trust: bool = False,
+    done: Callable[[str], None] | None = None,
+) -> InferResult:
+    """Which flocking law explains these tracks, with which numbers, and how much it misses.
+
+    Parameters
+    ----------
+    tracks : xarray.Dataset, path, or several of them
+        Recordings of individuals that fly or swim together: several are held out in turn.
+    models : sequence of str or Scenario
+        Laws by name, presets, scenario files or files with a law of your own.
+    settings : mapping, optional
+        Keys that hold for every candidate, such as {"world.arena": "square", "world.side": 40.0}.
+    check : int
+        Flights of the law found that are compared with the tracks; 0: none.
+    seed : int
+        Seed of the search for the best fit.
+    trust : bool
+        Whether laws in files may run.
+    done : callable, optional
+        Told what has been done, now and then.
+
+    Returns
+    -------
+    Inferred
+        `laws` from best to worst, `best` or None, `verdict`, `scenario()` of the law found.
+
+    Raises
+    ------
+    AirflockError
+        If the tracks or a law cannot be used, one line each.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.infer("fish.nc", models=[])
+    Traceback (most recent call last):
+    airflock.support.errors.AirflockError: infer: no laws to choose from; name models, such as couzin_2002
+    >>> found = airflock.infer("fish.nc")  # doctest: +SKIP
+    >>> found.verdict  # doctest: +SKIP
+    'couzin_2002 explains the tracks best'
+    """
+    models = [models] if isinstance(models, str) else models
+    if not isinstance(models, Iterable):
+        raise AirflockError(f"infer: models = {models!r}: give a list of laws, such as ['couzin_2002']")
+    if not models:
+        raise AirflockError("infer: no laws to choose from; name models, such as couzin_2002")
+    say = done or (lambda _: None)
+    settings = dict(settings or {})
+    scenarios, box = law_scenarios(models, settings, trust=trust)
+    recordings = read_recordings(tracks)
+    followed = [tracks_from_recording(recording, name, box=box) for name, recording in recordings]
+    _alike(followed)
+    scale = tracks_scale(followed)
+    comparison = _Comparison(followed, scale, seed, say)
+    laws, by_name = comparison.of([make_candidate(each, scale, followed[0].axes) for each in scenarios])
+    best, verdict = judge_laws(laws)
+    result = InferResult(
+        laws, best, verdict, sum(each.counted for each in followed), comparison.frames(), scale,
+        max(each.individual_count for each in followed),
+    )  # fmt: skip
+    if best is None:
+        return result
+    comparison.contest(laws, by_name)
+    result.best, result.verdict = judge_laws(laws)
+    if result.best is not None:
+        best, model = result.best, by_name[result.best.name]
+        teller = _teller(say, f"{best.name}, flown again")
+        corrected = correct_fit(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
+        set_parameters(result, model, corrected)
+        if check:
+            result.check = run_predictive_check(model, corrected.place, corrected.noise, check, _teller(say, "check"))
+    return result
+
+
+class _Comparison:
+    """Laws against going straight on, on the same tracks.
+
+    spans : those on which is fitted
+    """
+
+    def __init__(self, followed: Sequence[SpanTracks], scale: TrackScale, seed: int, say: Callable[[str], None]):
+        self.followed, self.scale, self.seed, self.say = followed, scale, seed, say
+        self.reference, self.straight = law_selection.straight_model(followed, scale)
+        self.plain = law_selection.cross_validate(self.reference, self.straight, lambda: say("going straight on"))
+        self.spans = law_selection.sample_spans(self.reference)
+        self.laws: dict[str, LawCandidate] = {}
+
+    def frames(self) -> tuple[int, int]:
+        """Frames on which laws are fitted, of all."""
+        chosen = (self.followed[t].spans[s] for t, s in (self.reference.spans[k] for k in self.spans))
+        return sum(end - begin for begin, end in chosen), sum(len(each.seen) for each in self.followed)
+
+    def of(self, candidates: Sequence[LawCandidate]) -> tuple[list[LawResult], dict[str, FitModel]]:
+        """Laws from best to worst, and the model of each by its name."""
+        self.laws = {each.name: each for each in candidates}
+        laws, models = [], {}
+        for each in candidates:
+            say = _teller(self.say, each.name)
+            models[each.name], fit = self.fitted(each, self.seed, say)
+            laws.append(self.judged(each.name, models[each.name], fit, say))
+        laws.sort(key=lambda law: -law.gain)
+        return laws, models
+
+    def fitted(self, law: LawCandidate, seed: int, say: Callable[[], None]) -> tuple[FitModel, Fit]:
+        """A law at its likeliest, raced from places drawn by a seed."""
+        gains = self.straight.place[self.reference.named :]
+        return law_selection.fit_law(law, self.followed, self.scale, gains, seed, say)
+
+    def contest(self, laws: list[LawResult], models: dict[str, FitModel]) -> None:
+        """Search deeper for the best law, and for each that cannot be told from it; laws are sorted anew.
+
+        A law may lose for want of searching alone: a short search ends on another hill now and then.
+        """
+        searched: set[str] = set()
+        while waiting := [law for law in (laws[0], *indistinguishable_laws(laws)) if law.name not in searched]:
+            law = waiting[0]
+            models[law.name], deeper = self.deeper(law, models[law.name])
+            laws[:] = sorted((deeper if each is law else each for each in laws), key=lambda each: -each.gain)
+            searched.add(law.name)
+
+    def deeper(self, law: LawResult, model: FitModel) -> tuple[FitModel, LawResult]:
+        """A law after more searching, and without numbers that the others make up for; judged anew."""
+        own, say = self.laws[law.name], _teller(self.say, f"{law.name}, simplified")
+        tried = [(model, law.fit), *(self.fitted(own, self.seed + more, say) for more in range(1, RACES))]
+        model, fit = law_selection.fit_minimal(own, *min(tried, key=lambda each: each[1].loss), say)
+        return model, self.judged(law.name, model, fit, say)
+
+    def judged(self, name: str, model: FitModel, fit: Fit, say: Callable[[], None]) -> LawResult:
+        """How well a fitted law foretells what it has not seen."""
+        assert model.law is not None
+        held = law_selection.cross_validate(model, fit, say)
+        ahead = self.plain.negative_log_likelihoods - held.negative_log_likelihoods
+        numbers = {
+            n.key: ParameterEstimate(n.key, n.value(fit.place[k]), None, None, n.unit)
+            for k, n in enumerate(model.numbers[: model.named])
+        }
+        bare = fit.score.loss() + len(fit.free), self.straight.score.loss() + len(self.straight.free)
+        left, gained = (
+            lack_of_fit(model, fit.place, self.spans),
+            max(self.straight.score.loss() - fit.score.loss(), 0.0),
+        )
+        return LawResult(
+            name, float(ahead.sum()), float(np.sqrt(len(ahead)) * ahead.std(ddof=1)), float((ahead > 0.0).mean()),
+            0.5 * len(numbers) * math.log(max(sum(each.counted for each in model.tracks), 2)),
+            2.0 * (bare[0] - bare[1]), held.inside, left / max(gained + left, 1e-9), numbers, model.law, fit,
+            force_maps(model, fit.place, self.scale, self.spans), held.negative_log_likelihoods,
+        )  # fmt: skip
+
+
+def _teller(say: Callable[[str], None], name: str) -> Callable[[], None]:
+    return lambda: say(name)
+
+
+def read_recordings(tracks: Any) -> list[tuple[str, xr.Dataset]]:
+    """Recordings by name: given ones, saved ones, or files that `load_tracks` reads without options."""
+    several: Iterable[Any] = [tracks] if isinstance(tracks, (xr.Dataset, str, Path)) else tracks
+    if not isinstance(several, Iterable):
+        raise RecordingError(f"{type(tracks).__name__} holds no tracks; give recordings or files")
+    recordings = []
+    for number, each in enumerate(several, 1):
+        if isinstance(each, xr.Dataset):
+            recordings.append((f"recording {number}", each))
+        elif str(each).endswith(".nc"):
+            recordings.append((str(each), load_recording(each)))
+        else:
+            recordings.append((str(each), _read(expand_path(each))))
+    if not recordings:
+        raise RecordingError("no tracks to infer a law from")
+    return recordings
+
+
+def _read(path: Path) -> xr.Dataset:
+    """A file of tracks that import reads without options; where it needs some, the fault gives the command."""
+    try:
+        return load_tracks(path)
+    except RecordingError as fault:
+        if not path.is_file() or " --" not in str(fault):  # it is nothing that an option would mend
+            raise
+        raise RecordingError(
+            f"{fault}\n{path}: infer takes no options of import: airflock import {path.name} ... --save tracks.nc, "
+            "then give tracks.nc"
+        ) from fault
+
+
+def _alike(followed: Sequence[SpanTracks]) -> None:
+    first = followed[0]
+    for other in followed[1:]:
+        if other.axes != first.axes or abs(other.period - first.period) > 0.01 * first.period:
+            raise RecordingError(
+                f"{other.name}: {other.axes} axes, a frame every {other.period:g} s; {first.name} has {first.axes}, "
+                f"{first.period:g} s; import both with the same --rate"
+            )

@@ -1,0 +1,499 @@
+"""Correct bias and intervals of a fit by flights of the fitted law (a parametric bootstrap)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.estimate.inference.identifiability import Ridges, profile_ridges, ridges_of_dropped
+from airflock.estimate.inference.innovation_filter import FilterGains, FitModel, InnovationFilter
+from airflock.estimate.inference.law_candidates import LawCandidate
+from airflock.estimate.inference.likelihood_fit import (
+    CENTRAL_SLOPES,
+    FINE_SLOPES,
+    Fit,
+    climb_to_maximum,
+    distance_to_worse,
+    loss_at,
+    open_ends,
+    settle_fit,
+    standard_errors,
+)
+from airflock.estimate.inference.observed_tracks import (
+    ABSENT,
+    ENTERS,
+    SpanTracks,
+    with_positions,
+)
+
+Array = NDArray[np.float64]
+FREE = 1e-9  # m²: least variance
+PUSHED, BLURRED = -1, -2  # noise that is no number of the law or its body
+LASTING = 1.0  # s; correlation time of errors of what is perceived
+BLUR = 0.05  # of the distance to the nearest neighbour: first guess of these errors
+LADDER = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0)  # of the logarithm of noise
+
+
+@dataclass(frozen=True)
+class FitNoise:
+    """Noise of a flight and of its tracks.
+
+    law   : number of the law or its body that is noise (column), and its value; PUSHED: SD of pushes of velocities,
+            m/s; BLURRED: SD of errors of perceived positions, m
+    speed : SD of a period's change of own speed, m/s, where speeds are the individuals' own
+    seen  : SD of a seen position, m
+    """
+
+    column: int
+    law: float
+    speed: float
+    seen: float
+
+    def shifted(self, steps: Array) -> "FitNoise":
+        """The noise with logarithms changed."""
+        law, speed, seen = (
+            value * float(np.exp(step)) for value, step in zip((self.law, self.speed, self.seen), steps, strict=True)
+        )
+        return replace(self, law=law, speed=speed, seen=seen)
+
+
+class NoisyFlight:
+    """A flight of a fitted law with its noise, period by period of the tracks.
+
+    place : numbers by column, gains, usual speed (`Model.split`)
+    """
+
+    def __init__(
+        self, walk: InnovationFilter, fitted: tuple[dict[int, float], FilterGains, float], noise: FitNoise, seed: int
+    ):
+        numbers, self.gains, self.mean_speed = fitted
+        self.walk, self.noise, self.generator = walk, noise, np.random.default_rng(seed)
+        self.columns = {**numbers, **({noise.column: noise.law} if noise.column >= 0 else {})}
+        self.shape = walk.axes, walk.tracks.individual_count
+        self.own_speed = walk.law is not None and walk.law.commands_heading
+        self.error: Array | None = None  # of everybody's position as it is perceived, m
+
+    def begin(self, world: int) -> None:
+        """Forget the flight before. world : which random numbers the law draws."""
+        if self.noise.column == BLURRED:
+            self.error = self.generator.normal(0.0, self.noise.law, self.shape)
+        self.walk.begin(self.columns, world=world)
+
+    def step(self, speed: Array | None = None) -> Array | None:
+        """Fly for one period. Returns own speeds (individual,) after it, m/s, where they are the individuals' own.
+
+        speed : own speeds before it, by default those of the velocities
+        """
+        walk, axes = self.walk, self.walk.axes
+        was = walk.now().copy()
+        if self.noise.column == PUSHED:
+            walk.now()[axes:] += self.generator.normal(0.0, self.noise.law, self.shape)
+        if self.error is None:
+            walk.fly(self.mean_speed)
+        else:  # everybody decides by displaced positions, and moves from the true one
+            lasts = float(np.exp(-walk.tracks.period / LASTING))
+            draws = self.generator.normal(0.0, self.noise.law, self.shape)
+            self.error = lasts * self.error + np.sqrt(1.0 - lasts**2) * draws
+            walk.now()[:axes] += self.error
+            walk.fly(self.mean_speed)
+            walk.now()[:axes] -= self.error
+        if not self.own_speed:
+            return None
+        speed = np.linalg.norm(was[axes:], axis=0) if speed is None else speed
+        speed = next_speed(speed, self.gains.keep, self.mean_speed, self.noise.speed, self.generator)
+        stretch_last_step(walk, was, speed / self.mean_speed)
+        return speed
+
+
+def fly_tracks(
+    walk: InnovationFilter,
+    fitted: tuple[dict[int, float], FilterGains, float],
+    filtered_states: Array,
+    noise: FitNoise,
+    spans: Sequence[int],
+    seed: int,
+) -> SpanTracks:
+    """Tracks of the law flown again from the beginning of each span.
+
+    place : numbers by column, gains, usual speed (`Model.split`); kept : where individuals were (`Walk.errors`)
+    """
+    tracks, axes = walk.tracks, walk.axes
+    flight = NoisyFlight(walk, fitted, noise, seed)
+    seen = np.full_like(tracks.seen, np.nan)
+    for s in spans:
+        begin, end = tracks.spans[s]
+        flight.begin((seed * 1009 + s + 1) % 2**31)
+        for k in range(begin, end):
+            state = tracks.state[k]
+            if k > begin:
+                flight.step()
+            enters = (state == ENTERS) | (state == ABSENT)
+            walk.now()[:, enters] = filtered_states[k][:, enters]
+            if k == begin:
+                walk.fill_past_states(walk.now().copy())
+            there = state > 1
+            noisy = walk.now()[:axes] + flight.generator.normal(0.0, noise.seen, flight.shape)
+            seen[k][:, there] = noisy[:, there]
+    return with_positions(tracks, seen)
+
+
+def next_speed(
+    speed: Array, persistence: float, mean_speed: float, noise: float, generator: np.random.Generator
+) -> Array:
+    """Own speeds (individual,) a period later, m/s: they return to the usual one, and wander.
+
+    persistence : share of a difference from the usual speed that is left; noise : standard deviation of a period's
+                  change
+    """
+    found: Array = mean_speed + persistence * (speed - mean_speed) + generator.normal(0.0, noise, len(speed))
+    return np.maximum(found, 0.05 * mean_speed)
+
+
+def stretch_last_step(walk: InnovationFilter, previous: Array, factor: Array) -> None:
+    """Make the last step of each individual so many times as long, and its velocity as large.
+
+    was : (component, individual), positions and velocities before the step
+    """
+    now, axes = walk.now(), walk.axes
+    now[:axes] = previous[:axes] + factor * walk.tracks.nearest(now[:axes] - previous[:axes])
+    now[axes:] *= factor
+
+
+def noise_statistics(model: FitModel, u: Array, spans: Sequence[int]) -> Array:
+    """What noise shows in: logarithms of the variances along and across, and correlations from frame to frame."""
+    found = []
+    for walk, own in model.parts(spans):
+        by_column, gains, usual = model.split(u)
+        e = walk.errors(by_column, gains, usual, own)
+        rows = np.concatenate([np.arange(*walk.tracks.spans[s]) for s in own])
+        found.append(e[rows])
+    parts = []
+    for c in range(2):
+        x = np.concatenate([e[:, c].ravel() for e in found])
+        pairs = np.concatenate([(e[1:, c] * e[:-1, c]).ravel() for e in found])
+        parts.append((np.log((x[x != 0.0] ** 2).mean()), pairs[pairs != 0.0].mean() / (x[x != 0.0] ** 2).mean()))
+    return np.array([parts[0][0], parts[1][0], 2.0 * parts[0][1], 2.0 * parts[1][1]])
+
+
+class FittedFlights:
+    """Flights of a fitted model, from the beginnings of some spans of its tracks."""
+
+    def __init__(self, model: FitModel, point: Array, spans: Sequence[int]):
+        self.model, self.spans = model, list(spans)
+        self.wanted = noise_statistics(model, point, self.spans)
+        self.kept = []
+        for walk in model.filters:
+            kept = np.zeros((len(walk.seen), 2 * walk.axes, walk.tracks.individual_count))
+            walk.errors(*model.split(point), None, kept)
+            self.kept.append(kept)
+
+    def tracks(self, point: Array, noise: FitNoise, seed: int) -> list[SpanTracks]:
+        """Tracks of one flight of all spans."""
+        found = []
+        by_walk = dict(self.model.parts(self.spans))
+        for t, walk in enumerate(self.model.filters):
+            own = by_walk.get(walk, [])
+            found.append(fly_tracks(walk, self.model.split(point), self.kept[t], noise, own, 7919 * seed + t))
+        return found
+
+    def model_on(self, tracks: list[SpanTracks]) -> FitModel:
+        """The same model on other tracks."""
+        twin = FitModel(self.model.law, tracks, self.model.scale)
+        twin = twin.with_fixed(sorted(self.model.held))
+        return twin.robust() if self.model.soft else twin
+
+    def noise(self, point: Array, first_noise: FitNoise, fitted: Array) -> tuple[FitNoise, float]:
+        """Noise with which the flights' statistics are those of the tracks, and the misfit.
+
+        fitted : place at which statistics are taken, that of the fit to the tracks
+        """
+        from scipy.optimize import least_squares
+
+        active = [0, 2] if not self.model.own_speed else [0, 1, 2]
+
+        def off(z: Array, base: FitNoise = first_noise) -> Array:
+            steps = np.zeros(3)
+            steps[active] = z
+            twin = self.model_on(self.tracks(point, base.shifted(steps), 1))
+            return np.nan_to_num(noise_statistics(twin, fitted, self.spans) - self.wanted, nan=10.0)
+
+        tried = [float(np.sum(off(np.eye(len(active))[0] * step) ** 2)) for step in LADDER]
+        start = np.eye(len(active))[0] * LADDER[int(np.argmin(tried))]
+        found = least_squares(off, start, diff_step=0.1, x_scale=1.0, max_nfev=5)
+        steps = np.zeros(3)
+        steps[active] = np.clip(found.x, -8.0, 8.0)
+        return first_noise.shifted(steps), 2.0 * float(found.cost)
+
+
+def first_noise(model: FitModel, point: Array, spans: Sequence[int]) -> list[FitNoise]:
+    """Noise to begin with, of each kind that there may be.
+
+    What the gains say of the noise of the tracks, and a guess of that of the flight.
+    """
+    along, across = model.score(point, spans).variances()
+    _, gains, usual = model.split(point)
+    seen = float(np.sqrt(max((1.0 - gains.across[0]) * across, FREE)))
+    period = model.tracks[0].period
+    push = float(np.sqrt(max(across, FREE))) * gains.across[1] / period
+    column, law = PUSHED, push
+    assert model.law is not None
+    if model.law.noise_parameters:
+        number = model.law.noise_parameters[0]
+        column, law = number.column, max(push / max(usual, 1e-6), 1e-3) if number.unit == "rad" else push
+    elif model.law.body_noise_column >= 0:
+        column, law = model.law.body_noise_column, max(push**2 / (2.0 * period), 1e-6)
+    found = FitNoise(column, law, float(np.sqrt(max(along, FREE))) * gains.along[1] / period, seen)
+    if column != PUSHED:
+        return [found]
+    return [found, replace(found, column=BLURRED, law=BLUR * model.scale.near)]
+
+
+FLOWN = 40  # flights of each look
+RANGE = 1.6  # of the logarithm of noise, to each side, at the first look
+NARROW = 0.15  # at the second, at least
+BESIDE = 1.25  # of the interval: range of the second look
+OTHERS = (0.7, 0.15)  # of the logarithms of noise of the own speed, and of the tracks: to each side
+MOVED = 4  # times that the first look is made, each where the one before points to
+POWERS = 3  # of the curves
+PLACES = 161  # along the range
+IntervalEnds = tuple[float | None, float | None]
+
+
+def estimate_law_noise(
+    flights: FittedFlights,
+    point: Array,
+    scatter: Array,
+    noise: FitNoise,
+    fitted: Array,
+    levels: Sequence[float],
+    seed: int,
+) -> tuple[FitNoise, list[IntervalEnds]]:
+    """The likeliest noise, and the ends of an interval for each level; None where the tracks set no limit.
+
+    place, scatter : numbers of the law, as places, and their standard errors; fitted: where statistics are taken
+    levels         : shares of Student's distribution below an upper end, such as 0.975
+    """
+    generator = np.random.default_rng(seed)
+    centre, half, widest = 0.0, RANGE, int(np.argmax(levels))
+    for _ in range(MOVED):
+        steps, first = _look(flights, point, scatter, noise, fitted, levels, centre, half, generator)
+        low, high = first[widest]
+        if high is None:  # more noise always shows at last
+            centre += half
+        elif low is None and steps[0] < centre - 0.9 * half:
+            centre -= half
+        else:
+            break
+    bottom, top = (centre - half if low is None else low), (centre + half if high is None else high)
+    centre, half = 0.5 * (bottom + top), max(0.5 * BESIDE * (top - bottom), NARROW)
+    steps, intervals = _look(flights, point, scatter, noise, fitted, levels, centre, half, generator)
+    ends: list[IntervalEnds] = []
+    for (low, high), (before, after) in zip(intervals, first, strict=True):
+        below = centre - half if low is None and before is not None else low
+        above = centre + half if high is None and after is not None else high
+        ends.append(
+            (None if below is None else noise.law * float(np.exp(below)),
+             None if above is None else noise.law * float(np.exp(above)))
+        )  # fmt: skip
+    return noise.shifted(steps), ends
+
+
+def _look(
+    flights: FittedFlights, place: Array, scatter: Array, noise: FitNoise, fitted: Array, levels: Sequence[float],
+    centre: float, half: float, generator: np.random.Generator,
+) -> tuple[Array, list[IntervalEnds]]:  # fmt: skip
+    """Logarithms by which noises are the likeliest, and ends of that of the law, by flights over a range."""
+    from scipy.stats import t as student
+
+    named = flights.model.named
+    speeds = flights.model.own_speed
+    design, rows = [], []
+    for number in range(FLOWN):
+        x = 2.0 * (number + generator.random()) / FLOWN - 1.0
+        speed, seen = generator.uniform(-1.0, 1.0, 2) * (1.0 if speeds else 0.0, 1.0)
+        steps = np.array([centre + half * x, OTHERS[0] * speed, OTHERS[1] * seen])
+        law = place.copy()
+        law[:named] = np.clip(law[:named] + scatter[:named] * generator.normal(size=named), 0.0, 1.0)
+        twin = flights.model_on(flights.tracks(law, noise.shifted(steps), int(generator.integers(2, 2**20))))
+        rows.append(np.nan_to_num(noise_statistics(twin, fitted, flights.spans) - flights.wanted, nan=10.0))
+        design.append([*(x**power for power in range(POWERS + 1)), seen, *([speed] if speeds else [])])
+    matrix, found = np.array(design), np.array(rows)
+    curves = np.linalg.lstsq(matrix, found, rcond=None)[0]
+    left = found - matrix @ curves
+    freedom = FLOWN - matrix.shape[1]
+    covariance = left.T @ left / freedom * (1.0 + matrix.shape[1] / FLOWN)
+    weight = np.linalg.inv(covariance + 1e-12 * np.eye(len(covariance)))
+    along = np.linspace(-1.0, 1.0, PLACES)
+    off = np.stack([along**power for power in range(POWERS + 1)], axis=1) @ curves[: POWERS + 1]
+    others = curves[POWERS + 1 :]  # noise of the tracks and of speeds follows, within what was flown
+    follow = -np.linalg.solve(others @ weight @ others.T + np.eye(len(others)), others @ weight @ off.T)
+    rest = off + follow.T @ others
+    worse = np.einsum("ij,jk,ik->i", rest, weight, rest) + (follow**2).sum(axis=0)
+    best = int(np.argmin(worse))
+    steps = np.array([centre + half * along[best], OTHERS[0] * follow[1, best] if speeds else 0.0, 0.0])
+    steps[2] = OTHERS[1] * follow[0, best]
+    ends: list[IntervalEnds] = []
+    for level in levels:
+        held = np.flatnonzero(worse - worse[best] <= student.ppf(level, freedom) ** 2)
+        low = None if held[0] == 0 else centre + half * float(along[held[0]])
+        high = None if held[-1] == PLACES - 1 else centre + half * float(along[held[-1]])
+        ends.append((low, high))
+    return steps, ends
+
+
+ROUNDS = (3, 10)  # flights of each round, and of the last, which gives the intervals
+MOST = 6  # rounds
+LONGEST = 0.1  # of a range: move of a number that is put right, in one round
+MATCHED = 0.005  # sum of squares by which statistics of flights may differ from those of the tracks in the last round
+STEPS = 6  # of a climb
+# Relative standard deviations of what flights leave out, of numbers and of noise, such as where steps of the motion
+# fall between frames. Measured on tracks of known laws (tests/nightly/infer.py).
+BEYOND = (0.0075, 0.05)
+DOUBT = 0.5  # share of a correction that is not trusted
+ONE = 1.96  # standard errors that hold one number in 95 %
+APART = 0.05  # of a range: largest standard deviation by which the laws of the last flights are apart
+UNLIKELY = 20.0  # loss above the fit, beyond which another end is left
+SURE = 0.95  # of a number alone, and of all numbers together
+WIDER = (1.0, 3.0)  # least and largest variance of refitted numbers, in units of what the curvature says
+
+
+@dataclass
+class CorrectedFit:
+    """A fit corrected by flights of its own law, and how sure it is.
+
+    place  : of all numbers, corrected
+    alone  : ends of 95 % intervals of each number by itself, as places; low and high
+    joint  : ends of intervals that hold all numbers together in 95 %
+    noise  : of the flight and of the tracks
+    noises : ends of the number of noise, alone and together; None where the tracks set no limit
+    """
+
+    place: Array
+    alone: tuple[Array, Array]
+    joint_ends: tuple[Array, Array]
+    noise: FitNoise
+    noise_ends: tuple[IntervalEnds, IntervalEnds]
+
+
+def interval_levels(numbers: int) -> tuple[float, float]:
+    """Shares below the upper end of an interval: of one number, and of so many that hold together (Šidák 1967)."""
+    return 0.5 + 0.5 * SURE, 0.5 + 0.5 * SURE ** (1.0 / max(numbers, 1))
+
+
+def correct_fit(
+    law: LawCandidate, model: FitModel, fit: Fit, spans: Sequence[int], on_progress: Callable[[], None] = lambda: None
+) -> CorrectedFit:
+    """Correct a fit by flights of its own law, and find its intervals.
+
+    law : with all its numbers, also those that the model does without; spans : on which it was fitted
+    """
+    from scipy.stats import norm as normal, t as student
+
+    model, fit = _softened(model, fit, spans)
+    kinds = first_noise(model, fit.place, spans)
+    named = [k for k in fit.free if k < model.named]
+    shares = interval_levels(len(named) + (kinds[0].column >= 0))
+    deepest = 0.5 * WIDER[1] * float(normal.ppf(shares[1])) ** 2
+    fit, ways = profile_ridges(model, fit, spans, deepest, on_progress)
+    ways = Ridges((*ways.paths, *ridges_of_dropped(law, model, fit, spans, deepest, on_progress)))
+    fitted = fit.place
+    flights = FittedFlights(model, fitted, spans)
+    curved, (below, above) = standard_errors(model, fit, spans), open_ends(model, fit, spans)
+    for k in np.flatnonzero(below != above):  # a plateau has no curvature, its edge is an end
+        curved[k] = distance_to_worse(model, fit, spans, int(k), 0.0 if above[k] else 1.0) / ONE
+    place, kinds, misses = _put_right(flights, fit, kinds, curved, on_progress)
+    deviations = misses.std(axis=0, ddof=1)
+    wider = float(np.clip(np.median((deviations[named] / curved[named]) ** 2), *WIDER))
+    slopes = [n.slope(float(x)) / max(n.value(float(x)), 1e-9) for n, x in zip(model.numbers, place, strict=True)]
+    count, found = len(misses), []
+    for share in shares:
+        z = float(normal.ppf(share))
+        wide = float(student.ppf(share, count - 1)) * np.sqrt(1.0 + 1.0 / count)
+        scatter = np.maximum(wide * deviations, z * curved)
+        # half of what was put right is doubt about the noise, which is simpler in flights than in animals
+        doubt = np.hypot(DOUBT * (place - fitted), z * BEYOND[0] / np.maximum(slopes, 1e-9))
+        down, up = ways.ends(fitted, 0.5 * wider * z**2)
+        low = place - np.hypot(np.maximum(scatter, fitted - down), doubt)
+        high = place + np.hypot(np.maximum(scatter, up - fitted), doubt)
+        low[below | (down <= 0.0)], high[above | (up >= 1.0)] = 0.0, 1.0
+        found.append((low, high))
+    noise = kinds[0]
+    ends: list[IntervalEnds] = [(None, None), (None, None)]
+    if noise.column >= 0:
+        noise, ends = _noise(flights, place, 0.5 * (found[0][1] - found[0][0]) / ONE, noise, fitted, shares)
+        on_progress()
+    return CorrectedFit(place, found[0], found[1], noise, (ends[0], ends[1]))
+
+
+def _softened(model: FitModel, fit: Fit, spans: Sequence[int]) -> tuple[FitModel, Fit]:
+    """The model in which large differences count less, and its fit, from that of all differences or another end."""
+    model = model.robust()
+    here = model.score(fit.place, spans).loss()
+    near = [u for u in fit.others if model.score(u, spans).loss() < here + UNLIKELY]
+    ends = [
+        climb_to_maximum(model, u, fit.free, spans, slopes=(FINE_SLOPES, CENTRAL_SLOPES)) for u in (fit.place, *near)
+    ]
+    best = min(ends, key=lambda end: end.loss)
+    return model, replace(best, others=(*fit.others, *(end.place for end in ends if end is not best)))
+
+
+def _put_right(
+    flights: FittedFlights, fit: Fit, kinds: list[FitNoise], curved: Array, say: Callable[[], None]
+) -> tuple[Array, list[FitNoise], Array]:
+    """The place put right, the noise of each kind that goes with it, and the misses of the last flights."""
+    model, spans, fitted = flights.model, flights.spans, fit.place
+    named = [k for k in fit.free if k < model.named]
+    place, number, misses = fitted.copy(), 1, np.zeros((1, len(fitted)))
+    generator = np.random.default_rng(len(spans))
+    for turns in range(MOST):
+        matched = [flights.noise(place, each, fitted) for each in kinds]
+        kinds = [noise for noise, _ in matched]
+        # noise and numbers go together, as that of a heading and the limit of its turns: each is put right in turn
+        last = turns == MOST - 1 or (turns > 0 and min(off for _, off in matched) < MATCHED)
+        # how far fits miss depends on the law: the last flights are of laws as far apart as the first fits were
+        apart = np.minimum(np.maximum(curved, misses.std(axis=0)), APART) if len(misses) > 1 else np.zeros(len(fitted))
+        found = []
+        for turn in range(ROUNDS[last]):
+            number += 1
+            law = place.copy()
+            law[named] = np.clip(law[named] + apart[named] * generator.normal(size=len(named)), 0.0, 1.0)
+            twin = flights.model_on(flights.tracks(law, kinds[turn % len(kinds)], number))
+            # from the law itself, or from where fits of such laws have ended, whichever is likelier
+            starts = (law, np.clip(fitted + law - place, 0.0, 1.0))
+            start = min(starts, key=lambda u, twin=twin: loss_at(twin, u, fit.free, spans))  # type: ignore[misc]
+            found.append(
+                settle_fit(
+                    twin, climb_to_maximum(twin, start, fit.free, spans, STEPS, slopes=(FINE_SLOPES,)), spans
+                ).place
+                - law
+            )
+            say()
+        misses = np.array(found)
+        moved = fitted[named] - np.median(misses[:, named], axis=0)
+        place[named] = np.clip(moved, place[named] - LONGEST, place[named] + LONGEST).clip(0.0, 1.0)
+        if last:
+            break
+    return place, [flights.noise(place, each, fitted)[0] for each in kinds], misses
+
+
+def _noise(
+    flights: FittedFlights, place: Array, scatter: Array, noise: FitNoise, fitted: Array, shares: tuple[float, float]
+) -> tuple[FitNoise, list[IntervalEnds]]:
+    """The number of noise, and its ends alone and together, with what flights leave out."""
+    from scipy.stats import norm as normal
+
+    noise, ends = estimate_law_noise(flights, place, scatter, noise, fitted, shares, len(flights.spans))
+    found: list[IntervalEnds] = []
+    for share, (low, high) in zip(shares, ends, strict=True):
+        more = float(normal.ppf(share)) * BEYOND[1]
+        found.append((_farther(noise.law, low, more), _farther(noise.law, high, more)))
+    return noise, found
+
+
+def _farther(value: float, end: float | None, more: float) -> float | None:
+    """An end whose logarithm lies further off, by what flights leave out."""
+    if end is None:
+        return None
+    away = float(np.log(end / value))
+    return value * float(np.exp(np.copysign(np.hypot(away, more), away)))

@@ -1,1 +1,0 @@
-"""Recordings for other tools: CSV, Parquet, and netCDF in both layouts of `movement`."""

@@ -1,0 +1,182 @@
+"""Put tracks into one local frame (east, north, up) and on one clock."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.recordings.imports.table_columns import quote_column
+from airflock.recordings.imports.track import (
+    COMMAND_TARGETS,
+    GEODETIC_TARGETS,
+    POSITION_TARGETS,
+    VELOCITY_TARGETS,
+    ImportedTrack,
+    ImportReport,
+)
+
+SEMI_MAJOR = 6378137.0  # m, WGS84 (NIMA TR8350.2)
+FLATTENING = 1.0 / 298.257223563
+ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)
+
+
+def to_ecef(lat: Any, lon: Any, height: Any) -> NDArray[np.float64]:
+    """Earth-centred, earth-fixed coordinates (..., 3), m, of latitude and longitude (degrees) and height (m)."""
+    phi, lam, h = np.radians(lat), np.radians(lon), np.asarray(height, float)
+    normal = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY2 * np.sin(phi) ** 2)
+    across = (normal + h) * np.cos(phi)
+    up = (normal * (1.0 - ECCENTRICITY2) + h) * np.sin(phi)
+    return np.stack(np.broadcast_arrays(across * np.cos(lam), across * np.sin(lam), up), axis=-1)
+
+
+def enu_axes(lat: float, lon: float) -> NDArray[np.float64]:
+    """Unit vectors east, north and up at a place, as rows, in earth-centred coordinates."""
+    phi, lam = np.radians(lat), np.radians(lon)
+    east = [-np.sin(lam), np.cos(lam), 0.0]
+    north = [-np.sin(phi) * np.cos(lam), -np.sin(phi) * np.sin(lam), np.cos(phi)]
+    return np.array([east, north, np.cross(east, north)])
+
+
+def to_enu(lat: Any, lon: Any, height: Any, origin: tuple[float, float, float]) -> NDArray[np.float64]:
+    """East, north, up (..., 3), m, about an origin of latitude, longitude (degrees) and height (m)."""
+    offset: NDArray[np.float64] = (to_ecef(lat, lon, height) - to_ecef(*origin)) @ enu_axes(*origin[:2]).T
+    return offset
+
+
+def points_to_origin(
+    local: NDArray[np.float64], from_origin: tuple[float, float, float], to_origin: tuple[float, float, float]
+) -> NDArray[np.float64]:
+    """Points (row, 3) of the frame about one origin in the frame about another, m."""
+    centred = local @ enu_axes(*from_origin[:2]) + (to_ecef(*from_origin) - to_ecef(*to_origin))
+    return centred @ enu_axes(*to_origin[:2]).T
+
+
+def vectors_to_origin(
+    vectors: NDArray[np.float64], from_origin: tuple[float, float, float], to_origin: tuple[float, float, float]
+) -> NDArray[np.float64]:
+    """Vectors (row, 3), such as velocities, from the axes at one origin to those at another."""
+    rotated: NDArray[np.float64] = vectors @ enu_axes(*from_origin[:2]) @ enu_axes(*to_origin[:2]).T
+    return rotated
+
+
+DEGREES = {"lat": 90.0, "lon": 360.0}  # the largest that there are
+
+
+def to_local_frame(
+    tracks: list[ImportedTrack], origin: tuple[float, float, float] | None, findings: ImportReport
+) -> None:
+    """Rule 3: latitude and longitude to local metres, and all frames about one origin."""
+    geodetic = [t for t in tracks if "x" not in t.columns]
+    placed = [t for t in tracks if "x" in t.columns and t.origin is not None]
+    free = [t for t in tracks if "x" in t.columns and t.origin is None]
+    if free and (geodetic or placed):
+        findings.fault(
+            f"{free[0].source}: has no origin, while {(geodetic or placed)[0].source} has one; import them separately"
+        )
+        return
+    if origin is None and placed:
+        origin = placed[0].origin
+    wrong: set[str] = set()
+    for track in geodetic:
+        fault = _degrees_fault(track)
+        if fault and track.source not in wrong:
+            wrong.add(track.source)
+            findings.fault(fault)
+        elif not fault and len(track.columns["lat"]):
+            if origin is None:
+                origin = _first_fix(track)
+                findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
+            _project(track, origin)
+    for track in placed:
+        assert origin is not None
+        _move(track, origin)
+
+
+def _degrees_fault(track: ImportedTrack) -> str:
+    """The first row that is no latitude and longitude, and what to write; empty if all are."""
+    lat, lon = track.columns["lat"], track.columns["lon"]
+    beyond = {name: np.abs(track.columns[name]) > most for name, most in DEGREES.items()}
+    bad = np.flatnonzero(beyond["lat"] | beyond["lon"])
+    if not bad.size:
+        return ""
+    names = [name for name in DEGREES if beyond[name].any()]
+    ways = " ".join(f'--map "{name}:={quote_column(track.label(name))}*1e-7"' for name in names)
+    return (
+        f"{track.source}: column {', '.join(map(track.label, names))}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, "
+        f"{lon[bad[0]]:g} is no latitude and longitude; if it is in 1e-7 degrees, write {ways}"
+    )
+
+
+def _first_fix(track: ImportedTrack) -> tuple[float, float, float]:
+    """Latitude, longitude (degrees) and height (m) of a track's first row; 0 m where no height is logged."""
+    height = track.columns["alt"][0] if "alt" in track.columns else 0.0
+    return float(track.columns["lat"][0]), float(track.columns["lon"][0]), float(height)
+
+
+def _project(track: ImportedTrack, origin: tuple[float, float, float]) -> None:
+    """Put local metres about an origin in the place of a track's latitude, longitude and height."""
+    lat, lon = track.columns["lat"], track.columns["lon"]
+    local = to_enu(lat, lon, track.columns.get("alt", np.zeros(len(lat))), origin)
+    axes = 3 if "alt" in track.columns else 2
+    track.columns = {k: v for k, v in track.columns.items() if k not in GEODETIC_TARGETS}
+    track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION_TARGETS[:axes])}
+    track.user_labels |= {"x": track.label("lon"), "y": track.label("lat"), "z": track.label("alt")}
+    track.origin = origin
+
+
+def _move(track: ImportedTrack, origin: tuple[float, float, float]) -> None:
+    """Carry a track in local metres over to the frame about another origin."""
+    assert track.origin is not None
+    if track.origin == origin:
+        return
+    for names, change in (
+        (POSITION_TARGETS, points_to_origin),
+        (VELOCITY_TARGETS, vectors_to_origin),
+        (COMMAND_TARGETS, vectors_to_origin),
+    ):
+        if track.has(names):
+            moved = change(track.stack(names, 3), track.origin, origin)
+            track.columns |= {name: moved[:, c] for c, name in enumerate(names) if name in track.columns}
+    track.origin = origin
+
+
+def align_clocks(tracks: list[ImportedTrack], same_clock: bool, findings: ImportReport) -> bool:
+    """Put all times on one clock, in place; returns whether quantities between individuals mean something.
+
+    same : the user says that the clocks agree
+    """
+    files = {track.source for track in tracks}
+    if len(files) < 2 and len(tracks) == 1:
+        return True
+    own = [track for track in tracks if track.clock in ("boot", "own")]
+    if not own or same_clock:
+        return True
+    lacking = [track for track in own if track.utc is None]
+    if lacking and len({track.source for track in tracks}) > 1:
+        names = ", ".join(sorted({track.source for track in lacking})[:3])
+        findings.fault(
+            f"{names}{' ...' if len(lacking) > 3 else ''}: nothing says that the clocks of {len(files)} files "
+            "agree, and distances between individuals need that; write --same-clock if they do, or --map utc:=COLUMN"
+        )
+        return False
+    if len(lacking) == len(own):
+        return True  # all of one file, whose clock is theirs
+    worst = max(to_utc(track) for track in own if track.utc is not None)
+    findings.notes.append(f"clocks aligned by GNSS time, largest residual {1e3 * worst:.1f} ms")
+    return True
+
+
+def to_utc(track: ImportedTrack) -> float:
+    """Replace own time by UTC, by a straight line through the pairs; returns the largest residual, s."""
+    assert track.utc is not None
+    own, utc = track.utc.T
+    centre = own.mean()
+    offset = utc - own
+    ahead = offset - offset.mean()
+    spread = float(((own - centre) ** 2).sum())
+    # a drift can only be told over minutes: quartz drifts by 1e-5, a packet of the receiver is late by 0.1 s
+    drift = float((ahead * (own - centre)).sum() / spread) if own.max() - own.min() > 60.0 else 0.0
+    residual = ahead - drift * (own - centre)
+    track.time = track.time + offset.mean() + drift * (track.time - centre)
+    track.clock = "utc"
+    return float(np.abs(residual).max())

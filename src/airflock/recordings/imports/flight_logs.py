@@ -1,0 +1,304 @@
+"""Read flight logs: PX4 ULog, ArduPilot DataFlash, MAVLink telemetry, and logs of nodes on board."""
+
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airflock.drones import AIRBORNE_PHASES, FLYING_PHASES, read_log_ticks
+from airflock.recordings.imports.table_columns import invalid_note, px4_origin
+from airflock.recordings.imports.track import (
+    COMMAND_TARGETS,
+    POSITION_TARGETS,
+    VELOCITY_TARGETS,
+    ImportedTrack,
+    ImportOptions,
+    ImportReport,
+)
+from airflock.recordings.reader_process import Contents, OnShare, ReaderProcess
+from airflock.support import LinkError, RecordingError
+
+LOCAL, SETPOINT = "vehicle_local_position", "trajectory_setpoint"
+TOPICS = [LOCAL, SETPOINT, "vehicle_gps_position", "vehicle_land_detected"]
+NED = (("x", "y", "z"), ("vx", "vy", "vz"))
+
+
+def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """Track of a PX4 log: vehicle_local_position, and trajectory_setpoint as the command in force.
+
+    The set-point is what the companion asked for; vehicle_local_position_setpoint is the controller's own output and
+    is not read. Rows where the estimator calls its position invalid are left out.
+    """
+    try:
+        from pyulog import ULog
+    except ImportError as fault:
+        raise RecordingError(f"{path}: PX4 logs need pyulog: pip install 'airflock[logs]'") from fault
+    try:
+        log = ULog(str(path), TOPICS)
+    except Exception as fault:  # pyulog raises TypeError, struct.error, IndexError and others for damaged files
+        raise RecordingError(f"{path}: is not a ULog that can be read: {type(fault).__name__}: {fault}") from fault
+    topics = {data.name: data.data for data in reversed(log.data_list) if data.multi_id == 0}
+    options.done(0.8)
+    if LOCAL not in topics:
+        raise RecordingError(f"{path}: has no {LOCAL}; log it (SDLOG_PROFILE, default set) or import the GNSS as CSV")
+    local = topics[LOCAL]
+    time = local["timestamp"] * 1e-6
+    columns = _enu({axis: local[axis] for axis in NED[0]}, POSITION_TARGETS) | _enu(
+        {a: local[a] for a in NED[1]}, VELOCITY_TARGETS
+    )
+    columns |= _command(topics.get(SETPOINT), time, path, findings)
+    valid = np.ones(len(time), bool)
+    for flag in ("xy_valid", "v_xy_valid"):
+        valid &= local[flag].astype(bool) if flag in local else True
+    labels = {"x": "y", "y": "x", "z": "-z", "vx": "vy", "vy": "vx", "vz": "-vz"}
+    found = ImportedTrack(path.stem, str(path), time, columns, np.arange(len(time)), labels, "boot", datum="amsl")
+    if "xy_reset_counter" in local:
+        found.breaks = np.flatnonzero(np.diff(local["xy_reset_counter"].astype(np.int64)) != 0) + 1
+        if found.breaks.size:
+            findings.notes.append(f"{path}: {found.breaks.size} resets of the estimator: the track is split there")
+    found.origin = px4_origin(local)
+    found.utc = _utc(topics.get("vehicle_gps_position"))
+    found.in_air = _air(topics.get("vehicle_land_detected"), time)
+    if not valid.any():
+        raise RecordingError(f"{path}: the estimator never called its position valid")
+    if not valid.all():
+        findings.notes.append(invalid_note(str(path), path.stem, valid, found.rows))
+        found.keep(valid)
+    return [found]
+
+
+def _enu(ned: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    north, east, down = (np.asarray(values, float) for values in ned.values())
+    return {names[0]: east, names[1]: north, names[2]: -down}
+
+
+def _command(topic: Any, time: Any, path: Path, findings: ImportReport) -> dict[str, Any]:
+    """Velocity set-point held until the next one; nan where the position was controlled instead."""
+    if topic is None:
+        findings.notes.append(f"{path}: has no {SETPOINT}: no commands")
+        return {}
+    new = "velocity[0]" in topic  # PX4 from 1.13
+    parts = {axis: topic[f"velocity[{c}]" if new else f"v{axis}"] for c, axis in enumerate("xyz")}
+    ask = _enu(parts, COMMAND_TARGETS)
+    at = np.searchsorted(topic["timestamp"] * 1e-6, time, side="right") - 1
+    held = {name: np.where(at >= 0, values[np.maximum(at, 0)], np.nan) for name, values in ask.items()}
+    share = float(np.isnan(held["cx"]).mean()) if len(time) else 1.0
+    if share > 0.0:
+        findings.notes.append(f"{path}: {share:.0%} of the time no velocity was commanded")
+    return held if share < 1.0 else {}
+
+
+def _utc(topic: Any) -> Any:
+    if topic is None or "time_utc_usec" not in topic:
+        return None
+    pairs = np.stack([topic["timestamp"] * 1e-6, topic["time_utc_usec"].astype(float) * 1e-6], axis=1)
+    pairs = pairs[pairs[:, 1] > 1e9]
+    return pairs if len(pairs) >= 2 else None
+
+
+def _air(topic: Any, time: Any) -> Any:
+    if topic is None or "landed" not in topic or not len(topic["timestamp"]):
+        return None
+    at = np.searchsorted(topic["timestamp"] * 1e-6, time, side="right") - 1
+    return ~topic["landed"].astype(bool)[np.maximum(at, 0)] & (at >= 0)
+
+
+PARTS = ("PSCN", "PSCE", "PSCD")  # position control: north, east, down
+PACE = 1e5  # bytes per second; read by Python, row by row
+HEAD = b"\xa3\x95"  # of each message; source: ArduPilot, AP_Logger/LogStructure.h
+GPS_EPOCH = 315964800.0  # 6 January 1980 in seconds since 1970
+LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so that it cannot part them
+
+
+def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """Track of a DataFlash log: PSCN, PSCE, PSCD (position, velocity, commanded velocity), ORGN and GPS."""
+    _need_pymavlink(path)
+    with path.open("rb") as file:
+        if file.read(len(HEAD)) != HEAD:
+            raise RecordingError(f"{path}: is no DataFlash log of ArduPilot: it does not begin with its mark, A3 95")
+    told = ReaderProcess(path, read_dataflash_arrays, "a DataFlash log", pace=PACE).answer(options.done)
+    rows = {part: told[part].values for part in PARTS if part in told}
+    if "PSCN" not in rows or "PSCE" not in rows:
+        raise RecordingError(
+            f"{path}: has no PSCN and PSCE (position control, Copter 4.2 and later); write its estimates as a table: "
+            f"mavlogdump.py --format csv --types XKF1 {path.name} > {path.stem}.csv"
+        )
+    found = _joined(rows, path)
+    found.clock, found.datum = "boot", "amsl"
+    if "ORGN" in told:
+        latitude, longitude, height = (float(value) for value in told["ORGN"].values[-1])
+        found.origin = (latitude, longitude, height)
+    found.utc = _gps_times(told["GPS"].values) if "GPS" in told else None
+    return [found]
+
+
+def _gps_times(table: Any) -> Any:
+    """Times since the start and since 1970 (row, 2), s, where the first receiver knows the week; None below two."""
+    known = table[(table[:, 1] > 0.0) & (table[:, 3] == 0.0)]
+    utc = GPS_EPOCH - LEAP_SECONDS + known[:, 1] * 604800.0 + known[:, 2] * 1e-3
+    return np.stack([known[:, 0] * 1e-6, utc], axis=1) if len(known) >= 2 else None
+
+
+def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
+    """One table on the times of the north axis; the other axes are written within the same loop."""
+    north, east, down = rows["PSCN"], rows["PSCE"], rows.get("PSCD")
+    time = north[:, 0] * 1e-6
+
+    def at(table: Any, column: int) -> Any:
+        return np.interp(north[:, 0], table[:, 0], table[:, column])
+
+    def held(table: Any) -> Any:
+        place = np.searchsorted(table[:, 0], north[:, 0], side="right") - 1
+        return table[np.maximum(place, 0), 3]
+
+    columns = {"x": at(east, 1), "y": north[:, 1], "vx": at(east, 2), "vy": north[:, 2]}
+    columns |= {"cx": held(east), "cy": north[:, 3]}
+    if down is not None:
+        columns |= {"z": -at(down, 1), "vz": -at(down, 2), "cz": -held(down)}
+    columns = {
+        k: columns[k]
+        for k in (*POSITION_TARGETS, *VELOCITY_TARGETS, *COMMAND_TARGETS)
+        if k in columns and np.isfinite(columns[k]).any()
+    }
+    labels = {"x": "PSCE.PE", "y": "PSCN.PN", "z": "-PSCD.PD", "vx": "PSCE.VE", "vy": "PSCN.VN", "vz": "-PSCD.VD"}
+    return ImportedTrack(path.stem, str(path), time, columns, np.arange(len(time)), labels)
+
+
+def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """Tracks of a telemetry log: LOCAL_POSITION_NED of each vehicle, POSITION_TARGET_LOCAL_NED as its command.
+
+    All vehicles are stamped by the receiver's clock, so they share it; their positions are about their own origins.
+    """
+    _need_pymavlink(path)
+    told = ReaderProcess(path, read_telemetry_arrays, "telemetry", pace=PACE).answer(options.done)
+    if "LOCAL_POSITION_NED" not in told:
+        raise RecordingError(f"{path}: has no LOCAL_POSITION_NED; import the vehicles' own logs instead")
+    states = _by_vehicle(told, "LOCAL_POSITION_NED", (0, 2, 1, 3, 5, 4, 6), (1, 1, 1, -1, 1, 1, -1))
+    wishes = _by_vehicle(told, "POSITION_TARGET_LOCAL_NED", (0, 2, 1, 3), (1, 1, 1, -1))
+    origins = _by_vehicle(told, "GPS_GLOBAL_ORIGIN", (1, 2, 3), (1e-7, 1e-7, 1e-3))
+    found = []
+    for who, table in sorted(states.items()):
+        columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), table.T[1:].copy(), strict=True))
+        if who in wishes:
+            ask = wishes[who]
+            at = np.searchsorted(ask[:, 0], table[:, 0], side="right") - 1
+            columns |= {
+                n: np.where(at >= 0, ask[np.maximum(at, 0), c + 1], np.nan) for c, n in enumerate(COMMAND_TARGETS)
+            }
+        track = ImportedTrack(
+            f"vehicle_{who}", str(path), table[:, 0], columns, np.arange(len(table)), {}, "utc", datum="amsl"
+        )
+        if who in origins:
+            latitude, longitude, height = (float(value) for value in origins[who][-1])
+            track.origin = (latitude, longitude, height)
+        found.append(track)
+    return found
+
+
+def _by_vehicle(told: Any, kind: str, columns: tuple[int, ...], factors: tuple[float, ...]) -> dict[int, Any]:
+    """Rows of each vehicle, of these columns (0: the time) times factors, in their order in the log."""
+    if kind not in told:
+        return {}
+    table = told[kind].values
+    return {int(who): table[table[:, 0] == who][:, 1:][:, columns] * factors for who in np.unique(table[:, 0])}
+
+
+def read_dataflash_arrays(path: str, _: int, share: OnShare) -> Contents:
+    """Read tables of time (µs), position, velocity, commanded velocity of each axis; of origins; of GPS times."""
+    from pymavlink import DFReader
+
+    fields: dict[str, tuple[str, ...]] = {
+        part: ("TimeUS", f"P{part[-1]}", f"V{part[-1]}", f"TV{part[-1]}") for part in PARTS
+    }
+    fields |= {"ORGN": ("Lat", "Lng", "Alt"), "GPS": ("TimeUS", "GWk", "GMS", "I")}
+    return _tables(DFReader.DFReader_binary(path), fields, lambda message: [], share)
+
+
+def read_telemetry_arrays(path: str, _: int, share: OnShare) -> Contents:
+    """Read tables of vehicle, time (s) and six numbers of states, three of commands and of origins."""
+    from pymavlink import mavutil
+
+    fields = {
+        "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
+        "POSITION_TARGET_LOCAL_NED": ("vx", "vy", "vz"),
+        "GPS_GLOBAL_ORIGIN": ("latitude", "longitude", "altitude"),
+    }
+
+    def source(message: Any) -> list[float]:
+        return [message.get_srcSystem(), getattr(message, "_timestamp", 0.0)]
+
+    return _tables(mavutil.mavlink_connection(path), fields, source, share)
+
+
+def _tables(
+    log: Any, fields: Mapping[str, tuple[str, ...]], source: Callable[[Any], list[float]], share: OnShare
+) -> Contents:
+    """Read one table of float64 for each kind of message, a row each: its source, then its fields."""
+    rows: dict[str, list[list[float]]] = {kind: [] for kind in fields}
+    percent = 0.0
+    while (message := log.recv_match(type=[*fields])) is not None:
+        kind = message.get_type()
+        # a log without I is of a vehicle with one GPS receiver, number 0
+        numbers = [getattr(message, name, 0.0 if name == "I" else np.nan) for name in fields[kind]]
+        rows[kind].append([*source(message), *numbers])
+        if getattr(log, "percent", 0.0) >= percent + 1.0:
+            percent = log.percent
+            share(percent / 100.0)
+    return {}, {kind: (None, {}, np.array(table, float)) for kind, table in rows.items() if table}
+
+
+def _need_pymavlink(path: Path) -> None:
+    if find_spec("pymavlink") is None:
+        raise RecordingError(f"{path}: ArduPilot logs need pymavlink (LGPL-3): pip install 'airflock[logs]'")
+
+
+OTHERS = "of ArduPilot give the .bin that it was made from"  # whose text logs end in .log, too
+
+
+def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """Track of the drone on which a node flew: local east-north-up of its mission, by the clock of its computer.
+
+    A row is a tick at which the own state was another than at the tick before; between such rows the autopilot had said
+    nothing new. Commands are those of phases in which the node flies; their clock is told UTC by the log's first line.
+    """
+    with open(path, "rb") as file:
+        if not file.read(8).startswith(b'{"log":'):
+            raise RecordingError(f"{path}: .log: unknown format; {OTHERS}")
+    try:
+        told = read_log_ticks(path)
+    except LinkError as fault:
+        raise RecordingError(str(fault)) from fault
+    options.done(0.8)
+    states = [tick.own for tick in told.ticks]
+    rows = [k for k, own in enumerate(states) if own is not None and (k == 0 or own != states[k - 1])]
+    if not rows:
+        raise RecordingError(f"{path}: the autopilot never told where it is")
+    ticks = [told.ticks[k] for k in rows]
+    time = np.array([tick.time for tick in ticks])
+    flown = np.array([tick.phase in FLYING_PHASES for tick in ticks])
+    place = np.array([tick.own for tick in ticks], float)
+    command = np.where(flown[:, None], np.array([tick.command for tick in ticks], float), np.nan)
+    columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), place.T, strict=True)) | dict(
+        zip(COMMAND_TARGETS, command.T, strict=True)
+    )
+    if not flown.any():
+        findings.notes.append(f"{path}: the node never flew: no commands")
+        columns = {name: column for name, column in columns.items() if name not in COMMAND_TARGETS}
+    labels = {name: f"own[{c}]" for c, name in enumerate((*POSITION_TARGETS, *VELOCITY_TARGETS))}
+    labels |= {name: f"set[{c}]" for c, name in enumerate(COMMAND_TARGETS)}
+    found = ImportedTrack(
+        f"member_{told.member}",
+        str(path),
+        time,
+        columns,
+        np.array([tick.line for tick in ticks]),
+        labels,
+        "boot",
+        datum="home",
+    )
+    ends = time[[0, -1]]
+    found.utc = np.stack([ends, told.utc * 1e-6 + ends - told.now], axis=1)
+    found.in_air = np.array([tick.phase in AIRBORNE_PHASES for tick in ticks])
+    return [found]

@@ -1,0 +1,348 @@
+"""Load tracks of others: read files, tables and arrays, check them, and return a recording or all errors at once."""
+
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from airflock.recordings.dataset import EAST_NORTH_UP, FRAME_ATTRIBUTE
+from airflock.recordings.imports import (
+    array_readers,
+    common_frame,
+    flight_logs,
+    read_tables,
+    resampling,
+    table_columns,
+    track_checks,
+)
+from airflock.recordings.imports.common_frame import to_local_frame
+from airflock.recordings.imports.track import (
+    ACCEPTABLE_ERRORS,
+    GEODETIC_TARGETS,
+    POSITION_TARGETS,
+    VELOCITY_TARGETS,
+    ImportedTrack,
+    ImportOptions,
+    ImportReport,
+    ignore_progress,
+)
+from airflock.recordings.reader_process import refuse_archive, refuse_pickle_file
+from airflock.support import RecordingError, as_error, expand_path, is_number
+
+
+def load_tracks(
+    source: Any,
+    *,
+    map: Mapping[str, str] | None = None,
+    unit: str = "",
+    scale: float | None = None,
+    time_unit: str = "",
+    fps: float | None = None,
+    keypoint: str = "",
+    axes: str = "",
+    origin: tuple[float, float, float] | None = None,
+    rate: float | None = None,
+    bridge: float = 1.0,
+    begin: float | None = None,
+    end: float | None = None,
+    same_clock: bool = False,
+    accept: Iterable[str] = (),
+    decimal: str = ".",
+    delimiter: str = "",
+    precision: int = 32,
+    say: Callable[[str], None] | None = None,
+    done: Callable[[float], None] = ignore_progress,
+) -> xr.Dataset:
+    """Recording made of tracks of others: flight logs and animals.
+
+    Parameters
+    ----------
+    source : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array
+        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .log, .nc, .h5, .npy), a table, such as {"t": [...], "id":
+        [...], "x": [...]}, a Dataset of `movement`, or an array (frame, individual, 2 or 3).
+    map : mapping, optional
+        Target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are t, x, y, z
+        (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s), lat, lon (degrees), alt (m), utc (s since 1970),
+        air (1 in flight) and id. Headers with units need none: `x [mm]`, `time_us`.
+    unit : str
+        Of lengths that bring none: m, cm, mm, km, ft or px.
+    scale : float, optional
+        Metres per pixel, with px.
+    time_unit : str
+        Of times that bring none: s, ms, us, ns, min or frames.
+    fps : float, optional
+        Frames per second, with frames.
+    keypoint : str
+        Which one, where there are several.
+    axes : str
+        enu, or ned where x is north and z down; by default enu, but ned of a table with the fields of PX4.
+    origin : tuple of float, optional
+        Latitude, longitude (degrees) and height (m) of the local frame; by default the first fix.
+    rate : float, optional
+        Frames per second of the recording; by default the tracks' own.
+    bridge : float
+        Longest gap that is bridged, s (confidence 0.5); where a gap is longer, an individual is absent (nan).
+    begin, end : float, optional
+        Window of time, s.
+    same_clock : bool
+        The clocks of several files agree.
+    accept : str or iterable of str
+        Kinds of faults that are meant so: absent, axes, down, duplicates, height, jumps, time.
+    decimal, delimiter : str
+        Of a text file: its decimal point, and what stands between columns, which is found out by default.
+    precision : int
+        Bits per number, 32 or 64; far from the origin, where 32 do not tell a centimetre, 64.
+    say, done : callable, optional
+        Called with each note, and with the share that has been read.
+
+    Returns
+    -------
+    xarray.Dataset
+        (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; differentiated where it is
+        not logged: central differences, one-sided at both ends of a track and of gaps), command (m/s) where
+        logged, confidence.
+
+    Raises
+    ------
+    RecordingError
+        With one line per fault: file, column, first row, and what to write instead.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> tracks = np.zeros((20, 2, 2))  # two individuals in a plane, both going east at 1 m/s
+    >>> tracks[:, :, 0] = 0.1 * np.arange(20)[:, None]
+    >>> tracks[:, 1, 1] = 2.0
+    >>> recording = airflock.load_tracks(tracks, fps=10.0, unit="m")
+    >>> dict(recording.position.sizes)
+    {'time': 20, 'space': 2, 'keypoint': 1, 'individual': 2}
+    """
+    options = ImportOptions(
+        map={} if map is None else map, unit=unit, scale=scale, time_unit=time_unit, fps=fps, keypoint=keypoint,
+        axes=axes, decimal=decimal, delimiter=delimiter, done=done,
+    )  # fmt: skip
+    numbers = {"rate": rate, "bridge": bridge, "begin": begin, "end": end}
+    findings = ImportReport()
+    check_options(options, findings, numbers, precision, accept, origin)
+    findings.accepted_kinds = frozenset([accept] if isinstance(accept, str) else accept)
+    tracks, comparable = read_tracks(
+        source, options, findings, origin=origin, same_clock=same_clock, begin=begin, end=end
+    )
+    track_checks.check_presence(tracks, findings)
+    findings.raise_errors()
+    if not all(track.has(VELOCITY_TARGETS) for track in tracks):
+        findings.notes.append(
+            "no velocity: differentiated from positions, one-sided at both ends of a track and of gaps; axes and units "
+            "could not be checked against them"
+        )
+    times, period = resampling.time_grid(tracks, rate, begin, end)
+    sources = sorted({track.source for track in tracks})
+    kept, step = resampling.needed_bits(tracks, precision)
+    if kept != precision:
+        findings.notes.append(
+            f"far from the origin: kept with 64 bits; 32 bits resolve positions there only to {step:.2g} m"
+        )
+    found, shares = resampling.resample(tracks, times, period, bridge, kept)
+    gone = 1.0 - shares["present"]
+    findings.notes.append(
+        f"{found.sizes['individual']} individuals, {times[-1] - times[0]:.4g} s at {1 / period:.4g} Hz; "
+        f"{gone:.1%} absent, {shares['bridged']:.1%} bridged (gaps up to {bridge:g} s)"
+    )
+    if found.sizes["individual"] > 1 and period > 0.05:
+        findings.notes.append(f"nearest distances between frames {period:.3g} s apart are upper bounds")
+    found.attrs |= {
+        "source_software": "airflock import", "source_file": ", ".join(sources), "airflock_comparable": int(comparable),
+        "airflock_import": json.dumps({"notes": findings.notes}),
+    }  # fmt: skip
+    if _on_ground(tracks, options):
+        found.attrs[FRAME_ATTRIBUTE] = EAST_NORTH_UP
+    if say is not None:
+        for note in findings.notes:
+            say(note)
+    return found
+
+
+def _on_ground(tracks: list[ImportedTrack], options: ImportOptions) -> bool:
+    """Whether the axes are known to point east and north: of a site or an autopilot, or because the user says so."""
+    first = tracks[0]
+    autopilot = Path(first.source).suffix.lower() in AUTOPILOT_SUFFIXES
+    return first.origin is not None or first.ground or bool(options.axes) or autopilot
+
+
+def read_tracks(
+    source: Any,
+    options: ImportOptions,
+    findings: ImportReport,
+    *,
+    origin: tuple[float, float, float] | None = None,
+    same_clock: bool = False,
+    begin: float | None = None,
+    end: float | None = None,
+) -> tuple[list[ImportedTrack], bool]:
+    """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault.
+
+    begin, end : window of time, s; what lies outside is not checked for jumps
+    """
+    tracks = _read(source, options, findings)
+    findings.raise_errors()
+    tracks = track_checks.drop_incomplete_rows(tracks, findings)
+    track_checks.check_columns(tracks, findings)
+    track_checks.note_missing_velocities(tracks, findings)
+    track_checks.check_times(tracks, findings)
+    track_checks.check_names(tracks, findings)
+    track_checks.check_heights(tracks, options.axes, findings)
+    to_local_frame(tracks, origin, findings)
+    findings.raise_errors()
+    track_checks.check_axes(tracks, findings)
+    findings.raise_errors()
+    comparable = common_frame.align_clocks(tracks, same_clock, findings)
+    if begin is not None or end is not None:
+        tracks = cut_window(tracks, begin, end)
+    for track in tracks:
+        track_checks.check_jumps(track, findings)
+        track_checks.note_resolution(track, findings)
+    findings.raise_errors()
+    return tracks, comparable
+
+
+def cut_window(tracks: list[ImportedTrack], begin: float | None, end: float | None) -> list[ImportedTrack]:
+    """Tracks between two times, s; those that have none of it are left out."""
+    low, high = -np.inf if begin is None else begin, np.inf if end is None else end
+    for track in tracks:
+        late = resampling.grid_tolerance(track_checks.median_period(track), *track.time[[0, -1]])
+        track.keep((track.time >= low - late) & (track.time <= high + late))
+    there = [track for track in tracks if len(track.time)]
+    if not there:
+        raise RecordingError(f"no rows between {low:g} and {high:g} s")
+    return there
+
+
+def _read(what: Any, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    if isinstance(what, xr.Dataset):  # which is a mapping, too
+        return array_readers.read_dataset(what, options)
+    if isinstance(what, Mapping):
+        what = read_tables.table_from_columns(what)
+    if isinstance(what, pd.DataFrame):
+        return read_tables.read_frame(what, options, findings)
+    if isinstance(what, np.ndarray):
+        return array_readers.read_array(what, options)
+    if isinstance(what, (str, os.PathLike)):
+        what = [what]
+    try:
+        files = [expand_path(name) for name in what]
+    except TypeError as fault:
+        raise RecordingError(
+            f"{type(what).__name__} holds no tracks; give files, a DataFrame, a Dataset or an array"
+        ) from fault
+    if not files:
+        raise RecordingError("no files to import")
+    tracks = []
+    for path in files:
+        try:
+            tracks += _placed(path, read_file(path, options, findings))
+        except RecordingError as fault:
+            findings.faults += str(fault).splitlines()
+        options.done(1.0)
+    return tracks
+
+
+def _placed(path: Path, tracks: list[ImportedTrack]) -> list[ImportedTrack]:
+    """Tracks that have a place at every time; raises RecordingError for one without."""
+    for track in tracks:
+        if not any(set(names) <= set(track.columns) for names in (POSITION_TARGETS[:2], GEODETIC_TARGETS[:2])):
+            raise RecordingError(f"{path}: {track.name} has no positions")
+    return tracks
+
+
+def check_options(
+    options: ImportOptions, findings: ImportReport, numbers: Mapping[str, Any], precision: Any, accept: Any, origin: Any
+) -> None:
+    """Refuse options that cannot be meant, all at once. Raises RecordingError."""
+    faults = findings.faults
+    known = {
+        "unit": ("", *table_columns.LENGTH_UNITS, *table_columns.PIXEL_UNITS),
+        "time_unit": ("", *table_columns.TIME_UNITS, "frames"),
+    }
+    for name, allowed in {**known, "axes": ("", "enu", "ned"), "decimal": (".", ",")}.items():
+        value = getattr(options, name)
+        if not isinstance(value, str) or value not in allowed:
+            faults.append(f"{name} = {value!r} is none of {', '.join(text for text in allowed if text)}")
+    given = {name: getattr(options, name) for name in ("keypoint", "delimiter")}
+    faults += [f"{name} = {value!r} is no text" for name, value in given.items() if not isinstance(value, str)]
+    if not isinstance(options.map, Mapping):
+        faults.append(f'map = {options.map!r}: give targets with expressions, such as {{"t": "time_us*1e-6"}}')
+    else:
+        said = [(key, text) for key, text in options.map.items() if not isinstance(text, str)]
+        faults += [f"map: {key} = {text!r} is no text; an expression is one" for key, text in said]
+    for name, number in {"scale": options.scale, "fps": options.fps, "rate": numbers["rate"]}.items():
+        if number is not None and not (is_number(number) and 0.0 < number < 1e9):
+            faults.append(f"{name} = {_shown(number)} must be a number above 0")
+    if not (is_number(numbers["bridge"]) and 0.0 <= numbers["bridge"] < 1e9):
+        faults.append(f"bridge = {_shown(numbers['bridge'])} s must be a number, 0 or more")
+    for name in ("begin", "end"):
+        if numbers[name] is not None and not (is_number(numbers[name]) and np.isfinite(numbers[name])):
+            faults.append(f"{name} = {_shown(numbers[name])} is not a time in s")
+    if not is_number(precision) or precision not in (32, 64):
+        faults.append(f"precision = {precision} is none of 32, 64")
+    if origin is not None and not _is_origin(origin):
+        faults.append(f"origin = {origin!r} is not (latitude, longitude, height) in degrees, degrees and m")
+    kinds = [accept] if isinstance(accept, str) or not isinstance(accept, Iterable) else list(accept)
+    faults += [
+        f"accept = {kind} is none of {', '.join(ACCEPTABLE_ERRORS)}"
+        for kind in kinds
+        if str(kind) not in ACCEPTABLE_ERRORS
+    ]
+    findings.raise_errors()
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if is_number(value) else repr(value)
+
+
+def _is_origin(given: Any) -> bool:
+    """Whether something is a latitude, a longitude and a height."""
+    numbers = list(given) if isinstance(given, Iterable) else []
+    sound = len(numbers) == 3 and all(is_number(number) and np.isfinite(number) for number in numbers)
+    return sound and abs(numbers[0]) <= 90.0 and abs(numbers[1]) <= 360.0
+
+
+Reader = Callable[[Path, ImportOptions, ImportReport], list[ImportedTrack]]
+READERS: dict[str, tuple[str, Reader]] = {
+    ".csv": ("table", read_tables.read_csv),
+    ".tsv": ("table", read_tables.read_csv),
+    ".txt": ("table", read_tables.read_csv),
+    ".parquet": ("table", read_tables.read_parquet),
+    ".ulg": ("PX4 ULog", flight_logs.read_ulog),
+    ".bin": ("ArduPilot DataFlash", flight_logs.read_dataflash),
+    ".tlog": ("MAVLink telemetry", flight_logs.read_tlog),
+    ".log": ("log of a node on board", flight_logs.read_node_log),
+    ".nc": ("movement netCDF", array_readers.read_netcdf),
+    ".h5": ("movement or idtracker.ai HDF5", array_readers.read_netcdf),
+    ".hdf5": ("movement or idtracker.ai HDF5", array_readers.read_netcdf),
+    ".npy": ("NumPy array", array_readers.read_npy),
+    ".npz": ("NumPy arrays", array_readers.read_npy),
+}
+
+AUTOPILOT_SUFFIXES = (".ulg", ".bin", ".tlog", ".log")  # their axes are those of the ground
+
+
+def read_file(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """Tracks of a file; raises RecordingError for what is no known format."""
+    if path.is_dir():
+        raise RecordingError(f"{path}: is a folder; name the files in it")
+    if not path.is_file():
+        raise RecordingError(f"{path}: no such file")
+    ending = path.suffix.lower()
+    refuse_archive(path)
+    refuse_pickle_file(path)
+    if ending not in READERS:
+        known = ", ".join(READERS)
+        raise RecordingError(f"{path}: {ending or 'a name without an ending'}: unknown format; known: {known}")
+    with as_error(path, RecordingError):  # libraries raise whatever they happen to where a file is damaged
+        return READERS[ending][1](path, options, findings)

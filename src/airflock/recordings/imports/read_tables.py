@@ -1,0 +1,363 @@
+"""Read tables: CSV and Parquet files and pandas DataFrames, long or with columns for each individual."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from airflock.recordings.imports import table_columns
+from airflock.recordings.imports.table_columns import MAX_COLUMNS, ColumnLayout, column_layout
+from airflock.recordings.imports.track import (
+    GEODETIC_TARGETS,
+    POSITION_TARGETS,
+    ImportedTrack,
+    ImportOptions,
+    ImportReport,
+)
+from airflock.recordings.imports.track_checks import PLACE_TARGETS
+from airflock.support import RecordingError, trim_heap
+
+CLOCK = r"\d+:[0-5]\d:[0-5]\d(\.\d+)?"  # hours, minutes, seconds
+CHUNK = 250_000  # rows that are read at a time, so that an hour of thirty drones fits
+
+
+def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """Tracks of a text table; raises RecordingError that names column and row."""
+    head = read_head(path, options)
+    if head.above:
+        findings.notes.append(f"{path}: line{'s' * (head.above > 1)} above the table left out: {head.above}")
+    size = path.stat().st_size
+    text = {"sep": head.delimiter, "decimal": options.decimal, "encoding": head.encoding, "skipinitialspace": True}
+    text |= {"skiprows": head.above, "header": None, "names": head.names} if head.hidden else {"skiprows": head.above}
+
+    def parts(columns: list[str] | None) -> Iterator[tuple[int, pd.DataFrame]]:
+        at = head.first  # the row after the header, as an editor counts
+        with path.open("rb") as file:
+            wanted = None if columns is None else lambda c: c.strip() in columns
+            try:
+                for part in pd.read_csv(file, usecols=wanted, chunksize=CHUNK, low_memory=False, **text):
+                    part.columns = [str(c).strip() for c in part.columns]
+                    yield at, part
+                    at += len(part)
+                    options.done(file.tell() / max(size, 1))
+            except (pd.errors.ParserError, UnicodeDecodeError) as fault:
+                raise RecordingError(f"{path}: {str(fault).splitlines()[0]}") from fault
+
+    return tracks_from_parts(str(path), path.stem, head.names, parts, options, findings)
+
+
+def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """Tracks of a Parquet table."""
+    try:
+        import pyarrow
+        import pyarrow.parquet as parquet
+    except ImportError as fault:
+        raise RecordingError(f"{path}: needs pyarrow: pip install 'airflock[logs]'") from fault
+    try:
+        file = parquet.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20)
+    except (OSError, ValueError) as fault:
+        raise RecordingError(f"{path}: is not a Parquet table: {str(fault).splitlines()[0]}") from fault
+    total = max(file.metadata.num_rows, 1)
+
+    def parts(columns: list[str] | None) -> Iterator[tuple[int, pd.DataFrame]]:
+        at = 1
+        # Arrow decodes a column in each of its threads, and keeps what it has freed: a third of an hour's memory
+        for batch in file.iter_batches(batch_size=CHUNK // 4, columns=columns, use_threads=False):
+            yield at, batch.to_pandas()
+            at += batch.num_rows
+            pyarrow.default_memory_pool().release_unused()
+            options.done(min(1.0, at / total))
+
+    return tracks_from_parts(str(path), path.stem, list(file.schema_arrow.names), parts, options, findings)
+
+
+def table_from_columns(columns: Mapping[str, Any]) -> pd.DataFrame:
+    """Columns by name as a table, one value for all rows where a column is no list; raises RecordingError."""
+    lists = {str(k): list(v) for k, v in columns.items() if np.iterable(v) and not isinstance(v, str)}
+    if len({len(column) for column in lists.values()}) != 1:
+        told = ", ".join(f"{name} has {len(column)}" for name, column in lists.items()) or "there are none"
+        raise RecordingError(f"columns of a table must be lists of equal length: {told}")
+    return pd.DataFrame({str(name): lists.get(str(name), value) for name, value in columns.items()})
+
+
+def read_frame(table: pd.DataFrame, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
+    """Tracks of a pandas DataFrame; its index is a column too, where it has a name."""
+    flat = table.reset_index() if any(name is not None for name in table.index.names) else table
+    flat = flat.set_axis([str(c) for c in flat.columns], axis=1)
+    return tracks_from_parts(
+        "DataFrame", "individual", list(flat.columns), lambda _: iter([(0, flat)]), options, findings
+    )
+
+
+def tracks_from_parts(
+    where: str, stem: str, names: list[str], parts: Any, options: ImportOptions, findings: ImportReport
+) -> list[ImportedTrack]:
+    """Tracks of a table that comes in parts, by the layout of its columns."""
+    wide = (
+        wide_columns(names)
+        if not any(target in options.map for target in (*POSITION_TARGETS, *GEODETIC_TARGETS))
+        else {}
+    )
+    how = column_layout(where, first_individual_columns(names, wide) if wide else names, options)
+    findings.notes += how.notes
+    timed = {
+        table_columns.single_column(how.expressions[target]) for target in ("t", "utc") if target in how.expressions
+    }
+    gathered: dict[str, list[Any]] = {}
+    nameless: list[Any] = [np.empty(0, int)]
+    columns = None if wide else how.used
+    for at, part in parts(columns):
+        rows = np.arange(at, at + len(part))
+        for name, piece in split_by_individual(part, wide, how, stem):
+            numbers = {c: _numbers(piece[c], where, c, at, time=c in timed) for c in how.used if c != how.id}
+            values = how.values(numbers, len(piece))
+            whole = np.all([np.isfinite(values[c]) for c in PLACE_TARGETS if c in values], axis=0)
+            whole &= np.isfinite(values["t" if "t" in values else "utc"])
+            if how.id:
+                nameless.append(rows[whole & piece[how.id].isna().to_numpy()])
+                for own, chosen in _by_name(piece[how.id]):
+                    gathered.setdefault(own, []).append(_taken(values, rows, chosen))
+            else:
+                gathered.setdefault(name, []).append(_taken(values, rows, None))
+    if not gathered:
+        raise RecordingError(f"{where}: has no rows")
+    lost = np.unique(np.concatenate(nameless))
+    if len(lost):
+        findings.notes.append(f"{where}: {len(lost)} rows without an id left out, first row {lost[0]}")
+    tracks = []
+    for name in list(gathered):
+        tracks.append(_track(name, where, gathered.pop(name), how, bool(how.id or wide), findings))
+    trim_heap()
+    return tracks
+
+
+def _numbers(column: Any, where: str, name: str, at: int, *, time: bool) -> Any:
+    """A column as float64; dates become seconds since 1970, durations seconds; texts of neither are faults.
+
+    time : whether it tells times, which may be written as dates or as hours:minutes:seconds
+    """
+    if pd.api.types.is_numeric_dtype(column):
+        return column.to_numpy(float, na_value=np.nan)
+    if pd.api.types.is_datetime64_any_dtype(column):
+        return _since_1970(column)
+    if pd.api.types.is_timedelta64_dtype(column):
+        return column.dt.total_seconds().to_numpy(float)
+    found = pd.to_numeric(column, errors="coerce")
+    text = column.astype(str).str.strip()
+    given = column.notna() & (text != "")
+    bad = np.flatnonzero((found.isna() & given).to_numpy())
+    if not bad.size:
+        return found.to_numpy(float, na_value=np.nan)
+    if time:
+        when = pd.to_datetime(column, errors="coerce", utc=True, format="ISO8601")
+        if not (when.isna() & given).any():
+            return _since_1970(when)
+        if text[given].str.fullmatch(CLOCK).all():
+            return pd.to_timedelta(text.where(given)).dt.total_seconds().to_numpy(float)
+    raise RecordingError(f"{where}: column {name}, row {at + bad[0]}: {_no_number(str(column.iloc[bad[0]]), time)}")
+
+
+def _no_number(text: str, time: bool) -> str:
+    """What is wrong with a cell that is no number, and what to write instead."""
+    if re.fullmatch(r"\s*[-+]?\d+,\d+\s*", text):
+        return f"{text} has a decimal comma; write --decimal ,"
+    if table_columns.is_unit(text):
+        return f"{text!r} is a unit; write it into the header, such as x [mm], and remove this row"
+    if time and any(letter.isdigit() for letter in text):
+        return f"{text!r} is no time; write seconds, hours:minutes:seconds, or dates such as 2026-05-04T10:00:00.5"
+    return f"{text!r} is not a number; leave missing cells empty"
+
+
+def _since_1970(column: Any) -> Any:
+    when = column.dt.tz_convert("UTC").dt.tz_localize(None) if column.dt.tz is not None else column
+    seconds = when.to_numpy("datetime64[us]").astype(np.int64) * 1e-6
+    return np.where(when.isna(), np.nan, seconds)
+
+
+def _by_name(column: Any) -> Iterator[tuple[str, Any]]:
+    codes, names = pd.factorize(column)
+    order = np.argsort(codes, kind="stable")
+    edges = np.searchsorted(codes[order], np.arange(len(names) + 1))
+    for code, name in enumerate(names):
+        text = f"{name:g}" if isinstance(name, float) else str(name)
+        yield text, order[edges[code] : edges[code + 1]]
+
+
+def _taken(values: dict[str, Any], rows: Any, chosen: Any) -> tuple[dict[str, Any], Any]:
+    every = slice(None) if chosen is None else chosen
+    return {target: array[every] for target, array in values.items()}, rows[every]
+
+
+def _track(
+    name: str, where: str, parts: list[Any], how: ColumnLayout, shared: bool, findings: ImportReport
+) -> ImportedTrack:
+    """One individual of its pieces; shared: whether others have the same column of times."""
+    columns = {target: np.concatenate([p[0][target] for p in parts]) for target in parts[0][0]}
+    rows = np.concatenate([p[1] for p in parts])
+    origin, valid = table_columns.pop_origin_and_validity(columns)
+    if valid is not None and not valid.all():
+        findings.notes.append(table_columns.invalid_note(where, name, valid, rows))
+        columns, rows = {target: values[valid] for target, values in columns.items()}, rows[valid]
+    utc = columns.pop("utc", None)
+    time = columns.pop("t") if "t" in columns else utc
+    assert time is not None
+    of_day = bool((time[np.isfinite(time)][:1] > 1e9).any())  # seconds since 1970
+    clock = "utc" if of_day or (utc is not None and utc is time) else ("shared" if shared else "own")
+    pair = None
+    if utc is not None and utc is not time and np.isfinite(utc + time).any():
+        pair = np.stack([time, utc], axis=1)[np.isfinite(utc + time)]
+    air = columns.pop("air") > 0.5 if "air" in columns else None
+    found = ImportedTrack(name, where, time, columns, rows, dict(how.user_labels), clock, pair, how.datum)
+    found.origin, found.datum = (origin, found.datum or "amsl") if origin is not None else (None, found.datum)
+    found.in_air, found.ground = air, how.ground
+    return found
+
+
+DELIMITERS = (",", ";", "\t", "|")
+BLANKS = r"\s+"  # where nothing else separates columns, as NumPy writes tables
+MOST = 1 << 20  # bytes that are looked at
+REMARK = "#"  # begins a line above a table
+SEPARATOR = re.compile(r'"?sep=.?"?', re.IGNORECASE)  # such a line, which spreadsheets write and read
+
+
+class TableHead(NamedTuple):
+    """The beginning of a text table.
+
+    above  : number of lines above it; first : number of its first row of data, as an editor counts
+    hidden : whether the names stand in the last line above it, as NumPy writes them
+    """
+
+    encoding: str
+    delimiter: str
+    names: list[str]
+    above: int
+    hidden: bool
+
+    @property
+    def first(self) -> int:
+        """Number of the first row of data, as an editor counts."""
+        return self.above + (1 if self.hidden else 2)
+
+
+def read_head(path: Path, options: ImportOptions) -> TableHead:
+    """How a text table begins; raises RecordingError for what is none, and where columns have no names."""
+    encoding, lines = _lines(path)
+    above = next((i for i, line in enumerate(lines) if line.strip() and not _remark(line)), len(lines))
+    if above == len(lines):
+        raise RecordingError(f"{path}: has no rows")
+    body = [line for line in islice(lines, above + 1, above + 20) if line.strip()]
+    given = {"tab": "\t", "\\t": "\t"}.get(options.delimiter, options.delimiter)
+    delimiter = given or _delimiter(lines[above], body)
+    names = _cells(lines[above], delimiter)
+    if len(names) > MAX_COLUMNS:
+        column_layout(str(path), names, options)
+    hidden = False
+    if all(_numeric(name) for name in names):
+        over = _cells(lines[above - 1].strip().lstrip(REMARK), delimiter) if above else []
+        if len(over) != len(names) or any(_numeric(name) for name in over):
+            raise RecordingError(f"{path}: the first row holds numbers; add a row of names, for instance t,id,x,y")
+        body, names, hidden = [lines[above], *body], over, True
+    _decimals(path, body, len(names), delimiter, options, above + (1 if hidden else 2))
+    return TableHead(encoding, delimiter, names, above, hidden)
+
+
+def _lines(path: Path) -> tuple[str, list[str]]:
+    """Encoding and first lines of a text."""
+    with path.open("rb") as file:
+        start = file.read(MOST)
+    if not start.strip():
+        raise RecordingError(f"{path}: is empty")
+    if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        encoding = "utf-16"
+    elif b"\0" in start:
+        raise RecordingError(f"{path}: is not text; known formats: .csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy")
+    else:
+        encoding = "utf-8-sig"
+    try:
+        return encoding, start.decode(encoding, errors="strict" if len(start) < MOST else "ignore").splitlines()
+    except UnicodeDecodeError as fault:
+        raise RecordingError(f"{path}: is not written in UTF-8 (byte {fault.start}); save it as UTF-8") from fault
+
+
+def _remark(line: str) -> bool:
+    return line.lstrip().startswith(REMARK) or SEPARATOR.fullmatch(line.strip()) is not None
+
+
+def _delimiter(first: str, body: list[str]) -> str:
+    """What separates columns: the sign that the first line has most of, or blanks where it has none of them."""
+    likely = max(DELIMITERS, key=lambda d: (first.count(d), d == ","))
+    if likely in first:
+        return likely
+    words = len(first.split())
+    return BLANKS if words > 1 and body and all(len(line.split()) == words for line in body) else likely
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    found = line.split() if delimiter == BLANKS else line.split(delimiter)
+    return [cell.strip().strip('"').strip() for cell in found]
+
+
+def _numeric(text: str) -> bool:
+    return bool(re.fullmatch(r"[-+]?[\d.,]+([eE][-+]?\d+)?", text))
+
+
+def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: ImportOptions, at: int) -> None:
+    """Refuse decimal commas that nobody has announced; at: number of the first row."""
+    if options.decimal != ".":
+        return
+    for number, line in enumerate(body, at):
+        cells = line.split() if delimiter == BLANKS else line.split(delimiter)
+        comma = [cell.strip() for cell in cells if re.fullmatch(r'\s*"?[-+]?\d+,\d+"?\s*', cell)]
+        if delimiter != "," and comma:
+            raise RecordingError(f"{path}: row {number}: {comma[0]} has a decimal comma; write --decimal ,")
+        if delimiter == "," and '"' not in line and len(cells) > count:
+            raise RecordingError(
+                f"{path}: row {number} has {len(cells)} cells, the header {count}; if the numbers have decimal commas, "
+                "save the table with ; between its columns and write --decimal ,"
+            )
+
+
+AXIS_FIRST = re.compile(r"([xyz])_?(\d+)")
+NAME_FIRST = re.compile(r"([a-z][a-z_]*?_?\d+)_([xyz])")  # a number: head_x, tail_x are places on one individual
+
+
+def wide_columns(names: list[str]) -> dict[str, dict[str, str]]:
+    """Individual → component → column, of a table such as time, x1, y1, x2, y2; empty if it is none."""
+    found: dict[str, dict[str, str]] = {}
+    plain = [table_columns.split_header(name)[0] for name in names]
+    if any(name in table_columns.ALIASES["x"] for name in plain):
+        return found
+    for name, text in zip(names, plain, strict=True):
+        first, second = AXIS_FIRST.fullmatch(text), NAME_FIRST.fullmatch(text)
+        if first:
+            found.setdefault(first[2], {})[first[1]] = name
+        elif second:
+            found.setdefault(second[1], {})[second[2]] = name
+    return found if found and all({"x", "y"} <= set(parts) for parts in found.values()) else {}
+
+
+def first_individual_columns(names: list[str], wide: dict[str, dict[str, str]]) -> list[str]:
+    """Columns of the first individual of a wide table, under the names of a long one."""
+    taken = {column for parts in wide.values() for column in parts.values()}
+    first = next(iter(wide.values()))
+    unit = {part: table_columns.split_header(column)[1] for part, column in first.items()}
+    return [n for n in names if n not in taken] + [f"{part} [{unit[part]}]" if unit[part] else part for part in first]
+
+
+def split_by_individual(
+    table: pd.DataFrame, wide: dict[str, dict[str, str]], layout: ColumnLayout, stem: str
+) -> Iterable[tuple[str, pd.DataFrame]]:
+    """Rows of a table by individual, each under the names of a long one; all of them as `stem` where it is not wide."""
+    if not wide:
+        return [(stem, table)]
+    taken = [column for parts in wide.values() for column in parts.values()]
+    rest = table.drop(columns=taken)
+    told = {layout.user_labels[axis]: axis for axis in POSITION_TARGETS if axis in layout.user_labels}
+    return (
+        (number, rest.assign(**{label: table[parts[axis]] for label, axis in told.items() if axis in parts}))
+        for number, parts in wide.items()
+    )

@@ -1,0 +1,478 @@
+"""Columns of tables: meanings and units of headers, fields of PX4, expressions of the user, and the layout of all."""
+
+import ast
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.recordings.imports.track import (
+    COMMAND_TARGETS,
+    GEODETIC_TARGETS,
+    POSITION_TARGETS,
+    TARGETS,
+    VELOCITY_TARGETS,
+    ImportOptions,
+)
+from airflock.support import RecordingError, collect_errors, suggest
+
+LENGTH_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048, "in": 0.0254}
+TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+SPEED_UNITS = {"m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 1e-3, "km/h": 1 / 3.6, "kmh": 1 / 3.6,
+          "kn": 1852.0 / 3600.0, "kt": 1852.0 / 3600.0, "ft/s": 0.3048}  # fmt: skip
+OTHER_COMMAND_UNITS = ("1", "m/s^2")  # units of commands that are headings or accelerations
+ANGLES = {"deg": 1.0, "°": 1.0, "degrees": 1.0}
+PIXEL_UNITS = ("px", "pixel", "pixels")
+UNIT_HINT = (
+    "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"  # where nothing tells the unit of a length
+)
+
+_EAST, _NORTH, _UP = ("x", "e", "east"), ("y", "n", "north"), ("z", "u", "up")
+ALIASES: dict[str, tuple[str, ...]] = {
+    "t": ("t", "time", "timestamp", "seconds"),
+    "frame": ("frame", "frames", "frame_idx", "frame_index", "frame_number"),
+    "id": ("id", "individual", "agent", "drone", "track", "track_id", "trackid", "animal", "tag", "identity", "name",
+           "individual_local_identifier", "tag_local_identifier", "fish", "bird", "ant", "subject", "uav", "vehicle",
+           "individual_id", "agent_id", "drone_id", "animal_id", "fish_id", "bird_id", "object_id", "vehicle_id"),
+    "lat": ("lat", "latitude", "location_lat"),
+    "lon": ("lon", "lng", "long", "longitude", "location_long", "location_lon"),
+    "alt": ("alt", "altitude", "height", "amsl", "height_above_msl", "height_above_ellipsoid", "relative_alt", "agl"),
+    "utc": ("utc", "utc_time", "unix", "unix_time", "gps_time"),
+    "air": ("air", "in_air", "flying", "armed"),
+}  # fmt: skip
+for _axis, (_place, _speed, _wish, _words) in enumerate(
+    zip(POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS, (_EAST, _NORTH, _UP), strict=True)
+):
+    ALIASES[_place] = (*_words, *(f"{p}_{w}" for p in ("pos", "position", "p") for w in _words))
+    ALIASES[_speed] = tuple(f"{p}{w}" for p in ("v", "v_", "vel_", "velocity_", "speed_") for w in _words)
+    wishes = ("c", "c_", "cmd_", "cmd_v", "command_", "command_v", "target_v", "target_vel_", "set_v", "sp_v", "tv")
+    ALIASES[_wish] = tuple(f"{p}{w}" for p in wishes for w in _words)
+EAST_HEADERS = frozenset(alias for alias in (*ALIASES["x"], "pe") if alias.split("_")[-1] in ("e", "east", "pe"))
+ALIASES |= {"x": (*ALIASES["x"], "pe"), "y": (*ALIASES["y"], "pn")}  # of ArduPilot's XKF1, beside PD, VN, VE, VD
+DOWN = {"down": "z", "pos_d": "z", "pos_down": "z", "position_down": "z", "vd": "vz", "vel_d": "vz", "vel_down": "vz",
+        "pd": "z", "cmd_d": "cz", "cmd_vd": "cz", "cmd_down": "cz"}  # fmt: skip
+DATUMS = {"height_above_msl": "amsl", "amsl": "amsl", "height_above_ellipsoid": "ellipsoid", "relative_alt": "home",
+          "agl": "ground"}  # fmt: skip
+_TARGET = {alias: target for target, known in ALIASES.items() for alias in known}
+_SUFFIXES = sorted({*LENGTH_UNITS, *TIME_UNITS, *SPEED_UNITS, *ANGLES, *PIXEL_UNITS}, key=len, reverse=True)
+
+
+class HeaderMeaning(NamedTuple):
+    """What a header says: target, its unit (empty: not said), sign (-1 for down), and the level of a height."""
+
+    target: str
+    unit: str
+    sign: float
+    datum: str
+
+
+def split_header(header: str) -> tuple[str, str]:
+    """Name and unit of a header: `x [mm]`, `x(mm)`, `x_mm`; an empty unit if it has none."""
+    text = header.strip()
+    found = re.fullmatch(r"(.+?)\s*[\[(]([^\])]*)[\])]", text)
+    if found:
+        return _plain(found[1]), found[2].strip().lower()
+    plain = _plain(text)
+    if plain == "timeus":  # as ArduPilot writes it
+        return "time", "us"
+    if plain not in _TARGET:
+        for unit in _SUFFIXES:
+            if plain.endswith(f"_{unit}") and len(plain) > len(unit) + 1:
+                return plain[: -len(unit) - 1], unit
+    return plain, ""
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is nothing but a unit, also in brackets."""
+    plain = text.strip().strip("[]()").strip().lower()
+    return plain in {*LENGTH_UNITS, *TIME_UNITS, *SPEED_UNITS, *ANGLES, *PIXEL_UNITS}
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"[\s.\-:]+", "_", text.strip().lower())
+
+
+def header_meaning(header: str) -> HeaderMeaning | None:
+    """What a column holds, or None if its name tells nothing."""
+    name, unit = split_header(header)
+    if name in DOWN:
+        return HeaderMeaning(DOWN[name], unit, -1.0, "")
+    target = _TARGET.get(name)
+    return None if target is None else HeaderMeaning(target, unit, 1.0, DATUMS.get(name, ""))
+
+
+def column_factor(target: str, unit: str, where: str, options: ImportOptions) -> float:
+    """Number that turns a column into SI; raises RecordingError for a unit of something else.
+
+    unit : of the header; if empty, that of the options
+    """
+    kind = {"t": TIME_UNITS, "utc": TIME_UNITS, "lat": ANGLES, "lon": ANGLES, "alt": LENGTH_UNITS}.get(target)
+    if kind is None:
+        kind = (
+            LENGTH_UNITS
+            if target in POSITION_TARGETS
+            else SPEED_UNITS
+            if target in (*VELOCITY_TARGETS, *COMMAND_TARGETS)
+            else {}
+        )
+    if not kind or target in GEODETIC_TARGETS[:2]:
+        return 1.0
+    if not unit and target in ("t", "utc"):
+        unit = options.time_unit if options.time_unit != "frames" else ""
+    if not unit and target in POSITION_TARGETS:
+        unit = options.unit
+    if not unit and target in (*VELOCITY_TARGETS, *COMMAND_TARGETS) and options.unit not in ("", *PIXEL_UNITS):
+        return LENGTH_UNITS[options.unit]
+    if unit in PIXEL_UNITS and target in POSITION_TARGETS:
+        if options.scale is None:
+            raise RecordingError(f"{where}: {target} is in pixels; say how many metres one is: --scale 0.0005")
+        return options.scale
+    if unit and unit not in kind:
+        raise RecordingError(f"{where}: {unit}: unknown unit of {target}; known: {', '.join(kind)}")
+    return kind[unit] if unit else 1.0
+
+
+def unit_in_metres(unit: str, where: str, subject: str, options: ImportOptions) -> float:
+    """Metres in one unit of what has no header; raises RecordingError where neither it nor the options tell the unit.
+
+    unit : that the file tells, if any; where, what : file and variable, for the message
+    """
+    if options.unit or unit in LENGTH_UNITS or unit in PIXEL_UNITS:
+        return column_factor("x", options.unit or unit, where, options)
+    raise RecordingError(f"{where}: {subject} has no unit; {UNIT_HINT}")
+
+
+FIELDS = {"timestamp", *POSITION_TARGETS, *VELOCITY_TARGETS}
+# fields of vehicle_local_position that no other table has; source: PX4, msg/VehicleLocalPosition.msg
+MARKS = {"ref_timestamp", "xy_valid", "z_valid", "v_xy_valid", "xy_reset_counter", "vxy_reset_counter", "z_deriv"}
+ORIGIN = ("ref_lat", "ref_lon", "ref_alt")
+VALID = ("xy_valid", "v_xy_valid")
+
+
+def px4_options(where: str, columns: Sequence[str], options: ImportOptions) -> tuple[ImportOptions, list[str]]:
+    """Options for a table of these columns, and notes: axes and times of PX4 where its fields are there.
+
+    Raises RecordingError where they may be those of PX4 and nobody has said which axes they are.
+    """
+    names = {split_header(column)[0]: split_header(column)[1] for column in columns}
+    if not set(names) >= FIELDS or set(options.map) & {*POSITION_TARGETS, *VELOCITY_TARGETS}:
+        return options, []
+    micro = "us" in (options.time_unit, names["timestamp"]) or "timestamp" in options.map.get("t", "")
+    if is_px4_log(columns):
+        unit = options.time_unit or ("" if names["timestamp"] else "us")
+        found = replace(options, axes=options.axes or "ned", time_unit=unit, unit=options.unit or "m")
+        told = "x is north, y east, z down (otherwise --axes enu), times in us, lengths in m"
+        return found, [f"{where}: fields of PX4's vehicle_local_position: {told}"] if not options.axes else []
+    if micro and not options.axes:
+        raise RecordingError(
+            f"{where}: timestamp in us, x, y, z, vx, vy, vz are fields of PX4, whose x is north and z down: "
+            "write --axes ned, or --axes enu if x is east"
+        )
+    return options, []
+
+
+def is_px4_log(columns: Sequence[str]) -> bool:
+    """Whether a table of these columns can only be PX4's vehicle_local_position."""
+    names = {split_header(column)[0] for column in columns}
+    return names >= FIELDS and bool(names & MARKS)
+
+
+def extra_columns(columns: Sequence[str], options: ImportOptions) -> list[str]:
+    """Further columns of such a table that are read: where its origin is, and whether a row is valid."""
+    if options.axes != "ned" or not is_px4_log(columns):
+        return []
+    return [*(ORIGIN if set(columns) >= set(ORIGIN) else ()), *(name for name in VALID if name in columns)]
+
+
+def pop_origin_and_validity(columns: dict[str, Any]) -> tuple[tuple[float, float, float] | None, Any]:
+    """Take these columns out of a track's, and return its origin, if known, and of each row whether it is valid."""
+    origin = px4_origin(columns)
+    flags = [columns.pop(name) for name in VALID if name in columns]
+    for name in ORIGIN:
+        columns.pop(name, None)
+    return origin, np.all([flag != 0.0 for flag in flags], axis=0) if flags else None
+
+
+def invalid_note(where: str, name: str, valid: Any, row_numbers: Any) -> str:
+    """What is told of rows that the estimator calls invalid."""
+    bad = row_numbers[~valid]
+    return f"{where}: {name}: {len(bad)} rows that the estimator calls invalid left out, first row {bad[0]}"
+
+
+def px4_origin(local: Mapping[str, Any]) -> tuple[float, float, float] | None:
+    """Latitude, longitude (degrees) and height (m) of x = y = z = 0, which the estimator tells once it knows them."""
+    if not all(name in local for name in ORIGIN):
+        return None
+    place = np.stack([np.asarray(local[f"ref_{name}"], float) for name in ("lat", "lon", "alt")], axis=1)
+    known = place[np.isfinite(place).all(axis=1) & (place[:, :2] != 0.0).any(axis=1)]
+    return None if not len(known) else (float(known[-1, 0]), float(known[-1, 1]), float(known[-1, 2]))
+
+
+LONGEST = 300  # characters; nothing that a column needs is longer
+OPERATIONS = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
+ALLOWED = "column names, numbers, + - * / and parentheses; a name with blanks stands in quotes"
+
+
+def parse_expression(text: str, target: str) -> ast.expr:
+    """Tree of an expression; raises RecordingError for anything but arithmetic of columns."""
+    if len(text) > LONGEST:
+        raise RecordingError(f"--map {target}:=...: has {len(text)} characters, more than {LONGEST}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as fault:
+        raise RecordingError(f"--map {target}:={text}: cannot be read; it may hold {ALLOWED}") from fault
+    for node in ast.walk(tree):
+        number = isinstance(node, ast.Constant) and type(node.value) in (int, float, str)
+        sign = isinstance(node, (ast.UnaryOp, ast.USub, ast.UAdd))
+        word = isinstance(node, (ast.Name, ast.Load, ast.BinOp, *OPERATIONS))
+        if not (number or sign or word):
+            raise RecordingError(f"--map {target}:={text}: {type(node).__name__} is not allowed; it may hold {ALLOWED}")
+    return tree
+
+
+def column_names(tree: ast.expr) -> list[str]:
+    """Columns that an expression asks for."""
+    found = [node.id for node in ast.walk(tree) if isinstance(node, ast.Name)]
+    return found + [n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
+
+
+def single_column(tree: ast.expr) -> str:
+    """The column, if an expression is nothing but one; else empty."""
+    return column_names(tree)[0] if isinstance(tree, ast.Name) or _text(tree) else ""
+
+
+def _text(tree: ast.expr) -> bool:
+    return isinstance(tree, ast.Constant) and isinstance(tree.value, str)
+
+
+def check_columns(tree: ast.expr, columns: Any, where: str, target: str) -> None:
+    """Raise a RecordingError if an expression asks for a column that is not there."""
+    for name in column_names(tree):
+        if name not in columns:
+            shown = ", ".join(str(c) for c in list(columns)[:12])
+            hint = suggest(name, map(str, columns), f"it has {shown}", cutoff=0.4)
+            raise RecordingError(f"{where}: --map {target}: no column {name}; {hint}")
+
+
+def evaluate(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
+    """An expression with arrays in the place of names."""
+    if isinstance(tree, ast.BinOp):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return OPERATIONS[type(tree.op)](evaluate(tree.left, columns), evaluate(tree.right, columns))
+    if isinstance(tree, ast.UnaryOp):
+        inner = evaluate(tree.operand, columns)
+        return -inner if isinstance(tree.op, ast.USub) else inner
+    if isinstance(tree, ast.Name):
+        return columns[tree.id]
+    assert isinstance(tree, ast.Constant)
+    return columns[tree.value] if isinstance(tree.value, str) else float(tree.value)  # type: ignore[arg-type]
+
+
+def quote_column(column: str) -> str:
+    """A column as it stands in an expression of --map."""
+    return column if column.isidentifier() else f"'{column}'"
+
+
+MAX_COLUMNS = 2000
+OF_A_TRACKER = ("probability", "likelihood", "score", "confidence")
+
+
+@dataclass
+class ColumnLayout:
+    """How a table is read: target → tree and factor; the column of names; what to tell the user."""
+
+    where: str
+    expressions: dict[str, Any] = field(default_factory=dict)
+    factors: dict[str, float] = field(default_factory=dict)
+    user_labels: dict[str, str] = field(default_factory=dict)
+    id: str = ""  # a column, or "" where the whole file is one individual
+    datum: str = ""
+    ground: bool = False  # whether its axes are known to point east and north
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def used(self) -> list[str]:
+        """Columns that are needed."""
+        found = [name for tree in self.expressions.values() for name in column_names(tree)]
+        return list(dict.fromkeys(found + ([self.id] if self.id else [])))
+
+    def values(self, table: Mapping[str, NDArray[np.float64]], count: int) -> dict[str, NDArray[np.float64]]:
+        """Targets in SI units."""
+        return {
+            target: np.broadcast_to(self.factors[target] * evaluate(tree, table), count).astype(float)
+            for target, tree in self.expressions.items()
+        }
+
+
+def column_layout(where: str, columns: Sequence[str], options: ImportOptions) -> ColumnLayout:
+    """Layout of a table with these columns; raises RecordingError with every fault."""
+    if len(columns) > MAX_COLUMNS:
+        raise RecordingError(
+            f"{where}: {len(columns)} columns are more than {MAX_COLUMNS}; "
+            "give a long table with the columns id, t, x, y"
+        )
+    twice = [name for i, name in enumerate(columns) if name in columns[:i]]
+    if twice:
+        raise RecordingError(f"{where}: column {twice[0]} appears twice; rename one of them")
+    faults: list[str] = []
+    options, notes = px4_options(where, columns, options)
+    found = ColumnLayout(where, notes=notes)
+    other = [column for column in columns if _commands_no_velocity(column)]
+    with collect_errors(faults):
+        _mapped(found, columns, options)
+    with collect_errors(faults):
+        _recognised(found, [column for column in columns if column not in other], options)
+    if other:
+        found.notes.append(f"{where}: {', '.join(other)}: no commanded velocity: left out")
+    whole = not faults
+    _frames(found, options, faults)
+    if whole:
+        _complete(found, columns, faults)
+    if faults:
+        raise RecordingError("\n".join(faults))
+    found.ground = bool(options.axes) or split_header(found.user_labels.get("x", ""))[0] in EAST_HEADERS
+    _ned(found, options)
+    for name in extra_columns(columns, options):
+        found.expressions[name], found.factors[name], found.user_labels[name] = (
+            parse_expression(repr(name), name),
+            1.0,
+            name,
+        )
+    return found
+
+
+def _commands_no_velocity(column: str) -> bool:
+    """Whether a column holds a heading or an acceleration that was commanded."""
+    told = header_meaning(column)
+    return told is not None and told.target in COMMAND_TARGETS and told.unit in OTHER_COMMAND_UNITS
+
+
+def _mapped(found: ColumnLayout, columns: Sequence[str], options: ImportOptions) -> None:
+    faults = []
+    for target, text in options.map.items():
+        try:
+            if target not in TARGETS:
+                hint = suggest(target, TARGETS, f"known: {', '.join(TARGETS)}", cutoff=0.6)
+                raise RecordingError(f"--map {target}:={text}: no target {target}; {hint}")
+            if target == "id" and text.strip() == "file":
+                continue
+            tree = parse_expression(text, target)
+            check_columns(tree, columns, found.where, target)
+            if target == "id":
+                found.id = single_column(tree)
+                if not found.id:
+                    raise RecordingError(f"--map id:={text}: give one column, or file")
+                continue
+            one = single_column(tree)
+            told = header_meaning(one) if one else None
+            unit = told.unit if told is not None and told.target == target else (split_header(one)[1] if one else "")
+            found.expressions[target], found.user_labels[target] = tree, text.strip()
+            alone = bool(one)
+            found.factors[target] = column_factor(target, unit, found.where, options) if alone else 1.0
+            if target == "alt" and told is not None:
+                found.datum = told.datum
+        except RecordingError as fault:
+            faults.append(str(fault))
+    if faults:
+        raise RecordingError("\n".join(faults))
+
+
+def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOptions) -> None:
+    faults, unsaid = [], []
+    for column in columns:
+        told = header_meaning(column)
+        if told is None or told.target in found.expressions:
+            continue
+        if told.target == "id":
+            if not found.id and options.map.get("id", "").strip() != "file":
+                found.id = column
+            continue
+        if told.target in options.map:
+            continue
+        try:
+            scale = column_factor(told.target, told.unit, f"{found.where}: column {column}", options)
+        except RecordingError as fault:
+            faults.append(str(fault))
+            continue
+        found.expressions[told.target] = parse_expression(repr(column), told.target)
+        found.factors[told.target] = told.sign * scale
+        found.user_labels[told.target] = column
+        found.datum = told.datum or found.datum
+        if told.target in POSITION_TARGETS and not told.unit and not options.unit:
+            unsaid.append(column)
+    if {"lat", "lon", "alt", "z"} <= set(found.expressions) and "z" not in options.map and "x" not in found.expressions:
+        unsaid = [
+            column for column in unsaid if column != found.user_labels["z"]
+        ]  # such as U, used, of ArduPilot's GPS
+        _drop(found, "z")
+    if faults:
+        raise RecordingError("\n".join(faults))
+    if unsaid:
+        tells = [f"{c} comes from a tracker" for c in columns if split_header(c)[0] in OF_A_TRACKER]
+        if "t" not in found.expressions and "frame" in found.expressions:
+            tells.append(f"{found.user_labels['frame']} comes from a camera")
+        if tells:
+            raise RecordingError(f"{found.where}: column {unsaid[0]} has no unit, and {tells[0]}; {UNIT_HINT}")
+        found.notes.append(
+            f"{found.where}: {', '.join(unsaid)} without a unit: taken as m; if not, write for instance --unit mm"
+        )
+
+
+def _frames(found: ColumnLayout, options: ImportOptions, faults: list[str]) -> None:
+    """Time from numbers of frames, where there is no other."""
+    counted = options.time_unit == "frames" and "t" in found.expressions
+    if "t" not in found.expressions and "frame" in found.expressions:
+        _copy(found, "frame", "t")
+        counted = True
+    if counted:
+        if options.fps is None:
+            faults.append(
+                f"{found.where}: column {found.user_labels['t']} counts frames; say how many a second: --fps 25"
+            )
+        else:
+            found.factors["t"] = 1.0 / options.fps
+    _drop(found, "frame")
+
+
+def _complete(found: ColumnLayout, columns: Sequence[str], faults: list[str]) -> None:
+    shown = ", ".join(list(columns)[:12]) + (", ..." if len(columns) > 12 else "")
+    if "t" not in found.expressions and "utc" not in found.expressions:
+        faults.append(f"{found.where}: no column of times among {shown}; write for instance --map t:=COLUMN")
+    local = all(name in found.expressions for name in POSITION_TARGETS[:2])
+    geodetic = all(name in found.expressions for name in ("lat", "lon"))
+    if not (local or geodetic):
+        faults.append(f"{found.where}: no position among {shown}; write for instance --map x:=COLUMN --map y:=COLUMN")
+    for part in (VELOCITY_TARGETS, COMMAND_TARGETS):
+        if sum(name in found.expressions for name in part[:2]) == 1:
+            there = next(name for name in part[:2] if name in found.expressions)
+            lacks = next(name for name in part[:2] if name not in found.expressions)
+            faults.append(
+                f"{found.where}: has {there} ({found.user_labels[there]}) but no {lacks}; --map {lacks}:=COLUMN"
+            )
+
+
+def _ned(found: ColumnLayout, options: ImportOptions) -> None:
+    """Swap north and east and turn z over, where the user says that x is north."""
+    if options.axes != "ned":
+        return
+    for first, second, third in (POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS):
+        if first in found.expressions and second in found.expressions:
+            _copy(found, first, "")
+            _copy(found, second, first)
+            _copy(found, "", second)
+        if third in found.factors:
+            found.factors[third] = -found.factors[third]
+    _drop(found, "")
+
+
+def _copy(found: ColumnLayout, source: str, target: str) -> None:
+    found.expressions[target], found.factors[target] = found.expressions[source], found.factors[source]
+    found.user_labels[target] = found.user_labels[source]
+
+
+def _drop(found: ColumnLayout, target: str) -> None:
+    for table in (found.expressions, found.factors, found.user_labels):
+        table.pop(target, None)

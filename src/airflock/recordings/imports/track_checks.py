@@ -1,0 +1,551 @@
+"""Check tracks: missing rows, presence, names, times, heights, axes against velocities, and jumps."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.recordings.imports.table_columns import (
+    LENGTH_UNITS,
+    SPEED_UNITS,
+    TIME_UNITS,
+    header_meaning,
+    quote_column,
+    split_header,
+)
+from airflock.recordings.imports.track import (
+    COMMAND_TARGETS,
+    GEODETIC_TARGETS,
+    POSITION_TARGETS,
+    VELOCITY_TARGETS,
+    ImportedTrack,
+    ImportReport,
+)
+from airflock.support import RecordingError
+
+PLACE_TARGETS = (*POSITION_TARGETS[:2], *GEODETIC_TARGETS[:2])
+MissingRows = dict[
+    str, list[tuple[NDArray[np.int64], int]]
+]  # column → of each individual the rows, and how many are inf
+
+
+def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) -> list[ImportedTrack]:
+    """Tracks without the rows that have no time or no place; raises RecordingError for a file with no others.
+
+    An individual is absent where its place is nan or inf; one that has no place at any time is left out.
+    """
+    kept = []
+    for source, own in tracks_by_source(tracks).items():
+        whole = [_timed(track) & _placed(track) for track in own]
+        there = [track for track, sound in zip(own, whole, strict=True) if sound.any()]
+        if not there:
+            raise RecordingError(f"{source}: no row has both a time and a position")
+        gone = [track.name for track, sound in zip(own, whole, strict=True) if not sound.any()]
+        findings.notes += [f"{source}: {name}: has no position at any time: left out" for name in gone]
+        late = [track.rows[_placed(track) & ~_timed(track)] for track in there]
+        _tell(findings, source, {"": [(rows, 0) for rows in late]}, "without a time left out")
+        _tell(findings, source, _lacking(there, PLACE_TARGETS), "without a number taken as absent")
+        for track, sound in zip(own, whole, strict=True):
+            if sound.any() and not sound.all():
+                track.keep(sound)
+        kept += there
+    return kept
+
+
+def note_missing_velocities(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """Tell where a velocity or a command is nan or inf; an infinite one is none."""
+    for source, own in tracks_by_source(tracks).items():
+        _tell(
+            findings, source, _lacking(own, VELOCITY_TARGETS), "without a number: differentiated from positions there"
+        )
+        endless = _lacking(own, COMMAND_TARGETS)
+        endless = {name: found for name, found in endless.items() if any(count for _, count in found)}
+        _tell(findings, source, endless, "without a number: no command there")
+    for track in tracks:
+        for name in (*VELOCITY_TARGETS, *COMMAND_TARGETS):
+            if name in track.columns and np.isinf(track.columns[name]).any():
+                track.columns[name] = np.where(np.isinf(track.columns[name]), np.nan, track.columns[name])
+
+
+def tracks_by_source(tracks: Iterable[ImportedTrack]) -> dict[str, list[ImportedTrack]]:
+    """Tracks by the file that they were read from."""
+    found: dict[str, list[ImportedTrack]] = {}
+    for track in tracks:
+        found.setdefault(track.source, []).append(track)
+    return found
+
+
+def _timed(track: ImportedTrack) -> NDArray[np.bool_]:
+    return np.isfinite(track.time)
+
+
+def _placed(track: ImportedTrack) -> NDArray[np.bool_]:
+    found = np.ones(len(track.time), bool)
+    for name in PLACE_TARGETS:
+        if name in track.columns:
+            found &= np.isfinite(track.columns[name])
+    return found
+
+
+def _lacking(tracks: list[ImportedTrack], names: Iterable[str]) -> MissingRows:
+    """Rows with a time but no number, by column, under the user's own word for it."""
+    found: MissingRows = {}
+    for track in tracks:
+        for name in names:
+            values = track.columns.get(name)
+            if values is not None:
+                bad = ~np.isfinite(values) & _timed(track)
+                found.setdefault(track.label(name), []).append((track.rows[bad], int(np.isinf(values[bad]).sum())))
+    return found
+
+
+def _tell(findings: ImportReport, source: str, lacking: MissingRows, what: str) -> None:
+    """One note for columns that lack a number in the same rows."""
+    lines: dict[tuple[bytes, str], list[str]] = {}
+    for column, parts in lacking.items():
+        rows = np.concatenate([rows for rows, _ in parts])
+        if len(rows):
+            endless = sum(count for _, count in parts)
+            told = f" ({endless} of them inf)" if endless else ""
+            line = f"{len(rows)} rows {what}{told}, first row {rows.min()}"
+            lines.setdefault((rows.tobytes(), line), []).append(column)
+    for (_, line), columns in lines.items():
+        named = f"column {', '.join(columns)}: " if any(columns) else ""
+        findings.notes.append(f"{source}: {named}{line}")
+
+
+STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
+SLOW = 5.0  # s between rows: a unit of thousandths would be odd for so slow a log
+SINCE_1970 = 1e8  # s; times beyond are dates, and their unit is plain
+LEAST = 0.2  # share of the common span below which an individual is worth a question
+
+
+def median_period(track: ImportedTrack) -> float:
+    """Usual time between rows, s; 0 for a single row."""
+    steps = np.diff(track.time)
+    return float(np.median(steps)) if steps.size else 0.0
+
+
+def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """Rule 1: sort by time, tell of repeated instants and of steps that no log has, each once for a file."""
+    for source, own in tracks_by_source(tracks).items():
+        late = [_sorted(track) for track in own]
+        _tell_order(source, [rows for rows in late if rows.size], findings)
+        _repeated(source, own, findings)
+        wrong = [line for line in map(_wrong_step, own) if line]
+        if wrong:
+            findings.fault(wrong[0], "time")
+        else:
+            findings.notes += [line for line in map(_unsaid_step, own) if line][:1]
+
+
+def _sorted(track: ImportedTrack) -> NDArray[np.int64]:
+    """Sort a track by time; the rows that came before an earlier one."""
+    late = np.flatnonzero(np.diff(track.time) < 0.0) + 1
+    rows = track.rows[late]
+    if late.size:
+        track.keep(np.argsort(track.time, kind="stable"))
+    return rows
+
+
+def _tell_order(source: str, late: list[NDArray[np.int64]], findings: ImportReport) -> None:
+    if late:
+        count, first = sum(len(rows) for rows in late), min(int(rows[0]) for rows in late)
+        findings.notes.append(f"{source}: {count} rows out of order (first row {first}): sorted")
+
+
+def _wrong_step(track: ImportedTrack) -> str:
+    """What is wrong with the time between rows; empty if nothing is."""
+    step, name = median_period(track), track.label("t")
+    where = f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}"
+    if step and not STEPS[0] <= step <= STEPS[1]:
+        return (
+            f'{where}; the unit is another one: write --map "t:={quote_column(name)}*1e-6" (for us) or *1e-3 (for ms)'
+        )
+    unit, finer = split_header(name)[1], {"ms": ("us", 1e-6), "us": ("ns", 1e-9), "µs": ("ns", 1e-9)}
+    if unit in finer and step >= SLOW and track.time[0] < SINCE_1970 and not track.has(VELOCITY_TARGETS):
+        other, factor = finer[unit]
+        return f'{where}: {other} named {unit}? Write --map "t:={quote_column(name)}*{factor:g}"'
+    return ""
+
+
+def _unsaid_step(track: ImportedTrack) -> str:
+    """What is told of times without a unit that would be far apart in seconds; empty if there are none."""
+    step, name = median_period(track), track.user_labels.get("t", "")
+    if (
+        not name.isidentifier()
+        or split_header(name)[1]
+        or step < SLOW
+        or track.time[0] >= SINCE_1970
+        or track.has(VELOCITY_TARGETS)
+    ):
+        return ""
+    return (
+        f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart; if it does not count seconds, "
+        "write for instance --time-unit us"
+    )
+
+
+def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> None:
+    """Rows with the time of the row before: the same row again, or another individual. The first of them is kept."""
+    again: list[tuple[ImportedTrack, NDArray[np.int64]]] = []
+    for track in own:
+        same = np.flatnonzero(np.diff(track.time) == 0.0)
+        if not same.size:
+            continue
+        place = track.stack(POSITION_TARGETS, 2)
+        apart = np.hypot(*(place[same + 1] - place[same]).T)
+        other = np.flatnonzero(apart > 1e-9)
+        if len(other) > 0.5 * len(same):
+            findings.fault(
+                f"{source}: column {track.label('t')}: {track.name} is at two places at once, first row "
+                f"{track.rows[same[other[0]] + 1]} ({apart[other[0]]:.3g} m apart): two individuals under one id; "
+                "map another column: --map id:=COLUMN",
+                "duplicates",
+            )
+        else:
+            again.append((track, track.rows[same + 1]))
+        track.keep(np.r_[True, np.diff(track.time) > 0.0])
+    if again:
+        who = again[0][0].name if len(again) == 1 else f"{len(again)} individuals"
+        count, first = sum(len(rows) for _, rows in again), min(int(rows[0]) for _, rows in again)
+        findings.fault(
+            f"{source}: column {again[0][0].label('t')}: {count} rows of {who} repeat a time, first row {first}; "
+            "remove the duplicates",
+            "duplicates",
+        )
+
+
+def check_names(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """No two individuals with one name."""
+    known: dict[str, ImportedTrack] = {}
+    for track in tracks:
+        if track.name in known:
+            findings.fault(
+                f"{track.source}: {track.name} is also in {known[track.name].source}; write --map id:=file, or rename"
+            )
+        known.setdefault(track.name, track)
+
+
+def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """A column without a number says nothing, so it is none; a row without a height that others have is no place."""
+    for track in tracks:
+        for name in (*VELOCITY_TARGETS, *COMMAND_TARGETS):
+            if name in track.columns and not np.isfinite(track.columns[name]).any():
+                del track.columns[name]
+    for name in ("z", "alt"):
+        having = [track for track in tracks if name in track.columns]
+        flat = not any(np.isfinite(track.columns[name]).any() for track in having)
+        for track in having:
+            where, known = f"{track.source}: column {track.label(name)}", np.isfinite(track.columns[name])
+            if flat:
+                del track.columns[name]
+                line = f"{where} holds no height: read as in a plane"
+                findings.notes += [line] if line not in findings.notes else []
+            elif not known.any():
+                findings.fault(
+                    f"{where} holds no height of {track.name}, but of others; leave it out, "
+                    f'or put all at one height: --map "{name}:=0"'
+                )
+            elif not known.all():
+                row, count = track.rows[np.flatnonzero(~known)[0]], int((~known).sum())
+                findings.notes.append(
+                    f"{where}: {count} rows of {track.name} without a height left out, first row {row}"
+                )
+                track.keep(known)
+
+
+def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport) -> None:
+    """Rule 4: heights of all individuals are above the same level; z points up, if `axes` (enu, ned) are the file's."""
+    levels = {track.datum: track for track in tracks if "z" in track.columns or "alt" in track.columns}
+    if len(levels) > 1:
+        told = ", ".join(f"{t.name}: {level or 'not said'}" for level, t in levels.items())
+        findings.fault(f"heights are above different levels ({told}); convert them to one", "height")
+    for source, own in tracks_by_source(tracks).items():
+        heights = [(track, track.columns["z"]) for track in own if "z" in track.columns]
+        rows = sum(len(z) for _, z in heights)
+        deep = [(track, np.flatnonzero(z < -1.0)) for track, z in heights]
+        if not rows or sum(len(low) for _, low in deep) <= 0.9 * rows:  # around 0 some are always below
+            continue
+        track, low = next((track, low) for track, low in deep if len(low))
+        name = track.label("z")
+        turn = f'--map "z:=-{quote_column(name)}"'
+        if axes == "ned":
+            told = f"it points up, where --axes ned has it down; leave --axes ned out, or add {turn} if x is north"
+        else:
+            told = f"it points down; write {turn}, or --axes ned if x is north"
+        findings.fault(
+            f"{source}: column {name}: z of {track.name} lies below -1 m, first row {track.rows[low[0]]}: {told}",
+            "down",
+        )
+        return
+
+
+def note_resolution(track: ImportedTrack, findings: ImportReport) -> None:
+    """Rule 7: resolution of positions that repeat, the floor of their noise."""
+    for axis in POSITION_TARGETS[:2]:
+        values = track.columns[axis]
+        steps = np.abs(np.diff(values))
+        moved = steps[steps > 0.0]
+        if len(steps) < 20 or not len(moved) or len(moved) > 0.8 * len(steps):
+            continue
+        least = float(moved.min())
+        if np.abs(moved / least - np.round(moved / least)).max() < 0.05:
+            findings.notes.append(
+                f"{track.source}: {track.name}: {track.label(axis)} comes in steps of {least:.3g} m "
+                f"({1 - len(moved) / len(steps):.0%} of the rows repeat the one before)"
+            )
+            return
+
+
+def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """Individuals that are hardly there: kept only if that is meant."""
+    first, last = min(t.time[0] for t in tracks), max(t.time[-1] for t in tracks)
+    if last <= first:
+        return
+    for source, own in tracks_by_source(tracks).items():
+        shares = [min(1.0, len(track.time) * median_period(track) / (last - first)) for track in own]
+        rare = [number for number, share in enumerate(shares) if share < LEAST]
+        if not rare:
+            continue
+        track, share = own[rare[0]], shares[rare[0]]
+        more = f", {len(rare) - 1} more for less than {LEAST:.0%}" if len(rare) > 1 else ""
+        findings.fault(
+            f"{source}: {track.name} is there for {share:.0%} of {last - first:.4g} s "
+            f"(from {track.time[0]:.4g} to {track.time[-1]:.4g} s){more}; leave it out, or cut with --begin and --end",
+            "absent",
+        )
+
+
+Array = NDArray[np.float64]
+LAG = 0.5  # s over which velocities are summed up, so that resolution does not hide the slope
+TOLERANCE = 0.1  # of a slope that should be 1
+SIGMAS, WILD = 8.0, 20.0  # of a jump, with and without a velocity to predict it
+REASONS = {  # how many times too fast → why, and what to write: targets and the numbers by which they are wrong
+    1e-6: ("the time counts microseconds", (("t", 1e-6),)),
+    1e-3: ("the time counts milliseconds (or microseconds are named ms)", (("t", 1e-3),)),
+    1e3: ("positions are in mm, or the time is 1000 times too small", (("x", 1e-3), ("t", 1e3))),
+    1e6: ("the time is 10^6 times too small", (("t", 1e6),)),
+    1e2: ("positions are in cm", (("x", 0.01),)),
+    1e-2: ("velocities are in cm/s", (("vx", 0.01),)),
+    1 / 3.6: ("velocities are in km/h", (("vx", 1 / 3.6),)),
+    3.2808: ("positions are in ft", (("x", 0.3048),)),
+}
+
+
+def check_axes(tracks: Iterable[ImportedTrack], findings: ImportReport) -> None:
+    """Rule 2: along each axis positions change as the velocities say; else name what is swapped, turned or scaled."""
+    by_file: dict[str, list[ImportedTrack]] = {}
+    for track in tracks:
+        if track.has(VELOCITY_TARGETS):
+            by_file.setdefault(track.source, []).append(track)
+    for source, own in by_file.items():
+        axes = 3 if all("z" in t.columns and "vz" in t.columns for t in own) else 2
+        pairs = [_displacements(track, axes) for track in own]
+        moved = np.concatenate([p[0] for p in pairs])
+        summed = np.concatenate([p[1] for p in pairs])
+        if len(moved) < 20:
+            findings.notes.append(f"{source}: too few rows to compare positions with velocities")
+            continue
+        _compare(source, own[0], moved, summed, findings)
+
+
+def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Displacements over about LAG, and the same from the velocities, (pair, axis), m."""
+    step = median_period(track)
+    place, speed = track.stack(POSITION_TARGETS, axes), track.stack(VELOCITY_TARGETS, axes)
+    steps = np.diff(track.time)
+    if not step:
+        return np.empty((0, axes)), np.empty((0, axes))
+    whole = (steps < 3.0 * step) & np.isfinite(speed[1:]).all(axis=1) & np.isfinite(speed[:-1]).all(axis=1)
+    path = np.cumsum(np.where(whole[:, None], 0.5 * (speed[1:] + speed[:-1]) * steps[:, None], 0.0), axis=0)
+    path = np.concatenate([np.zeros((1, axes)), path])
+    broken = np.concatenate([[0], np.cumsum(~whole)])
+    k = max(1, round(LAG / step)) if step < LAG else 1
+    sound = np.flatnonzero(broken[k:] == broken[:-k])
+    # rows by number: a stride over all of them would keep them all in memory
+    rows = sound[:: max(1, (len(broken) - k) // 20_000)]
+    return place[rows + k] - place[rows], path[rows + k] - path[rows]
+
+
+class AxisCorrelation(NamedTuple):
+    """How displacements (rows) go with velocities (columns), by axis.
+
+    lively : (axis,) whether the velocity along it varies enough to compare
+    r      : (axis, axis) correlation
+    slopes : (axis,) by how many times the displacement along it changes as the velocity says
+    """
+
+    lively: NDArray[np.bool_]
+    r: Array
+    slopes: Array
+
+
+def _likeness(moved: Array, summed: Array) -> AxisCorrelation:
+    """Compare displacements with the same from velocities, both (pair, axis), m; some velocity must vary."""
+    strength, spread = summed.std(axis=0), moved.std(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cross = (moved - moved.mean(0)).T @ (summed - summed.mean(0)) / len(moved)
+        r, slopes = np.nan_to_num(cross / np.outer(spread, strength)), np.diag(cross) / strength**2
+    return AxisCorrelation(strength > 0.05 * strength.max(), r, slopes)
+
+
+def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, findings: ImportReport) -> None:
+    """Find where velocities contradict positions: axes that are swapped or turned round, units that differ.
+
+    track : the first of its file, for names in messages
+    moved, summed : displacements, and the same from the velocities, (pair, axis), m
+    """
+    if summed.std(axis=0).max() <= 1e-12:
+        findings.notes.append(f"{source}: nothing moves: axes and units cannot be checked against velocities")
+        return
+    likeness = _likeness(moved, summed)
+    lively, r, slopes = likeness
+    swapped = _swap_fault(source, track, likeness)
+    if swapped:
+        findings.fault(swapped, "axes")
+        return
+    axes = range(len(slopes))
+    turned = [i for i in axes if lively[i] and r[i, i] < -0.5]
+    for i in turned:
+        speed = track.label(VELOCITY_TARGETS[i])
+        findings.fault(
+            f"{source}: column {track.label(POSITION_TARGETS[i])}, "
+            f"row {track.rows[0]} on: {POSITION_TARGETS[i]} grows where "
+            f"{speed} is negative (slope {slopes[i]:.2f}): one of them points the other way; "
+            f'write --map "{VELOCITY_TARGETS[i]}:=-{quote_column(speed)}"',
+            "axes",
+        )
+    wrong = [i for i in axes if lively[i] and i not in turned and abs(slopes[i] - 1.0) > TOLERANCE]
+    wrong = [i for i in wrong if abs(r[i, i]) > 0.5]
+    if wrong:
+        columns, slope = ", ".join(track.label(POSITION_TARGETS[i]) for i in wrong), float(np.median(slopes[wrong]))
+        findings.fault(
+            f"{source}: column {columns}, row {track.rows[0]} on: positions change {slope:.3g} times as fast "
+            f"as the velocities say: {_scale_reason(track, slope)}",
+            "axes",
+        )
+
+
+def _swap_fault(source: str, track: ImportedTrack, likeness: AxisCorrelation) -> str:
+    """The first axis of the positions that goes with another axis of the velocities; empty if none does."""
+    for i, row in enumerate(likeness.r):
+        j = int(np.abs(row).argmax())
+        if likeness.lively[i] and i != j and abs(row[i]) < 0.5 and abs(row[j]) > 0.8:
+            return (
+                f"{source}: column {track.label(POSITION_TARGETS[i])} ({POSITION_TARGETS[i]}), "
+                f"row {track.rows[0]} on: moves like "
+                f"{track.label(VELOCITY_TARGETS[j])} ({VELOCITY_TARGETS[j]}; r = {row[j]:.2f}): "
+                f"{_unswapped(track, i, j)}"
+            )
+    return ""
+
+
+def _scale_reason(track: ImportedTrack, slope: float) -> str:
+    """Why positions change so many times as fast as velocities say, and what to write."""
+    near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
+    if abs(np.log(near / slope)) >= 0.1:
+        return "units differ"
+    words, changes = REASONS[near]
+    return f"{words}: write {', or '.join(_mapped(track, *change) for change in changes)}"
+
+
+def _unswapped(track: ImportedTrack, i: int, j: int) -> str:
+    """What to write where axis i of the positions is axis j of the velocities."""
+    own = [quote_column(track.label(POSITION_TARGETS[k])) for k in (i, j)]
+    told = [header_meaning(track.label(POSITION_TARGETS[k])) for k in (i, j)]
+    if [None if one is None else one.target for one in told] == [
+        POSITION_TARGETS[j],
+        POSITION_TARGETS[i],
+    ]:  # they have been exchanged already, by --axes or --map
+        return (
+            "positions and velocities have different axes; write, without --axes, "
+            f'--map "{POSITION_TARGETS[i]}:={own[0]}" --map "{POSITION_TARGETS[j]}:={own[1]}"'
+        )
+    return (
+        f'swapped, or north-east-down; write --map "{POSITION_TARGETS[i]}:={own[1]}" '
+        f'--map "{POSITION_TARGETS[j]}:={own[0]}", '
+        "or --axes ned"
+    )
+
+
+def _mapped(track: ImportedTrack, target: str, wrong: float) -> str:
+    """What to write so that a target is `wrong` times what it is now; an expression loses the unit of its header."""
+    label = track.label(target)
+    name, unit = split_header(label)
+    own = {**TIME_UNITS, **LENGTH_UNITS, **SPEED_UNITS}.get(unit, 1.0) if name else 1.0
+    return f'--map "{target}:={quote_column(label)}*{own * wrong:.6g}"'
+
+
+def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
+    """Rules 5 and 6: a row off its track is left out; a track that goes on elsewhere was reset, and is split there."""
+    surprise, scale = prediction_errors(track)
+    if not len(surprise):
+        return
+    place = track.stack(POSITION_TARGETS, 2)
+    next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
+    if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
+        findings.fault(
+            f"{track.source}: {track.name} jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on: "
+            "two individuals under one id? Map another column: --map id:=COLUMN",
+            "jumps",
+        )
+        return
+    size = np.linalg.norm(surprise, axis=1)
+    limit = (SIGMAS if track.has(VELOCITY_TARGETS) else WILD) * scale
+    known = np.isin(np.arange(1, len(track.time)), track.breaks)
+    jumps = np.flatnonzero((size > limit) & ~known)
+    if len(jumps) > max(20, 0.05 * len(size)):
+        row = int(track.rows[jumps[0] + 1])
+        findings.fault(
+            f"{track.source}: {track.name} jumps {len(jumps)} times, first row {row}: two individuals under one id? "
+            "Map another column: --map id:=COLUMN",
+            "jumps",
+        )
+        return
+    away = [int(k) for k in jumps if k + 1 < len(size) and _returns(surprise[k], surprise[k + 1])]
+    back = {k + 1 for k in away}
+    resets = [int(k) for k in jumps if k not in away and k not in back]
+    if resets:
+        k = resets[0]
+        findings.fault(
+            f"{track.source}: column {track.label('x')}, row {track.rows[k + 1]}: {track.name} jumps {size[k]:.3g} m "
+            f"more than its velocity explains ({len(resets)} times): a reset of the estimator; cut before or "
+            "after it with --end or --begin; if accepted, the track is split there",
+            "jumps",
+        )
+        track.breaks = np.unique(np.concatenate([track.breaks, np.array(resets) + 1])).astype(np.int64)
+    if away:
+        row = int(track.rows[away[0] + 1])
+        findings.notes.append(f"{track.source}: {track.name}: {len(away)} outliers left out, first row {row}")
+        sound = np.ones(len(track.time), bool)
+        sound[np.array(away) + 1] = False
+        track.keep(sound)
+
+
+def _returns(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
+    return bool(np.linalg.norm(first + second) < 0.3 * np.linalg.norm(first))
+
+
+def prediction_errors(track: ImportedTrack) -> tuple[NDArray[np.float64], float]:
+    """What each step is beyond its prediction (row - 1, 2), m, and a robust scale of it; zero across gaps."""
+    step = median_period(track)
+    place = track.stack(POSITION_TARGETS, 2)
+    moved, steps = np.diff(place, axis=0), np.diff(track.time)
+    if len(moved) < 20:
+        return np.empty((0, 2)), 0.0
+    if track.has(VELOCITY_TARGETS):
+        speed = track.stack(VELOCITY_TARGETS, 2)
+        predicted = 0.5 * (speed[1:] + speed[:-1]) * steps[:, None]
+    else:
+        rate = moved / np.maximum(steps, 1e-12)[:, None]
+        predicted = np.concatenate([moved[:1], rate[:-1] * steps[1:, None]])
+    off = np.nan_to_num(moved - predicted)
+    off[steps > 1.5 * step] = 0.0
+    near = np.abs(off[steps <= 1.5 * step])
+    # of the livelier axis: who flies along one rests in the other
+    scale = 1.4826 * float(np.median(near, axis=0).max())
+    steps_of = np.abs(moved[moved != 0.0])
+    quantum = float(steps_of.min()) if steps_of.size else 0.0  # of positions that come in steps
+    return off, max(scale, quantum, 0.1 * float(np.median(np.abs(moved), axis=0).max()), 1e-9)

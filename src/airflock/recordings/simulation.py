@@ -1,0 +1,293 @@
+"""Simulate a scenario, and keep the flight as a recording; on request with what agents perceived."""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock import __version__
+from airflock.core import radio, random
+from airflock.engine import Flight, driver_text, fly_world, pick_device
+from airflock.recordings.attributes import FAULTS_ATTRIBUTE
+from airflock.recordings.dataset import DIMENSIONS, VARIABLE_UNITS, make_dataset
+from airflock.scenarios import MODELS, Event, Scenario, check_seed, group_names, law_hash, load_if_named, step_counts
+from airflock.support import FlightError, processor_name, toolchain_versions
+from airflock.world import half_sizes
+
+
+def simulate(
+    scenario: Scenario | str | os.PathLike[str],
+    seed: int = 0,
+    *,
+    precision: int = 32,
+    start: Any = None,
+    device: str = "cpu",
+    say: Callable[[str], None] | None = None,
+    events: Sequence[Event | Mapping[str, Any]] = (),
+    keep: Sequence[str] = (),
+) -> xr.Dataset:
+    """Fly a scenario once and return the recording, sampled every `metrics.period`.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path
+        A scenario, or the name of a preset or scenario file.
+    seed : int
+        From 0 to 2^64 - 1; the same seed gives the same bits.
+    precision : int
+        Bits per number, 32 or 64.
+    start : array, optional
+        Positions and velocities to start from, (component, agent) in m and m/s, instead of random ones.
+    device : str
+        cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which tells `say` what it picked.
+    say : callable, optional
+        Told what auto picked.
+    events : sequence of mappings, optional
+        What is done to the flight on its way, as `Flight.events` or `recordings.attributes.events` tell it.
+    keep : sequence of str
+        measured: the variables measured_position and measured_velocity, as agents last measured their own; heard: the
+        variable age (time, receiver, sender), s since what was last heard had been sent, nan where nothing was. The
+        flight's bits are the same.
+
+    Returns
+    -------
+    xarray.Dataset
+        position (m), velocity (m/s) and command, each (time, space, keypoint, individual). Its attributes hold the
+        scenario, the seed, versions and processor, so that it can be flown again.
+
+    Raises
+    ------
+    ScenarioError, FlightError, ParameterError, DeviceError
+        If the scenario, the flight, the seed or the device is faulty.
+
+    Notes
+    -----
+    The layout follows the package movement (time, space, keypoint, individual).
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> recording = airflock.simulate(short, seed=7)
+    >>> dict(recording.position.sizes)
+    {'time': 6, 'space': 2, 'keypoint': 1, 'individual': 4}
+    """
+    seed = check_seed(seed)
+    scenario = load_if_named(scenario).with_drawn_scene(seed)
+    check_keep(keep, events, scenario)
+    device = pick_device([scenario], device, precision=precision, record=True, notify=say)
+    if device in Flight.DEVICES:
+        flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events, device=device)
+        perceived = finish_keeping(flight, keep) if keep else {}
+        flight.finish()
+        return recording_of(flight).assign(perceived)
+    if events or keep:
+        raise FlightError(
+            f"{'events' if events else 'keep'}: a flight on device = {device} takes none; choose device = cpu or python"
+        )
+    flown = fly_world(scenario, seed, precision=precision, record=True, start=start, device=device)
+    assert flown.frames is not None
+    times = np.arange(len(flown.frames)) * step_counts(scenario)["sample_every"] * scenario.flight.dt
+    attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None), "airflock_device": device}
+    return make_dataset(
+        flown.frames,
+        scenario.dimensions,
+        times,
+        attributes,
+        scenario.model.command,
+        group_names(scenario.groups, scenario.agents),
+    )
+
+
+def recording_of(flight: Flight) -> xr.Dataset:
+    """Recording of what an open flight has flown so far.
+
+    Parameters
+    ----------
+    flight : Flight
+        It must have been opened with record=True.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `airflock.simulate` returns it. Its attribute airflock_events holds what was done to the flight; with
+        scenario and seed it gives the same bits.
+
+    Raises
+    ------
+    FlightError
+        Where the flight keeps no frames.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> flight = airflock.open(short, seed=1, record=True).advance(0.5)
+    >>> airflock.recording_of(flight).sizes["time"]
+    3
+    """
+    if not isinstance(flight, Flight):
+        raise FlightError(f"{type(flight).__name__} is no open flight; airflock.open gives one")
+    scenario, seed, precision, start = flight.origin
+    attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}
+    attributes |= {"airflock_device": flight.device} if flight.device != "cpu" else {}
+    if flight.events:
+        attributes["airflock_events"] = json.dumps(
+            {"events": [to_plain_values(event.plain()) for event in flight.events]}
+        )
+    if flight.faults:
+        attributes[FAULTS_ATTRIBUTE] = json.dumps({"faults": to_plain_values(flight.faults)})
+    return make_dataset(
+        flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command,
+        group_names(scenario.groups, scenario.agents),
+    )  # fmt: skip
+
+
+def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
+    """Everything that decides the bits of a flight, as plain attributes."""
+    text = driver_text(scenario, precision=precision)
+    own = scenario.document.get("model", {}).get("kind") not in MODELS
+    return {
+        "airflock_scenario": json.dumps(bare_document(scenario)),
+        "airflock_name": scenario.name,
+        "airflock_metrics": json.dumps(asdict(scenario.resolved_metrics())),
+        "airflock_seed": seed,
+        "airflock_precision": precision,
+        "airflock_version": __version__,
+        "airflock_sources": hashlib.sha256(text.encode()).hexdigest(),
+        "airflock_toolchain": toolchain_versions(),
+        "airflock_processor": processor_name(),
+        **({"airflock_law": law_hash(scenario.model)} if own else {}),
+    }
+
+
+def bare_document(scenario: Scenario) -> dict[str, Any]:
+    """The scenario as plain values, of which code of the user's own is its bare name: no file, and no place of one."""
+    document: dict[str, Any] = to_plain_values(scenario.document)
+    for section in ("model", "body", "sensors", "metrics"):
+        table = document.get(section, {})
+        kind = table.get("kind") if isinstance(table, dict) else None
+        if isinstance(kind, str) and kind.endswith(".py"):
+            table["kind"] = PurePath(kind).stem
+    tables = [entry["model"] for entry in document.get("groups", ()) if isinstance(entry.get("model"), dict)]
+    for entry in (*document.get("faults", ()), *tables):
+        if str(entry.get("kind", "")).endswith(".py"):
+            entry["kind"] = PurePath(entry["kind"]).stem
+    return document
+
+
+def to_plain_values(value: Any) -> Any:
+    """A nested dict of plain Python values, for JSON."""
+    if isinstance(value, dict) or hasattr(value, "items"):
+        return {str(key): to_plain_values(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [to_plain_values(entry) for entry in value]
+    return value
+
+
+Array = NDArray[Any]
+KINDS = ("measured", "heard")
+FARTHEST = 1e8  # m; the limit of any range in a driver
+
+
+def check_keep(keep: Sequence[str], events: Sequence[Any], scenario: Scenario) -> None:
+    """Refuse what cannot be kept, one line each."""
+    if isinstance(keep, str) or not isinstance(keep, Iterable):
+        raise FlightError(f"keep = {keep!r} is not a list; give some of {', '.join(KINDS)}, such as keep=('measured',)")
+    faults = [f"keep = {kind!r} is none of {', '.join(KINDS)}" for kind in keep if kind not in KINDS]
+    if keep and events:
+        faults.append("keep: a flight with events is cut by them already; keep nothing, or give no events")
+    if keep and scenario.flight.update == "sequential":
+        faults.append("keep: with update = 'sequential' each agent moves before the next one perceives")
+    if faults:
+        raise FlightError("\n".join(faults))
+
+
+def finish_keeping(flight: Flight, keep: Sequence[str]) -> dict[str, xr.Variable]:
+    """Fly to the end and return what was perceived, as variables of the recording.
+
+    measured_position (m), measured_velocity (m/s) : (time, space, keypoint, individual), as last measured
+    age : (time, receiver, sender), s since what was last heard had been sent; nan: never heard
+    """
+    scenario, n = flight.scenario, flight.agents
+    times, dt = step_counts(scenario), scenario.flight.dt
+    every, sample = times["decide_every"], times["sample_every"]
+    late = times["delay"] * dt
+    stamps = np.full((n, n), np.nan)
+    measured: list[Array] = []
+    ages: list[Array] = []
+    following = 0  # frame
+    while not flight.over:
+        flight.sense()
+        now = flight.step * dt
+        last = min(flight.step + every, times["steps"])
+        if "heard" in keep:
+            stamps = _stamps(flight, stamps, flight.step // every, now, late)
+        own = flight.measured if "measured" in keep else None
+        while following * sample < last:
+            _note(measured, ages, own, stamps if "heard" in keep else None, following * sample * dt)
+            following += 1
+        flight.advance(steps=last - flight.step)
+    if following * sample <= times["steps"]:
+        own = flight.measured if "measured" in keep else None
+        _note(measured, ages, own, stamps if "heard" in keep else None, following * sample * dt)
+    flight.finish()
+    count = len(flight.frame_times)
+    return _variables(measured[:count], ages[:count], scenario.dimensions)
+
+
+def _note(measured: list[Array], ages: list[Array], own: Array | None, stamps: Array | None, time: float) -> None:
+    if own is not None:
+        measured.append(own)
+    if stamps is not None:
+        ages.append(time - stamps)
+
+
+def _variables(measured: list[Array], ages: list[Array], dimensions: int) -> dict[str, xr.Variable]:
+    found: dict[str, xr.Variable] = {}
+    if measured:
+        table = np.array(measured)[:, :, None, :]
+        for c, name in enumerate(("position", "velocity")):
+            part = table[:, c * dimensions : (c + 1) * dimensions]
+            found[f"measured_{name}"] = xr.Variable(DIMENSIONS, part, {"units": VARIABLE_UNITS[name]})
+    if ages:
+        found["age"] = xr.Variable(("time", "receiver", "sender"), np.array(ages, np.float32), {"units": "s"})
+    return found
+
+
+def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
+    """Uniform number of each pair (receiver, sender) in a decision: `core.random.pair_uniform` for a whole flock."""
+    fours, senders = -(-agents // 4), np.arange(agents, dtype=np.uint64)
+    first = random.pair_number(4 * np.arange(fours, dtype=np.uint64)[:, None], senders, agents)
+    zero = np.zeros_like(first)
+    drawn = random.philox(
+        first, zero + np.uint64(decision), zero + np.uint64(random.PACKET), zero + np.uint64(world), seed, seed >> 32
+    )
+    return np.asarray(random.uniform(np.stack(drawn, axis=1).reshape(4 * fours, agents)[:agents]))
+
+
+def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float) -> Array:
+    """When what each agent knows of each other one was sent, s, after a decision; nan: never heard."""
+    k, n = flight.scenario.radio, flight.agents
+    if flight.scenario.transceiver.keeps_packets:
+        return np.where(np.eye(n, dtype=bool), np.nan, flight.sent)
+    place = flight.state[: flight.scenario.dimensions].astype(float)
+    offset = place[:, None, :] - place[:, :, None]  # from receiver (first) to sender
+    if flight.scenario.world.edges == "periodic":
+        halves = half_sizes(flight.scenario.world)
+        for d, half in zip(offset, halves, strict=False):
+            d -= 2.0 * half * np.round(d / (2.0 * half))
+    apart = np.sqrt((offset**2).sum(axis=0))
+    heard = (apart <= min(k.range, FARTHEST)) & ~np.eye(n, dtype=bool)
+    if k.loss > 0.0:
+        i, j = np.nonzero(heard)
+        lost = np.array([radio.lost(float(d), k) for d in apart[i, j]])
+        heard[i, j] = packet_uniforms(flight.seed, flight.world, number, n)[i, j] >= lost
+    return np.where(heard, now - late, stamps)
