@@ -1,15 +1,22 @@
-"""The groups of a scenario file: agents that share numbers or a law, and how far each agent is off these numbers."""
+"""The groups of a scenario file: agents that share numbers or a law, and how far each agent is off these numbers.
+
+`read_groups` checks the entries of [[groups]]; `flown_laws` and `agent_values` say by which law and with which
+numbers each agent flies.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import signature
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from airflock.core import Choice, Model, Quantity, declarations, random
-from airflock.scenarios import schema, units
-from airflock.scenarios.group_laws import GroupLawReader
-from airflock.scenarios.spreads import check_spreads, relative_spread, standard_deviation, with_share_hint
+from airflock.core import Body, Choice, Model, Quantity, Sensor, argument_names, choices, declarations, random
+from airflock.scenarios import schema
+from airflock.scenarios.named_code import find_law
+from airflock.scenarios.scenario_checks import body_errors, sensor_errors, silence_errors
+from airflock.scenarios.units import check_spreads, convert_units, relative_spread, standard_deviation, with_share_hint
+from airflock.support import AirflockError
 
 LETTERS = {
     "model": "p",
@@ -26,9 +33,9 @@ class Group:
     """One entry of [[groups]].
 
     agents  : their numbers, in order
-    numbers : (letter, name) → value that they have instead of the flock's
-    spread  : (letter, name) → standard deviation by which each agent differs from it, or what share of it that is
-    law     : model and parameters that they fly by, where these are not the flock's but for numbers
+    numbers : (letter, name) → value in place of the flock's
+    spread  : (letter, name) → standard deviation of the agents' values about it, absolute or a share of the value
+    law     : model and parameters, if the group flies by another law, or by the flock's law with other choices
     """
 
     name: str
@@ -38,13 +45,169 @@ class Group:
     law: tuple[Model, Any] | None = None
 
     def without(self, letter: str) -> "Group":
-        """The same group without numbers of its own in one record."""
+        """Return the group without numbers of its own in one record."""
         rest = [{key: v for key, v in part.items() if key[0] != letter} for part in (self.numbers, self.spread)]
         return replace(self, numbers=rest[0], spread=rest[1])
 
 
+class FlownLaw(NamedTuple):
+    """A law that agents of a flock fly by.
+
+    parameters : its record; numbers that differ among its agents are those of the first group that flies by it
+    agents     : numbers of the agents that fly by it
+    varied     : its numbers that differ among them, as ("p", name)
+    """
+
+    model: Model
+    parameters: Any
+    agents: tuple[int, ...]
+    varied: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def uses_groups(self) -> bool:
+        """True if its rule for neighbours reads their groups."""
+        rule = self.model.neighbour
+        return rule is not None and bool({"kin", "group"} & set(argument_names(rule, "neighbour", self.model.name)))
+
+
+@dataclass
+class GroupLawReader:
+    """Reads the section `model` of a group.
+
+    model, kind, parameters : law of the flock, as its file names it, and its numbers
+    own    : laws that the caller gives, by name
+    folder : of the scenario file; trust : True if a file of the user's own may run
+    walls  : True if the world has polygons, which are shapes for a law that casts rays and surfaces for any other
+    """
+
+    model: Model
+    kind: Any
+    parameters: Any
+    own: Mapping[str, Model] = field(default_factory=dict)
+    folder: Path | None = None
+    trust: bool = False
+    walls: bool = False
+    _read: dict[str, Model] = field(default_factory=dict)
+
+    def named(self, where: str, table: Any) -> tuple[tuple[Model, Any] | None, list[str]]:
+        """Return the law of a group, None for that of the flock, and the errors, one line each."""
+        if not isinstance(table, Mapping):
+            return None, []  # said where its numbers are read
+        kind = table.get("kind", self.kind)
+        try:
+            found = self._found(where, kind)
+        except AirflockError as fault:
+            return None, str(fault).splitlines()
+        faults = self._misfits(where, kind, found)
+        record, more = self._chosen(where, table, found)
+        if faults or more:
+            return None, faults + more
+        same = found == self.model and choices(record) == choices(self.parameters)
+        return (None if same else (found, record)), []
+
+    def _found(self, where: str, kind: Any) -> Model:
+        known = {**self._read, **self.own, self.model.name: self.model}
+        if kind == self.kind:
+            return self.model
+        if isinstance(kind, str) and kind in known:
+            return known[kind]
+        self._read[kind] = found = find_law(kind, self.folder, where=f"{where}.kind", trust=self.trust)
+        return found
+
+    def _misfits(self, where: str, kind: Any, found: Model) -> list[str]:
+        """Return why a law cannot fly beside that of the flock."""
+        faults, told, base = [], f"{where}.kind = {kind!r}", self.model
+        if found is base:
+            return []
+        if found.command != base.command:
+            faults.append(
+                f"{told}: model {found.name} commands {found.command}, and model {base.name} of the flock "
+                f"{base.command}; one body carries all"
+            )
+        for law in (base, found):
+            if law.flock is not None:
+                faults.append(f"{told}: model {law.name} solves for the whole flock, so all fly by it")
+        if self.walls and (found.sight is None) != (base.sight is None):
+            casts, other = (base, found) if found.sight is None else (found, base)
+            faults.append(
+                f"{told}: model {casts.name} casts rays at polygons and model {other.name} feels them as surfaces; "
+                "give a world without polygons"
+            )
+        return faults
+
+    def _chosen(self, where: str, table: Mapping[str, Any], found: Model) -> tuple[Any, list[str]]:
+        """Return the parameters of a group's law with its own choices; its numbers come later."""
+        known = {name for name, declared, _ in declarations(found.Parameters) if isinstance(declared, Choice)}
+        own = {key: schema.value_of(value) for key, value in table.items() if key in known}
+        made, faults = schema.read_section(where, own, found.Parameters)
+        if faults or made is None:
+            return None, faults
+        base = self.parameters if found == self.model else found.Parameters()
+        record = replace(base, **{key: getattr(made, key) for key in own})
+        if found == self.model and found.flock is not None and choices(record) != choices(base):
+            return None, [f"{where}: model {found.name} solves for the whole flock, with one set of choices"]
+        return record, []
+
+
+def group_errors(
+    groups: Sequence[Group], parts: Mapping[str, Any], model: Model, body: Body, sensor: Sensor
+) -> list[str]:
+    """Return why groups cannot fly with their own numbers or law, one line each."""
+    faults: list[str] = []
+    of_all = {*body_errors(body, parts, model), *sensor_errors(sensor, parts)}  # told already
+    for number, group in enumerate(groups):
+        law, base = group.law or (model, parts["parameters"])
+        own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in "pbs"}
+        if group.law is None and not any(own.values()):
+            continue
+        told: dict[str, Any] = {**parts, "parameters": base and replace(base, **own["p"])}
+        told["body"] = parts["body"] and replace(parts["body"], **own["b"])
+        told["sensors"] = parts["sensors"] and replace(parts["sensors"], **own["s"])
+        more = body_errors(body, told, law) + (sensor_errors(sensor, told) if own["s"] else [])
+        if group.law is not None and parts["silence"] is not None and parts["flight"] is not None:
+            more += silence_errors(parts["silence"].rule, parts["flight"], law)
+        faults += [f"groups[{number}]: {fault}" for fault in more if fault not in of_all]
+    return faults
+
+
+def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: int) -> tuple[FlownLaw, ...]:
+    """Return the laws of a flock: that of all agents without their own, then those of groups, one for each text."""
+    found: dict[Any, list[Group]] = {}
+    for group in groups:
+        if group.law is not None and group.agents:
+            found.setdefault((group.law[0], tuple(choices(group.law[1]).items())), []).append(group)
+    apart = {agent for members in found.values() for group in members for agent in group.agents}
+    rest = tuple(agent for agent in range(agents) if agent not in apart)
+    base = [group for group in groups if group.law is None]
+    made = [FlownLaw(model, parameters, rest, _varied(base, parameters))]
+    for (law, _), members in found.items():
+        first = members[0]
+        assert first.law is not None
+        record = replace(
+            first.law[1], **{name: value for (letter, name), value in first.numbers.items() if letter == "p"}
+        )
+        who = tuple(sorted(agent for group in members for agent in group.agents))
+        made.append(FlownLaw(law, record, who, _varied(members, record)))
+    return tuple(made)
+
+
+def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]:
+    """Return the numbers of a law that differ among the agents of groups, as ("p", name), in declared order."""
+    found = []
+    for name, declared, _ in declarations(record):
+        usual, key = float(getattr(record, name) or 0.0) if isinstance(declared, Quantity) else 0.0, ("p", name)
+        values = {
+            group.numbers.get(key, float(getattr(group.law[1] if group.law else record, name) or 0.0))
+            for group in groups
+            if isinstance(declared, Quantity)
+        }
+        if values - {usual} or any(group.spread.get(key, 0.0) > 0.0 for group in groups):
+            found.append(key)
+    return tuple(found)
+
+
 def read_members(where: str, value: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:
-    """Numbers of agents from a list of them; and what is wrong with it, one line."""
+    """Read a list of numbers of agents; return them, or None, with the error, one line."""
     whole = isinstance(value, Sequence) and not isinstance(value, str)
     if not whole or not value or not all(isinstance(k, int) and not isinstance(k, bool) for k in value):
         return None, [f"{where} = {value!r} is not a list of numbers of agents, 0 to {agents - 1}"]
@@ -55,13 +218,13 @@ def read_members(where: str, value: Any, agents: int) -> tuple[tuple[int, ...] |
 
 
 def group_names(groups: Sequence[Group], agents: int) -> tuple[str, ...]:
-    """Name of the group of each agent, "" in none; nothing where there are no groups."""
+    """Return the name of the group of each agent, "" in none; empty where there are no groups."""
     named = {agent: group.name for group in groups for agent in group.agents}
     return tuple(named.get(agent, "") for agent in range(agents)) if named else ()
 
 
 def count_of_share(value: Any, agents: int) -> Any:
-    """A number of agents out of a share of the flock such as "20 %", at least one; anything else as it is."""
+    """Convert a share of the flock such as "20 %" to a number of agents, at least one; return anything else as is."""
     share = SHARE.fullmatch(value) if isinstance(value, str) else None
     if share is None or not 0.0 < float(share[1]) <= 100.0:
         return value
@@ -71,7 +234,7 @@ def count_of_share(value: Any, agents: int) -> Any:
 def read_groups(
     tables: Any, agents: int, records: Mapping[str, type], laws: GroupLawReader | None = None
 ) -> tuple[tuple[Group, ...], list[str], list[str]]:
-    """Groups, notes of converted units, and everything that is wrong with them, one line each.
+    """Read groups; return them with notes on converted units and all errors, one line each.
 
     records : "model", "body" and "sensors" → record of their parameters
     laws    : finds the law that a group's section model names
@@ -105,7 +268,7 @@ def read_groups(
 
 
 def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple[int, ...]], list[str]]:
-    """Members of each group: those that are listed, so many of the next ones, or all that are left."""
+    """Return the members of each group: those that are listed, so many of the next ones, or all that are left."""
     faults: list[str] = []
     found: list[tuple[int, ...]] = [()] * len(given)
     taken: set[int] = set()
@@ -144,7 +307,7 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
 
 
 def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], dict[str, float], list[str], list[str]]:
-    """Numbers and spreads of one section of a group."""
+    """Read one section of a group; return numbers, spreads, notes and errors."""
     if not isinstance(table, Mapping):
         return {}, {}, [], [f"{where} = {table!r} is not a table of numbers"]
     known = {name: declared for name, declared, _ in declarations(record)}
@@ -169,7 +332,7 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
         else:
             values[key] = value
     apart = f"{where}.spread"
-    converted, told, unfit = units.convert_units({where: values, apart: spreads}, {where: record, apart: record})
+    converted, told, unfit = convert_units({where: values, apart: spreads}, {where: record, apart: record})
     notes = [_as_written(line, where, apart) for line in told]
     wrong = [f"{_as_written(line, where, apart)}{with_share_hint(line, apart, known)}" for line in unfit]
     made, more = schema.read_section(where, converted[where], record)
@@ -180,7 +343,7 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
 
 
 def _as_written(line: str, where: str, apart: str) -> str:
-    """A line about a spread under the key that a file has for it."""
+    """Rewrite a line about a spread with the key that a file has for it."""
     if not line.startswith(f"{apart}."):
         return line
     key, _, rest = line.removeprefix(f"{apart}.").partition(" ")
@@ -188,9 +351,9 @@ def _as_written(line: str, where: str, apart: str) -> str:
 
 
 def varied_numbers(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Numbers that differ among agents, as (letter, name), in declared order; base : letter → record of the flock.
+    """Return the numbers that differ among agents, as (letter, name), in declared order.
 
-    Those of laws: `group_laws.Law.varied`.
+    base : letter → record of the flock. Varied numbers of laws: `FlownLaw.varied`.
     """
     found = []
     for letter, record in base.items() if groups else ():
@@ -204,9 +367,9 @@ def varied_numbers(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tu
 
 
 def agent_values(groups: Sequence[Group], agents: int, letter: str, name: str, record: Any, seed: int) -> list[float]:
-    """One number of every agent: its group's, and off it by a normal number of its own, within the allowed range.
+    """Return one number of every agent: its group's, plus a normal deviation of its own, clipped to the allowed range.
 
-    It is 0 of agents whose law has no such number.
+    It is 0 for agents whose law has no such number.
     """
     values = [float(getattr(record, name, None) or 0.0)] * agents
     for group in groups:
@@ -230,7 +393,7 @@ def agent_values(groups: Sequence[Group], agents: int, letter: str, name: str, r
 
 
 def group_number_errors(groups: Sequence[Group], model: Model | None) -> list[str]:
-    """Why numbers of groups cannot be flown by a law, one line."""
+    """Return why a law that solves for the whole flock cannot fly the numbers of groups, one line."""
     if model is None or model.flock is None or model.workspace is None:
         return []
     if "p" not in {*signature(model.flock).parameters, *signature(model.workspace).parameters}:

@@ -15,10 +15,10 @@ IN_FILES = {
 
 
 def keys_by_last_word(records: Mapping[str, type]) -> dict[str, list[str]]:
-    """Last word → whole keys of all sections that have it.
+    """Return last word → whole keys of all sections that have it.
 
-    A key of `metrics` that is taken from the scenario by default (such as metrics.v_flock) gives way to one of the
-    model's of the same name.
+    A key of `metrics` that is taken from the scenario by default (such as metrics.v_flock) gives way to a key of the
+    model with the same name.
     """
     found: dict[str, list[str]] = {}
     for section, record in records.items():
@@ -35,7 +35,7 @@ def keys_by_last_word(records: Mapping[str, type]) -> dict[str, list[str]]:
 def expand_short_keys(
     settings: Mapping[str, Any], records: Mapping[str, type], top: tuple[str, ...]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
-    """Settings with whole keys, notes of what was found, and faults of keys that are several or none.
+    """Expand settings to whole keys; return them with notes, and errors for ambiguous and unknown keys.
 
     settings : keys that are neither whole ("radio.delay") nor at the top of a file ("agents")
     records  : section → record of its parameters, "model" first
@@ -61,7 +61,7 @@ def expand_short_keys(
 
 
 def _meaning(key: str, records: Mapping[str, type]) -> str:
-    """What a whole key means, up to the first comma or semicolon."""
+    """Return the meaning of a whole key, up to the first comma or semicolon."""
     section, _, last = key.partition(".")
     declared = next(found for name, found, _ in declarations(records[section]) if name in (last, f"{last}_0"))
     return re.split(r"[;,(]", declared.meaning)[0].strip()

@@ -1,4 +1,4 @@
-"""Device: whether there is a GPU that can be used, what it is, and what is missing where there is none."""
+"""The GPU: whether one can be used, what it is, and why there is none."""
 
 import os
 from functools import cache
@@ -11,13 +11,13 @@ INSTALL = "pip install 'airflock[cuda]'"
 
 
 def cuda_runtime() -> Any:
-    """numba-cuda's runtime interface."""
+    """Return numba-cuda's runtime interface."""
     return import_module("numba.cuda")
 
 
 @cache
 def unavailable_reason() -> str | None:
-    """Why no GPU can be used here, as one line; None if one can."""
+    """Return why no GPU can be used here, as one line; None if one can."""
     try:
         import_module("numba_cuda")
         cuda = cuda_runtime()
@@ -36,7 +36,7 @@ def unavailable_reason() -> str | None:
 
 
 def _driver_fault() -> str:
-    """What the driver says."""
+    """Return the driver's own error."""
     fault = cuda_runtime().cuda_error()
     return _first_line(fault) if fault else "no device found"
 
@@ -47,12 +47,12 @@ def _first_line(fault: BaseException | str) -> str:
 
 
 def is_simulated() -> bool:
-    """Whether Numba's CUDA simulator stands for a GPU."""
+    """Return True if Numba's CUDA simulator stands for a GPU."""
     return os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
 
 
 def is_available() -> bool:
-    """Whether a GPU can be used."""
+    """Return True if a GPU can be used."""
     return unavailable_reason() is None
 
 
@@ -66,17 +66,17 @@ def require_gpu(allow_simulator: bool = False) -> None:
 
 
 def free_gpu_memory() -> int:
-    """Free bytes in the GPU's memory."""
+    """Return the free bytes in the GPU's memory."""
     return int(cuda_runtime().current_context().get_memory_info().free)
 
 
 def multiprocessor_count() -> int:
-    """Multiprocessors of the GPU."""
+    """Return the number of multiprocessors of the GPU."""
     return int(cuda_runtime().get_current_device().MULTIPROCESSOR_COUNT)
 
 
 def describe_gpus() -> list[dict[str, Any]]:
-    """Every GPU: name, compute capability, multiprocessors, memory in GB."""
+    """Describe every GPU: name, compute capability, multiprocessors, memory in GB."""
     if not is_available():
         return []
     cuda, found = cuda_runtime(), []
