@@ -95,14 +95,14 @@ def _widest_reach(scenario: Scenario, law: FlownLaw) -> float:
     if law.model.reach is None or law.model.neighbour is None:
         return 0.0
     read = fields_read(law.model.reach, "p")
-    found = [float(law.model.reach(law.parameters))]
+    reaches = [float(law.model.reach(law.parameters))]
     for group in scenario.groups:
         if group.agents and set(group.agents) <= set(law.agents):
             if any(letter == "p" and (read is None or name in read) for letter, name in group.spread):
                 return math.inf
             own = {name: value for (letter, name), value in group.numbers.items() if letter == "p"}
-            found.append(float(law.model.reach(replace(law.parameters, **own))))
-    return max(found)
+            reaches.append(float(law.model.reach(replace(law.parameters, **own))))
+    return max(reaches)
 
 
 def metrics_use_cells(scenario: Scenario) -> bool:
@@ -130,10 +130,10 @@ def check_run_time(scenario: Scenario) -> None:
         return
     days = LONGEST / 86400.0
     fit = largest_fitting(scenario.agents, lambda agents: estimated_seconds(_with_agents(scenario, agents)) <= LONGEST)
-    told = f"{scenario.name}: a flight takes about {took / 86400.0:.3g} days of a processor, more than {days:g}"
+    message = f"{scenario.name}: a flight takes about {took / 86400.0:.3g} days of a processor, more than {days:g}"
     fits = [f"about {fit} agents fit"] if fit else []
     fits.append(f"{'or ' if fits else ''}a duration of about {flight.duration * LONGEST / took:.3g} s")
-    raise FlightError(f"{told}; {'; '.join(fits)}, or a longer dt = {flight.dt:g} s")
+    raise FlightError(f"{message}; {'; '.join(fits)}, or a longer dt = {flight.dt:g} s")
 
 
 def _with_agents(scenario: Scenario, agents: float) -> Scenario:

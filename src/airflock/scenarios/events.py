@@ -42,8 +42,8 @@ def to_events(items: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
     for number, entry in enumerate(items):
         try:
             event = entry if isinstance(entry, Event) else Event(int(entry["step"]), str(entry["kind"]), entry["data"])
-        except (KeyError, TypeError, ValueError) as fault:
-            raise FlightError(f"events[{number}]: needs step, kind and data") from fault
+        except (KeyError, TypeError, ValueError) as error:
+            raise FlightError(f"events[{number}]: needs step, kind and data") from error
         if event.kind not in KINDS or event.step < 0 or not isinstance(event.data, Mapping):
             raise FlightError(
                 f"events[{number}]: kind = {event.kind!r} at step {event.step}; known kinds: {', '.join(KINDS)}"
@@ -66,13 +66,13 @@ def to_vectors(name: str, value: Any, count: int, dimensions: int, unit: str) ->
 def to_vector(name: str, value: Any, dimensions: int, unit: str) -> list[float]:
     """Check a finite vector; return plain floats. Raises FlightError in one line."""
     try:
-        found = [float(c) for c in value]
+        vector = [float(c) for c in value]
     except (TypeError, ValueError):
-        found = []
-    if len(found) != dimensions or not all(math.isfinite(c) for c in found):
+        vector = []
+    if len(vector) != dimensions or not all(math.isfinite(c) for c in vector):
         axes = ("east", "north", "up")[:dimensions]
         raise FlightError(f"{name} = {value!r} is not [{', '.join(axes)}] in {unit or '1'}, each finite")
-    return found
+    return vector
 
 
 def check_agent(agent: Any, agents: int) -> int:
@@ -93,15 +93,15 @@ def are_several(agents: Any) -> bool:
 
 def check_agents(number_or_list: Any, agents: int) -> list[int]:
     """Return the numbers of one agent or of several different ones. Raises FlightError in one line."""
-    found = [
+    numbers = [
         check_agent(number, agents) for number in (number_or_list if are_several(number_or_list) else [number_or_list])
     ]
-    if not found:
+    if not numbers:
         raise FlightError(f"agent = {number_or_list!r}: names no agent")
-    twice = [number for place, number in enumerate(found) if number in found[:place]]
+    twice = [number for place, number in enumerate(numbers) if number in numbers[:place]]
     if twice:
         raise FlightError(f"agent = {number_or_list!r}: {twice[0]} is named twice")
-    return found
+    return numbers
 
 
 def _index(given: Any) -> int:
@@ -119,26 +119,26 @@ MAX_FLIGHTS = 10_000_000  # flights at a time
 def check_seed(seed: Any) -> int:
     """Return a seed as a plain integer. Raises ParameterError, as any other number would fly like another seed."""
     try:
-        found = operator.index(seed)
+        number = operator.index(seed)
     except TypeError:
         raise ParameterError(f"seed = {seed!r} is not a whole number in [0, 2^64 - 1]") from None
-    if not 0 <= found <= LARGEST_SEED:
-        raise ParameterError(f"seed = {found} lies outside [0, 2^64 - 1]")
-    return found
+    if not 0 <= number <= LARGEST_SEED:
+        raise ParameterError(f"seed = {number} lies outside [0, 2^64 - 1]")
+    return number
 
 
 def check_seeds(seeds: int | Iterable[int]) -> list[int]:
     """Return the seeds of several flights: 0, 1, ... up to a number of flights, or those of a list."""
     if isinstance(seeds, Iterable):
-        found = [check_seed(seed) for seed in seeds]
+        checked = [check_seed(seed) for seed in seeds]
     else:
         try:
             count = operator.index(seeds)
             if count > MAX_FLIGHTS:
                 raise ParameterError(f"seeds = {count}: more than {MAX_FLIGHTS} flights at a time")
-            found = list(range(count))
+            checked = list(range(count))
         except TypeError:
             raise ParameterError(f"seeds = {seeds!r} is neither a whole number nor a list of seeds") from None
-    if not found:
+    if not checked:
         raise ParameterError(f"seeds = {seeds!r}: no flight would be flown; give at least 1")
-    return found
+    return checked

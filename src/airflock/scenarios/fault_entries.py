@@ -83,65 +83,65 @@ def read_fault_entries(
         return (), [], ["faults is not a list of tables; write [[faults]]"]
     if len(tables) > MOST:
         return (), [], [f"faults: {len(tables)} entries are more than {MOST}"]
-    found: list[FaultEntry] = []
+    entries: list[FaultEntry] = []
     notes: list[str] = []
-    faults: list[str] = []
+    errors: list[str] = []
     kinds = {**KINDS, **(user_kinds or {})}
     for number, table in enumerate(tables):
-        entry, told, wrong = _entry(f"faults[{number}]", table, agents, groups, sequential, folder, kinds, trust)
-        notes += told
-        faults += wrong
-        found += [entry] if entry and not wrong else []
+        entry, entry_notes, wrong = _entry(f"faults[{number}]", table, agents, groups, sequential, folder, kinds, trust)
+        notes += entry_notes
+        errors += wrong
+        entries += [entry] if entry and not wrong else []
         if entry is not None:
             if kinds.get(entry.fault.name, entry.fault) != entry.fault:
-                faults.append(f"faults[{number}].kind: {entry.fault.name} is the name of another kind already")
+                errors.append(f"faults[{number}].kind: {entry.fault.name} is the name of another kind already")
             kinds[entry.fault.name] = entry.fault
-    return tuple(found), notes, faults
+    return tuple(entries), notes, errors
 
 
 def _entry(
     where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None,
     kinds: Mapping[str, Fault], trust: bool,
 ) -> tuple[FaultEntry | None, list[str], list[str]]:  # fmt: skip
-    kind, faults = _kind(where, table.get("kind"), folder, kinds, trust)
+    kind, errors = _kind(where, table.get("kind"), folder, kinds, trust)
     names = ("kind", "agents", "group")
     timing = {key: value for key, value in table.items() if key in ENTRY_KEYS and key not in names}
     when, notes, wrong = _record(where, timing, FaultTiming)
-    faults += wrong
+    errors += wrong
     numbers = None
     if kind is not None:  # else nobody can judge its numbers
         rest = {key: value for key, value in table.items() if key not in ENTRY_KEYS}
-        numbers, told, wrong = _record(where, rest, kind.Parameters, ENTRY_KEYS)
-        notes, faults = notes + told, faults + wrong
+        numbers, number_notes, wrong = _record(where, rest, kind.Parameters, ENTRY_KEYS)
+        notes, errors = notes + number_notes, errors + wrong
     who, wrong = _who(where, table, agents, groups)
-    faults += wrong
+    errors += wrong
     if when is not None:
-        faults += _when_faults(where, when, agents if who is None else len(who))
+        errors += _when_faults(where, when, agents if who is None else len(who))
     if kind is None:
-        return None, notes, faults
+        return None, notes, errors
     if sequential and PERCEPTION & set(kind.rules):
-        faults.append(
+        errors.append(
             f"{where}.kind = {kind.name!r} disturbs what agents know of each other; update = 'sequential' is for agents"
             " that see each other as they are"
         )
     if when is None or numbers is None or who is None:
-        return None, notes, faults
-    faults += _end_faults(where, when, kind, numbers)
+        return None, notes, errors
+    errors += _end_faults(where, when, kind, numbers)
     count = 1 if when.number is None and when.per_hour is not None else when.number
     entry = FaultEntry(
         kind, numbers, who, None if count is None else int(count), when.at, when.per_hour or 0.0,
         math.inf if when.until is None else when.until, math.inf if when.lasts is None else when.lasts,
     )  # fmt: skip
-    return entry, notes, faults
+    return entry, notes, errors
 
 
 def _record(
     where: str, table: Mapping[str, Any], record: type, beside: Sequence[str] = ()
 ) -> tuple[Any, list[str], list[str]]:
     """Make a record from keys of an entry, in SI units; return it, or None, with notes and errors."""
-    document, notes, faults = convert_units({where: table}, {where: record})
-    made, wrong = schema.read_section(where, document[where], record, beside)
-    return (None if faults else made), notes, faults + wrong
+    document, notes, errors = convert_units({where: table}, {where: record})
+    result, wrong = schema.read_section(where, document[where], record, beside)
+    return (None if errors else result), notes, errors + wrong
 
 
 def _kind(
@@ -178,27 +178,27 @@ def _who(
 
 def _when_faults(where: str, when: FaultTiming, may: int) -> list[str]:
     """Return the errors of times that are valid one by one; may : how many agents may be affected."""
-    faults = []
+    errors = []
     if (when.at is None) == (when.per_hour is None):
-        faults.append(f"{where}: give at, when it begins, or per_hour, how often it comes")
+        errors.append(f"{where}: give at, when it begins, or per_hour, how often it comes")
     if when.until is not None and when.lasts is not None and when.at is not None:
-        faults.append(f"{where} says twice when it ends; give until or lasts")
+        errors.append(f"{where} says twice when it ends; give until or lasts")
     if when.at is not None and when.until is not None and when.until <= when.at:
-        faults.append(f"{where}.until = {when.until:g} s is not after at = {when.at:g} s")
+        errors.append(f"{where}.until = {when.until:g} s is not after at = {when.at:g} s")
     if when.number is not None and (when.number != int(when.number) or when.number > may):
-        faults.append(f"{where}.number = {when.number:g} is not a whole number up to {may}, the agents that it may hit")
-    return faults
+        errors.append(f"{where}.number = {when.number:g} is not a whole number up to {may}, the agents that it may hit")
+    return errors
 
 
 def _end_faults(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> list[str]:
     """Return why a fault cannot end."""
-    faults = []
+    errors = []
     ends = when.lasts is not None or (when.at is not None and when.until is not None)
     if ends and kind.time_to_absence(numbers) <= 0.0:
-        faults.append(
+        errors.append(
             f"{where}: {kind.name} does not end, as an agent that drops out stays out; leave out until and lasts"
         )
-    return faults
+    return errors
 
 
 ENDLESS = 1e9  # s; how long a fault lasts that does not end
@@ -228,10 +228,10 @@ class FaultOnset(NamedTuple):
 
 def draw_onsets(scenario: "Scenario", seed: int, world: int = 0) -> tuple[FaultOnset, ...]:
     """Draw all fault onsets of a flight, in the order of their steps."""
-    found: list[FaultOnset] = []
+    onsets: list[FaultOnset] = []
     for number, entry in enumerate(scenario.faults):
-        found += _onsets_of_entry(scenario, entry, number, seed, world)
-    return _in_order(found)
+        onsets += _onsets_of_entry(scenario, entry, number, seed, world)
+    return _in_order(onsets)
 
 
 def merge_onsets(

@@ -130,22 +130,24 @@ def load(
     with as_error(where):
         document, folder = _read(where, None)
         document, base = extend_document(document, where, folder, _read)
-        document, given = _with_given(document, zip(PART_KINDS, (metrics, body, sensor, radio, topology), strict=True))
-        flown = None if law is None else law_from_caller(law)
+        document, caller_parts = _with_given(
+            document, zip(PART_KINDS, (metrics, body, sensor, radio, topology), strict=True)
+        )
+        own_law = None if law is None else law_from_caller(law)
         of_groups = {own.name: own for own in map(law_from_caller, _several(laws))}
-        given = replace(given, law=flown, fault_kinds=_kinds(faults), laws=of_groups)
+        caller_parts = replace(caller_parts, law=own_law, fault_kinds=_kinds(faults), laws=of_groups)
         notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
-        document, settings, told, wrong = with_field(document, settings_dict(settings, where), folder)
-        if flown is not None:
-            kind = str(expand_path(law).absolute()) if str(law).endswith(".py") else flown.name
+        document, settings, field_notes, wrong = with_field(document, settings_dict(settings, where), folder)
+        if own_law is not None:
+            kind = str(expand_path(law).absolute()) if str(law).endswith(".py") else own_law.name
             document = {**document, "model": {"kind": kind}, "published": {}}
         return build_scenario(
             document,
             where,
             settings,
             folder=folder,
-            caller_parts=given,
-            notes=notes + told,
+            caller_parts=caller_parts,
+            notes=notes + field_notes,
             known_errors=wrong,
             trust=trust,
         )
@@ -165,8 +167,8 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     with as_error(name):
         try:
             document = read_toml(path)
-        except FormatError as fault:
-            raise ScenarioError([f"{name}: is not a scenario file (TOML): {fault}"]) from fault
+        except FormatError as error:
+            raise ScenarioError([f"{name}: is not a scenario file (TOML): {error}"]) from error
     if tells_of_study(document) and not {"model", "extends"} & set(document):
         raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
     return {**formats.to_current_format(document, name), formats.KEY: formats.FORMAT}, path.parent
@@ -181,27 +183,27 @@ def _with_given(
     """
     document = dict(document)
     rules: dict[str, Any] = {}
-    faults: list[str] = []
-    for family, what in given:
-        if what is None:
+    errors: list[str] = []
+    for family, part in given:
+        if part is None:
             continue
-        table, kind = document.get(family.section, {}), str(what)
-        if not (isinstance(what, str) and what in family.shipped):
-            found, more = family.from_caller(what)
-            faults += more
-            if found is None:
+        table, kind = document.get(family.section, {}), str(part)
+        if not (isinstance(part, str) and part in family.shipped):
+            own_part, more = family.from_caller(part)
+            errors += more
+            if own_part is None:
                 continue
-            rules[family.field], kind = found, found.name
+            rules[family.field], kind = own_part, own_part.name
         document[family.section] = {**family.kept(table, kind), "kind": kind}
-    if faults:
-        raise ScenarioError(faults)
+    if errors:
+        raise ScenarioError(errors)
     return document, CallerParts(**rules)
 
 
 def _kinds(given: Any) -> dict[str, Fault]:
     """Return the kinds of fault that the caller gives, by name."""
-    found = [kind if isinstance(kind, Fault) else fault(kind) for kind in _several(given)]
-    return {kind.name: kind for kind in found}
+    kinds = [kind if isinstance(kind, Fault) else fault(kind) for kind in _several(given)]
+    return {kind.name: kind for kind in kinds}
 
 
 def _several(given: Any) -> list[Any]:
@@ -279,8 +281,8 @@ def _extended(
         raise ScenarioError([f"{where}: extends = {name!r} leads back to itself: {' → '.join((*chain, name))}"])
     try:
         base, place = read(name, folder)
-    except ScenarioError as fault:
-        raise ScenarioError([f"{where}: extends = {name!r}: {line}" for line in fault.faults]) from fault
+    except ScenarioError as error:
+        raise ScenarioError([f"{where}: extends = {name!r}: {line}" for line in error.faults]) from error
     base, _ = _extended(_with_paths(base, place), name, place, read, (*chain, name))
     for key in OF_ITS_OWN:
         base.pop(key, None)
@@ -354,32 +356,32 @@ def with_field(
     name = value_of(world.get("file", ""))
     if not isinstance(name, str) or not name:
         return dict(document), settings, (), ()
-    faults = [f"world.{key}: is given, and world.file as well; take one of them out" for key in GIVEN if key in world]
+    errors = [f"world.{key}: is given, and world.file as well; take one of them out" for key in GIVEN if key in world]
     shape = value_of(settings.get("world.arena", "polygon"))
     if shape != "polygon":
-        faults.append(f"world.arena = {shape!r}: is given, and world.file as well; take one of them out")
+        errors.append(f"world.arena = {shape!r}: is given, and world.file as well; take one of them out")
     path = expand_path(name) if is_file(name) or folder is None else folder / expand_path(name)
-    faults += [] if is_file(path) else [f"world.file = {name!r}: no such file"]
+    errors += [] if is_file(path) else [f"world.file = {name!r}: no such file"]
     simplify, more = _metres(world)
-    faults += more
+    errors += more
     kept = {key: value for key, value in table.items() if key not in ("file", "simplify", "arena", "walls")}
     rest = {key: value for key, value in settings.items() if key not in FROM_FILE}
-    if not faults:
+    if not errors:
         try:
             space = str(value_of(world.get("dimensions", "2"))) == "3"
-            found = load_field(path, simplify=simplify, space=space)
-        except ScenarioError as fault:
-            faults += str(fault).splitlines()
+            field = load_field(path, simplify=simplify, space=space)
+        except ScenarioError as error:
+            errors += str(error).splitlines()
         else:
-            return {**document, "world": {**found.keys, **kept}}, rest, (found.note,), ()
+            return {**document, "world": {**field.keys, **kept}}, rest, (field.note,), ()
     kept = {key: value for key, value in kept.items() if key not in GIVEN} | INSTEAD
     rest = {key: value for key, value in rest.items() if key.removeprefix("world.") not in (*GIVEN, *INSTEAD, "walls")}
-    return {**document, "world": kept}, rest, (), tuple(faults)
+    return {**document, "world": kept}, rest, (), tuple(errors)
 
 
 def _metres(world: Mapping[str, Any]) -> tuple[float, list[str]]:
     """Return by how much outlines may move, m, and the errors of that number."""
     given = {"world": {key: value for key, value in world.items() if key == "simplify"}}
-    told, _, faults = convert_units(given, {"world": arena.Parameters})
-    made, more = schema.read_section("world", told["world"], arena.Parameters)
-    return (made.simplify if made is not None else 0.0), faults + more
+    converted, _, errors = convert_units(given, {"world": arena.Parameters})
+    numbers, more = schema.read_section("world", converted["world"], arena.Parameters)
+    return (numbers.simplify if numbers is not None else 0.0), errors + more

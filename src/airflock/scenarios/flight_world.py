@@ -56,22 +56,22 @@ def scene_errors(scenario: Scenario, started: bool = False) -> list[str]:
     try:
         place = scenario.stands()
         points = scenario.waypoints()
-    except SceneError as fault:
-        return str(fault).splitlines()
-    found = []
+    except SceneError as error:
+        return str(error).splitlines()
+    errors = []
     for number, point in enumerate(points):
         depth = _depth(place, point)
         if depth > 0.0:
             where = ", ".join(f"{c:g}" for c in point[: scenario.dimensions])
-            found.append(
+            errors.append(
                 f"goals.points[{number}] = [{where}] m lies {depth:.3g} m inside what stands in the scene; move it out"
             )
     if not started and _blocked(scenario) == 1.0:
-        found.append(
+        errors.append(
             "start: the whole region in which agents start lies inside what stands in the scene, or nearer to it than "
             f"start.clearance = {scenario.start.clearance:g} m; enlarge the region or lower scene.density"
         )
-    return found
+    return errors
 
 
 def scene_notes(scenario: Scenario) -> list[str]:
@@ -101,8 +101,8 @@ def wrap_start(scenario: Scenario, start: NDArray[Any]) -> NDArray[Any]:
 
 def start_error(scenario: Scenario, start: NDArray[Any]) -> str:
     """Return why a start (component, agent) cannot be flown, as a sentence; empty if it can."""
-    fault = position_error(scenario, start, range(np.shape(start)[1]))
-    return f"start: {fault}" if fault else ""
+    error = position_error(scenario, start, range(np.shape(start)[1]))
+    return f"start: {error}" if error else ""
 
 
 def position_error(scenario: Scenario, positions: NDArray[Any], agents: Sequence[int]) -> str:

@@ -16,11 +16,13 @@ MIGRATIONS: tuple[Callable[[Mapping[str, Any]], Mapping[str, Any]], ...] = ()  #
 
 def to_current_format(document: Mapping[str, Any], where: str) -> Mapping[str, Any]:
     """Convert a document of any known format to the current one, without its key `format`."""
-    found = document.get(KEY, 1)
-    if isinstance(found, bool) or not isinstance(found, int) or found < 1:
-        raise ScenarioError([f"{where}: {KEY} = {found!r} is not a number of a format; leave it out, or give {FORMAT}"])
-    if found > FORMAT:
-        raise ScenarioError([f"{where}: {KEY} = {found} is newer than this Airflock, which reads up to {FORMAT}"])
-    for step in MIGRATIONS[found - 1 :]:
+    number = document.get(KEY, 1)
+    if isinstance(number, bool) or not isinstance(number, int) or number < 1:
+        raise ScenarioError(
+            [f"{where}: {KEY} = {number!r} is not a number of a format; leave it out, or give {FORMAT}"]
+        )
+    if number > FORMAT:
+        raise ScenarioError([f"{where}: {KEY} = {number} is newer than this Airflock, which reads up to {FORMAT}"])
+    for step in MIGRATIONS[number - 1 :]:
         document = step(document)
     return {key: value for key, value in document.items() if key != KEY}

@@ -95,15 +95,15 @@ class GroupLawReader:
             return None, []  # said where its numbers are read
         kind = table.get("kind", self.kind)
         try:
-            found = self._found(where, kind)
-        except AirflockError as fault:
-            return None, str(fault).splitlines()
-        faults = self._misfits(where, kind, found)
-        record, more = self._chosen(where, table, found)
-        if faults or more:
-            return None, faults + more
-        same = found == self.model and choices(record) == choices(self.parameters)
-        return (None if same else (found, record)), []
+            law = self._found(where, kind)
+        except AirflockError as error:
+            return None, str(error).splitlines()
+        errors = self._misfits(where, kind, law)
+        record, more = self._chosen(where, table, law)
+        if errors or more:
+            return None, errors + more
+        same = law == self.model and choices(record) == choices(self.parameters)
+        return (None if same else (law, record)), []
 
     def _found(self, where: str, kind: Any) -> Model:
         known = {**self._read, **self.own, self.model.name: self.model}
@@ -111,37 +111,37 @@ class GroupLawReader:
             return self.model
         if isinstance(kind, str) and kind in known:
             return known[kind]
-        self._read[kind] = found = find_law(kind, self.folder, where=f"{where}.kind", trust=self.trust)
-        return found
+        self._read[kind] = law = find_law(kind, self.folder, where=f"{where}.kind", trust=self.trust)
+        return law
 
     def _misfits(self, where: str, kind: Any, found: Model) -> list[str]:
         """Return why a law cannot fly beside that of the flock."""
-        faults, told, base = [], f"{where}.kind = {kind!r}", self.model
+        errors, key, base = [], f"{where}.kind = {kind!r}", self.model
         if found is base:
             return []
         if found.command != base.command:
-            faults.append(
-                f"{told}: model {found.name} commands {found.command}, and model {base.name} of the flock "
+            errors.append(
+                f"{key}: model {found.name} commands {found.command}, and model {base.name} of the flock "
                 f"{base.command}; one body carries all"
             )
         for law in (base, found):
             if law.flock is not None:
-                faults.append(f"{told}: model {law.name} solves for the whole flock, so all fly by it")
+                errors.append(f"{key}: model {law.name} solves for the whole flock, so all fly by it")
         if self.walls and (found.sight is None) != (base.sight is None):
             casts, other = (base, found) if found.sight is None else (found, base)
-            faults.append(
-                f"{told}: model {casts.name} casts rays at polygons and model {other.name} feels them as surfaces; "
+            errors.append(
+                f"{key}: model {casts.name} casts rays at polygons and model {other.name} feels them as surfaces; "
                 "give a world without polygons"
             )
-        return faults
+        return errors
 
     def _chosen(self, where: str, table: Mapping[str, Any], found: Model) -> tuple[Any, list[str]]:
         """Return the parameters of a group's law with its own choices; its numbers come later."""
         known = {name for name, declared, _ in declarations(found.Parameters) if isinstance(declared, Choice)}
         own = {key: schema.value_of(value) for key, value in table.items() if key in known}
-        made, faults = schema.read_section(where, own, found.Parameters)
-        if faults or made is None:
-            return None, faults
+        made, errors = schema.read_section(where, own, found.Parameters)
+        if errors or made is None:
+            return None, errors
         base = self.parameters if found == self.model else found.Parameters()
         record = replace(base, **{key: getattr(made, key) for key in own})
         if found == self.model and found.flock is not None and choices(record) != choices(base):
@@ -153,47 +153,47 @@ def group_errors(
     groups: Sequence[Group], parts: Mapping[str, Any], model: Model, body: Body, sensor: Sensor
 ) -> list[str]:
     """Return why groups cannot fly with their own numbers or law, one line each."""
-    faults: list[str] = []
+    errors: list[str] = []
     of_all = {*body_errors(body, parts, model), *sensor_errors(sensor, parts)}  # told already
     for number, group in enumerate(groups):
         law, base = group.law or (model, parts["parameters"])
         own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in "pbs"}
         if group.law is None and not any(own.values()):
             continue
-        told: dict[str, Any] = {**parts, "parameters": base and replace(base, **own["p"])}
-        told["body"] = parts["body"] and replace(parts["body"], **own["b"])
-        told["sensors"] = parts["sensors"] and replace(parts["sensors"], **own["s"])
-        more = body_errors(body, told, law) + (sensor_errors(sensor, told) if own["s"] else [])
+        own_parts: dict[str, Any] = {**parts, "parameters": base and replace(base, **own["p"])}
+        own_parts["body"] = parts["body"] and replace(parts["body"], **own["b"])
+        own_parts["sensors"] = parts["sensors"] and replace(parts["sensors"], **own["s"])
+        more = body_errors(body, own_parts, law) + (sensor_errors(sensor, own_parts) if own["s"] else [])
         if group.law is not None and parts["silence"] is not None and parts["flight"] is not None:
             more += silence_errors(parts["silence"].rule, parts["flight"], law)
-        faults += [f"groups[{number}]: {fault}" for fault in more if fault not in of_all]
-    return faults
+        errors += [f"groups[{number}]: {error}" for error in more if error not in of_all]
+    return errors
 
 
 def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: int) -> tuple[FlownLaw, ...]:
     """Return the laws of a flock: that of all agents without their own, then those of groups, one for each text."""
-    found: dict[Any, list[Group]] = {}
+    by_law: dict[Any, list[Group]] = {}
     for group in groups:
         if group.law is not None and group.agents:
-            found.setdefault((group.law[0], tuple(choices(group.law[1]).items())), []).append(group)
-    apart = {agent for members in found.values() for group in members for agent in group.agents}
+            by_law.setdefault((group.law[0], tuple(choices(group.law[1]).items())), []).append(group)
+    apart = {agent for members in by_law.values() for group in members for agent in group.agents}
     rest = tuple(agent for agent in range(agents) if agent not in apart)
     base = [group for group in groups if group.law is None]
-    made = [FlownLaw(model, parameters, rest, _varied(base, parameters))]
-    for (law, _), members in found.items():
+    laws = [FlownLaw(model, parameters, rest, _varied(base, parameters))]
+    for (law, _), members in by_law.items():
         first = members[0]
         assert first.law is not None
         record = replace(
             first.law[1], **{name: value for (letter, name), value in first.numbers.items() if letter == "p"}
         )
         who = tuple(sorted(agent for group in members for agent in group.agents))
-        made.append(FlownLaw(law, record, who, _varied(members, record)))
-    return tuple(made)
+        laws.append(FlownLaw(law, record, who, _varied(members, record)))
+    return tuple(laws)
 
 
 def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]:
     """Return the numbers of a law that differ among the agents of groups, as ("p", name), in declared order."""
-    found = []
+    names = []
     for name, declared, _ in declarations(record):
         usual, key = float(getattr(record, name) or 0.0) if isinstance(declared, Quantity) else 0.0, ("p", name)
         values = {
@@ -202,8 +202,8 @@ def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]
             if isinstance(declared, Quantity)
         }
         if values - {usual} or any(group.spread.get(key, 0.0) > 0.0 for group in groups):
-            found.append(key)
-    return tuple(found)
+            names.append(key)
+    return tuple(names)
 
 
 def read_members(where: str, value: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:
@@ -241,45 +241,45 @@ def read_groups(
     """
     if not isinstance(tables, Sequence) or isinstance(tables, str) or not all(isinstance(g, Mapping) for g in tables):
         return (), [], ["groups is not a list of tables; write [[groups]]"]
-    who, faults = _agents(tables, agents)
-    found: list[Group] = []
+    who, errors = _agents(tables, agents)
+    groups: list[Group] = []
     notes: list[str] = []
     for number, table in enumerate(tables):
         where = f"groups[{number}]"
-        faults += [f"{where}.{key}: unknown key; known: {', '.join(KEYS)}" for key in table if key not in KEYS]
+        errors += [f"{where}.{key}: unknown key; known: {', '.join(KEYS)}" for key in table if key not in KEYS]
         name = table.get("name", f"group_{number}")
-        if not isinstance(name, str) or not name or name in {group.name for group in found}:
-            faults.append(f"{where}.name = {name!r} is not a name of its own")
+        if not isinstance(name, str) or not name or name in {group.name for group in groups}:
+            errors.append(f"{where}.name = {name!r} is not a name of its own")
             name = where
         numbers: dict[tuple[str, str], float] = {}
         spread: dict[tuple[str, str], float] = {}
         law, own = (None, []) if laws is None else laws.named(f"{where}.model", table.get("model", {}))
-        faults += own
+        errors += own
         for section, letter in LETTERS.items():
             if section in records and not (section == "model" and own):
                 record = type(law[1]) if law and section == "model" else records[section]
-                values, spreads, told, wrong = _section(f"{where}.{section}", table.get(section, {}), record)
+                values, spreads, unit_notes, wrong = _section(f"{where}.{section}", table.get(section, {}), record)
                 numbers |= {(letter, key): value for key, value in values.items()}
                 spread |= {(letter, key): value for key, value in spreads.items()}
-                notes += told
-                faults += wrong
-        found.append(Group(name, who[number], numbers, spread, law))
-    return tuple(found), notes, faults
+                notes += unit_notes
+                errors += wrong
+        groups.append(Group(name, who[number], numbers, spread, law))
+    return tuple(groups), notes, errors
 
 
 def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple[int, ...]], list[str]]:
     """Return the members of each group: those that are listed, so many of the next ones, or all that are left."""
-    faults: list[str] = []
-    found: list[tuple[int, ...]] = [()] * len(given)
+    errors: list[str] = []
+    members: list[tuple[int, ...]] = [()] * len(given)
     taken: set[int] = set()
     for number, table in enumerate(given):
         if isinstance(table.get("agents"), (list, tuple)):
             listed, wrong = read_members(f"groups[{number}].agents", table["agents"], agents)
-            faults += wrong
+            errors += wrong
             twice = sorted(taken & set(listed or ()))
             if twice:
-                faults.append(f"groups[{number}].agents: agent {twice[0]} is in another group already")
-            found[number] = listed or ()
+                errors.append(f"groups[{number}].agents: agent {twice[0]} is in another group already")
+            members[number] = listed or ()
             taken |= set(listed or ())
     left = [agent for agent in range(agents) if agent not in taken]
     rest = []
@@ -290,20 +290,20 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
         elif not isinstance(count, (list, tuple)):
             whole = isinstance(count, (int, float)) and not isinstance(count, bool) and count % 1 == 0
             if not whole or not 1 <= count <= len(left):
-                faults.append(
+                errors.append(
                     f"groups[{number}].agents = {count!r} is neither a list of agents, a share such as '20 %', nor a "
                     f"number of them up to {len(left)}, as many as are left of {agents}"
                 )
                 continue
-            found[number], left = tuple(left[: int(count)]), left[int(count) :]
+            members[number], left = tuple(left[: int(count)]), left[int(count) :]
     for number in rest[:1]:
-        found[number] = tuple(left)
+        members[number] = tuple(left)
         if not left:
-            faults.append(f"groups[{number}] has no agents, and no agent is left for it")
-    faults += [
+            errors.append(f"groups[{number}] has no agents, and no agent is left for it")
+    errors += [
         f"groups[{number}].agents is missing; only one group may take the agents that are left" for number in rest[1:]
     ]
-    return found, faults
+    return members, errors
 
 
 def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], dict[str, float], list[str], list[str]]:
@@ -313,14 +313,14 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
     known = {name: declared for name, declared, _ in declarations(record)}
     values: dict[str, Any] = {}
     spreads: dict[str, Any] = {}
-    faults: list[str] = []
+    errors: list[str] = []
     for key, value in table.items():
         if where.endswith("model") and (key == "kind" or isinstance(known.get(key), Choice)):
             continue
         if key == "kind" or isinstance(known.get(key), Choice):
-            faults.append(f"{where}.{key}: {ONE[where.rpartition('.')[2]]}; only numbers differ from group to group")
+            errors.append(f"{where}.{key}: {ONE[where.rpartition('.')[2]]}; only numbers differ from group to group")
         elif key == "period" and where.endswith("sensors"):
-            faults.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
+            errors.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
         elif isinstance(value, Mapping) and "spread" in value:
             unit = {"unit": value["unit"]} if "unit" in value else {}
             share = relative_spread(value["spread"], known.get(key))
@@ -332,14 +332,18 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
         else:
             values[key] = value
     apart = f"{where}.spread"
-    converted, told, unfit = convert_units({where: values, apart: spreads}, {where: record, apart: record})
-    notes = [_as_written(line, where, apart) for line in told]
+    converted, unit_notes, unfit = convert_units({where: values, apart: spreads}, {where: record, apart: record})
+    notes = [_as_written(line, where, apart) for line in unit_notes]
     wrong = [f"{_as_written(line, where, apart)}{with_share_hint(line, apart, known)}" for line in unfit]
-    made, more = schema.read_section(where, converted[where], record)
-    faults += wrong + more
+    record_of_group, more = schema.read_section(where, converted[where], record)
+    errors += wrong + more
     off, more = check_spreads(where, converted[apart], known)
-    numbers = {key: float(getattr(made, key)) for key in converted[where]} if made is not None and not more else {}
-    return numbers, off, notes, faults + more
+    numbers = (
+        {key: float(getattr(record_of_group, key)) for key in converted[where]}
+        if record_of_group is not None and not more
+        else {}
+    )
+    return numbers, off, notes, errors + more
 
 
 def _as_written(line: str, where: str, apart: str) -> str:
@@ -355,15 +359,15 @@ def varied_numbers(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tu
 
     base : letter → record of the flock. Varied numbers of laws: `FlownLaw.varied`.
     """
-    found = []
+    names = []
     for letter, record in base.items() if groups else ():
         for name, declared, _ in declarations(record):
             if isinstance(declared, Quantity):
                 usual = float(getattr(record, name) or 0.0)
                 others = any(group.numbers.get((letter, name), usual) != usual for group in groups)
                 if others or any(group.spread.get((letter, name), 0.0) > 0.0 for group in groups):
-                    found.append((letter, name))
-    return tuple(found)
+                    names.append((letter, name))
+    return tuple(names)
 
 
 def agent_values(groups: Sequence[Group], agents: int, letter: str, name: str, record: Any, seed: int) -> list[float]:

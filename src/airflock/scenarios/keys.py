@@ -174,7 +174,7 @@ def _whole(section: str) -> list[Key]:
 
 def _declared(before: str, owner: str, record: type) -> list[Key]:
     """Return the keys of one record."""
-    found = []
+    keys_of_record = []
     for name, declared, default in declarations(record):
         unit, low, high = getattr(declared, "unit", ""), None, None
         options: tuple[str, ...] = ()
@@ -187,8 +187,8 @@ def _declared(before: str, owner: str, record: type) -> list[Key]:
             assert isinstance(declared, (Points, Text))
         meaning, source = declared.meaning, declared.source
         whole = f"{before}.{name}".lstrip(".")
-        found.append(Key(whole, owner, kind, default, unit, low, high, options, meaning, source))
-    return found
+        keys_of_record.append(Key(whole, owner, kind, default, unit, low, high, options, meaning, source))
+    return keys_of_record
 
 
 OWN = "FILE.py"

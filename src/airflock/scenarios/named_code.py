@@ -98,10 +98,10 @@ def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
     module = util.module_from_spec(spec)
     try:  # the text as it is now: bytecode kept beside it may be of an earlier text, or of a stranger's
         exec(spec.loader.source_to_code(path.read_bytes(), str(path)), vars(module))
-    except (Exception, SystemExit, KeyboardInterrupt) as fault:  # the user's own file may fail in any way
-        lines = [frame.lineno for frame in traceback.extract_tb(fault.__traceback__) if frame.filename == str(path)]
+    except (Exception, SystemExit, KeyboardInterrupt) as error:  # the user's own file may fail in any way
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         place = f"{path}:{lines[-1]}" if lines else str(path)
-        raise RuleError(f"{place}: {shortened(describe_error(fault))}{_beside(path, fault)}") from fault
+        raise RuleError(f"{place}: {shortened(describe_error(error))}{_beside(path, error)}") from error
     return module
 
 
@@ -126,10 +126,10 @@ def build_from_file(
         if isinstance(record := getattr(module, "Parameters", None), type) and declarations(record):
             record()  # its defaults are checked by their own ranges
         return made
-    except (RuleError, ParameterError) as fault:
-        lines = str(fault).splitlines()
-        told = [line if Path(name).name in line else f"{name}: {line}" for line in lines]
-        raise type(fault)("\n".join(told)) from fault
+    except (RuleError, ParameterError) as error:
+        lines = str(error).splitlines()
+        named_lines = [line if Path(name).name in line else f"{name}: {line}" for line in lines]
+        raise type(error)("\n".join(named_lines)) from error
 
 
 def user_error_line(error: Exception) -> str:

@@ -80,8 +80,8 @@ class PartKind(Generic[T]):
         if isinstance(kind, str) and kind.endswith(".py"):
             try:
                 return build_from_file(self.gather, key, kind, folder, trust=trust), []
-            except AirflockError as fault:
-                return None, str(fault).splitlines()
+            except AirflockError as error:
+                return None, str(error).splitlines()
         hint = suggest(kind, self.shipped, f"known: {', '.join(self.shipped)}, or a file that ends in .py", cutoff=0.4)
         return None, [f"{key} = {kind!r}: unknown {self.noun}; {hint}"]
 
@@ -170,7 +170,7 @@ def drag_descent_errors(model: Model) -> list[str]:
     """Return why drag descent cannot be added to a model, one line."""
     if model.flock is not None:
         return [f"aero: model {model.name} goes down the gradient of the drag by itself; leave the section [aero] out"]
-    return [f"aero: {fault}" for fault in misfits(model, DESCENT)]
+    return [f"aero: {error}" for error in misfits(model, DESCENT)]
 
 
 class ScenarioParts(NamedTuple):
@@ -214,12 +214,12 @@ def collect_parts(
         """Return the caller's part or the document's; the default one, with errors, where that is missing."""
         if mine is not None:
             return mine, []
-        found, faults = family.named(family.kind(document, usual), folder, trust=trust)
-        found = family.shipped[usual] if found is None else found
-        assert found is not None, "the usual one is one of ours"
-        return found, faults
+        parts, errors = family.named(family.kind(document, usual), folder, trust=trust)
+        parts = family.shipped[usual] if parts is None else parts
+        assert parts is not None, "the usual one is one of ours"
+        return parts, errors
 
-    law, faults = _law(document, caller_parts, folder, trust)
+    law, errors = _law(document, caller_parts, folder, trust)
     usual = default_body(law.command if law else "velocity")
     vehicle, of_body = one(BODY_KIND, caller_parts.vehicle, usual)
     of_body = of_body or body_law_errors(
@@ -235,32 +235,38 @@ def collect_parts(
     own_topology, of_topology = caller_parts.own_topology, list[str]()
     if own_topology is None and str(kind := TOPOLOGY_KIND.kind(document)).endswith(".py"):
         own_topology, of_topology = TOPOLOGY_KIND.named(kind, folder, trust=trust)  # ours are judged as a choice
-    found = ScenarioParts(law, vehicle, measures, sensor, transceiver, own_topology)
-    told = {"body": of_body, "metrics": of_metrics, "sensors": of_sensor, "radio": of_radio, "topology": of_topology}
-    for section, more in told.items():
-        faults += more
+    parts = ScenarioParts(law, vehicle, measures, sensor, transceiver, own_topology)
+    errors_of = {
+        "body": of_body,
+        "metrics": of_metrics,
+        "sensors": of_sensor,
+        "radio": of_radio,
+        "topology": of_topology,
+    }
+    for section, more in errors_of.items():
+        errors += more
         if more and section == "topology":
             document = {**document, section: {}}
         elif more:
-            document = without_unknown_numbers(document, section, found.records[section])
-    return found, document, faults
+            document = without_unknown_numbers(document, section, parts.records[section])
+    return parts, document, errors
 
 
 def _law(
     document: Mapping[str, Any], given: CallerParts, folder: Path | None, trust: bool
 ) -> tuple[Model | None, list[str]]:
     """Find the law, and add drag descent where the document has a section [aero]; return it with the errors."""
-    table, faults = model_table(document)
-    found = given.law
-    if found is None and not faults:
+    table, errors = model_table(document)
+    law = given.law
+    if law is None and not errors:
         try:
-            found = find_law(table.get("kind"), folder, trust=trust)
-        except AirflockError as fault:
-            faults += str(fault).splitlines()
-    if found is None or "aero" not in document:
-        return found, faults
-    more = drag_descent_errors(found)
-    return found if more else with_drag_descent(found), faults + more
+            law = find_law(table.get("kind"), folder, trust=trust)
+        except AirflockError as error:
+            errors += str(error).splitlines()
+    if law is None or "aero" not in document:
+        return law, errors
+    more = drag_descent_errors(law)
+    return law if more else with_drag_descent(law), errors + more
 
 
 def body_law_errors(body: Body, model: Model | None, kind: str) -> list[str]:

@@ -138,12 +138,12 @@ class Scenario:
     def numbers(self) -> dict[str, tuple[str, ...]]:
         """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
         records = self.records
-        found: dict[str, tuple[str, ...]] = {
+        columns: dict[str, tuple[str, ...]] = {
             each.letter: each.driver_record._fields if each.driver_record else number_names(records[each.key])
             for each in ORDER
             if each.letter
         }
-        return found | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
+        return columns | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
 
     @cached_property
     def order_parameters(self) -> tuple[Metric, ...]:
@@ -174,11 +174,11 @@ class Scenario:
     @cached_property
     def law_indices(self) -> tuple[int, ...]:
         """Index in `laws` of each agent's law."""
-        found = [0] * self.agents
+        indices = [0] * self.agents
         for number, law in enumerate(self.laws[1:], 1):
             for agent in law.agents:
-                found[agent] = number
-        return tuple(found)
+                indices[agent] = number
+        return tuple(indices)
 
     def law_of(self, agent: int) -> FlownLaw:
         """Return the law that an agent flies by."""
@@ -187,11 +187,11 @@ class Scenario:
     @cached_property
     def group_indices(self) -> tuple[int, ...]:
         """Number of each agent's group in [[groups]]; -1 where it is in none."""
-        found = [-1] * self.agents
+        indices = [-1] * self.agents
         for number, group in enumerate(self.groups):
             for agent in group.agents:
-                found[agent] = number
-        return tuple(found)
+                indices[agent] = number
+        return tuple(indices)
 
     def agent_values(self, letter: str, name: str, seed: int) -> list[float]:
         """Return one number of every agent, with its tolerance as a seed draws it."""
@@ -305,8 +305,8 @@ class Scenario:
         >>> airflock.load("vasarhelyi_2018/4ms", {"start.separation": 7.0}).separation()
         7.0
         """
-        given = self.start.separation
-        return default_separation(self.model, self.parameters, self.start, self.world) if given is None else given
+        distance = self.start.separation
+        return default_separation(self.model, self.parameters, self.start, self.world) if distance is None else distance
 
 
 SHOWN = 8  # lists of points longer than this are counted, not printed
@@ -368,24 +368,24 @@ def scenario_html(scenario: Scenario) -> str:
 
 def default_metrics(scenario: Scenario) -> MetricParameters:
     """Return the numbers of the order parameters, with open ones derived from the scenario."""
-    given = {name: getattr(scenario.metrics, name) for name in scenario.metrics.__dataclass_fields__}
+    numbers = {name: getattr(scenario.metrics, name) for name in scenario.metrics.__dataclass_fields__}
     p, model = scenario.parameters, scenario.model
-    if given["v_flock"] is None:
-        given["v_flock"] = 1.0 if model.preferred_speed is None else model.speed(p)
-    if given["v_tol"] is None:
-        given["v_tol"] = 0.375 * given["v_flock"]
-    if given["r_comm"] is None:
-        given["r_comm"] = scenario.radio.range
-    if given["r_cluster"] is None:
+    if numbers["v_flock"] is None:
+        numbers["v_flock"] = 1.0 if model.preferred_speed is None else model.speed(p)
+    if numbers["v_tol"] is None:
+        numbers["v_tol"] = 0.375 * numbers["v_flock"]
+    if numbers["r_comm"] is None:
+        numbers["r_comm"] = scenario.radio.range
+    if numbers["r_cluster"] is None:
         known = model.interaction_range or model.reach
-        given["r_cluster"] = min(float(known(p)), 1e6) if known else min(scenario.radio.range, 1e6)
-    if given["collision_period"] is None:
-        given["collision_period"] = scenario.flight.dt
-    if given["max_e"] is None:
-        given["max_e"] = largest_extension(scenario.world) or None
-    if given["k"] is None:
-        given["k"] = given["max_e"]
-    return type(scenario.metrics)(**given)
+        numbers["r_cluster"] = min(float(known(p)), 1e6) if known else min(scenario.radio.range, 1e6)
+    if numbers["collision_period"] is None:
+        numbers["collision_period"] = scenario.flight.dt
+    if numbers["max_e"] is None:
+        numbers["max_e"] = largest_extension(scenario.world) or None
+    if numbers["k"] is None:
+        numbers["k"] = numbers["max_e"]
+    return type(scenario.metrics)(**numbers)
 
 
 def default_silence(scenario: Scenario) -> SilenceParameters:

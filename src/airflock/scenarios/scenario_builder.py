@@ -81,37 +81,37 @@ def build_scenario(
         With all errors, one line each.
     """
     settings = settings_dict(settings, where)
-    document, settings, faults = with_group_keys(formats.to_current_format(document, where), settings)
+    document, settings, errors = with_group_keys(formats.to_current_format(document, where), settings)
     document, settings, wrong = with_fault_keys(document, settings)
-    faults += wrong
+    errors += wrong
     short = {key: value for key, value in settings.items() if "." not in key and key not in TOP_LEVEL_KEYS}
     document, left_out = with_kinds(document, settings)
     whole, unknown = apply_settings(document, {key: value for key, value in settings.items() if key not in short})
     flown, whole, more = collect_parts(whole, caller_parts, folder, trust=trust)
-    faults = [*known_errors, *unknown, *faults, *more]
+    errors = [*known_errors, *unknown, *errors, *more]
     records = ({"model": flown.law.Parameters} if flown.law else {}) | flown.records
-    whole, told, more = _written_out(whole, settings, short, records)
-    faults += more
+    whole, key_notes, more = _written_out(whole, settings, short, records)
+    errors += more
     parts, more = _parts(whole, flown)
-    faults += more + _faults_between(parts, flown, started)
-    individuals, told_of, more = _individuals(whole, parts, flown, caller_parts, folder, trust)
+    errors += more + _faults_between(parts, flown, started)
+    individuals, individual_notes, more = _individuals(whole, parts, flown, caller_parts, folder, trust)
     published, wrong = _published(whole.get("published", {}))
-    faults += more + wrong
-    if faults or flown.law is None:
-        raise ScenarioError([f"{where}: {fault}" for fault in faults])
+    errors += more + wrong
+    if errors or flown.law is None:
+        raise ScenarioError([f"{where}: {error}" for error in errors])
     parts["scene"] = _beside(parts["scene"], folder)
     scenario = Scenario(
         name=where, model=flown.law, vehicle=flown.vehicle, sensor=flown.sensor, transceiver=flown.transceiver,
         measures=flown.measures, own_topology=flown.own_topology, published=published,
         document=whole, **parts, **individuals,
     )  # fmt: skip
-    if faults := _derived_faults(scenario) or scene_errors(scenario, started):
-        raise ScenarioError([f"{where}: {fault}" for fault in faults])
+    if errors := _derived_faults(scenario) or scene_errors(scenario, started):
+        raise ScenarioError([f"{where}: {error}" for error in errors])
     notes = (
         *notes,
         *left_out,
-        *told,
-        *told_of,
+        *key_notes,
+        *individual_notes,
         *setting_notes(scenario),
         *dubious_setting_notes(scenario),
         *scene_notes(scenario),
@@ -123,21 +123,21 @@ def _written_out(
     document: dict[str, Any], settings: Mapping[str, Any], short: Mapping[str, Any], records: Mapping[str, type]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
     """Expand last words to whole keys and vectors to components, convert to SI units; return notes and errors, too."""
-    named, told, faults = short_keys.expand_short_keys(short, records, TOP_LEVEL_KEYS)
-    faults += [f"{key} is given twice, once by its last word" for key in named if key in settings]
+    named, notes, errors = short_keys.expand_short_keys(short, records, TOP_LEVEL_KEYS)
+    errors += [f"{key} is given twice, once by its last word" for key in named if key in settings]
     document, more = with_vector_components(apply_settings(document, named)[0], records)
-    faults += more
+    errors += more
     document, converted, more = convert_units(document, {"": Flight, **records})
-    return document, [*told, *converted], faults + more
+    return document, [*notes, *converted], errors + more
 
 
 def _derived_faults(scenario: Scenario) -> list[str]:
     """Return errors of numbers that follow from the scenario and lie outside their ranges."""
     try:
         scenario.resolved_metrics()
-    except ParameterError as fault:
-        told = [f"metrics.{line.partition('.')[2]}" for line in str(fault).splitlines()]
-        return [f"{line}; it follows from the other keys unless it is given" for line in told]
+    except ParameterError as error:
+        lines = [f"metrics.{line.partition('.')[2]}" for line in str(error).splitlines()]
+        return [f"{line}; it follows from the other keys unless it is given" for line in lines]
     return []
 
 
@@ -162,15 +162,15 @@ def _individuals(
         walls = world is not None and (world.arena == "polygon" or bool(world.obstacles))
         named = GroupLawReader(law, kind, parts["parameters"], given.laws, folder, trust, walls)
     count = int(flight.agents)
-    flocks, notes, faults = read_groups(document.get("groups", ()), count, records, named)
-    faults += group_number_errors(flocks, law)
-    if law is not None and not faults:
-        faults += group_errors(flocks, parts, law, flown.vehicle, flown.sensor)
+    flocks, notes, errors = read_groups(document.get("groups", ()), count, records, named)
+    errors += group_number_errors(flocks, law)
+    if law is not None and not errors:
+        errors += group_errors(flocks, parts, law, flown.vehicle, flown.sensor)
     sequential = flight.update == "sequential"
-    made, told, more = read_fault_entries(
+    entries, fault_notes, more = read_fault_entries(
         document.get("faults", ()), count, flocks, sequential, folder, user_kinds=given.fault_kinds, trust=trust
     )
-    return {"groups": flocks, "faults": made}, notes + told, faults + more
+    return {"groups": flocks, "faults": entries}, notes + fault_notes, errors + more
 
 
 def _beside(scene: Any, folder: Path | None) -> Any:
@@ -183,67 +183,67 @@ def _beside(scene: Any, folder: Path | None) -> Any:
 def _parts(document: Mapping[str, Any], flown: ScenarioParts) -> tuple[dict[str, Any], list[str]]:
     """Make the records of a scenario by section, None where one has an error; return them with all errors."""
     parts: dict[str, Any] = {}
-    faults: list[str] = []
+    errors: list[str] = []
     kinds = {family.section: family.records for family in PART_KINDS if family is not METRIC_SET_KIND}
     for section, record in flown.records.items():
         given = document.get(section, {})
         if section in kinds and isinstance(given, Mapping) and not hasattr(record, "kind"):
             given = {key: value for key, value in given.items() if key != "kind"}
         parts[section], more = schema.read_section(section, given, record, kinds=kinds.get(section))
-        faults += more
+        errors += more
     top: dict[str, Any] = {key: document[key] for key in ("agents", "duration", "dt", "update") if key in document}
     parts["flight"], more = schema.read_section("", top, Flight)
-    faults += more
+    errors += more
     table = document.get("model", {})
     if flown.law is not None and isinstance(table, Mapping):
         keys = {key: value for key, value in table.items() if key != "kind"}
         parts["parameters"], more = schema.read_section("model", keys, flown.law.Parameters)
-        faults += more
-    return parts, faults
+        errors += more
+    return parts, errors
 
 
 def _faults_between(parts: Mapping[str, Any], flown: ScenarioParts, started: bool) -> list[str]:
     """Return the errors of sections that are valid alone but do not fit each other."""
-    faults: list[str] = []
+    errors: list[str] = []
     flight, law, world = parts["flight"], flown.law, parts["world"]
     if flight is not None and flight.agents != int(flight.agents):
-        faults.append(f"agents = {flight.agents:g} is not a whole number")
+        errors.append(f"agents = {flight.agents:g} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
     ours = parts["topology"] is not None and flown.own_topology is None
     meets = TOPOLOGY_KIND.shipped[parts["topology"].kind] if ours else flown.own_topology
-    faults += topology_errors(meets, world, law)
-    faults += field_file_errors(world)
+    errors += topology_errors(meets, world, law)
+    errors += field_file_errors(world)
     if world is not None:
         separation = parts["start"].separation if parts["start"] is not None else 0.0
         if separation is None and law is not None and parts.get("parameters") is not None:
             separation = default_separation(law, parts["parameters"], begin, world)
         count = int(flight.agents) if flight is not None else 1
-        faults += world_errors(world, count, separation or 0.0, begin, started=started)
+        errors += world_errors(world, count, separation or 0.0, begin, started=started)
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
-        faults += timing_errors(flight, parts["sensors"].period, parts["metrics"])
-        faults += update_order_errors(flight, flown.sensor, parts["sensors"], flown.transceiver, parts["radio"])
-        faults += silence_errors(parts["silence"].rule, flight, law) if parts["silence"] is not None else []
-        faults += metric_errors(flown.measures, parts["metrics"], world)
-        faults += wing_errors(parts, law, flown.measures, started)
-    return faults + body_errors(flown.vehicle, parts, law, started) + sensor_errors(flown.sensor, parts)
+        errors += timing_errors(flight, parts["sensors"].period, parts["metrics"])
+        errors += update_order_errors(flight, flown.sensor, parts["sensors"], flown.transceiver, parts["radio"])
+        errors += silence_errors(parts["silence"].rule, flight, law) if parts["silence"] is not None else []
+        errors += metric_errors(flown.measures, parts["metrics"], world)
+        errors += wing_errors(parts, law, flown.measures, started)
+    return errors + body_errors(flown.vehicle, parts, law, started) + sensor_errors(flown.sensor, parts)
 
 
 def _published(table: Any) -> tuple[dict[str, tuple[float, float | None]], list[str]]:
     """Read a paper's numbers by name: mean, and standard deviation where it is given; return them with errors."""
     if not isinstance(table, Mapping):
         return {}, [f"published = {table!r} is not a table of order parameters"]
-    found: dict[str, tuple[float, float | None]] = {}
-    faults: list[str] = []
+    published: dict[str, tuple[float, float | None]] = {}
+    errors: list[str] = []
     for key, entry in table.items():
         if isinstance(entry, Mapping) and set(entry) <= {"mean", "sd"}:
-            told = [entry.get("mean"), *([entry["sd"]] if "sd" in entry else [])]
+            numbers = [entry.get("mean"), *([entry["sd"]] if "sd" in entry else [])]
         else:
-            told = list(entry) if isinstance(entry, (list, tuple)) else [entry]
-        if 1 <= len(told) <= 2 and all(map(_finite, told)):
-            found[key] = (float(told[0]), float(told[1]) if len(told) == 2 else None)
+            numbers = list(entry) if isinstance(entry, (list, tuple)) else [entry]
+        if 1 <= len(numbers) <= 2 and all(map(_finite, numbers)):
+            published[key] = (float(numbers[0]), float(numbers[1]) if len(numbers) == 2 else None)
         else:
-            faults.append(f"published.{key} = {entry!r}: give a number, [mean, sd], or {{ mean = ..., sd = ... }}")
-    return found, faults
+            errors.append(f"published.{key} = {entry!r}: give a number, [mean, sd], or {{ mean = ..., sd = ... }}")
+    return published, errors
 
 
 def _finite(value: Any) -> bool:
@@ -276,8 +276,8 @@ def rebuilt(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = 
     if "faults" not in settings and "faults" in document:
         document["faults"] = named_fault_entries(scenario)
     law = None if shipped or "model.kind" in settings else scenario.model
-    given = CallerParts(law=law, fault_kinds=kinds, laws=user_laws(scenario), **own)
-    return build_scenario(document, scenario.name, settings, caller_parts=given, started=started)
+    caller_parts = CallerParts(law=law, fault_kinds=kinds, laws=user_laws(scenario), **own)
+    return build_scenario(document, scenario.name, settings, caller_parts=caller_parts, started=started)
 
 
 def user_laws(scenario: Scenario) -> dict[str, Model]:
@@ -311,15 +311,15 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     start. Raises ScenarioError with one line per error.
     """
     new = rebuilt(scenario, settings, started=True)
-    faults = [
+    errors = [
         f"{key} = {getattr(new.flight, key):g}: {what} cannot change in flight; open another flight"
         for key, what in FIXED_KEYS.items()
         if getattr(new.flight, key) != getattr(scenario.flight, key)
     ]
     if new.dimensions != scenario.dimensions:
-        faults.append(f"world.dimensions = {new.dimensions}: cannot change in flight; open another flight")
+        errors.append(f"world.dimensions = {new.dimensions}: cannot change in flight; open another flight")
     if new.start != scenario.start:
-        faults.append("start: the flight has started; open another flight")
-    if faults:
-        raise ScenarioError([f"{scenario.name}: {fault}" for fault in faults])
+        errors.append("start: the flight has started; open another flight")
+    if errors:
+        raise ScenarioError([f"{scenario.name}: {error}" for error in errors])
     return new

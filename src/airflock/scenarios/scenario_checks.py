@@ -64,12 +64,12 @@ def update_order_errors(flight: Any, sensor: Sensor, sensors: Any, radio: Radio,
 
 def topology_errors(kind: Topology | None, world: Any, model: Model | None) -> list[str]:
     """Return why agents of a law in a world cannot meet each other by a topology."""
-    faults = []
+    errors = []
     if kind is not None and kind.flat and world is not None and world.dimensions == "3":
-        faults.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
+        errors.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
     if kind is not None and model is not None and model.neighbour is None:
-        faults.append(f"topology.kind = {kind.name!r}: law {model.name} has no rule for single neighbours")
-    return faults
+        errors.append(f"topology.kind = {kind.name!r}: law {model.name} has no rule for single neighbours")
+    return errors
 
 
 def metric_errors(measures: MetricSet, q: Any, world: Any) -> list[str]:
@@ -84,16 +84,16 @@ def silence_errors(rule: str, flight: Any, model: Model | None) -> list[str]:
     """Return why a law cannot stop for a lost neighbour: it must hear neighbours, and be able to stop."""
     if rule == "fly_on" or model is None:
         return []
-    faults = []
+    errors = []
     if model.command != "velocity":
-        faults.append(
+        errors.append(
             f"commands {'an' if model.command[0] in 'aeiou' else 'a'} {model.command}, and none of it stops an agent"
         )
     if model.neighbour is None or model.flock is not None:
-        faults.append("has no rule for the neighbours that an agent hears")
+        errors.append("has no rule for the neighbours that an agent hears")
     if flight.update == "sequential":
-        faults.append("sees all others as they are with update = 'sequential'")
-    return [f"silence.rule = {rule!r}: model {model.name} {fault}; set silence.rule = 'fly_on'" for fault in faults]
+        errors.append("sees all others as they are with update = 'sequential'")
+    return [f"silence.rule = {rule!r}: model {model.name} {error}; set silence.rule = 'fly_on'" for error in errors]
 
 
 def timing_errors(flight: Flight, period: float, metrics: Any) -> list[str]:
@@ -104,12 +104,12 @@ def timing_errors(flight: Flight, period: float, metrics: Any) -> list[str]:
         "metrics.period": metrics.period,
         "metrics.collision_period": metrics.collision_period or dt,
     }
-    found = [
+    errors = [
         f"{key} = {value:g} s is shorter than dt = {dt:g} s" for key, value in times.items() if 0.0 < value < 0.5 * dt
     ]
     if flight.duration / dt > 2**31:
-        found.append(f"duration = {flight.duration:g} s takes more than 2^31 steps of dt = {dt:g} s")
-    return found
+        errors.append(f"duration = {flight.duration:g} s takes more than 2^31 steps of dt = {dt:g} s")
+    return errors
 
 
 def field_file_errors(world: Any) -> list[str]:
@@ -285,19 +285,19 @@ def formation_errors(world: arena.Parameters, start_record: start.Parameters, ag
 
 def _edge_faults(world: arena.Parameters) -> list[str]:
     """Return the errors of edges that the arena cannot have."""
-    found = []
+    errors = []
     if world.edges != "open" and world.arena != "square":
-        found.append(f"world.edges = {world.edges!r} needs world.arena = 'square'")
+        errors.append(f"world.edges = {world.edges!r} needs world.arena = 'square'")
     if world.edges == "periodic" and world.obstacles:
-        found.append("world.edges = 'periodic' takes no obstacles")
-    return found
+        errors.append("world.edges = 'periodic' takes no obstacles")
+    return errors
 
 
 def start_region_errors(world: arena.Parameters, start_record: start.Parameters, agents: int) -> list[str]:
     """Return why a start region does not fit into the arena."""
-    found = []
+    errors = []
     if start_record.kind in FORMATIONS:
-        found += formation_errors(world, start_record, agents)
+        errors += formation_errors(world, start_record, agents)
     elif start_record.kind != "arena" and world.arena != "none":
         reach = start_record.radius if start_record.kind == "ball" else 0.5 * start_record.side
         z = min(-arena.heights_of(world)[0], arena.heights_of(world)[1]) if world.dimensions == "3" else math.inf
@@ -306,12 +306,12 @@ def start_region_errors(world: arena.Parameters, start_record: start.Parameters,
         region = round_ if start_record.kind == "ball" else box(-reach, -reach, reach, reach)
         if plan is not None and (not plan.covers(region) or reach > z):
             name = "radius" if start_record.kind == "ball" else "side"
-            found.append(
+            errors.append(
                 f"start.{name} = {getattr(start_record, name):g} m: "
                 f"the arena is smaller than the {start_record.kind} in which "
                 f"agents start; enlarge world.side or world.height, or lower start.{name}"
             )
-    return found
+    return errors
 
 
 def _region(world: arena.Parameters, begin: start.Parameters) -> tuple[Any, float]:
@@ -333,69 +333,69 @@ def _size(world: arena.Parameters, begin: start.Parameters) -> str:
 
 def height_errors(world: arena.Parameters) -> list[str]:
     """Return the errors of floor, ceiling and the heights of obstacles."""
-    found = []
+    errors = []
     given = [key for key in ("floor", "ceiling") if getattr(world, key) is not None]
     low, high = arena.heights_of(world)
     if world.dimensions == "2":
-        found += [f"world.{key}: a plane has no heights; set world.dimensions = '3'" for key in given]
-        found += ["world.heights: a plane has no heights; set world.dimensions = '3'"] if world.heights else []
-        return found
+        errors += [f"world.{key}: a plane has no heights; set world.dimensions = '3'" for key in given]
+        errors += ["world.heights: a plane has no heights; set world.dimensions = '3'"] if world.heights else []
+        return errors
     if given and not low < high:
-        found.append(f"world.floor = {low:g} m does not lie below world.ceiling = {high:g} m")
+        errors.append(f"world.floor = {low:g} m does not lie below world.ceiling = {high:g} m")
     if given and (world.edges != "open" or world.walls == "nearest_per_axis"):
         key, value = ("edges", world.edges) if world.edges != "open" else ("walls", world.walls)
-        found.append(f"world.{given[0]}: with world.{key} = {value!r} give world.height instead")
+        errors.append(f"world.{given[0]}: with world.{key} = {value!r} give world.height instead")
     if world.heights and len(world.heights) != len(world.obstacles):
-        found.append(f"world.heights: {len(world.heights)} pairs for {len(world.obstacles)} obstacles; give one each")
+        errors.append(f"world.heights: {len(world.heights)} pairs for {len(world.obstacles)} obstacles; give one each")
     for number, (bottom, top) in enumerate(world.heights):
         if not bottom < top:
-            found.append(f"world.heights[{number}] = [{bottom:g}, {top:g}] m: the lowest height does not come first")
-    return found
+            errors.append(f"world.heights[{number}] = [{bottom:g}, {top:g}] m: the lowest height does not come first")
+    return errors
 
 
 def world_errors(
     world: arena.Parameters, agents: int, separation: float, start_record: start.Parameters, *, started: bool = False
 ) -> list[str]:
     """Return all errors of a world, and of starting in it unless the flight has started; one line each."""
-    found = height_errors(world)
+    errors = height_errors(world)
     if world.arena == "polygon":
-        fault = polygon_error(world.corners)
-        if fault:
-            found.append(f"world.corners {fault}")
+        error = polygon_error(world.corners)
+        if error:
+            errors.append(f"world.corners {error}")
     if world.arena != "square" and world.walls == "nearest_per_axis":
-        found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'; set world.walls = 'every_edge'")
-    plan = None if found else ground_plan(world)
-    region, height = (None, 1.0) if found else _region(world, start_record)
-    if not found:
-        found += (
+        errors.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'; set world.walls = 'every_edge'")
+    plan = None if errors else ground_plan(world)
+    region, height = (None, 1.0) if errors else _region(world, start_record)
+    if not errors:
+        errors += (
             _edge_faults(world) if started else start_region_errors(world, start_record, agents) + _edge_faults(world)
         )
     solid: list[Polygon] = []
     within = None if plan is None or not world.obstacles else plan.buffer(ROUNDED, join_style="mitre")
     for number, corners in enumerate(world.obstacles):
-        fault = polygon_error(corners)
-        if fault:
-            found.append(f"world.obstacles[{number}] {fault}")
+        error = polygon_error(corners)
+        if error:
+            errors.append(f"world.obstacles[{number}] {error}")
             continue
         shape = Polygon(corners)
         if within is not None and not within.covers(shape):
-            found.append(f"world.obstacles[{number}] reaches outside the arena")
+            errors.append(f"world.obstacles[{number}] reaches outside the arena")
         solid.append(shape.buffer(start_record.wall_clearance))
     if started:
-        return found
+        return errors
     free = math.inf if region is None else region.difference(union_all(solid)).area
     if world.dimensions == "3":
         need = agents * math.pi / 6.0 * separation**3 / max(free * height, 1e-9)
     else:
         need = agents * math.pi / 4.0 * separation**2 / max(free, 1e-9)
-    if not found and need > (JAMMED if world.dimensions == "2" else 0.35):
-        found.append(
+    if not errors and need > (JAMMED if world.dimensions == "2" else 0.35):
+        errors.append(
             f"agents = {agents} do not fit at start.separation = {separation:g} m"
             + (f" and start.wall_clearance = {start_record.wall_clearance:g} m" if start_record.wall_clearance else "")
             + (f": they would cover {need:.0%} of" if free * height > 0.0 else ": no place is left in")
             + f" the region they start in; enlarge {_size(world, start_record)}, or lower agents or "
             + ("start.separation or start.wall_clearance" if start_record.wall_clearance else "start.separation")
         )
-    if not found and world.arena == "none" and agents > 1 and start_record.kind == "arena":
-        found.append("world.arena = 'none' has no region to start in; give an arena, or start.kind = 'ball'")
-    return found
+    if not errors and world.arena == "none" and agents > 1 and start_record.kind == "arena":
+        errors.append("world.arena = 'none' has no region to start in; give an arena, or start.kind = 'ball'")
+    return errors

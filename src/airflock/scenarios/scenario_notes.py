@@ -51,8 +51,8 @@ SEES_WALLS = {"ray", "cast"}
 
 def dubious_setting_notes(scenario: Scenario) -> list[str]:
     """Return notes that a person should read before flying a scenario."""
-    asked = (_speed_alone, _no_walls, _lengths, _all_met, _unsent, _too_late, _about_an_edge)
-    return [note for note in (ask(scenario) for ask in asked) if note]
+    checks = (_speed_alone, _no_walls, _lengths, _all_met, _unsent, _too_late, _about_an_edge)
+    return [note for note in (check(scenario) for check in checks) if note]
 
 
 def _speed_alone(scenario: Scenario) -> str:
@@ -116,12 +116,12 @@ def _unsent(scenario: Scenario) -> str:
     """Note faults of messages where agents see each other and send none."""
     if scenario.transceiver.see is None:
         return ""
-    told = [kind for kind in scenario.fault_kinds if set(kind.rules) <= {"tell"} or kind.name == "radio_silent"]
-    if not told:
+    unsent = [kind for kind in scenario.fault_kinds if set(kind.rules) <= {"tell"} or kind.name == "radio_silent"]
+    if not unsent:
         return ""
     return (
         f"radio.kind = {scenario.transceiver.name!r}: agents send nothing, so these faults have no effect: "
-        + ", ".join(kind.name for kind in told)
+        + ", ".join(kind.name for kind in unsent)
     )
 
 
@@ -179,7 +179,7 @@ def pair_notes(flight: Any, q: Any, metrics: tuple[Metric, ...], cells: bool) ->
 
 def timing_notes(scenario: Scenario) -> list[str]:
     """Note times that are rounded to steps."""
-    told, dt = [], scenario.flight.dt
+    notes, dt = [], scenario.flight.dt
     times = {
         "sensors.period": scenario.sensors.period,
         "radio.delay": scenario.radio.delay,
@@ -189,14 +189,14 @@ def timing_notes(scenario: Scenario) -> list[str]:
     for key, value in times.items():
         steps = round(value / dt)
         if abs(steps * dt - value) > 1e-9 * max(value, dt):
-            told.append(f"{key} = {value:g} s is rounded to {steps * dt:g} s, {steps} steps of dt = {dt:g} s")
+            notes.append(f"{key} = {value:g} s is rounded to {steps * dt:g} s, {steps} steps of dt = {dt:g} s")
     period, delay = scenario.sensors.period, scenario.radio.delay
     if period > 0.0 and abs(delay / period - round(delay / period)) > 1e-9:
-        told.append(
+        notes.append(
             f"radio.delay = {delay:g} s is not a multiple of sensors.period = {period:g} s: decisions use "
             "states exactly that old, which lie between two measurements"
         )
-    return told
+    return notes
 
 
 def wing_notes(scenario: Any) -> list[str]:

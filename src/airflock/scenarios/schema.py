@@ -29,25 +29,25 @@ def plain_values(section: str, table: Mapping[str, Any], record: type) -> tuple[
     """Return the values of a section without units and sources, and errors for units that are not the declared ones."""
     known = {name: declared for name, declared, _ in declarations(record)}
     units = {name: getattr(declared, "unit", "") for name, declared in known.items()}
-    values, faults = {}, []
+    values, errors = {}, []
     for key, value in table.items():
         if isinstance(value, Mapping):
             name = f"{section}.{key}".lstrip(".")
             unknown = set(value) - LONG_FORM
             if "value" not in value or unknown:
-                faults.append(f"{name}: give a value, or a table with value, unit and source")
+                errors.append(f"{name}: give a value, or a table with value, unit and source")
                 continue
             if "interval" in value and not _holds(value["interval"], value["value"]):
-                faults.append(f"{name}: interval = {value['interval']!r} is not [low, high] about {value['value']!r}")
+                errors.append(f"{name}: interval = {value['interval']!r} is not [low, high] about {value['value']!r}")
                 continue
             unit = value.get("unit", "")
             if unit and units.get(key) is not None and unit != units[key]:
-                faults.append(f"{name} = {value['value']} {unit}: the unit is {units[key] or 'none'}")
+                errors.append(f"{name} = {value['value']} {unit}: the unit is {units[key] or 'none'}")
             value = value["value"]
         if isinstance(known.get(key), Choice) and isinstance(value, int) and not isinstance(value, bool):
             value = str(value)  # model.scheme = 2
         values[key] = value
-    return values, faults
+    return values, errors
 
 
 def _holds(interval: Any, value: Any) -> bool:
@@ -73,14 +73,14 @@ def read_section(
     """
     if not isinstance(table, Mapping):
         return None, [f"{section} = {table!r} is not a table of keys"]
-    values, faults = plain_values(section, table, record)
+    values, errors = plain_values(section, table, record)
     known = {name: declared for name, declared, _ in declarations(record)}
     values = {key: _python(value, known.get(key)) for key, value in values.items()}
     for name, declared in known.items():
         if name in values and _is_wrong(values[name], declared):
-            faults.append(_line(f"{section}.{name}".lstrip("."), values[name], declared))
-    faults += [_unknown(section, str(key), (*known, *other_keys), kinds or {}) for key in values if key not in known]
-    return (None if faults else record(**values)), faults
+            errors.append(_line(f"{section}.{name}".lstrip("."), values[name], declared))
+    errors += [_unknown(section, str(key), (*known, *other_keys), kinds or {}) for key in values if key not in known]
+    return (None if errors else record(**values)), errors
 
 
 def _python(value: Any, declared: Declaration | None) -> Any:

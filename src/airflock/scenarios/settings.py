@@ -27,11 +27,11 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
     notes: list[str] = []
     for family in PART_KINDS:
         section = family.section
-        given, key = document.get(section, {}), f"{section}.kind"
-        if key not in settings or not isinstance(given, Mapping):
+        table, key = document.get(section, {}), f"{section}.kind"
+        if key not in settings or not isinstance(table, Mapping):
             continue
-        kept = family.kept(given, str(settings[key]))
-        if set(given) - {"kind", *kept}:
+        kept = family.kept(table, str(settings[key]))
+        if set(table) - {"kind", *kept}:
             notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {family.kind(document)} are left out")
         document = {**document, section: kept}
     law = document.get("model", {})
@@ -63,17 +63,17 @@ def _plain(value: Any) -> Any:
 
 def apply_settings(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Return a copy of a document with keys like "model.p_rep" set, and errors for unknown keys."""
-    made: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in document.items()}
-    faults: list[str] = []
+    result: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in document.items()}
+    errors: list[str] = []
     for key, value in settings.items():
         section, _, name = key.partition(".")
-        if name and not isinstance(made.setdefault(section, {}), dict):
-            faults.append(f"{key}: unknown key")
+        if name and not isinstance(result.setdefault(section, {}), dict):
+            errors.append(f"{key}: unknown key")
         elif name:
-            made[section] = {**without_replaced(made[section], {name: value}), name: value}
+            result[section] = {**without_replaced(result[section], {name: value}), name: value}
         else:
-            made[section] = value
-    return made, faults + [_unknown(key, value) for key, value in made.items() if key not in TOP_LEVEL_KEYS]
+            result[section] = value
+    return result, errors + [_unknown(key, value) for key, value in result.items() if key not in TOP_LEVEL_KEYS]
 
 
 def _unknown(key: str, value: object) -> str:
@@ -86,12 +86,12 @@ def _unknown(key: str, value: object) -> str:
 
 def with_vector_components(document: dict[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str]]:
     """Return a document in which each vector is its components, and the errors of vectors that are given whole."""
-    faults: list[str] = []
+    errors: list[str] = []
     for section, record in records.items():
-        if isinstance(given := document.get(section), Mapping) and getattr(record, "VECTORS", None):
-            document[section], more = expand_vectors(section, given, record)
-            faults += more
-    return document, faults
+        if isinstance(table := document.get(section), Mapping) and getattr(record, "VECTORS", None):
+            document[section], more = expand_vectors(section, table, record)
+            errors += more
+    return document, errors
 
 
 GROUP_PREFIX, SPREAD = "groups.", "spread"
@@ -115,31 +115,35 @@ def with_group_keys(
     document: Mapping[str, Any], settings: Mapping[str, Any]
 ) -> tuple[Mapping[str, Any], dict[str, Any], list[str]]:
     """Set the keys of groups in a document; return it, the other settings, and the errors of these keys."""
-    wanted = {key: value for key, value in settings.items() if is_group_key(key)}
-    others = {key: value for key, value in settings.items() if key not in wanted}
-    given = others.get("groups", document.get("groups", ()))
+    group_settings = {key: value for key, value in settings.items() if is_group_key(key)}
+    others = {key: value for key, value in settings.items() if key not in group_settings}
+    entries = others.get("groups", document.get("groups", ()))
     if (
-        not wanted
-        or not given
-        or not isinstance(given, (list, tuple))
-        or not all(isinstance(table, Mapping) for table in given)
+        not group_settings
+        or not entries
+        or not isinstance(entries, (list, tuple))
+        or not all(isinstance(table, Mapping) for table in entries)
     ):
-        return document, others, [f"{key}: the scenario has no [[groups]]; write them in a file" for key in wanted]
-    tables = [dict(table) for table in given]
+        return (
+            document,
+            others,
+            [f"{key}: the scenario has no [[groups]]; write them in a file" for key in group_settings],
+        )
+    tables = [dict(table) for table in entries]
     names = [table.get("name", f"group_{number}") for number, table in enumerate(tables)]
-    faults = []
-    for key, value in wanted.items():
+    errors = []
+    for key, value in group_settings.items():
         group, section, name = split_key(key)
         if section not in LETTERS and _belongs_to_file(key, names):
-            faults.append(
+            errors.append(
                 f"{key}: a setting changes only {', '.join(LETTERS)} of a group; write it in the file's [[groups]]"
             )
         elif section not in LETTERS or not name:
             hint = _group_key_hint(key, document, dict(zip(map(str, names), tables, strict=True)))
-            faults.append(f"{key}: unknown key; {hint}")
+            errors.append(f"{key}: unknown key; {hint}")
         elif group not in names:
             hint = suggest(group, [str(known) for known in names], f"known: {', '.join(map(str, names))}")
-            faults.append(f"{key}: unknown group {group!r}; {hint}")
+            errors.append(f"{key}: unknown group {group!r}; {hint}")
         else:
             table = tables[names.index(group)]
             own, (name, _, spread) = table.get(section, {}), name.partition(".")
@@ -149,7 +153,7 @@ def with_group_keys(
                     **own,
                     name: _with_spread(before, value) if spread else with_old_spread(before, value),
                 }
-    return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, faults
+    return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, errors
 
 
 def _belongs_to_file(key: str, names: list[str]) -> bool:
@@ -211,9 +215,9 @@ def group_declarations(scenario: Any) -> Iterator[tuple[str, Declaration, Any]]:
 def group_key_value(scenario: Any, key: str) -> Any:
     """Return the value of a key of a group; that of the flock where the group has none of its own."""
     group, section, name = split_key(key)
-    found = next(each for each in scenario.groups if each.name == group)
-    record = found.law[1] if found.law and section == "model" else scenario.records[section]
-    return found.numbers.get((LETTERS[section], name), getattr(record, name))
+    owner = next(each for each in scenario.groups if each.name == group)
+    record = owner.law[1] if owner.law and section == "model" else scenario.records[section]
+    return owner.numbers.get((LETTERS[section], name), getattr(record, name))
 
 
 FAULT_PREFIX = "faults."
@@ -224,25 +228,33 @@ def with_fault_keys(
     document: Mapping[str, Any], settings: Mapping[str, Any]
 ) -> tuple[Mapping[str, Any], dict[str, Any], list[str]]:
     """Set the keys of faults in a document; return it, the other settings, and the errors of these keys."""
-    wanted = {key: value for key, value in settings.items() if key.startswith(FAULT_PREFIX)}
-    others = {key: value for key, value in settings.items() if key not in wanted}
-    if not wanted:
+    fault_settings = {key: value for key, value in settings.items() if key.startswith(FAULT_PREFIX)}
+    others = {key: value for key, value in settings.items() if key not in fault_settings}
+    if not fault_settings:
         return document, others, []
-    given = others.get("faults", document.get("faults", ()))
-    if not given or not isinstance(given, (list, tuple)) or not all(isinstance(table, Mapping) for table in given):
-        return document, others, [f"{key}: the scenario has no [[faults]]; write them in a file" for key in wanted]
-    tables = [dict(table) for table in given]
-    faults = []
-    for key, value in wanted.items():
+    entries = others.get("faults", document.get("faults", ()))
+    if (
+        not entries
+        or not isinstance(entries, (list, tuple))
+        or not all(isinstance(table, Mapping) for table in entries)
+    ):
+        return (
+            document,
+            others,
+            [f"{key}: the scenario has no [[faults]]; write them in a file" for key in fault_settings],
+        )
+    tables = [dict(table) for table in entries]
+    errors = []
+    for key, value in fault_settings.items():
         entry, _, name = key.removeprefix(FAULT_PREFIX).rpartition(".")
-        number, fault = _find_entry(entry, name, tables)
+        number, error = _find_entry(entry, name, tables)
         if number is None:
-            faults.append(f"{key}: {fault}")
+            errors.append(f"{key}: {error}")
         elif value is None:  # as it is without
             tables[number].pop(name, None)
         else:
             tables[number][name] = value
-    return {**document, "faults": tables}, {key: v for key, v in others.items() if key != "faults"}, faults
+    return {**document, "faults": tables}, {key: v for key, v in others.items() if key != "faults"}, errors
 
 
 def is_fault_key(key: str) -> bool:

@@ -72,26 +72,26 @@ def convert_units(
     left out of the document, so that it is reported once.
     """
     notes: list[str] = []
-    faults: list[str] = []
+    errors: list[str] = []
     result = dict(document)
     for section, record in records.items():
         known = {name: declared for name, declared, _ in declarations(record)}
-        given = document if not section else document.get(section)
-        if not isinstance(given, Mapping):
+        values = document if not section else document.get(section)
+        if not isinstance(values, Mapping):
             continue
         changed = {}
-        for key in (key for key in given if key in known):  # in the order of the file, so that notes are
+        for key in (key for key in values if key in known):  # in the order of the file, so that notes are
             name = f"{section}.{key}".lstrip(".")
-            changed[key], note, fault = _converted(name, given[key], known[key])
+            changed[key], note, error = _converted(name, values[key], known[key])
             notes += [note] if note else []
-            faults += [fault] if fault else []
+            errors += [error] if error else []
         wrong = {key for key in changed if changed[key] is None}
-        table = {key: changed.get(key, value) for key, value in given.items() if key not in wrong}
+        table = {key: changed.get(key, value) for key, value in values.items() if key not in wrong}
         if section:
             result[section] = table
         else:
             result = table | {key: value for key, value in result.items() if key not in known}
-    return result, notes, faults
+    return result, notes, errors
 
 
 def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, str]:
@@ -205,21 +205,21 @@ def with_share_hint(line: str, spread_prefix: str, known: Mapping[str, Any]) -> 
 
 def check_spreads(where: str, table: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
     """Return standard deviations in declared units, and the errors of those that are none."""
-    found, faults = {}, []
+    spreads, errors = {}, []
     for key, entry in table.items():
         value = entry.get("value", entry) if isinstance(entry, Mapping) else entry
         declared = known.get(key)
         if not isinstance(declared, Quantity):
-            faults.append(f"{where}.{key}: unknown number")
+            errors.append(f"{where}.{key}: unknown number")
         elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
             other = with_share_hint(f"{where}.spread.{key}", f"{where}.spread", known)
             least = format_with_unit("0", declared.unit)
-            faults.append(
+            errors.append(
                 f"{where}.{key}.spread = {_told(value)} is not a standard deviation of {least} or more{other}"
             )
         else:
-            found[key] = value if isinstance(value, RelativeSpread) else float(value)
-    return found, faults
+            spreads[key] = value if isinstance(value, RelativeSpread) else float(value)
+    return spreads, errors
 
 
 def _told(spread: Any) -> str:

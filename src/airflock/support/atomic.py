@@ -34,8 +34,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         with _beside(target) as temporary:
             yield temporary
-    except OSError as fault:
-        raise OSError(fault.errno, fault.strerror or str(fault), str(path)) from fault
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
 @contextmanager
@@ -129,7 +129,7 @@ def suffix_error(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> str
     target = Path(path)
     if target.suffix.lower() in suffixes:
         return ""
-    said = f"ending {target.suffix}" if target.suffix else "name without an ending"
+    ending = f"ending {target.suffix}" if target.suffix else "name without an ending"
     if len(suffixes) == 1:
-        return f"{target}: {said} is not {suffixes[0]}, the only format written here"
-    return f"{target}: {said}: unknown format; give one of {', '.join(suffixes)}"
+        return f"{target}: {ending} is not {suffixes[0]}, the only format written here"
+    return f"{target}: {ending}: unknown format; give one of {', '.join(suffixes)}"

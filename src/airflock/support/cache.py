@@ -37,10 +37,10 @@ def cache_folder_error(base: Path) -> str:
     """Return why a folder cannot keep compiled code; empty if it can. A missing folder is made."""
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = base.stat()
-        if OWNERS and found.st_uid not in (0, os.geteuid()):
+        status = base.stat()
+        if OWNERS and status.st_uid not in (0, os.geteuid()):
             return f"{base} belongs to another user"
-        if OWNERS and found.st_mode & 0o022 and not found.st_mode & stat.S_ISVTX:
+        if OWNERS and status.st_mode & 0o022 and not status.st_mode & stat.S_ISVTX:
             return f"{base} may be written by other users"
         (base / DRIVERS).mkdir(mode=0o700, exist_ok=True)
         inner = os.lstat(base / DRIVERS)
@@ -52,8 +52,8 @@ def cache_folder_error(base: Path) -> str:
             (base / DRIVERS).chmod(0o700)
         with tempfile.TemporaryFile(dir=base / DRIVERS):
             return "" if shutil.disk_usage(base).free > ROOM else f"{base} has less than {ROOM / 1e6:.0f} MB free"
-    except OSError as fault:
-        return f"{base} cannot be written: {fault.strerror or fault}"
+    except OSError as error:
+        return f"{base} cannot be written: {error.strerror or error}"
 
 
 @cache
@@ -67,7 +67,7 @@ def private_folder() -> Path:
 
 def list_drivers(base: Path) -> list[tuple[float, int, Path]]:
     """Return last use (s since 1970), bytes and folder of every driver, also those of version 0.1, oldest first."""
-    found = []
+    drivers = []
     for parent in (base, base / DRIVERS):
         for folder in parent.iterdir() if parent.is_dir() else ():
             if re.fullmatch("[0-9a-f]{20}", folder.name) and folder.is_dir() and not folder.is_symlink():
@@ -76,8 +76,8 @@ def list_drivers(base: Path) -> list[tuple[float, int, Path]]:
                     with suppress(OSError):  # removed meanwhile
                         size += path.lstat().st_size
                 with suppress(OSError):
-                    found.append((folder.stat().st_mtime, size, folder))
-    return sorted(found)
+                    drivers.append((folder.stat().st_mtime, size, folder))
+    return sorted(drivers)
 
 
 def shrink(base: Path, max_bytes: int = MOST) -> int:

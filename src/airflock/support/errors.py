@@ -55,8 +55,8 @@ def collect_errors(errors: list[str]) -> Iterator[None]:
     """Collect the errors of the block, one line each, and go on, so that all of them are reported together."""
     try:
         yield
-    except AirflockError as fault:
-        errors += [line for line in str(fault).splitlines() if line not in errors]
+    except AirflockError as error:
+        errors += [line for line in str(error).splitlines() if line not in errors]
 
 
 class ParameterError(AirflockError):
@@ -67,7 +67,7 @@ class ScenarioError(AirflockError):
     """A scenario file or a set of its keys cannot be used; carries all errors, one line each."""
 
     def __init__(self, errors: list[str]):
-        self.faults = [printable(fault) for fault in shortened_lines(errors)]
+        self.faults = [printable(error) for error in shortened_lines(errors)]
         super().__init__("\n".join(self.faults))
 
 
@@ -103,7 +103,7 @@ class CardError(AirflockError):
     """A flight card cannot be flown: carries all errors, one line each."""
 
     def __init__(self, errors: list[str]):
-        self.faults = [printable(fault) for fault in shortened_lines(errors)]
+        self.faults = [printable(error) for error in shortened_lines(errors)]
         super().__init__("\n".join(self.faults))
 
 
@@ -150,21 +150,21 @@ class ErrorCollector:
         if not any(part is INVALID for part in (*parts, *named.values())):
             try:
                 return reader(*parts, **named)
-            except AirflockError as fault:
-                self._raised.append(fault)
-                self.note(*str(fault).splitlines())
+            except AirflockError as error:
+                self._raised.append(error)
+                self.note(*str(error).splitlines())
         return INVALID  # type: ignore[no-any-return]
 
     def collect_each(self, reader: Callable[[Any], T], parts: Iterable[Any] | None) -> list[T]:
         """Read each of several parts; INVALID where one of them is."""
         if parts is INVALID:
             return INVALID  # type: ignore[return-value]
-        found = [self.read(reader, part) for part in parts or ()]
-        return INVALID if any(part is INVALID for part in found) else found
+        results = [self.read(reader, part) for part in parts or ()]
+        return INVALID if any(part is INVALID for part in results) else results
 
     def note(self, *errors: str) -> None:
         """Add errors that no reader raises."""
-        self.faults += [fault for fault in errors if fault not in self.faults]
+        self.faults += [error for error in errors if error not in self.faults]
 
     def raise_errors(self) -> None:
         """Raise the reader's own exception if it is the only error, or else a ScenarioError with all of them."""

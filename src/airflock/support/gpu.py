@@ -21,24 +21,24 @@ def unavailable_reason() -> str | None:
     try:
         import_module("numba_cuda")
         cuda = cuda_runtime()
-    except ImportError as fault:
-        missing = isinstance(fault, ModuleNotFoundError) and fault.name == "numba_cuda"
-        return f"numba-cuda is not installed; {INSTALL}" if missing else f"numba-cuda: {_first_line(fault)}"
+    except ImportError as error:
+        missing = isinstance(error, ModuleNotFoundError) and error.name == "numba_cuda"
+        return f"numba-cuda is not installed; {INSTALL}" if missing else f"numba-cuda: {_first_line(error)}"
     if is_simulated():
         return "the CUDA simulator is on (NUMBA_ENABLE_CUDASIM); it is only for tests"
     try:
         if not cuda.is_available():
             return f"no GPU can be used: {_driver_fault()}"
         cuda.get_current_device()
-    except Exception as fault:  # the driver's own faults come in many types
-        return f"the GPU cannot be used: {_first_line(fault)}"
+    except Exception as error:  # the driver's own faults come in many types
+        return f"the GPU cannot be used: {_first_line(error)}"
     return None
 
 
 def _driver_fault() -> str:
     """Return the driver's own error."""
-    fault = cuda_runtime().cuda_error()
-    return _first_line(fault) if fault else "no device found"
+    error = cuda_runtime().cuda_error()
+    return _first_line(error) if error else "no device found"
 
 
 def _first_line(fault: BaseException | str) -> str:
@@ -60,9 +60,9 @@ def require_gpu(allow_simulator: bool = False) -> None:
     """Raise DeviceError with the reason if no GPU can be used."""
     if allow_simulator and is_simulated():
         return
-    fault = unavailable_reason()
-    if fault is not None:
-        raise DeviceError(f"device = cuda: {fault}; choose device = cpu or auto")
+    error = unavailable_reason()
+    if error is not None:
+        raise DeviceError(f"device = cuda: {error}; choose device = cpu or auto")
 
 
 def free_gpu_memory() -> int:
@@ -79,12 +79,12 @@ def describe_gpus() -> list[dict[str, Any]]:
     """Describe every GPU: name, compute capability, multiprocessors, memory in GB."""
     if not is_available():
         return []
-    cuda, found = cuda_runtime(), []
+    cuda, gpus = cuda_runtime(), []
     for device in cuda.gpus:
         with device:
             memory = cuda.current_context().get_memory_info()
             name = device.name.decode() if isinstance(device.name, bytes) else str(device.name)
-            found.append(
+            gpus.append(
                 {
                     "name": name,
                     "compute_capability": ".".join(map(str, device.compute_capability)),
@@ -93,4 +93,4 @@ def describe_gpus() -> list[dict[str, Any]]:
                     "free_gb": round(memory.free / 1e9, 1),
                 }
             )
-    return found
+    return gpus

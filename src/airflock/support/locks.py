@@ -35,9 +35,9 @@ def _lock_byte(handle: int) -> None:
     os.lseek(handle, BYTE, os.SEEK_SET)
     try:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
-    except OSError as fault:
-        if fault.errno in (errno.EACCES, errno.EDEADLK):
-            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)) from fault
+    except OSError as error:
+        if error.errno in (errno.EACCES, errno.EDEADLK):
+            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)) from error
         raise
     finally:
         os.lseek(handle, place, os.SEEK_SET)

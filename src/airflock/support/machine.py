@@ -67,21 +67,21 @@ def toolchain_versions() -> str:
 
 def free_memory() -> int | None:
     """Return the bytes that this process may still take, of the machine or of its container; None if unknown."""
-    found = []
+    limits = []
     try:
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
             if line.startswith("MemAvailable:"):
-                found.append(1024 * int(line.split()[1]))
+                limits.append(1024 * int(line.split()[1]))
     except (OSError, ValueError):
         names = os.sysconf_names if hasattr(os, "sysconf_names") else {}
         if {"SC_PHYS_PAGES", "SC_PAGE_SIZE"} <= set(names):
-            found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+            limits.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     for limit in map(Path, LIMITS):
         try:
-            found.append(int(limit.read_text(encoding="ascii")))
+            limits.append(int(limit.read_text(encoding="ascii")))
         except (OSError, ValueError):  # no container, or one without a limit
             continue
-    return min(found, default=None)
+    return min(limits, default=None)
 
 
 def trim_heap() -> None:

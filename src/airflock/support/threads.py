@@ -82,8 +82,8 @@ def _work(
             return
         try:
             ended.put(_Ended(number, jobs[number]()))
-        except BaseException as fault:  # raised again where the result is asked for
-            ended.put(_Ended(number, fault=fault))
+        except BaseException as error:  # raised again where the result is asked for
+            ended.put(_Ended(number, fault=error))
 
 
 def run_in_background(work: Callable[[], Any]) -> Future[Any]:
@@ -93,15 +93,15 @@ def run_in_background(work: Callable[[], Any]) -> Future[Any]:
     5 ms.
     """
     future: Future[Any] = Future()
-    asked = Event()
+    released = Event()
 
     def run() -> None:
-        asked.wait()
+        released.wait()
         try:
             future.set_result(work())
-        except Exception as fault:  # raised again where the result is asked for
-            future.set_exception(fault)
+        except Exception as error:  # raised again where the result is asked for
+            future.set_exception(error)
 
     Thread(target=run, daemon=True).start()
-    asked.set()
+    released.set()
     return future

@@ -68,18 +68,18 @@ def as_error(where: object, error_class: type[AirflockError] = ScenarioError) ->
     """
     try:
         yield
-    except AirflockError as fault:
-        if not isinstance(fault, TextError):
+    except AirflockError as error:
+        if not isinstance(error, TextError):
             raise
-        raise _one(error_class, f"{where}: {fault}") from fault
-    except OSError as fault:
-        raise _one(error_class, f"{where}: {os_error_message(fault)}") from fault
-    except RecursionError as fault:
-        raise _one(error_class, f"{where}: is nested too deeply") from fault
-    except MemoryError as fault:
-        raise _one(error_class, f"{where}: needs more memory than there is") from fault
-    except Exception as fault:  # the last resort: a stranger's text must not end in a traceback
-        raise _one(error_class, f"{where}: cannot be used: {describe_error(fault)}") from fault
+        raise _one(error_class, f"{where}: {error}") from error
+    except OSError as error:
+        raise _one(error_class, f"{where}: {os_error_message(error)}") from error
+    except RecursionError as error:
+        raise _one(error_class, f"{where}: is nested too deeply") from error
+    except MemoryError as error:
+        raise _one(error_class, f"{where}: needs more memory than there is") from error
+    except Exception as error:  # the last resort: a stranger's text must not end in a traceback
+        raise _one(error_class, f"{where}: cannot be used: {describe_error(error)}") from error
 
 
 def _one(kind: type[AirflockError], line: str) -> AirflockError:
@@ -118,8 +118,8 @@ def read_text(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES) -> str:
         raise TextError(f"is larger than {max_bytes / 1e6:g} MB, more than any file of this kind needs")
     try:
         return content.decode("utf-8-sig")
-    except UnicodeDecodeError as fault:
-        raise FormatError(f"is not text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}") from fault
+    except UnicodeDecodeError as error:
+        raise FormatError(f"is not text in UTF-8: byte {error.start} is 0x{content[error.start]:02x}") from error
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -132,15 +132,15 @@ def parse_toml(text: str) -> dict[str, Any]:
     _measure(text)
     try:
         document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as fault:
-        raise FormatError(f"{fault}{_quotes(text, str(fault))}") from fault
+    except tomllib.TOMLDecodeError as error:
+        raise FormatError(f"{error}{_quotes(text, str(error))}") from error
     _walk(document)
     return document
 
 
-def _quotes(text: str, said: str) -> str:
+def _quotes(text: str, message: str) -> str:
     """Return a hint where the line at which a parser stopped holds a number with a unit."""
-    place = re.search(r"at line (\d+)", said)
+    place = re.search(r"at line (\d+)", message)
     line = text.splitlines()[int(place[1]) - 1] if place else ""
     with_unit = _UNQUOTED.fullmatch(line[:MOST_KEY])
     return f'; a number with its unit stands in quotes: {with_unit[1]} = "{with_unit[2]}"' if with_unit else ""
@@ -159,10 +159,10 @@ def parse_toml_value(text: str) -> Any:
 
 def parse_json_object(text: Any) -> dict[str, Any]:
     """Parse a JSON text as a dict; raises FormatError where it is none and TextError beyond bounds."""
-    found = parse_json(text)
-    if not isinstance(found, dict):
-        raise FormatError(f"holds {type(found).__name__} {shortened(repr(found), 40)}, not an object of keys")
-    return found
+    document = parse_json(text)
+    if not isinstance(document, dict):
+        raise FormatError(f"holds {type(document).__name__} {shortened(repr(document), 40)}, not an object of keys")
+    return document
 
 
 def parse_json(text: Any) -> Any:
@@ -172,11 +172,11 @@ def parse_json(text: Any) -> Any:
     if len(text) > MOST_SHORT or text.count("[") + text.count("{") > MOST_DEPTH:
         _measure(text)
     try:
-        found = json.loads(text)
-    except ValueError as fault:
-        raise FormatError(f"is not JSON: {fault}") from fault
-    _walk(found)
-    return found
+        document = json.loads(text)
+    except ValueError as error:
+        raise FormatError(f"is not JSON: {error}") from error
+    _walk(document)
+    return document
 
 
 class Element(NamedTuple):
@@ -220,8 +220,8 @@ def parse_xml(text: str) -> Element:
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
     try:
         parser.Parse(text.encode("utf-8"), True)
-    except expat.ExpatError as fault:
-        raise FormatError(f"is not XML: {fault}") from fault
+    except expat.ExpatError as error:
+        raise FormatError(f"is not XML: {error}") from error
     return around[0][3][0]
 
 
