@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from airflock.scenarios.cost import step_counts
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.timing import step_counts
 
 HERE = Path(__file__).parent
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from c_reference import SCORES, parameters_of
 
-from airflock.scenarios.timing import step_counts
+from airflock.scenarios.cost import step_counts
 from airflock.support import gpu as device
 
 HERE = Path(__file__).parent

@@ -22,7 +22,7 @@ from airflock.engine import score_flights
 from airflock.runs.folder import read_toml_file
 from airflock.runs.space import with_parameters
 from airflock.runs.store import CandidateBatch, FlightStore
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.cmaes import CMAES
 from airflock.search.space_table import read_space
 

@@ -15,7 +15,7 @@ from airflock.parts.faults.registry import KINDS
 from airflock.parts.radios.registry import RADIOS
 from airflock.parts.sensors.registry import SENSORS
 from airflock.parts.topologies.registry import TOPOLOGIES
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.scenarios.sections import SECTIONS
 from flocks import ISLANDS, NOTCHED, scenario
 

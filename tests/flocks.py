@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from airflock.engine import fly_world, measure_frames
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 
 ISLANDS = [[[-12.0, -10.0], [4.0, -14.0], [2.0, 3.0], [-9.0, 6.0]], [[12.0, 8.0], [20.0, 8.0], [16.0, 17.0]]]
 NOTCHED = [[-45.0, -38.0], [40.0, -38.0], [40.0, 4.0], [2.0, 6.0], [6.0, 44.0], [-45.0, 40.0]]  # an L

@@ -91,7 +91,7 @@ def tune(folder):
     """A tuning of real flights, tiny ones, but for its pictures."""
     from importlib import import_module
 
-    from airflock.scenarios.making import build_scenario
+    from airflock.scenarios.scenario_builder import build_scenario
 
     tuning = import_module("airflock.search.tune.run")
     tuning.rate_of = lambda *_: 300.0

@@ -22,10 +22,10 @@ from airflock.parts.bodies.registry import BODIES as KNOWN_BODIES
 from airflock.parts.faults.registry import KINDS
 from airflock.parts.radios.registry import RADIOS
 from airflock.parts.sensors.registry import SENSORS
-from airflock.scenarios.families import CallerParts
-from airflock.scenarios.laws import MODELS, find_law
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.named_code import MODELS, find_law
+from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.support.errors import ScenarioError
 

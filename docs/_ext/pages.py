@@ -55,7 +55,7 @@ def models(drawn: bool) -> None:
     """A page for each model: docstring, picture, equations beside code, parameters, presets, what reproduces."""
     from airflock.scenarios.files import load, presets as known
     from airflock.scenarios.keys import keys as keys_of
-    from airflock.scenarios.laws import MODELS, find_law
+    from airflock.scenarios.named_code import MODELS, find_law
 
     scenarios = {name: load(name) for name in known()}
     rows = []

@@ -13,7 +13,7 @@ from airflock.engine import fly_world
 from airflock.parts.aero import descent
 from airflock.parts.laws import reynolds_1987, vasarhelyi_2018
 from airflock.scenarios.files import load
-from airflock.scenarios.wings import DESCENT
+from airflock.scenarios.part_kinds import DESCENT
 from airflock.support.errors import RuleError, ScenarioError
 from reference.flight import fly_plainly
 
@@ -39,7 +39,7 @@ class Still:
 def test_without_gain_no_bit_of_a_flight_changes(seed):
     bare = load(PRESET, SMALL)
     document = {key: value for key, value in bare.document.items() if key != "aero"}
-    alone = airflock.scenarios.making.build_scenario(document, "alone")
+    alone = airflock.scenarios.scenario_builder.build_scenario(document, "alone")
     assert alone.model.flock is None
     frames = [
         fly_world(each, seed, record=True, device="python").frames

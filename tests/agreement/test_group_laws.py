@@ -11,7 +11,7 @@ from against_reference import compared
 from airflock.engine import driver_text, fly_world, plan_of
 from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.scenarios.files import load
-from airflock.scenarios.laws import find_law
+from airflock.scenarios.named_code import find_law
 from airflock.support.errors import ScenarioError
 from scenarios_drawn import Draw
 

@@ -8,7 +8,7 @@ import pytest
 import airflock
 import wary as wary_law
 from airflock.engine import driver_text, plan_of
-from airflock.scenarios import cells
+from airflock.scenarios import cost
 from airflock.scenarios.cost import estimated_seconds
 from airflock.scenarios.files import load
 from inside import cpu, tables
@@ -37,7 +37,7 @@ def wary(tmp_path):
 @pytest.fixture
 def soon(monkeypatch):
     """Flocks go by cells from 50 agents on."""
-    monkeypatch.setattr(cells, "GRID_FROM", 50)
+    monkeypatch.setattr(cost, "GRID_FROM", 50)
 
 
 def test_laws_and_numbers_fly_by_cells_as_among_all_pairs(wary, soon):

@@ -351,7 +351,7 @@ def test_a_battery_lands_the_agent_when_it_is_empty():
 
 def test_faults_that_come_at_random_come_as_often_as_they_should():
     scenario = load(PAPER, {"agents": 20, "duration": 3600.0, "faults": [{"kind": "motor", "per_hour": 30.0}]})
-    from airflock.scenarios.onsets import draw_onsets
+    from airflock.scenarios.fault_entries import draw_onsets
 
     counts = [draw_onsets(scenario, seed) for seed in range(60)]
     assert np.mean([len(found) for found in counts]) == pytest.approx(30.0, abs=4.0 * np.sqrt(30.0 / 60.0))

@@ -140,7 +140,7 @@ def test_pilots_fly_what_the_simulator_flies(name):
 @given(at=st.tuples(st.floats(-150, 150), st.floats(-150, 150), st.floats(-60, 60)), turn=st.floats(0, 6.28))
 @settings(max_examples=60, deadline=None)
 def test_a_place_read_from_a_card_is_the_world_of_the_flight(name, at, turn):
-    from airflock.scenarios.surroundings import FlightWorld as Engine
+    from airflock.scenarios.flight_world import FlightWorld as Engine
 
     scenario = build(name)
     ours, theirs = place_of(scenario), Engine(scenario)
@@ -157,7 +157,7 @@ def test_a_place_read_from_a_card_is_the_world_of_the_flight(name, at, turn):
 def test_polygons_are_judged_as_shapely_judges_them(corners):
     from shapely.geometry import Polygon
 
-    from airflock.scenarios.geometry import polygon_error as theirs
+    from airflock.scenarios.scenario_checks import polygon_error as theirs
 
     whole = [(round(x, 1), round(y, 1)) for x, y in corners]
     shape = Polygon(whole)

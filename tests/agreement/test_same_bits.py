@@ -19,7 +19,7 @@ PAPER = {
 FRESH = """
 import hashlib
 from airflock.engine import fly
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 settings = {settings!r}
 found = build_scenario({{"model": {{"kind": "vasarhelyi_2018"}}}}, "test", settings)
 print(hashlib.sha256(fly(found, {seed}, record=True).frames.tobytes()).hexdigest())

@@ -11,9 +11,9 @@ import pytest
 
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters, quantity
-from airflock.scenarios.families import CallerParts
 from airflock.scenarios.files import load
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.part_kinds import CallerParts
+from airflock.scenarios.scenario_builder import build_scenario
 from flocks import interpreted
 from reference.flight import fly_plainly
 

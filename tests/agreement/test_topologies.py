@@ -13,8 +13,8 @@ from airflock.core.contract import model
 from airflock.core.parameters import Parameters
 from airflock.drones.onboard.card import card_hash, parse_card
 from airflock.engine import plan_of
-from airflock.scenarios.families import CallerParts
-from airflock.scenarios.files import build_scenario
+from airflock.scenarios.part_kinds import CallerParts
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.space_table import read_space
 from airflock.support.errors import CardError, ScenarioError
 from fleets import document, scenario

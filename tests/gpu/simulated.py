@@ -20,9 +20,9 @@ import covering  # noqa: E402
 import several_terms  # noqa: E402
 import wary  # noqa: E402
 from airflock.engine import plan_of  # noqa: E402
-from airflock.scenarios.families import CallerParts  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
-from airflock.scenarios.making import build_scenario  # noqa: E402
+from airflock.scenarios.part_kinds import CallerParts  # noqa: E402
+from airflock.scenarios.scenario_builder import build_scenario  # noqa: E402
 from covering import fault  # noqa: E402
 from flocks import IDEAL, ISLANDS, scenario  # noqa: E402
 from inside import (

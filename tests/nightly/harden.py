@@ -24,8 +24,8 @@ import numpy as np
 import airflock
 from airflock import __version__
 from airflock.runs.folder import STUDY_FILE
-from airflock.scenarios.making import build_scenario
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.harden import COST, harden
 from airflock.search.held import SAFETY, SLACK
 from airflock.search.intervals import mean_interval

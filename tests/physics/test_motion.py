@@ -9,7 +9,7 @@ from airflock.core import random
 from airflock.parts.bodies import jostled, motion, wind
 from airflock.parts.sensors import langevin
 from airflock.scenarios.files import load
-from airflock.scenarios.surroundings import FlightWorld
+from airflock.scenarios.flight_world import FlightWorld
 from airflock.world import start
 from flocks import flown, from_start, ideal, scenario
 from reference.begin import begin

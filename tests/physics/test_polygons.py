@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 from shapely.geometry import LineString, Point, Polygon
 
-from airflock.scenarios.surroundings import FlightWorld as Seen
+from airflock.scenarios.flight_world import FlightWorld as Seen
 from airflock.support.errors import ScenarioError
 from airflock.view.stage.scene import prism_solid as drawn_prism
 from airflock.world import arena, polygon

@@ -22,9 +22,9 @@ from airflock.core.parameters import choices
 from airflock.core.pilot import Pilot
 from airflock.core.vocabulary import call_rule
 from airflock.parts.bodies import dryden, wind
+from airflock.scenarios.cost import step_counts
+from airflock.scenarios.flight_world import FlightWorld, GoalCourse, wall_range
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.surroundings import FlightWorld, GoalCourse, wall_range
-from airflock.scenarios.timing import step_counts
 from inside import Flown
 from reference.begin import ZERO, Vector, begin, given, normals
 from reference.individuals import Suffering, ahead, begins, groups_of, law_of, misled, own_parameters, radio_of

@@ -10,7 +10,7 @@ from airflock.core.agent import State
 from airflock.core.parameters import Quantity, declarations
 from airflock.core.vocabulary import call_rule
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.spreads import RelativeSpread
+from airflock.scenarios.units import RelativeSpread
 
 
 @dataclass

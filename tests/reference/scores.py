@@ -9,7 +9,7 @@ from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
 from airflock.core.vocabulary import Mean, call_rule
 from airflock.engine.text.probe import scratch_shapes
-from airflock.scenarios.surroundings import FlightWorld
+from airflock.scenarios.flight_world import FlightWorld
 
 Record = Any  # a NamedTuple of floats that a metric declares
 

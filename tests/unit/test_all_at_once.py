@@ -6,8 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airflock.cli.main import app
-from airflock.support.asked import INVALID, ErrorCollector, value_or_default
-from airflock.support.errors import AirflockError, CardError, ScenarioError
+from airflock.support.errors import INVALID, AirflockError, CardError, ErrorCollector, ScenarioError, value_or_default
 
 SET = "vasarhelyi_2018/4ms"
 LIMIT = "--limit 'r_mim<3 at 1%'"

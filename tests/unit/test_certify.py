@@ -26,7 +26,7 @@ from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.folder import Interrupted, open_folder
 from airflock.runs.space import with_parameters
 from airflock.scenarios.files import load
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.support.errors import AirflockError, ScenarioError, StudyError
 
 LIMIT = "r_min<1 at 2%"

@@ -25,7 +25,7 @@ from airflock.parts.laws.vasarhelyi_2018 import Sums
 from airflock.parts.metrics.registry import METRICS, SETS
 from airflock.parts.radios.registry import RADIOS
 from airflock.parts.sensors.registry import SENSORS
-from airflock.scenarios.laws import MODELS, find_law
+from airflock.scenarios.named_code import MODELS, find_law
 from airflock.support.errors import RuleError, ScenarioError
 
 

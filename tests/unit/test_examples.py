@@ -10,7 +10,7 @@ import pytest
 
 from airflock.parts.laws import formation
 from airflock.scenarios.files import load
-from airflock.scenarios.laws import MODELS
+from airflock.scenarios.named_code import MODELS
 from flocks import interpreted
 from reference.flight import fly_plainly
 

@@ -12,9 +12,9 @@ from shapely.geometry import Polygon
 
 import airflock
 from airflock.recordings.flown_scenario import scenario_of_recording
-from airflock.scenarios import geometry
+from airflock.scenarios import scenario_checks
 from airflock.scenarios.files import load
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.support.coordinates import FlightSite
 from airflock.support.errors import ScenarioError
 from airflock.support.untrusted import TextError, parse_xml
@@ -196,7 +196,7 @@ def test_the_largest_extension_is_that_of_all_pairs(kind):
             "circle": [(math.cos(math.tau * k / count), math.sin(math.tau * k / count)) for k in range(count)],
             "line": [(0.1 * k, 0.3 * k) for k in range(count)],
         }[kind]
-        assert geometry.diameter(points) == max((math.dist(a, b) for a in points for b in points), default=0.0)
+        assert scenario_checks.diameter(points) == max((math.dist(a, b) for a in points for b in points), default=0.0)
 
 
 def kml(tmp_path, *placemarks, name="a.kml"):

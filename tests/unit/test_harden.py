@@ -9,7 +9,7 @@ from airflock.parts.radios.links import received
 from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.store import FlightStore
 from airflock.scenarios.files import load
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import harden
 from airflock.search.measures import CARRIED, STOPS, measures
 from airflock.search.sensitivity import run_sensitivity

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 import airflock
-from airflock.scenarios.laws import MODELS
+from airflock.scenarios.named_code import MODELS
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

@@ -20,7 +20,7 @@ from airflock.core.parameters import (
 from airflock.core.silence import Parameters as Silence, with_defaults
 from airflock.parts.bodies.registry import BODIES
 from airflock.scenarios.files import load
-from airflock.scenarios.laws import MODELS
+from airflock.scenarios.named_code import MODELS
 from airflock.scenarios.sections import SECTIONS
 from airflock.support.errors import ParameterError, ScenarioError
 

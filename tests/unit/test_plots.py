@@ -29,8 +29,8 @@ from airflock.recordings.dataset import make_dataset
 from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.recordings.recording_files import save
 from airflock.recordings.scores import time_series_names
-from airflock.scenarios.families import CallerParts
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.part_kinds import CallerParts
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.support.errors import AirflockError, RecordingError
 from airflock.view.plots import flight as flight_view, style
 from airflock.view.plots.certificate import extrapolated_tail, plot_certificate

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from airflock.scenarios.change import scenario_variant
-from airflock.scenarios.files import load, presets
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.files import load, presets, scenario_variant
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.support.errors import AirflockError, ScenarioError
 
 DOCUMENTS = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in presets().items()}

@@ -19,7 +19,7 @@ from airflock.runs.folder import Interrupted, open_folder
 from airflock.runs.space import with_parameters
 from airflock.runs.store import CandidateBatch, FlightStore
 from airflock.scenarios.files import load
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import harden
 from airflock.search.batched import BatchExecutor
 from airflock.search.evaluator import Evaluator

@@ -10,10 +10,11 @@ from airflock.core.parameters import Quantity, declarations
 from airflock.parts.bodies.registry import BODIES
 from airflock.parts.faults.registry import KINDS
 from airflock.parts.sensors.registry import SENSORS
-from airflock.scenarios import groups, keys, making
+from airflock.scenarios import groups, keys
 from airflock.scenarios.files import load, presets
-from airflock.scenarios.laws import MODELS, find_law
+from airflock.scenarios.named_code import MODELS, find_law
 from airflock.scenarios.sections import SECTIONS
+from airflock.scenarios.settings import TOP_LEVEL_KEYS
 from airflock.support.errors import ScenarioError
 
 NAME = "vasarhelyi_2018/real_6ms"
@@ -159,7 +160,7 @@ def test_the_list_of_keys_is_that_of_the_declarations_and_of_a_loaded_scenario()
 def test_every_name_that_a_file_may_hold_is_among_the_keys():
     every = airflock.keys()
     names = {key.name for key in every}
-    assert {name.partition(".")[0] for name in names} == {*making.TOP_LEVEL_KEYS, "extends"}
+    assert {name.partition(".")[0] for name in names} == {*TOP_LEVEL_KEYS, "extends"}
     for of, known in (("faults", fault.ENTRY_KEYS), ("groups", groups.KEYS)):
         assert {key.name for key in keys.sections()[of].keys} == {f"{of}.{name}" for name in known}
     records = {**BODIES, **SENSORS, **KINDS} | {name: find_law(name) for name in MODELS}

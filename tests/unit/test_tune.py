@@ -19,7 +19,7 @@ from airflock.engine import score_flights
 from airflock.runs.folder import Interrupted
 from airflock.runs.store import FlightStore
 from airflock.scenarios.files import load
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.race import RACE_ROUNDS
 from airflock.search.tune import run as tuning
 from airflock.search.tune.assumed import default_rows

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from airflock.scenarios.files import load
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.scenarios.units import SPELLINGS, UNITS, conversion_factor
 from airflock.support.errors import ScenarioError
 

@@ -1,13 +1,115 @@
-"""Cost: how long a flight takes on this machine, about, judged before it is compiled and flown."""
+"""The cost of a flight: its steps, its use of cells, and its run time, estimated before anything is compiled."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from airflock.scenarios.cells import uses_all_cores
+from airflock.core import fields_read
+from airflock.scenarios.groups import FlownLaw
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.timing import step_counts
 from airflock.support import FlightError
+from airflock.world import half_sizes
+
+
+def step_counts(scenario: Scenario) -> dict[str, int]:
+    """Return all times of a scenario in motion steps."""
+    dt, q = scenario.flight.dt, scenario.resolved_metrics()
+    decide_every = max(1, round(scenario.sensors.period / dt))
+    delay = round(scenario.radio.delay / dt)
+    return {
+        "steps": round(scenario.flight.duration / dt),
+        "decide_every": decide_every,
+        "sample_every": max(1, round(q.period / dt)),
+        "collide_every": round((q.collision_period or dt) / dt),
+        "delay": delay,
+        "ring": delay // decide_every + 2,
+    }
+
+
+GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
+# Agents from which order parameters look at pairs by cells: below, all pairs in vectors are as fast. A pair costs four
+# times as much where its offset goes to the nearest image. Measured: one sample of `zapotecatl` on one thread, of 1,000
+# to 8,000 agents.
+NEAR_FROM, NEAR_FROM_IN_A_BOX = 6000, 2000
+
+
+def uses_all_cores(scenario: Scenario) -> bool:
+    """Return True if one flight uses all cores by itself, so that several side by side gain nothing.
+
+    Its neighbours are found by cells: many agents, laws of finite reach, exact perception.
+    """
+    perfect = not scenario.has_sensor_error and step_counts(scenario)["delay"] == 0 and scenario.radio.loss == 0.0
+    return (
+        scenario.agents >= GRID_FROM
+        and perfect
+        and uses_cells(scenario)
+        and not scenario.transceiver.keeps_packets
+        and scenario.silence.rule == "fly_on"
+        and scenario.flight.update == "synchronous"
+        and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
+        and box_fits_cells(scenario)
+    )
+
+
+def cell_notes(scenario: Scenario) -> list[str]:
+    """Note laws of groups that alone keep a large flock from being flown by cells."""
+    if not scenario.groups or uses_all_cores(scenario) or not uses_all_cores(replace(scenario, groups=())):
+        return []
+    if not uses_cells(scenario):
+        endless = next(law.model.name for law in scenario.laws if not _within_reach(law))
+        why = f"{endless} sees without limit (it has no reach)"
+    else:
+        drawn = any(_widest_reach(scenario, law) == math.inf for law in scenario.laws)
+        why = "their reach is drawn, in a periodic box" if drawn else "the box is less than two of their reaches wide"
+    return [
+        f"groups: {why}, so each of {scenario.agents} agents looks at all others, on one core, instead of at those "
+        "in the cells around it, on all cores"
+    ]
+
+
+def uses_cells(scenario: Scenario) -> bool:
+    """Return True if cells as wide as a law's reach contain every agent that an agent of the law may meet."""
+    if not any(law.model.neighbour for law in scenario.laws) or not all(map(_within_reach, scenario.laws)):
+        return False
+    kind = scenario.topology_rule
+    walls = scenario.scene.kind != "none" or bool(scenario.world.obstacles)
+    return kind is None or (kind.near and not (walls and kind.asks_for("hidden")))
+
+
+def _within_reach(law: FlownLaw) -> bool:
+    """Return True if a law reads no neighbour beyond a reach that it declares."""
+    return law.model.neighbour is None or law.model.reach is not None
+
+
+def box_fits_cells(scenario: Scenario) -> bool:
+    """Return True if a periodic box is two reaches wide, so that a neighbour is in reach at one image only."""
+    if scenario.world.edges != "periodic":
+        return True
+    halves = half_sizes(scenario.world)[: scenario.dimensions]
+    return min(halves) >= max(_widest_reach(scenario, law) for law in scenario.laws)
+
+
+def _widest_reach(scenario: Scenario, law: FlownLaw) -> float:
+    """Return the widest reach of the agents that fly by a law, m; inf where it is drawn."""
+    if law.model.reach is None or law.model.neighbour is None:
+        return 0.0
+    read = fields_read(law.model.reach, "p")
+    reaches = [float(law.model.reach(law.parameters))]
+    for group in scenario.groups:
+        if group.agents and set(group.agents) <= set(law.agents):
+            if any(letter == "p" and (read is None or name in read) for letter, name in group.spread):
+                return math.inf
+            own = {name: value for (letter, name), value in group.numbers.items() if letter == "p"}
+            reaches.append(float(law.model.reach(replace(law.parameters, **own))))
+    return max(reaches)
+
+
+def metrics_use_cells(scenario: Scenario) -> bool:
+    """Return True if order parameters look at pairs by cells, too, where neighbours are found so."""
+    periodic = scenario.world.edges == "periodic"
+    return bool(scenario.agents >= (NEAR_FROM_IN_A_BOX if periodic else NEAR_FROM))
+
 
 TIMES = (("days", 86400.0), ("h", 3600.0), ("min", 60.0))
 LONGEST = 30 * 86400.0  # s of a processor that one flight may take; nobody waits longer for one
@@ -19,7 +121,7 @@ WING = 2e-6  # for what one wing does to another, while all are solved for
 
 
 def check_run_time(scenario: Scenario) -> None:
-    """Refuse a flight that nobody can wait for; raises FlightError with the number of agents or the time that fits."""
+    """Refuse a flight that takes too long; raises FlightError with the number of agents or the duration that fits."""
     flight, n = scenario.flight, float(scenario.agents)
     if flight.duration / flight.dt * n * (2.0 * n * PAIR + STEP + SIGHT + n * WING) <= LONGEST:
         return  # whatever its rates and its law are
@@ -27,20 +129,20 @@ def check_run_time(scenario: Scenario) -> None:
     if took <= LONGEST:
         return
     days = LONGEST / 86400.0
-    fit = largest_fitting(scenario.agents, lambda agents: estimated_seconds(_of(scenario, agents)) <= LONGEST)
-    told = f"{scenario.name}: a flight takes about {took / 86400.0:.3g} days of a processor, more than {days:g}"
+    fit = largest_fitting(scenario.agents, lambda agents: estimated_seconds(_with_agents(scenario, agents)) <= LONGEST)
+    message = f"{scenario.name}: a flight takes about {took / 86400.0:.3g} days of a processor, more than {days:g}"
     fits = [f"about {fit} agents fit"] if fit else []
     fits.append(f"{'or ' if fits else ''}a duration of about {flight.duration * LONGEST / took:.3g} s")
-    raise FlightError(f"{told}; {'; '.join(fits)}, or a longer dt = {flight.dt:g} s")
+    raise FlightError(f"{message}; {'; '.join(fits)}, or a longer dt = {flight.dt:g} s")
 
 
-def _of(scenario: Scenario, agents: float) -> Scenario:
-    """The same with so many agents."""
+def _with_agents(scenario: Scenario, agents: float) -> Scenario:
+    """Return the scenario with another number of agents."""
     return replace(scenario, flight=replace(scenario.flight, agents=float(agents)))
 
 
 def estimated_seconds(scenario: Scenario) -> float:
-    """Seconds of one core that a flight takes, about, without its compilation; at all cores, cells take a share."""
+    """Estimate the seconds of one core that a flight takes, without its compilation."""
     times, n, model = step_counts(scenario), float(scenario.agents), scenario.model
     decisions = times["steps"] / times["decide_every"]
     pairs = min(n, 60.0) if uses_all_cores(scenario) else n
@@ -50,13 +152,13 @@ def estimated_seconds(scenario: Scenario) -> float:
 
 
 def estimated_total_seconds(scenarios: Sequence[Scenario]) -> float:
-    """Seconds of one core that flights take, about; the same scenario may stand there very often."""
+    """Estimate the seconds of one core that flights take; scenarios may repeat."""
     kinds = {id(scenario): scenario for scenario in scenarios}
     return sum(count * estimated_seconds(kinds[kind]) for kind, count in Counter(map(id, scenarios)).items())
 
 
 def run_time_note(scenarios: Sequence[Scenario], threads: int) -> str:
-    """How long these flights take side by side, about, where that is more than a minute; empty if it is not."""
+    """Return the run time of flights side by side, for a person to read; empty below a minute."""
     seconds = estimated_total_seconds(scenarios) / max(1, min(threads, len(scenarios)))
     if seconds < 60.0:
         return ""
@@ -66,7 +168,7 @@ def run_time_note(scenarios: Sequence[Scenario], threads: int) -> str:
 
 
 def largest_fitting(limit: int, fits: Callable[[int], bool]) -> int:
-    """The largest number up to `high` that fits, 0 if not even one does."""
+    """Return the largest number below `limit` that fits, by bisection; 0 if not even one does."""
     low = 0
     while limit - low > 1:
         middle = (low + limit) // 2

@@ -1,23 +1,24 @@
-"""Scenario files: TOML with units and sources, presets by name, and keys changed from outside."""
+"""Scenario files: TOML with units and sources, presets by name, files that extend others, fields from map files."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from airflock.core import Fault, fault
-from airflock.scenarios import formats
-from airflock.scenarios.document import settings_dict
-from airflock.scenarios.extends import extend_document
-from airflock.scenarios.families import PART_KINDS, CallerParts, PartKind
-from airflock.scenarios.ground import with_field
-from airflock.scenarios.laws import law_from_caller
-from airflock.scenarios.making import build_scenario
+from airflock.core import Fault, PacketParameters, fault, number_names, without_replaced
+from airflock.scenarios import formats, schema
+from airflock.scenarios.named_code import law_from_caller
+from airflock.scenarios.part_kinds import PART_KINDS, CallerParts, PartKind
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.scenario_builder import build_scenario, rebuilt
+from airflock.scenarios.schema import value_of
+from airflock.scenarios.settings import settings_dict
+from airflock.scenarios.units import convert_units
 from airflock.support import FormatError, ScenarioError, as_error, expand_path, is_file, read_toml, suggest
+from airflock.world import arena, load_field
 
 IMPORTED = "not a scenario; airflock import makes a recording of it (in Python: airflock.load_tracks)"
 NO_SCENARIO = {  # files that stand beside scenarios, by their ending: what they are, and what takes them
@@ -31,7 +32,7 @@ NO_SCENARIO = {  # files that stand beside scenarios, by their ending: what they
 
 
 def presets() -> dict[str, Path]:
-    """Name and file of every preset that comes with the package.
+    """Return name and file of every preset that comes with the package.
 
     Returns
     -------
@@ -49,7 +50,7 @@ def presets() -> dict[str, Path]:
 
 @cache
 def _shipped() -> tuple[tuple[str, Path], ...]:
-    """Name and file of every preset: what is installed does not change while a process runs."""
+    """Return name and file of every preset: installed files do not change while a process runs."""
     root = Path(str(resources.files("airflock"))) / "scenarios" / "presets"
     return tuple((str(path.relative_to(root).with_suffix("")), path) for path in sorted(root.rglob("*.toml")))
 
@@ -129,29 +130,31 @@ def load(
     with as_error(where):
         document, folder = _read(where, None)
         document, base = extend_document(document, where, folder, _read)
-        document, given = _with_given(document, zip(PART_KINDS, (metrics, body, sensor, radio, topology), strict=True))
-        flown = None if law is None else law_from_caller(law)
+        document, caller_parts = _with_given(
+            document, zip(PART_KINDS, (metrics, body, sensor, radio, topology), strict=True)
+        )
+        own_law = None if law is None else law_from_caller(law)
         of_groups = {own.name: own for own in map(law_from_caller, _several(laws))}
-        given = replace(given, law=flown, fault_kinds=_kinds(faults), laws=of_groups)
+        caller_parts = replace(caller_parts, law=own_law, fault_kinds=_kinds(faults), laws=of_groups)
         notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
-        document, settings, told, wrong = with_field(document, settings_dict(settings, where), folder)
-        if flown is not None:
-            kind = str(expand_path(law).absolute()) if str(law).endswith(".py") else flown.name
+        document, settings, field_notes, wrong = with_field(document, settings_dict(settings, where), folder)
+        if own_law is not None:
+            kind = str(expand_path(law).absolute()) if str(law).endswith(".py") else own_law.name
             document = {**document, "model": {"kind": kind}, "published": {}}
         return build_scenario(
             document,
             where,
             settings,
             folder=folder,
-            caller_parts=given,
-            notes=notes + told,
+            caller_parts=caller_parts,
+            notes=notes + field_notes,
             known_errors=wrong,
             trust=trust,
         )
 
 
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
-    """Document of a preset or of a file, looked for in a folder, in today's format, and the folder that it lies in."""
+    """Read a preset or a file; return its document in the current format, and the folder of the file."""
     known = presets()
     path = known.get(name) or (expand_path(name) if folder is None else folder / expand_path(name))
     if not is_file(path):
@@ -164,8 +167,8 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     with as_error(name):
         try:
             document = read_toml(path)
-        except FormatError as fault:
-            raise ScenarioError([f"{name}: is not a scenario file (TOML): {fault}"]) from fault
+        except FormatError as error:
+            raise ScenarioError([f"{name}: is not a scenario file (TOML): {error}"]) from error
     if tells_of_study(document) and not {"model", "extends"} & set(document):
         raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
     return {**formats.to_current_format(document, name), formats.KEY: formats.FORMAT}, path.parent
@@ -174,42 +177,42 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
 def _with_given(
     document: Mapping[str, Any], given: Iterable[tuple[PartKind[Any], Any]]
 ) -> tuple[dict[str, Any], CallerParts]:
-    """A document that names what the caller gives, and the rules of it that are not found by their names alone.
+    """Put the caller's parts into a document; return it, and the parts that are not found by their names alone.
 
-    Giving them is consent to run them. Raises ScenarioError.
+    Giving a part is consent to run it. Raises ScenarioError.
     """
     document = dict(document)
     rules: dict[str, Any] = {}
-    faults: list[str] = []
-    for family, what in given:
-        if what is None:
+    errors: list[str] = []
+    for family, part in given:
+        if part is None:
             continue
-        table, kind = document.get(family.section, {}), str(what)
-        if not (isinstance(what, str) and what in family.shipped):
-            found, more = family.from_caller(what)
-            faults += more
-            if found is None:
+        table, kind = document.get(family.section, {}), str(part)
+        if not (isinstance(part, str) and part in family.shipped):
+            own_part, more = family.from_caller(part)
+            errors += more
+            if own_part is None:
                 continue
-            rules[family.field], kind = found, found.name
+            rules[family.field], kind = own_part, own_part.name
         document[family.section] = {**family.kept(table, kind), "kind": kind}
-    if faults:
-        raise ScenarioError(faults)
+    if errors:
+        raise ScenarioError(errors)
     return document, CallerParts(**rules)
 
 
 def _kinds(given: Any) -> dict[str, Fault]:
-    """Kinds of fault that the caller gives, by name."""
-    found = [kind if isinstance(kind, Fault) else fault(kind) for kind in _several(given)]
-    return {kind.name: kind for kind in found}
+    """Return the kinds of fault that the caller gives, by name."""
+    kinds = [kind if isinstance(kind, Fault) else fault(kind) for kind in _several(given)]
+    return {kind.name: kind for kind in kinds}
 
 
 def _several(given: Any) -> list[Any]:
-    """What a caller gives as one thing, as a list, or not at all."""
+    """Return one object as a list, and a list or None as it is."""
     return [] if given is None else list(given) if isinstance(given, (list, tuple)) else [given]
 
 
 def load_if_named(scenario: Any) -> Scenario:
-    """A scenario, or the one that a name stands for."""
+    """Return a scenario as it is, or load the one that a name stands for."""
     if isinstance(scenario, Scenario):
         return scenario
     if isinstance(scenario, (str, os.PathLike)):
@@ -220,5 +223,165 @@ def load_if_named(scenario: Any) -> Scenario:
 
 
 def tells_of_study(document: Mapping[str, Any]) -> bool:
-    """Whether a document has a table or key that only studies have."""
+    """Return True if a document has a table or key that only studies have."""
     return bool({"space", "scenario", "scenarios", "objective", "search"} & set(document))
+
+
+def scenario_variant(
+    scenario: Scenario | str | os.PathLike[str],
+    settings: Mapping[str, Any] | None,
+    law: Any = None,
+    *,
+    trust: bool = False,
+) -> Scenario:
+    """Return a scenario, or load the one that a name or file stands for, with keys changed; arguments as in `load`."""
+    if not isinstance(scenario, (Scenario, str, os.PathLike)):
+        return load_if_named(scenario)
+    if not isinstance(scenario, Scenario):
+        return load(scenario, settings, law, trust=trust)
+    if law is not None:
+        raise ScenarioError([f"{scenario.name}: is a Scenario already; give its law to load(name, law=...)"])
+    return rebuilt(scenario, settings) if settings else scenario
+
+
+OF_ITS_OWN = ("published", "title")  # what a paper published of a file and what the file is called: not of another
+LONGEST = 10  # files in a chain of extends
+# sections in which another kind means other keys
+SECTIONS_WITH_KINDS = ("model", "body", "sensors", "radio", "scene", "goals", "start")
+SHARED_KEYS = {"sensors": ("period",), "radio": number_names(PacketParameters)}  # but for these, which every kind has
+ReadDocument = Callable[[str, Path | None], tuple[dict[str, Any], Path]]
+
+
+def extend_document(
+    document: Mapping[str, Any], where: str, folder: Path | None, read: ReadDocument
+) -> tuple[dict[str, Any], str]:
+    """Merge a document over the file that it extends; return it, and the name of that file ("" for none).
+
+    Keys of the document replace those of the file. Where it names another kind of model, body, sensor, radio, scene,
+    goals or start, that section's other keys are not taken over. Neither are the published values of the file, nor its
+    title.
+
+    where  : name of the document, for errors
+    folder : where files are looked for
+    read   : name of a preset or file, folder → its document and its folder; raises ScenarioError
+    """
+    return _extended(document, where, folder, read, (where,))
+
+
+def _extended(
+    document: Mapping[str, Any], where: str, folder: Path | None, read: ReadDocument, chain: tuple[str, ...]
+) -> tuple[dict[str, Any], str]:
+    own = dict(document)
+    name = own.pop("extends", None)
+    if name is None:
+        return own, ""
+    if not isinstance(name, str):
+        raise ScenarioError([f"{where}: extends = {name!r} is not a name; give a preset or a scenario file"])
+    if name in chain or len(chain) > LONGEST:
+        raise ScenarioError([f"{where}: extends = {name!r} leads back to itself: {' → '.join((*chain, name))}"])
+    try:
+        base, place = read(name, folder)
+    except ScenarioError as error:
+        raise ScenarioError([f"{where}: extends = {name!r}: {line}" for line in error.faults]) from error
+    base, _ = _extended(_with_paths(base, place), name, place, read, (*chain, name))
+    for key in OF_ITS_OWN:
+        base.pop(key, None)
+    return {**base, **{key: _merge_section(key, base.get(key), value) for key, value in own.items()}}, name
+
+
+def _merge_section(key: str, base: Any, own: Any) -> Any:
+    """Merge one section: the document's keys over the file's, unless they are of different kinds."""
+    if not isinstance(base, Mapping) or not isinstance(own, Mapping) or (set(own) & {"value", "unit"} and key != "set"):
+        return own
+    kinds = (value_of(own.get("kind", base.get("kind"))), value_of(base.get("kind")))
+    other = key in SECTIONS_WITH_KINDS and kinds[0] != kinds[1]
+    if key == "topology":  # ours share their numbers; a file has its own
+        other = kinds[0] != kinds[1] and any(isinstance(kind, str) and kind.endswith(".py") for kind in kinds)
+    kept = {name: base[name] for name in SHARED_KEYS.get(key, ()) if name in base} if other else base
+    return {**without_replaced(kept, own), **own}
+
+
+def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return a document in which relative files of rules or meshes have absolute paths."""
+    result = dict(document)
+    kinds = [(section, "kind") for section in ("model", "body", "sensors", "radio", "topology", "metrics")]
+    for section, key in (*kinds, ("scene", "file")):
+        table = result.get(section)
+        name = value_of(table.get(key)) if isinstance(table, Mapping) else None
+        if isinstance(name, str) and name and not expand_path(name).is_absolute() and is_file(folder / name):
+            result[section] = {**table, key: str((folder / name).absolute())}  # type: ignore[dict-item]
+    faults, groups = result.get("faults"), result.get("groups")
+    if isinstance(faults, list):
+        result["faults"] = [_kind_with_path(entry, folder) for entry in faults]
+    if isinstance(groups, list):
+        result["groups"] = [_group_with_path(entry, folder) for entry in groups]
+    return result
+
+
+def _group_with_path(entry: Any, folder: Path) -> Any:
+    if not isinstance(entry, Mapping) or "model" not in entry:
+        return entry
+    return {**entry, "model": _kind_with_path(entry["model"], folder)}
+
+
+def _kind_with_path(entry: Any, folder: Path) -> Any:
+    name = entry.get("kind") if isinstance(entry, Mapping) else None
+    if not isinstance(name, str) or not name.endswith(".py") or Path(name).is_absolute() or not is_file(folder / name):
+        return entry
+    return {**entry, "kind": str((folder / name).absolute())}
+
+
+FROM_FILE = ("world.file", "world.simplify")
+GIVEN = ("corners", "obstacles", "heights")  # what the file says, and the scenario cannot say as well
+INSTEAD = {"arena": "square", "side": 1e6}  # of a file that cannot be read, so that all else is judged in wide room
+
+
+def with_field(
+    document: Mapping[str, Any], settings: Mapping[str, Any], folder: Path | None
+) -> tuple[dict[str, Any], Mapping[str, Any], tuple[str, ...], tuple[str, ...]]:
+    """Replace world.file by the keys of [world] that the map file stands for.
+
+    It is read when a person loads a scenario, and nowhere else: neither a recording nor an event of one names a file.
+
+    folder : of the scenario file, where its files are looked for
+
+    Returns
+    -------
+    Document and settings without the file, notes, and errors.
+    """
+    table = document.get("world", {})
+    if not isinstance(table, Mapping):
+        return dict(document), settings, (), ()
+    world = {**table, **{key[6:]: value for key, value in settings.items() if key.startswith("world.")}}
+    name = value_of(world.get("file", ""))
+    if not isinstance(name, str) or not name:
+        return dict(document), settings, (), ()
+    errors = [f"world.{key}: is given, and world.file as well; take one of them out" for key in GIVEN if key in world]
+    shape = value_of(settings.get("world.arena", "polygon"))
+    if shape != "polygon":
+        errors.append(f"world.arena = {shape!r}: is given, and world.file as well; take one of them out")
+    path = expand_path(name) if is_file(name) or folder is None else folder / expand_path(name)
+    errors += [] if is_file(path) else [f"world.file = {name!r}: no such file"]
+    simplify, more = _metres(world)
+    errors += more
+    kept = {key: value for key, value in table.items() if key not in ("file", "simplify", "arena", "walls")}
+    rest = {key: value for key, value in settings.items() if key not in FROM_FILE}
+    if not errors:
+        try:
+            space = str(value_of(world.get("dimensions", "2"))) == "3"
+            field = load_field(path, simplify=simplify, space=space)
+        except ScenarioError as error:
+            errors += str(error).splitlines()
+        else:
+            return {**document, "world": {**field.keys, **kept}}, rest, (field.note,), ()
+    kept = {key: value for key, value in kept.items() if key not in GIVEN} | INSTEAD
+    rest = {key: value for key, value in rest.items() if key.removeprefix("world.") not in (*GIVEN, *INSTEAD, "walls")}
+    return {**document, "world": kept}, rest, (), tuple(errors)
+
+
+def _metres(world: Mapping[str, Any]) -> tuple[float, list[str]]:
+    """Return by how much outlines may move, m, and the errors of that number."""
+    given = {"world": {key: value for key, value in world.items() if key == "simplify"}}
+    converted, _, errors = convert_units(given, {"world": arena.Parameters})
+    numbers, more = schema.read_section("world", converted["world"], arena.Parameters)
+    return (numbers.simplify if numbers is not None else 0.0), errors + more

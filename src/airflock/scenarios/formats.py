@@ -1,7 +1,7 @@
-"""Formats of the files that last: each carries a number, and an older file is read as it was meant.
+"""Formats of the files that last: each file carries a number, and an older file is read with its old meaning.
 
-A scenario or study without the key `format` is of format 1, as version 0.1 wrote them. A change that would make an
-older file mean something else raises the number and adds a step to MIGRATIONS; a newer file is refused in one line.
+A scenario or study without the key `format` is of format 1, as version 0.1 wrote them. A change that would give an
+older file another meaning raises the number and adds a step to MIGRATIONS; a newer file is refused in one line.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,12 +15,14 @@ MIGRATIONS: tuple[Callable[[Mapping[str, Any]], Mapping[str, Any]], ...] = ()  #
 
 
 def to_current_format(document: Mapping[str, Any], where: str) -> Mapping[str, Any]:
-    """A document of any format known here as one of today's, without its key `format`."""
-    found = document.get(KEY, 1)
-    if isinstance(found, bool) or not isinstance(found, int) or found < 1:
-        raise ScenarioError([f"{where}: {KEY} = {found!r} is not a number of a format; leave it out, or give {FORMAT}"])
-    if found > FORMAT:
-        raise ScenarioError([f"{where}: {KEY} = {found} is newer than this Airflock, which reads up to {FORMAT}"])
-    for step in MIGRATIONS[found - 1 :]:
+    """Convert a document of any known format to the current one, without its key `format`."""
+    number = document.get(KEY, 1)
+    if isinstance(number, bool) or not isinstance(number, int) or number < 1:
+        raise ScenarioError(
+            [f"{where}: {KEY} = {number!r} is not a number of a format; leave it out, or give {FORMAT}"]
+        )
+    if number > FORMAT:
+        raise ScenarioError([f"{where}: {KEY} = {number} is newer than this Airflock, which reads up to {FORMAT}"])
+    for step in MIGRATIONS[number - 1 :]:
         document = step(document)
     return {key: value for key, value in document.items() if key != KEY}

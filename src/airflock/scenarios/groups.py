@@ -1,15 +1,22 @@
-"""The groups of a scenario file: agents that share numbers or a law, and how far each agent is off these numbers."""
+"""The groups of a scenario file: agents that share numbers or a law, and how far each agent is off these numbers.
+
+`read_groups` checks the entries of [[groups]]; `flown_laws` and `agent_values` say by which law and with which
+numbers each agent flies.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import signature
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from airflock.core import Choice, Model, Quantity, declarations, random
-from airflock.scenarios import schema, units
-from airflock.scenarios.group_laws import GroupLawReader
-from airflock.scenarios.spreads import check_spreads, relative_spread, standard_deviation, with_share_hint
+from airflock.core import Body, Choice, Model, Quantity, Sensor, argument_names, choices, declarations, random
+from airflock.scenarios import schema
+from airflock.scenarios.named_code import find_law
+from airflock.scenarios.scenario_checks import body_errors, sensor_errors, silence_errors
+from airflock.scenarios.units import check_spreads, convert_units, relative_spread, standard_deviation, with_share_hint
+from airflock.support import AirflockError
 
 LETTERS = {
     "model": "p",
@@ -26,9 +33,9 @@ class Group:
     """One entry of [[groups]].
 
     agents  : their numbers, in order
-    numbers : (letter, name) → value that they have instead of the flock's
-    spread  : (letter, name) → standard deviation by which each agent differs from it, or what share of it that is
-    law     : model and parameters that they fly by, where these are not the flock's but for numbers
+    numbers : (letter, name) → value in place of the flock's
+    spread  : (letter, name) → standard deviation of the agents' values about it, absolute or a share of the value
+    law     : model and parameters, if the group flies by another law, or by the flock's law with other choices
     """
 
     name: str
@@ -38,13 +45,169 @@ class Group:
     law: tuple[Model, Any] | None = None
 
     def without(self, letter: str) -> "Group":
-        """The same group without numbers of its own in one record."""
+        """Return the group without numbers of its own in one record."""
         rest = [{key: v for key, v in part.items() if key[0] != letter} for part in (self.numbers, self.spread)]
         return replace(self, numbers=rest[0], spread=rest[1])
 
 
+class FlownLaw(NamedTuple):
+    """A law that agents of a flock fly by.
+
+    parameters : its record; numbers that differ among its agents are those of the first group that flies by it
+    agents     : numbers of the agents that fly by it
+    varied     : its numbers that differ among them, as ("p", name)
+    """
+
+    model: Model
+    parameters: Any
+    agents: tuple[int, ...]
+    varied: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def uses_groups(self) -> bool:
+        """True if its rule for neighbours reads their groups."""
+        rule = self.model.neighbour
+        return rule is not None and bool({"kin", "group"} & set(argument_names(rule, "neighbour", self.model.name)))
+
+
+@dataclass
+class GroupLawReader:
+    """Reads the section `model` of a group.
+
+    model, kind, parameters : law of the flock, as its file names it, and its numbers
+    own    : laws that the caller gives, by name
+    folder : of the scenario file; trust : True if a file of the user's own may run
+    walls  : True if the world has polygons, which are shapes for a law that casts rays and surfaces for any other
+    """
+
+    model: Model
+    kind: Any
+    parameters: Any
+    own: Mapping[str, Model] = field(default_factory=dict)
+    folder: Path | None = None
+    trust: bool = False
+    walls: bool = False
+    _read: dict[str, Model] = field(default_factory=dict)
+
+    def named(self, where: str, table: Any) -> tuple[tuple[Model, Any] | None, list[str]]:
+        """Return the law of a group, None for that of the flock, and the errors, one line each."""
+        if not isinstance(table, Mapping):
+            return None, []  # said where its numbers are read
+        kind = table.get("kind", self.kind)
+        try:
+            law = self._found(where, kind)
+        except AirflockError as error:
+            return None, str(error).splitlines()
+        errors = self._misfits(where, kind, law)
+        record, more = self._chosen(where, table, law)
+        if errors or more:
+            return None, errors + more
+        same = law == self.model and choices(record) == choices(self.parameters)
+        return (None if same else (law, record)), []
+
+    def _found(self, where: str, kind: Any) -> Model:
+        known = {**self._read, **self.own, self.model.name: self.model}
+        if kind == self.kind:
+            return self.model
+        if isinstance(kind, str) and kind in known:
+            return known[kind]
+        self._read[kind] = law = find_law(kind, self.folder, where=f"{where}.kind", trust=self.trust)
+        return law
+
+    def _misfits(self, where: str, kind: Any, found: Model) -> list[str]:
+        """Return why a law cannot fly beside that of the flock."""
+        errors, key, base = [], f"{where}.kind = {kind!r}", self.model
+        if found is base:
+            return []
+        if found.command != base.command:
+            errors.append(
+                f"{key}: model {found.name} commands {found.command}, and model {base.name} of the flock "
+                f"{base.command}; one body carries all"
+            )
+        for law in (base, found):
+            if law.flock is not None:
+                errors.append(f"{key}: model {law.name} solves for the whole flock, so all fly by it")
+        if self.walls and (found.sight is None) != (base.sight is None):
+            casts, other = (base, found) if found.sight is None else (found, base)
+            errors.append(
+                f"{key}: model {casts.name} casts rays at polygons and model {other.name} feels them as surfaces; "
+                "give a world without polygons"
+            )
+        return errors
+
+    def _chosen(self, where: str, table: Mapping[str, Any], found: Model) -> tuple[Any, list[str]]:
+        """Return the parameters of a group's law with its own choices; its numbers come later."""
+        known = {name for name, declared, _ in declarations(found.Parameters) if isinstance(declared, Choice)}
+        own = {key: schema.value_of(value) for key, value in table.items() if key in known}
+        made, errors = schema.read_section(where, own, found.Parameters)
+        if errors or made is None:
+            return None, errors
+        base = self.parameters if found == self.model else found.Parameters()
+        record = replace(base, **{key: getattr(made, key) for key in own})
+        if found == self.model and found.flock is not None and choices(record) != choices(base):
+            return None, [f"{where}: model {found.name} solves for the whole flock, with one set of choices"]
+        return record, []
+
+
+def group_errors(
+    groups: Sequence[Group], parts: Mapping[str, Any], model: Model, body: Body, sensor: Sensor
+) -> list[str]:
+    """Return why groups cannot fly with their own numbers or law, one line each."""
+    errors: list[str] = []
+    of_all = {*body_errors(body, parts, model), *sensor_errors(sensor, parts)}  # told already
+    for number, group in enumerate(groups):
+        law, base = group.law or (model, parts["parameters"])
+        own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in "pbs"}
+        if group.law is None and not any(own.values()):
+            continue
+        own_parts: dict[str, Any] = {**parts, "parameters": base and replace(base, **own["p"])}
+        own_parts["body"] = parts["body"] and replace(parts["body"], **own["b"])
+        own_parts["sensors"] = parts["sensors"] and replace(parts["sensors"], **own["s"])
+        more = body_errors(body, own_parts, law) + (sensor_errors(sensor, own_parts) if own["s"] else [])
+        if group.law is not None and parts["silence"] is not None and parts["flight"] is not None:
+            more += silence_errors(parts["silence"].rule, parts["flight"], law)
+        errors += [f"groups[{number}]: {error}" for error in more if error not in of_all]
+    return errors
+
+
+def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: int) -> tuple[FlownLaw, ...]:
+    """Return the laws of a flock: that of all agents without their own, then those of groups, one for each text."""
+    by_law: dict[Any, list[Group]] = {}
+    for group in groups:
+        if group.law is not None and group.agents:
+            by_law.setdefault((group.law[0], tuple(choices(group.law[1]).items())), []).append(group)
+    apart = {agent for members in by_law.values() for group in members for agent in group.agents}
+    rest = tuple(agent for agent in range(agents) if agent not in apart)
+    base = [group for group in groups if group.law is None]
+    laws = [FlownLaw(model, parameters, rest, _varied(base, parameters))]
+    for (law, _), members in by_law.items():
+        first = members[0]
+        assert first.law is not None
+        record = replace(
+            first.law[1], **{name: value for (letter, name), value in first.numbers.items() if letter == "p"}
+        )
+        who = tuple(sorted(agent for group in members for agent in group.agents))
+        laws.append(FlownLaw(law, record, who, _varied(members, record)))
+    return tuple(laws)
+
+
+def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]:
+    """Return the numbers of a law that differ among the agents of groups, as ("p", name), in declared order."""
+    names = []
+    for name, declared, _ in declarations(record):
+        usual, key = float(getattr(record, name) or 0.0) if isinstance(declared, Quantity) else 0.0, ("p", name)
+        values = {
+            group.numbers.get(key, float(getattr(group.law[1] if group.law else record, name) or 0.0))
+            for group in groups
+            if isinstance(declared, Quantity)
+        }
+        if values - {usual} or any(group.spread.get(key, 0.0) > 0.0 for group in groups):
+            names.append(key)
+    return tuple(names)
+
+
 def read_members(where: str, value: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:
-    """Numbers of agents from a list of them; and what is wrong with it, one line."""
+    """Read a list of numbers of agents; return them, or None, with the error, one line."""
     whole = isinstance(value, Sequence) and not isinstance(value, str)
     if not whole or not value or not all(isinstance(k, int) and not isinstance(k, bool) for k in value):
         return None, [f"{where} = {value!r} is not a list of numbers of agents, 0 to {agents - 1}"]
@@ -55,13 +218,13 @@ def read_members(where: str, value: Any, agents: int) -> tuple[tuple[int, ...] |
 
 
 def group_names(groups: Sequence[Group], agents: int) -> tuple[str, ...]:
-    """Name of the group of each agent, "" in none; nothing where there are no groups."""
+    """Return the name of the group of each agent, "" in none; empty where there are no groups."""
     named = {agent: group.name for group in groups for agent in group.agents}
     return tuple(named.get(agent, "") for agent in range(agents)) if named else ()
 
 
 def count_of_share(value: Any, agents: int) -> Any:
-    """A number of agents out of a share of the flock such as "20 %", at least one; anything else as it is."""
+    """Convert a share of the flock such as "20 %" to a number of agents, at least one; return anything else as is."""
     share = SHARE.fullmatch(value) if isinstance(value, str) else None
     if share is None or not 0.0 < float(share[1]) <= 100.0:
         return value
@@ -71,52 +234,52 @@ def count_of_share(value: Any, agents: int) -> Any:
 def read_groups(
     tables: Any, agents: int, records: Mapping[str, type], laws: GroupLawReader | None = None
 ) -> tuple[tuple[Group, ...], list[str], list[str]]:
-    """Groups, notes of converted units, and everything that is wrong with them, one line each.
+    """Read groups; return them with notes on converted units and all errors, one line each.
 
     records : "model", "body" and "sensors" → record of their parameters
     laws    : finds the law that a group's section model names
     """
     if not isinstance(tables, Sequence) or isinstance(tables, str) or not all(isinstance(g, Mapping) for g in tables):
         return (), [], ["groups is not a list of tables; write [[groups]]"]
-    who, faults = _agents(tables, agents)
-    found: list[Group] = []
+    who, errors = _agents(tables, agents)
+    groups: list[Group] = []
     notes: list[str] = []
     for number, table in enumerate(tables):
         where = f"groups[{number}]"
-        faults += [f"{where}.{key}: unknown key; known: {', '.join(KEYS)}" for key in table if key not in KEYS]
+        errors += [f"{where}.{key}: unknown key; known: {', '.join(KEYS)}" for key in table if key not in KEYS]
         name = table.get("name", f"group_{number}")
-        if not isinstance(name, str) or not name or name in {group.name for group in found}:
-            faults.append(f"{where}.name = {name!r} is not a name of its own")
+        if not isinstance(name, str) or not name or name in {group.name for group in groups}:
+            errors.append(f"{where}.name = {name!r} is not a name of its own")
             name = where
         numbers: dict[tuple[str, str], float] = {}
         spread: dict[tuple[str, str], float] = {}
         law, own = (None, []) if laws is None else laws.named(f"{where}.model", table.get("model", {}))
-        faults += own
+        errors += own
         for section, letter in LETTERS.items():
             if section in records and not (section == "model" and own):
                 record = type(law[1]) if law and section == "model" else records[section]
-                values, spreads, told, wrong = _section(f"{where}.{section}", table.get(section, {}), record)
+                values, spreads, unit_notes, wrong = _section(f"{where}.{section}", table.get(section, {}), record)
                 numbers |= {(letter, key): value for key, value in values.items()}
                 spread |= {(letter, key): value for key, value in spreads.items()}
-                notes += told
-                faults += wrong
-        found.append(Group(name, who[number], numbers, spread, law))
-    return tuple(found), notes, faults
+                notes += unit_notes
+                errors += wrong
+        groups.append(Group(name, who[number], numbers, spread, law))
+    return tuple(groups), notes, errors
 
 
 def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple[int, ...]], list[str]]:
-    """Members of each group: those that are listed, so many of the next ones, or all that are left."""
-    faults: list[str] = []
-    found: list[tuple[int, ...]] = [()] * len(given)
+    """Return the members of each group: those that are listed, so many of the next ones, or all that are left."""
+    errors: list[str] = []
+    members: list[tuple[int, ...]] = [()] * len(given)
     taken: set[int] = set()
     for number, table in enumerate(given):
         if isinstance(table.get("agents"), (list, tuple)):
             listed, wrong = read_members(f"groups[{number}].agents", table["agents"], agents)
-            faults += wrong
+            errors += wrong
             twice = sorted(taken & set(listed or ()))
             if twice:
-                faults.append(f"groups[{number}].agents: agent {twice[0]} is in another group already")
-            found[number] = listed or ()
+                errors.append(f"groups[{number}].agents: agent {twice[0]} is in another group already")
+            members[number] = listed or ()
             taken |= set(listed or ())
     left = [agent for agent in range(agents) if agent not in taken]
     rest = []
@@ -127,37 +290,37 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
         elif not isinstance(count, (list, tuple)):
             whole = isinstance(count, (int, float)) and not isinstance(count, bool) and count % 1 == 0
             if not whole or not 1 <= count <= len(left):
-                faults.append(
+                errors.append(
                     f"groups[{number}].agents = {count!r} is neither a list of agents, a share such as '20 %', nor a "
                     f"number of them up to {len(left)}, as many as are left of {agents}"
                 )
                 continue
-            found[number], left = tuple(left[: int(count)]), left[int(count) :]
+            members[number], left = tuple(left[: int(count)]), left[int(count) :]
     for number in rest[:1]:
-        found[number] = tuple(left)
+        members[number] = tuple(left)
         if not left:
-            faults.append(f"groups[{number}] has no agents, and no agent is left for it")
-    faults += [
+            errors.append(f"groups[{number}] has no agents, and no agent is left for it")
+    errors += [
         f"groups[{number}].agents is missing; only one group may take the agents that are left" for number in rest[1:]
     ]
-    return found, faults
+    return members, errors
 
 
 def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], dict[str, float], list[str], list[str]]:
-    """Numbers and spreads of one section of a group."""
+    """Read one section of a group; return numbers, spreads, notes and errors."""
     if not isinstance(table, Mapping):
         return {}, {}, [], [f"{where} = {table!r} is not a table of numbers"]
     known = {name: declared for name, declared, _ in declarations(record)}
     values: dict[str, Any] = {}
     spreads: dict[str, Any] = {}
-    faults: list[str] = []
+    errors: list[str] = []
     for key, value in table.items():
         if where.endswith("model") and (key == "kind" or isinstance(known.get(key), Choice)):
             continue
         if key == "kind" or isinstance(known.get(key), Choice):
-            faults.append(f"{where}.{key}: {ONE[where.rpartition('.')[2]]}; only numbers differ from group to group")
+            errors.append(f"{where}.{key}: {ONE[where.rpartition('.')[2]]}; only numbers differ from group to group")
         elif key == "period" and where.endswith("sensors"):
-            faults.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
+            errors.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
         elif isinstance(value, Mapping) and "spread" in value:
             unit = {"unit": value["unit"]} if "unit" in value else {}
             share = relative_spread(value["spread"], known.get(key))
@@ -169,18 +332,22 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
         else:
             values[key] = value
     apart = f"{where}.spread"
-    converted, told, unfit = units.convert_units({where: values, apart: spreads}, {where: record, apart: record})
-    notes = [_as_written(line, where, apart) for line in told]
+    converted, unit_notes, unfit = convert_units({where: values, apart: spreads}, {where: record, apart: record})
+    notes = [_as_written(line, where, apart) for line in unit_notes]
     wrong = [f"{_as_written(line, where, apart)}{with_share_hint(line, apart, known)}" for line in unfit]
-    made, more = schema.read_section(where, converted[where], record)
-    faults += wrong + more
+    record_of_group, more = schema.read_section(where, converted[where], record)
+    errors += wrong + more
     off, more = check_spreads(where, converted[apart], known)
-    numbers = {key: float(getattr(made, key)) for key in converted[where]} if made is not None and not more else {}
-    return numbers, off, notes, faults + more
+    numbers = (
+        {key: float(getattr(record_of_group, key)) for key in converted[where]}
+        if record_of_group is not None and not more
+        else {}
+    )
+    return numbers, off, notes, errors + more
 
 
 def _as_written(line: str, where: str, apart: str) -> str:
-    """A line about a spread under the key that a file has for it."""
+    """Rewrite a line about a spread with the key that a file has for it."""
     if not line.startswith(f"{apart}."):
         return line
     key, _, rest = line.removeprefix(f"{apart}.").partition(" ")
@@ -188,25 +355,25 @@ def _as_written(line: str, where: str, apart: str) -> str:
 
 
 def varied_numbers(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Numbers that differ among agents, as (letter, name), in declared order; base : letter → record of the flock.
+    """Return the numbers that differ among agents, as (letter, name), in declared order.
 
-    Those of laws: `group_laws.Law.varied`.
+    base : letter → record of the flock. Varied numbers of laws: `FlownLaw.varied`.
     """
-    found = []
+    names = []
     for letter, record in base.items() if groups else ():
         for name, declared, _ in declarations(record):
             if isinstance(declared, Quantity):
                 usual = float(getattr(record, name) or 0.0)
                 others = any(group.numbers.get((letter, name), usual) != usual for group in groups)
                 if others or any(group.spread.get((letter, name), 0.0) > 0.0 for group in groups):
-                    found.append((letter, name))
-    return tuple(found)
+                    names.append((letter, name))
+    return tuple(names)
 
 
 def agent_values(groups: Sequence[Group], agents: int, letter: str, name: str, record: Any, seed: int) -> list[float]:
-    """One number of every agent: its group's, and off it by a normal number of its own, within the allowed range.
+    """Return one number of every agent: its group's, plus a normal deviation of its own, clipped to the allowed range.
 
-    It is 0 of agents whose law has no such number.
+    It is 0 for agents whose law has no such number.
     """
     values = [float(getattr(record, name, None) or 0.0)] * agents
     for group in groups:
@@ -230,7 +397,7 @@ def agent_values(groups: Sequence[Group], agents: int, letter: str, name: str, r
 
 
 def group_number_errors(groups: Sequence[Group], model: Model | None) -> list[str]:
-    """Why numbers of groups cannot be flown by a law, one line."""
+    """Return why a law that solves for the whole flock cannot fly the numbers of groups, one line."""
     if model is None or model.flock is None or model.workspace is None:
         return []
     if "p" not in {*signature(model.flock).parameters, *signature(model.workspace).parameters}:

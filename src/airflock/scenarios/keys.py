@@ -1,4 +1,8 @@
-"""Every key that a scenario file may hold, from the declarations of its parameters."""
+"""Every key that a scenario file may hold, from the declarations of its parameters.
+
+Keys that no record declares (names, lists and tables that are read as a whole) stand at the end, in
+`UNDECLARED_KEYS`.
+"""
 
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -10,10 +14,9 @@ from airflock.parts.bodies import BODIES
 from airflock.parts.faults import KINDS
 from airflock.parts.radios import RADIOS
 from airflock.parts.sensors import SENSORS
-from airflock.scenarios.faulty import FaultTiming
-from airflock.scenarios.laws import MODELS, find_law
+from airflock.scenarios.fault_entries import FaultTiming
+from airflock.scenarios.named_code import MODELS, find_law
 from airflock.scenarios.sections import SECTIONS, Flight
-from airflock.scenarios.whole_keys import UNDECLARED_KEYS
 from airflock.support import ScenarioError
 
 TOP = "top"  # the keys before the first section
@@ -25,14 +28,14 @@ OTHER_RADIOS = {name: radio for name, radio in RADIOS.items() if radio.Parameter
 class Key(NamedTuple):
     """One key of a scenario file.
 
-    name    : as it is written after --set, for instance "radio.delay"; of an entry of [[faults]] or [[groups]] behind
-    the name of the list
+    name    : as it is written after --set, for instance "radio.delay"; keys of an entry of [[faults]] or [[groups]]
+        follow the name of the list
     of      : the model, body, sensor, radio or kind of fault that the key belongs to; "" where it is always there
     kind    : "number", "choice", "points", "text", "list" or "table"
     default : None means "derived from the rest of the scenario", or that there is none
-    unit    : SI unit; "1" for a plain number, "" for what has none
+    unit    : SI unit; "1" for a plain number, "" for a key without one
     low, high : allowed range of a number, both ends included; None otherwise
-    options : what a choice may be
+    options : values of a choice
     """
 
     name: str
@@ -55,16 +58,16 @@ class Key(NamedTuple):
 
     @property
     def allowed(self) -> str:
-        """What the key may be, for a person to read."""
+        """The allowed values, for a person to read."""
         if self.kind == "number":
             return format_with_unit(f"{self.low:g} … {self.high:g}", self.unit)
         return " | ".join(self.options) if self.options else self.kind
 
 
 class Section(NamedTuple):
-    """A section of a scenario file, or what one of its kinds brings.
+    """A section of a scenario file, or the keys that one of its kinds adds.
 
-    head  : how it begins in a file
+    head  : its first line in a file
     about : one sentence
     keys  : in the order of the declarations
     """
@@ -76,7 +79,7 @@ class Section(NamedTuple):
 
 @cache
 def sections() -> Mapping[str, Section]:
-    """Sections by name: the top, each model, body, sensor and radio, other sections, lists, kinds of fault."""
+    """Return sections by name: the top, each model, body, sensor and radio, other sections, lists, kinds of fault."""
     result = {TOP: _section("at the top", "", Flight)}
     for name in MODELS:
         result[name] = _section(f'model.kind = "{name}"', "model", find_law(name).Parameters, name)
@@ -156,7 +159,7 @@ def _last(key: Key) -> str:
 
 
 def _section(head: str, before: str, record: type, owner: str = "") -> Section:
-    """A section of a record, behind what of it is read as a whole."""
+    """Make the section of a record; keys that are read as a whole come first."""
     about = " ".join((record.__doc__ or "").strip().split("\n\n")[0].split())
     whole = () if owner else _whole(before)
     return Section(head, about, (*whole, *_declared(before, owner, record)))
@@ -170,8 +173,8 @@ def _whole(section: str) -> list[Key]:
 
 
 def _declared(before: str, owner: str, record: type) -> list[Key]:
-    """Keys of one record."""
-    found = []
+    """Return the keys of one record."""
+    keys_of_record = []
     for name, declared, default in declarations(record):
         unit, low, high = getattr(declared, "unit", ""), None, None
         options: tuple[str, ...] = ()
@@ -184,5 +187,49 @@ def _declared(before: str, owner: str, record: type) -> list[Key]:
             assert isinstance(declared, (Points, Text))
         meaning, source = declared.meaning, declared.source
         whole = f"{before}.{name}".lstrip(".")
-        found.append(Key(whole, owner, kind, default, unit, low, high, options, meaning, source))
-    return found
+        keys_of_record.append(Key(whole, owner, kind, default, unit, low, high, options, meaning, source))
+    return keys_of_record
+
+
+OWN = "FILE.py"
+
+
+class UndeclaredKey(NamedTuple):
+    """A key without a declaration: kind ("text", "choice", "list", "table"), meaning, options of a choice."""
+
+    kind: str
+    meaning: str
+    options: tuple[str, ...] = ()
+
+
+# section → key → what it is; "" stands for the keys at the top of a file
+UNDECLARED_KEYS: Mapping[str, Mapping[str, UndeclaredKey]] = {
+    "": {
+        "title": UndeclaredKey("text", "what the scenario is, for pictures and lists"),
+        "extends": UndeclaredKey(
+            "text", "a preset or a file to start from; keys that are left out here are taken from it"
+        ),
+        "published": UndeclaredKey(
+            "table",
+            "what a paper reports: order parameter → mean, [mean, SD] or { mean, sd }; shown beside ours",
+        ),
+        "model.kind": UndeclaredKey("choice", "the law that all agents fly by", (*MODELS, OWN)),
+        "body.kind": UndeclaredKey("choice", "what turns commands into motion", (*BODIES, OWN)),
+        "sensors.kind": UndeclaredKey("choice", "how an agent knows its own state", (*SENSORS, OWN)),
+    },
+    "faults": {
+        "kind": UndeclaredKey("choice", "what happens to an agent", (*KINDS, OWN)),
+        "agents": UndeclaredKey("list", "numbers of the agents that the fault may hit; by default all"),
+        "group": UndeclaredKey("text", "name of the group that the fault may hit; give this or agents"),
+    },
+    "groups": {
+        "name": UndeclaredKey("text", "name of the group"),
+        "agents": UndeclaredKey(
+            "list",
+            'numbers of its agents, how many, or a share ("20 %"); by default all that are in no other group',
+        ),
+        "model": UndeclaredKey("table", "kind, choices and numbers of its law; { value, spread } for a tolerance"),
+        "body": UndeclaredKey("table", "numbers of its agents' body; { value, spread } for a tolerance"),
+        "sensors": UndeclaredKey("table", "numbers of its agents' sensor; { value, spread } for a tolerance"),
+    },
+}

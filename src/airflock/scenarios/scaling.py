@@ -71,7 +71,7 @@ def starting_set(v_flock: float) -> str:
 
 
 def _gains(v_flock: float) -> list[str]:
-    """Lines of the section [model] but its kind: each number of Table S1 for a speed, m/s, with its source."""
+    """Return the lines of the section [model]: each number of Table S1 for a speed, m/s, with its source."""
     columns = {
         v: tomllib.loads(presets()[f"vasarhelyi_2018/{v:g}ms"].read_text(encoding="utf-8"))["model"] for v in SPEEDS
     }
@@ -102,7 +102,7 @@ def _gains(v_flock: float) -> list[str]:
 
 
 def _between(values: list[float], v: float) -> float:
-    """A column at speed v, interpolated in the logarithms of both."""
+    """Interpolate a column at speed v in the logarithms of both."""
     v = min(max(v, SPEEDS[0]), SPEEDS[-1])
     for low, high, a, b in zip(SPEEDS, SPEEDS[1:], values, values[1:], strict=False):
         if v <= high:

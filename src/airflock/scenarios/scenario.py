@@ -1,8 +1,9 @@
 """Scenario: model, body, radio, sensors, world, number of agents, duration and sampling; frozen data."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from html import escape
 from typing import Any
 
 from airflock.core import (
@@ -12,24 +13,26 @@ from airflock.core import (
     MetricSet,
     Model,
     PacketParameters,
+    Quantity,
     Radio,
     Sensor,
     SilenceParameters,
     Topology,
+    declarations,
+    format_with_unit,
     number_names,
     random,
+    with_defaults,
 )
 from airflock.parts.aero import descent, wing as wings
 from airflock.parts.bodies import wind
-from airflock.parts.metrics import parameters as metric_parameters
+from airflock.parts.metrics import Parameters as MetricParameters, parameters as metric_parameters
 from airflock.parts.sensors import SENSORS
 from airflock.parts.topologies import TOPOLOGIES
-from airflock.scenarios import filled_in
-from airflock.scenarios.faulty import FaultEntry
-from airflock.scenarios.group_laws import FlownLaw, flown_laws
-from airflock.scenarios.groups import Group, agent_values, varied_numbers
-from airflock.scenarios.portrait import scenario_html, summary
-from airflock.scenarios.sections import ORDER, Flight
+from airflock.scenarios.fault_entries import FaultEntry
+from airflock.scenarios.groups import FlownLaw, Group, agent_values, flown_laws, varied_numbers
+from airflock.scenarios.scenario_checks import largest_extension
+from airflock.scenarios.sections import ORDER, SECTIONS, Flight
 from airflock.world import Scene, arena, goals, scene_of, scenery, start, waypoints
 
 
@@ -40,11 +43,11 @@ class Scenario:
     model and parameters : the flocking law and its numbers
     body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, silence, metrics : records, SI units
     flight    : number of agents, duration (s), motion step (s)
-    vehicle, sensor, transceiver, measures : what `body`, `sensors`, `radio` and `metrics` hold the numbers of
-    groups    : agents that share numbers or a law; faults: what befalls single agents
+    vehicle, sensor, transceiver, measures : rules whose numbers are in `body`, `sensors`, `radio` and `metrics`
+    groups    : agents that share numbers or a law; faults: faults of single agents
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
-    notes     : what was adjusted, for a person to read
+    notes     : adjustments and warnings, for a person to read
 
     Examples
     --------
@@ -85,16 +88,16 @@ class Scenario:
         return f"<Scenario {summary(self)}>"
 
     def _repr_html_(self) -> str:
-        """Tables of all keys that differ from their defaults, for a notebook."""
+        """Return tables of all keys that differ from their defaults, for a notebook."""
         return scenario_html(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone: what follows from them is found again wherever it is asked for."""
+        """Return the fields alone: cached properties are derived again after unpickling."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def engine_cache(self) -> dict[Any, Any]:
-        """What an engine has made of this scenario for flights with other seeds, by keys of its own; empty at first."""
+        """A cache of the engine for flights of this scenario with other seeds, by keys of its own; empty at first."""
         return {}
 
     @property
@@ -109,7 +112,7 @@ class Scenario:
 
     @cached_property
     def has_sensor_error(self) -> bool:
-        """Whether agents measure themselves with errors."""
+        """True if agents measure themselves with errors."""
         own = [{key: v for (letter, key), v in group.numbers.items() if letter == "s"} for group in self.groups]
         spread = any(letter == "s" and sd > 0.0 for group in self.groups for (letter, _), sd in group.spread.items())
         kinds = (self.sensors, *(replace(self.sensors, **numbers) for numbers in own))
@@ -117,13 +120,13 @@ class Scenario:
 
     @property
     def without_sensor_errors(self) -> "Scenario":
-        """The same scenario with agents that know their own states as they are."""
+        """The scenario with agents that know their own states exactly."""
         exact, groups = SENSORS["perfect"], tuple(group.without("s") for group in self.groups)
         return replace(self, sensor=exact, sensors=exact.Parameters(period=self.sensors.period), groups=groups)
 
     @property
     def is_aerodynamic(self) -> bool:
-        """Whether drag descent is added to the model (the section [aero])."""
+        """True if drag descent is added to the model (the section [aero])."""
         return self.model.flock is descent.flock
 
     @property
@@ -135,12 +138,12 @@ class Scenario:
     def numbers(self) -> dict[str, tuple[str, ...]]:
         """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
         records = self.records
-        found: dict[str, tuple[str, ...]] = {
+        columns: dict[str, tuple[str, ...]] = {
             each.letter: each.driver_record._fields if each.driver_record else number_names(records[each.key])
             for each in ORDER
             if each.letter
         }
-        return found | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
+        return columns | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
 
     @cached_property
     def order_parameters(self) -> tuple[Metric, ...]:
@@ -149,7 +152,7 @@ class Scenario:
 
     @property
     def topology_rule(self) -> Topology | None:
-        """Which of those whom an agent hears it meets; None: all of them."""
+        """The topology that selects whom an agent meets among those that it hears; None: all of them."""
         return self.own_topology or TOPOLOGIES[self.topology.kind]
 
     @cached_property
@@ -160,7 +163,7 @@ class Scenario:
 
     @cached_property
     def varied(self) -> tuple[tuple[str, str], ...]:
-        """Numbers that differ among agents, as (letter, name); of laws that groups fly by their own: `laws`."""
+        """Numbers that differ among agents, as (letter, name); those of other laws of groups: `laws`."""
         return self.laws[0].varied + varied_numbers(self.groups, {"b": self.body, "s": self.sensors})
 
     @cached_property
@@ -170,43 +173,43 @@ class Scenario:
 
     @cached_property
     def law_indices(self) -> tuple[int, ...]:
-        """Of each agent which of `laws` it flies by."""
-        found = [0] * self.agents
+        """Index in `laws` of each agent's law."""
+        indices = [0] * self.agents
         for number, law in enumerate(self.laws[1:], 1):
             for agent in law.agents:
-                found[agent] = number
-        return tuple(found)
+                indices[agent] = number
+        return tuple(indices)
 
     def law_of(self, agent: int) -> FlownLaw:
-        """The law that an agent flies by."""
+        """Return the law that an agent flies by."""
         return self.laws[self.law_indices[agent]]
 
     @cached_property
     def group_indices(self) -> tuple[int, ...]:
-        """Of each agent the number of its group in [[groups]]; -1 where it is in none."""
-        found = [-1] * self.agents
+        """Number of each agent's group in [[groups]]; -1 where it is in none."""
+        indices = [-1] * self.agents
         for number, group in enumerate(self.groups):
             for agent in group.agents:
-                found[agent] = number
-        return tuple(found)
+                indices[agent] = number
+        return tuple(indices)
 
     def agent_values(self, letter: str, name: str, seed: int) -> list[float]:
-        """One number of every agent, with its tolerance as a seed draws it."""
+        """Return one number of every agent, with its tolerance as a seed draws it."""
         record = {"p": self.parameters, "b": self.body, "s": self.sensors}[letter]
         return agent_values(self.groups, self.agents, letter, name, record, seed)
 
     def alike(self) -> "Scenario":
-        """The same scenario without groups and faults: what a recording is measured by."""
+        """Return the scenario without groups and faults, by which a recording is measured."""
         return replace(self, groups=(), faults=()) if self.groups or self.faults else self
 
     def with_drawn_scene(self, seed: int) -> "Scenario":
-        """The scenario of one flight: where scene.draw = "flight", with the scene that this flight draws.
+        """Return the scenario of one flight: where scene.draw = "flight", with the scene that this flight draws.
 
         Examples
         --------
         >>> import airflock
         >>> city = airflock.load("kidger/city", {"scene.draw": "flight"})
-        >>> city.in_flight(1).scene.seed != city.in_flight(2).scene.seed  # each seed its own city
+        >>> city.with_drawn_scene(1).scene.seed != city.with_drawn_scene(2).scene.seed  # each seed its own city
         True
         """
         if self.scene.draw == "once":
@@ -217,7 +220,7 @@ class Scenario:
 
     @cached_property
     def has_scene(self) -> bool:
-        """Whether something stands in the world that agents see with rays, feel, or must not touch."""
+        """True if the world has shapes that agents see with rays, feel, or must not touch."""
         return self.scene.draw == "flight" or bool(len(self.stands().shapes))
 
     @property
@@ -232,16 +235,16 @@ class Scenario:
 
     @property
     def uses_battery(self) -> bool:
-        """Whether batteries run empty."""
+        """True if batteries run empty."""
         return self.vehicle.endures is not None and getattr(self.body, "battery", "") != "endless"
 
     @property
     def can_land(self) -> bool:
-        """Whether agents whose batteries are empty may come to the ground: then they are absent."""
+        """True if agents whose batteries are empty may come to the ground: then they are absent."""
         return self.uses_battery and self.ground is not None
 
     def stands(self) -> Scene:
-        """What stands in the world; for a model that casts, polygons are walls of it too.
+        """Return the shapes that stand in the world; for a model that casts rays, polygons are walls of it too.
 
         Raises SceneError for a mesh that cannot be read, and for a scene without free room.
 
@@ -259,7 +262,7 @@ class Scenario:
         return scene_of(self.scene, self.dimensions, polygons, self.world.heights)
 
     def waypoints(self) -> Any:
-        """Goals in their order (goal, 3), m.
+        """Return goals in their order (goal, 3), m.
 
         Raises SceneError where the scene has no room for its goals.
 
@@ -272,27 +275,29 @@ class Scenario:
         return waypoints(self.goals, self.scene, self.dimensions)
 
     def resolved_metrics(self) -> metric_parameters.Parameters:
-        """Metric parameters with everything that was left to the scenario filled in."""
+        """Return the metric parameters, with those that the scenario leaves open derived from the rest of it."""
         return self._measured
 
     @cached_property
     def _measured(self) -> metric_parameters.Parameters:
-        return filled_in.default_metrics(self)
+        """Metric parameters without open ones."""
+        return default_metrics(self)
 
     def judged(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Order parameters of a flight with what the metric set makes of them: partial fitnesses and fitness."""
+        """Add the partial fitnesses and the fitness of the metric set to the order parameters of a flight."""
         return self.measures.judged(values, self.agents, self.flight.duration, self.resolved_metrics())
 
     def resolved_silence(self) -> SilenceParameters:
-        """The rule of silence with everything that was left to the scenario filled in."""
+        """Return the rule of silence, with numbers that the scenario leaves open derived from the rest of it."""
         return self._silent
 
     @cached_property
     def _silent(self) -> SilenceParameters:
-        return filled_in.default_silence(self)
+        """The rule of silence without open numbers."""
+        return default_silence(self)
 
     def separation(self) -> float:
-        """Smallest distance of two agents at the start, m.
+        """Return the smallest distance of two agents at the start, m.
 
         Examples
         --------
@@ -300,9 +305,100 @@ class Scenario:
         >>> airflock.load("vasarhelyi_2018/4ms", {"start.separation": 7.0}).separation()
         7.0
         """
-        given = self.start.separation
-        return (
-            filled_in.default_separation(self.model, self.parameters, self.start, self.world)
-            if given is None
-            else given
-        )
+        distance = self.start.separation
+        return default_separation(self.model, self.parameters, self.start, self.world) if distance is None else distance
+
+
+SHOWN = 8  # lists of points longer than this are counted, not printed
+
+
+def summary(scenario: Scenario) -> str:
+    """Return name, size, law, body and arena in one line."""
+    world = scenario.world
+    size = {"square": f" of {world.side:g} m", "circle": f" of radius {world.radius:g} m"}.get(world.arena, "")
+    arena = "no arena" if world.arena == "none" else f"{world.arena} arena{size}"
+    return (
+        f"{scenario.name}: {scenario.agents} agents, {scenario.flight.duration:g} s, model {scenario.model.name}, "
+        f"{scenario.vehicle.name}, {arena}"
+    )
+
+
+def changed_values(record: object) -> list[tuple[str, str, str]]:
+    """Return key, value with unit, and meaning of each number that differs from its default."""
+    rows = []
+    for name, declared, default in declarations(record):
+        value = getattr(record, name)
+        if value == default:
+            continue
+        if isinstance(declared, Quantity):
+            text = format_with_unit(f"{value:g}", declared.unit)
+        elif isinstance(value, tuple):
+            text = str(value) if len(value) <= SHOWN else f"{len(value)} entries"
+        else:
+            text = str(value)
+        rows.append((name, text, declared.meaning))
+    return rows
+
+
+def format_number(value: float) -> str:
+    """Format a number with four digits, as tables show it."""
+    return f"{value:.4g}"
+
+
+def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table of plain texts in HTML."""
+    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in row)}</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def scenario_html(scenario: Scenario) -> str:
+    """Return a table of everything that differs from the defaults, section by section, and the notes."""
+    records = {"top": scenario.flight, "model": scenario.parameters, "body": scenario.body}
+    records |= {name: getattr(scenario, name) for name in SECTIONS if name != "body"}
+    rows = [
+        (name if section == "top" else f"{section}.{name}", value, meaning)
+        for section, record in records.items()
+        for name, value, meaning in changed_values(record)
+    ]
+    notes = "".join(f"<li>{escape(note)}</li>" for note in scenario.notes)
+    keys = html_table(("changed key", "value", "meaning"), rows)
+    return f"<p><b>{escape(summary(scenario))}</b></p>{keys}{f'<ul>{notes}</ul>' if notes else ''}"
+
+
+def default_metrics(scenario: Scenario) -> MetricParameters:
+    """Return the numbers of the order parameters, with open ones derived from the scenario."""
+    numbers = {name: getattr(scenario.metrics, name) for name in scenario.metrics.__dataclass_fields__}
+    p, model = scenario.parameters, scenario.model
+    if numbers["v_flock"] is None:
+        numbers["v_flock"] = 1.0 if model.preferred_speed is None else model.speed(p)
+    if numbers["v_tol"] is None:
+        numbers["v_tol"] = 0.375 * numbers["v_flock"]
+    if numbers["r_comm"] is None:
+        numbers["r_comm"] = scenario.radio.range
+    if numbers["r_cluster"] is None:
+        known = model.interaction_range or model.reach
+        numbers["r_cluster"] = min(float(known(p)), 1e6) if known else min(scenario.radio.range, 1e6)
+    if numbers["collision_period"] is None:
+        numbers["collision_period"] = scenario.flight.dt
+    if numbers["max_e"] is None:
+        numbers["max_e"] = largest_extension(scenario.world) or None
+    if numbers["k"] is None:
+        numbers["k"] = numbers["max_e"]
+    return type(scenario.metrics)(**numbers)
+
+
+def default_silence(scenario: Scenario) -> SilenceParameters:
+    """Return the rule of silence, with open numbers derived from the scenario."""
+    return with_defaults(scenario.silence, scenario.model.speed(scenario.parameters), scenario.radio.delay)
+
+
+def default_separation(model: Model, parameters: Any, start_record: start.Parameters, world: arena.Parameters) -> float:
+    """Return the default of start.separation, m: 2 s of flight at the preferred speed, at least 3 m.
+
+    In a ball, a box or a periodic world agents may start anywhere: 0. Source: authors' program of Vásárhelyi et al.
+    2018.
+    """
+    if start_record.kind != "arena" or world.edges == "periodic":
+        return 0.0
+    return max(3.0, 2.0 * model.speed(parameters))

@@ -1,7 +1,7 @@
-"""Validation: from a nested dict to records, with every fault found at once.
+"""Validation: make records from nested dicts, and report all errors at once.
 
-The declarations of the parameters are the schema. Each complaint is one line: file, key, value, unit, allowed range,
-and the nearest right key for a wrong one.
+The declarations of the parameters are the schema. Each error is one line: file, key, value, unit, allowed range, and
+the nearest right key for a wrong one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,39 +26,39 @@ LONG_FORM = {"value", "unit", "source", "note", "interval"}
 
 
 def plain_values(section: str, table: Mapping[str, Any], record: type) -> tuple[dict[str, Any], list[str]]:
-    """Values without their units and sources; faults for units that differ from the declared ones."""
+    """Return the values of a section without units and sources, and errors for units that are not the declared ones."""
     known = {name: declared for name, declared, _ in declarations(record)}
     units = {name: getattr(declared, "unit", "") for name, declared in known.items()}
-    values, faults = {}, []
+    values, errors = {}, []
     for key, value in table.items():
         if isinstance(value, Mapping):
             name = f"{section}.{key}".lstrip(".")
             unknown = set(value) - LONG_FORM
             if "value" not in value or unknown:
-                faults.append(f"{name}: give a value, or a table with value, unit and source")
+                errors.append(f"{name}: give a value, or a table with value, unit and source")
                 continue
             if "interval" in value and not _holds(value["interval"], value["value"]):
-                faults.append(f"{name}: interval = {value['interval']!r} is not [low, high] about {value['value']!r}")
+                errors.append(f"{name}: interval = {value['interval']!r} is not [low, high] about {value['value']!r}")
                 continue
             unit = value.get("unit", "")
             if unit and units.get(key) is not None and unit != units[key]:
-                faults.append(f"{name} = {value['value']} {unit}: the unit is {units[key] or 'none'}")
+                errors.append(f"{name} = {value['value']} {unit}: the unit is {units[key] or 'none'}")
             value = value["value"]
         if isinstance(known.get(key), Choice) and isinstance(value, int) and not isinstance(value, bool):
             value = str(value)  # model.scheme = 2
         values[key] = value
-    return values, faults
+    return values, errors
 
 
 def _holds(interval: Any, value: Any) -> bool:
-    """Whether an interval, written by identify, is two numbers about a value."""
+    """Return True if an interval, as identify writes it, is two numbers about a value."""
     numbers = [interval[0], value, interval[1]] if isinstance(interval, list) and len(interval) == 2 else [None]
     sound = all(isinstance(n, (int, float)) and not isinstance(n, bool) for n in numbers)
     return sound and numbers[0] <= value <= numbers[-1]
 
 
 def value_of(entry: Any) -> Any:
-    """A value as it is, or that of a table that also holds its unit or source: { value = ..., source = ... }."""
+    """Return a value, or that of a table which also holds its unit or source: { value = ..., source = ... }."""
     return entry["value"] if isinstance(entry, Mapping) and "value" in entry else entry
 
 
@@ -66,24 +66,25 @@ def read_section(
     section: str, table: Mapping[str, Any], record: type, other_keys: Sequence[str] = (),
     kinds: Mapping[str, type] | None = None,
 ) -> tuple[Any, list[str]]:  # fmt: skip
-    """Record made from a section, or None, and all faults in it.
+    """Make a record from a section; return it, or None, with all errors of the section.
 
-    beside : further keys that its table may hold; kinds : records that the section has with another kind
+    other_keys : further keys that the table may hold
+    kinds : records that the section has with another kind, for the hint where a key belongs to one of them
     """
     if not isinstance(table, Mapping):
         return None, [f"{section} = {table!r} is not a table of keys"]
-    values, faults = plain_values(section, table, record)
+    values, errors = plain_values(section, table, record)
     known = {name: declared for name, declared, _ in declarations(record)}
     values = {key: _python(value, known.get(key)) for key, value in values.items()}
     for name, declared in known.items():
         if name in values and _is_wrong(values[name], declared):
-            faults.append(_line(f"{section}.{name}".lstrip("."), values[name], declared))
-    faults += [_unknown(section, str(key), (*known, *other_keys), kinds or {}) for key in values if key not in known]
-    return (None if faults else record(**values)), faults
+            errors.append(_line(f"{section}.{name}".lstrip("."), values[name], declared))
+    errors += [_unknown(section, str(key), (*known, *other_keys), kinds or {}) for key in values if key not in known]
+    return (None if errors else record(**values)), errors
 
 
 def _python(value: Any, declared: Declaration | None) -> Any:
-    """A value in the types that records hold: NumPy's and tomlkit's become Python's own, whole numbers floats."""
+    """Convert a value to the types of records: NumPy's and tomlkit's become Python's own, whole numbers floats."""
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(declared, Quantity) and isinstance(value, Real) and not isinstance(value, bool):
         try:
@@ -94,7 +95,7 @@ def _python(value: Any, declared: Declaration | None) -> Any:
 
 
 def _is_wrong(value: Any, declared: Declaration) -> bool:
-    """Whether a value of Python's own types is not what was declared."""
+    """Return True if a value of Python's own types is not what was declared."""
     if isinstance(declared, Quantity):
         return bool(quantity_error(value, declared)) or value in (inf, -inf)
     if isinstance(declared, Choice):
@@ -103,7 +104,7 @@ def _is_wrong(value: Any, declared: Declaration) -> bool:
 
 
 def _unknown(section: str, key: str, may: Sequence[str], kinds: Mapping[str, type]) -> str:
-    """The line for a key that a section does not have; `kinds` as of `read_section`."""
+    """Return the error line for a key that a section does not have; `kinds` as in `read_section`."""
     of = [kind for kind, other in kinds.items() if key in {name for name, _, _ in declarations(other)}]
     prefix = f"{section}." if section else ""
     hint = suggest(key, may, f"known: {', '.join(may)}", prefix=prefix)
@@ -112,7 +113,7 @@ def _unknown(section: str, key: str, may: Sequence[str], kinds: Mapping[str, typ
 
 
 def _line(name: str, value: Any, declared: Declaration) -> str:
-    """The line for a value that is not what was declared."""
+    """Return the error line for a value that is not what was declared."""
     if isinstance(declared, Quantity):
         if isinstance(value, float) and isfinite(value) and declared.whole and not value.is_integer():
             return f"{name} = {value:g} is not a whole number; give one in {declared.span}"
@@ -137,7 +138,7 @@ def _line(name: str, value: Any, declared: Declaration) -> str:
 
 
 def _number(value: Real) -> str:
-    """A number for a person; a whole number may be too large to be a float."""
+    """Format a number for a person; a whole number may be too large to be a float."""
     try:
         return f"{value:g}"
     except OverflowError:

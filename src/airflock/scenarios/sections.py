@@ -1,7 +1,7 @@
-"""The sections of a scenario: one list.
+"""The sections of a scenario in one list.
 
-The tables of a scenario file, the fields of a `Scenario`, the keys of a search space, the records that rules are
-handed and the columns of the row that a driver reads are all made from `ORDER`, each by name.
+The tables of a scenario file, the fields of a `Scenario`, the keys of a search space, the records that rules receive
+and the columns of the row that a driver reads are all made from `ORDER`, each by name.
 """
 
 from dataclasses import dataclass
@@ -35,10 +35,10 @@ class Flight(Record):
 
 
 class Geometry(NamedTuple):
-    """What drivers read of world, start and goals: derived at set-up, m and m/s.
+    """The numbers that drivers read of world, start and goals, derived at set-up, m and m/s.
 
     half_*   : half sizes of the arena; extent_*: of the box about the origin from which starts are drawn
-    speed    : at the start; clearance: from what stands in the scene; wall_clearance: from that, walls and obstacles
+    speed    : at the start; clearance: from the shapes of the scene; wall_clearance: from those, walls and obstacles
     goal_*   : radius in which a goal counts as reached, speed, spread, distance of a shepherd
     spacing_*, jitter : of a start formation
     """
@@ -64,7 +64,7 @@ class Geometry(NamedTuple):
 
 
 class StepTimes(NamedTuple):
-    """What drivers read of the flight: motion step and time between two decisions, s."""
+    """The times that drivers read: motion step and time between two decisions, s."""
 
     dt: float
     period: float
@@ -75,8 +75,8 @@ class Section(NamedTuple):
 
     key     : its table in a scenario file; empty for the keys at the top
     record  : its parameters; None where the model brings them. Body, sensor, radio and metric set may bring others
-    letter  : what rules and drivers call its numbers; empty where no driver reads any
-    derived : what drivers read instead of the record itself
+    letter  : name of its numbers in rules and drivers; empty where no driver reads any
+    driver_record : record that drivers read instead of the section's own
     """
 
     key: str
@@ -86,7 +86,7 @@ class Section(NamedTuple):
 
     @property
     def field(self) -> str:
-        """Field of a Scenario that holds its record."""
+        """Field of a Scenario that holds the section's record."""
         return {"model": "parameters", "": "flight"}.get(self.key, self.key)
 
 

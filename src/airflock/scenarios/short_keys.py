@@ -15,34 +15,34 @@ IN_FILES = {
 
 
 def keys_by_last_word(records: Mapping[str, type]) -> dict[str, list[str]]:
-    """Last word → whole keys of all sections that have it.
+    """Return last word → whole keys of all sections that have it.
 
-    A key of `metrics` that is taken from the scenario by default (such as metrics.v_flock) gives way to one of the
-    model's of the same name.
+    A key of `metrics` that is taken from the scenario by default (such as metrics.v_flock) gives way to a key of the
+    model with the same name.
     """
-    found: dict[str, list[str]] = {}
+    keys: dict[str, list[str]] = {}
     for section, record in records.items():
         for name, declared, _ in declarations(record):
             if section:
                 derived = section == "metrics" and isinstance(declared, Quantity) and declared.optional
-                if not (derived and name in found):
-                    found.setdefault(name, []).append(f"{section}.{name}")
+                if not (derived and name in keys):
+                    keys.setdefault(name, []).append(f"{section}.{name}")
         for name in getattr(record, "VECTORS", {}):
-            found.setdefault(name, []).append(f"{section}.{name}")
-    return found
+            keys.setdefault(name, []).append(f"{section}.{name}")
+    return keys
 
 
 def expand_short_keys(
     settings: Mapping[str, Any], records: Mapping[str, type], top: tuple[str, ...]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
-    """Settings with whole keys, notes of what was found, and faults of keys that are several or none.
+    """Expand settings to whole keys; return them with notes, and errors for ambiguous and unknown keys.
 
     settings : keys that are neither whole ("radio.delay") nor at the top of a file ("agents")
     records  : section → record of its parameters, "model" first
     """
     known = keys_by_last_word(records)
     result: dict[str, Any] = {}
-    notes, faults = [], []
+    notes, errors = [], []
     for key, value in settings.items():
         where = known.get(key, [])
         if len(where) == 1:
@@ -50,18 +50,18 @@ def expand_short_keys(
             notes.append(f"{key} is read as {where[0]}")
         elif where:
             meant = (f"{name} ({_meaning(name, records)})" for name in where)
-            faults.append(f"{key} is several keys; write {' or '.join(meant)}")
+            errors.append(f"{key} is several keys; write {' or '.join(meant)}")
         elif key in IN_FILES:
-            faults.append(f"{key}: {IN_FILES[key]}")
+            errors.append(f"{key}: {IN_FILES[key]}")
         else:
             near = get_close_matches(key, (*top, *known), n=1, cutoff=0.5)
             full = known.get(near[0], near) if near else []
-            faults.append(f"{key}: unknown key; {f'did you mean {full[0]}?' if near else 'known: ' + ', '.join(top)}")
-    return result, notes, faults
+            errors.append(f"{key}: unknown key; {f'did you mean {full[0]}?' if near else 'known: ' + ', '.join(top)}")
+    return result, notes, errors
 
 
 def _meaning(key: str, records: Mapping[str, type]) -> str:
-    """What a whole key means, up to the first comma or semicolon."""
+    """Return the meaning of a whole key, up to the first comma or semicolon."""
     section, _, last = key.partition(".")
     declared = next(found for name, found, _ in declarations(records[section]) if name in (last, f"{last}_0"))
     return re.split(r"[;,(]", declared.meaning)[0].strip()

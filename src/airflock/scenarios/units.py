@@ -1,6 +1,7 @@
-"""Units that people write, turned into the declared SI units; each conversion is told in a note.
+"""Units of a scenario file: people's units become the declared SI units, and a note reports each conversion.
 
 A value may carry its unit as text, `delay = "400 ms"`, or as a table, `delay = { value = 400, unit = "ms" }`.
+A spread is the standard deviation of a manufacturing tolerance, in the unit of its number or as a share of it.
 """
 
 import math
@@ -12,7 +13,6 @@ from airflock.core import Declaration, Points, Quantity, declarations, format_wi
 
 DEGREE = math.pi / 180.0
 FOOT, MILE, NAUTICAL_MILE = 0.3048, 1609.344, 1852.0
-
 # declared unit → what else may be written → factor to the declared one; feet, miles, pounds and knots are the
 # international ones of 1959, g is the standard gravity of 1901
 UNITS: dict[str, dict[str, float]] = {
@@ -46,12 +46,11 @@ SPELLINGS = {
 }  # fmt: skip
 # a digit can go on only after a blank (1 1/s), so that no unit takes digits from its number
 NUMBER_WITH_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s+(?=\S)|(?![\d.]))(.*?)\s*")
-
 DECIMAL_COMMA = re.compile(r",\d+")
 
 
 def conversion_factor(unit: str, declared: str) -> float | None:
-    """Declared units in one of `unit`, for instance 0.001 for ms where s is declared; None if it is no such unit."""
+    """Return how many declared units one `unit` is, such as 0.001 for ms where s is declared; None if unknown."""
     name = unit.strip().replace("²", "^2").replace("³", "^3").replace("**", "^").replace("m/s/s", "m/s^2")
     name = SPELLINGS.get(name, name)
     return 1.0 if name == declared else UNITS.get(declared, {}).get(name)
@@ -60,36 +59,43 @@ def conversion_factor(unit: str, declared: str) -> float | None:
 def convert_units(
     document: Mapping[str, Any], records: Mapping[str, type]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
-    """A document in declared units, notes of what was converted, and faults of units that cannot be.
+    """Convert a document to declared units.
 
-    document : nested dict of a scenario; records : section → record of its parameters, "" for the keys at the top
-    A key with a faulty unit is left out of the document, so that it is told once.
+    Parameters
+    ----------
+    document : nested dict of a scenario
+    records : section → record of its parameters, "" for the keys at the top
+
+    Returns
+    -------
+    The document, notes on what was converted, and errors for units that do not fit. A key with a wrong unit is
+    left out of the document, so that it is reported once.
     """
     notes: list[str] = []
-    faults: list[str] = []
+    errors: list[str] = []
     result = dict(document)
     for section, record in records.items():
         known = {name: declared for name, declared, _ in declarations(record)}
-        given = document if not section else document.get(section)
-        if not isinstance(given, Mapping):
+        values = document if not section else document.get(section)
+        if not isinstance(values, Mapping):
             continue
         changed = {}
-        for key in (key for key in given if key in known):  # in the order of the file, so that notes are
+        for key in (key for key in values if key in known):  # in the order of the file, so that notes are
             name = f"{section}.{key}".lstrip(".")
-            changed[key], note, fault = _converted(name, given[key], known[key])
+            changed[key], note, error = _converted(name, values[key], known[key])
             notes += [note] if note else []
-            faults += [fault] if fault else []
+            errors += [error] if error else []
         wrong = {key for key in changed if changed[key] is None}
-        table = {key: changed.get(key, value) for key, value in given.items() if key not in wrong}
+        table = {key: changed.get(key, value) for key, value in values.items() if key not in wrong}
         if section:
             result[section] = table
         else:
             result = table | {key: value for key, value in result.items() if key not in known}
-    return result, notes, faults
+    return result, notes, errors
 
 
 def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, str]:
-    """A value in its declared unit, a note and a fault; the value is None where its unit is none for this key."""
+    """Convert one value; return it with a note and an error. The value is None where its unit does not fit the key."""
     if not isinstance(declared, (Quantity, Points)):
         return given, "", ""
     long = isinstance(given, Mapping) and "value" in given
@@ -124,12 +130,12 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
 
 
 def _others(declared: str) -> str:
-    """Units that may be written where one is declared."""
+    """List the units that may be written instead of the declared one."""
     return ", ".join(UNITS.get(declared, ()))
 
 
 def _unitless(number: str, declared: Quantity | Points) -> str:
-    """What is wrong with a number in quotes, and what to write instead."""
+    """Return the end of an error line about a number in quotes without a unit: what to write instead."""
     if declared.unit in ("", "1"):
         return f"is text; give {number} without quotes"
     others = f" (or {_others(declared.unit)})" if _others(declared.unit) else ""
@@ -137,7 +143,7 @@ def _unitless(number: str, declared: Quantity | Points) -> str:
 
 
 def _times(value: Any, times: float) -> Any:
-    """A number, or nested lists of numbers, times a factor; None where something else is in it."""
+    """Multiply a number, or nested lists of numbers, by a factor; return None where something else is in it."""
     if isinstance(value, bool):
         return None
     if isinstance(value, (int, float)):
@@ -149,4 +155,73 @@ def _times(value: Any, times: float) -> Any:
 
 
 def _short(value: Any) -> str:
+    """Format a number with six digits, and anything else as text."""
     return f"{value:g}" if isinstance(value, (int, float)) else str(value)
+
+
+OF_IT = "a share of the number such as '10 %'"
+
+
+class RelativeSpread(float):
+    """A standard deviation that is a share of the number itself."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, RelativeSpread) and float(self) == float(other)
+
+    __hash__ = float.__hash__
+
+    @classmethod
+    def parse(cls, entry: Any) -> "RelativeSpread | None":
+        """Parse a text or table such as "10 %"; return None where it has another unit, or none."""
+        match = NUMBER_WITH_UNIT.fullmatch(entry) if isinstance(entry, str) else None
+        value, unit = (match[1], match[2]) if match else ("", "")
+        if isinstance(entry, Mapping):
+            value, unit = entry.get("value"), entry.get("unit")
+        if isinstance(value, bool) or not isinstance(unit, str) or conversion_factor(unit, "1") in (None, 1.0):
+            return None
+        try:
+            return cls(float(f"{float(value) / 100.0:.12g}"))
+        except (TypeError, ValueError):
+            return None
+
+
+def standard_deviation(spread: float, value: float) -> float:
+    """Return the standard deviation of a number with this value, in the unit of the number."""
+    return spread * abs(value) if isinstance(spread, RelativeSpread) else spread
+
+
+def relative_spread(entry: Any, declared: Any) -> RelativeSpread | None:
+    """Parse a spread as a share of its number; None for a number that is a share itself, of which "10 %" is 0.1."""
+    relative = isinstance(declared, Quantity) and declared.unit not in ("", "1")
+    return RelativeSpread.parse(entry) if relative else None
+
+
+def with_share_hint(line: str, spread_prefix: str, known: Mapping[str, Any]) -> str:
+    """Return the end of an error line about the unit of a spread, which may be a share as well; "" where it may not."""
+    key = line.removeprefix(f"{spread_prefix}.").partition(" ")[0]
+    declared = known.get(key) if line.startswith(f"{spread_prefix}.") else None
+    return f", or {OF_IT}" if isinstance(declared, Quantity) and declared.unit not in ("", "1") else ""
+
+
+def check_spreads(where: str, table: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
+    """Return standard deviations in declared units, and the errors of those that are none."""
+    spreads, errors = {}, []
+    for key, entry in table.items():
+        value = entry.get("value", entry) if isinstance(entry, Mapping) else entry
+        declared = known.get(key)
+        if not isinstance(declared, Quantity):
+            errors.append(f"{where}.{key}: unknown number")
+        elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
+            other = with_share_hint(f"{where}.spread.{key}", f"{where}.spread", known)
+            least = format_with_unit("0", declared.unit)
+            errors.append(
+                f"{where}.{key}.spread = {_told(value)} is not a standard deviation of {least} or more{other}"
+            )
+        else:
+            spreads[key] = value if isinstance(value, RelativeSpread) else float(value)
+    return spreads, errors
+
+
+def _told(spread: Any) -> str:
+    """Format a spread as a file writes it."""
+    return f"'{100.0 * spread:g} %'" if isinstance(spread, RelativeSpread) else repr(spread)

@@ -4,13 +4,16 @@ from . import (
     gpu as gpu,
     locks as locks,
 )
-from .asked import (
-    INVALID as INVALID,
-    ErrorCollector as ErrorCollector,
-    invalid_if as invalid_if,
-    value_or_default as value_or_default,
+from .atomic import (
+    PAGES as PAGES,
+    PICTURES as PICTURES,
+    RECORDINGS as RECORDINGS,
+    SCENARIOS as SCENARIOS,
+    TABLES as TABLES,
+    VIDEOS as VIDEOS,
+    atomic_path as atomic_path,
+    suffix_error as suffix_error,
 )
-from .atomic import atomic_path as atomic_path
 from .cache import (
     DRIVERS as DRIVERS,
     cache_folder as cache_folder,
@@ -27,9 +30,11 @@ from .coordinates import (
     swap_enu_ned as swap_enu_ned,
 )
 from .errors import (
+    INVALID as INVALID,
     AirflockError as AirflockError,
     CardError as CardError,
     DeviceError as DeviceError,
+    ErrorCollector as ErrorCollector,
     FlightError as FlightError,
     LinkError as LinkError,
     ParameterError as ParameterError,
@@ -39,11 +44,19 @@ from .errors import (
     SceneError as SceneError,
     StudioError as StudioError,
     StudyError as StudyError,
+    check_device as check_device,
+    check_precision as check_precision,
     collect_errors as collect_errors,
+    describe_error as describe_error,
+    invalid_if as invalid_if,
+    is_number as is_number,
     os_error_message as os_error_message,
     printable as printable,
     shortened as shortened,
     shortened_lines as shortened_lines,
+    suggest as suggest,
+    to_identifier as to_identifier,
+    value_or_default as value_or_default,
 )
 from .gpu import (
     cuda_runtime as cuda_runtime,
@@ -53,34 +66,15 @@ from .gpu import (
     require_gpu as require_gpu,
     unavailable_reason as unavailable_reason,
 )
-from .hardware import (
-    check_device as check_device,
-    check_precision as check_precision,
-)
 from .machine import (
     free_memory as free_memory,
     processor_kind as processor_kind,
     processor_name as processor_name,
     toolchain_versions as toolchain_versions,
+    trim_heap as trim_heap,
     vector_bits as vector_bits,
 )
 from .many_tests import holm_correction as holm_correction
-from .memory import trim_heap as trim_heap
-from .numeric import is_number as is_number
-from .spelling import (
-    describe_error as describe_error,
-    suggest as suggest,
-    to_identifier as to_identifier,
-)
-from .suffixes import (
-    PAGES as PAGES,
-    PICTURES as PICTURES,
-    RECORDINGS as RECORDINGS,
-    SCENARIOS as SCENARIOS,
-    TABLES as TABLES,
-    VIDEOS as VIDEOS,
-    suffix_error as suffix_error,
-)
 from .threads import (
     available_cores as available_cores,
     check_interrupted as check_interrupted,

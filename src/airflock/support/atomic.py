@@ -1,7 +1,7 @@
 """Files that are complete or not there at all: a temporary name in the same folder, then a rename.
 
-A process that is killed leaves its temporary file. It held a lock on it, which the system has given back: so the
-next process that writes beside it knows that nobody needs it, and removes it.
+A process that is killed leaves its temporary file. It had a lock on it, which the system has released: so the next
+process that writes into the folder sees that nobody needs it, and removes it. The suffix of a file names its format.
 """
 
 import os
@@ -24,8 +24,8 @@ FOUND = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path with the same ending to write to; it takes the final name only if the block succeeds.
 
-    A link is followed: the file that it names is replaced, not the link. Raises OSError, which names the path, where it
-    is that of something else than a file, such as a named pipe, and for whatever goes wrong while it is written.
+    A link is followed: the file that it names is replaced, not the link. Raises OSError, which names the path, where
+    it is that of something other than a file, such as a named pipe, and for every error while it is written.
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
@@ -34,13 +34,13 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         with _beside(target) as temporary:
             yield temporary
-    except OSError as fault:
-        raise OSError(fault.errno, fault.strerror or str(fault), str(path)) from fault
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
 @contextmanager
 def _beside(target: Path) -> Iterator[Path]:
-    """A temporary file beside a target, which it replaces at the end; nothing of it is left otherwise."""
+    """Yield a temporary file that replaces its target at the end, or vanishes without a trace."""
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem[:100]}{MARK}", suffix=target.suffix)
     temporary = Path(name)
     try:
@@ -60,7 +60,7 @@ def _beside(target: Path) -> Iterator[Path]:
 
 
 def _let_go(handle: int) -> int:
-    """Close a file, so that it can be renamed or removed, where the system does that to no open file; else keep it."""
+    """Close a file before it is renamed or removed, where the system does that to no open file; else keep it."""
     if locks.CAN_RENAME_OPEN_FILES or handle < 0:
         return handle
     os.close(handle)
@@ -82,7 +82,7 @@ def write_file(path: str | os.PathLike[str], content: str | bytes | memoryview) 
 
 @cache
 def remove_leftovers(folder: Path) -> int:
-    """Remove what processes that were killed had begun to write into a folder, once a process; how many files."""
+    """Remove temporary files of killed processes from a folder, once a process; return how many."""
     count = 0
     with suppress(OSError):
         for path in folder.glob(f".*{MARK}????????*"):
@@ -91,7 +91,7 @@ def remove_leftovers(folder: Path) -> int:
 
 
 def _remove(path: Path) -> bool:
-    """Remove a temporary file that no process holds."""
+    """Remove a temporary file that no process has locked."""
     try:
         handle = os.open(path, FOUND)
     except OSError:
@@ -114,3 +114,22 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+PICTURES = (".png", ".pdf", ".svg")
+VIDEOS = (".mp4", ".gif")
+RECORDINGS = (".nc",)
+TABLES = (".csv",)
+PAGES = (".html",)
+SCENARIOS = (".toml",)
+
+
+def suffix_error(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> str:
+    """Return why a file cannot be written under this ending; empty if it can."""
+    target = Path(path)
+    if target.suffix.lower() in suffixes:
+        return ""
+    ending = f"ending {target.suffix}" if target.suffix else "name without an ending"
+    if len(suffixes) == 1:
+        return f"{target}: {ending} is not {suffixes[0]}, the only format written here"
+    return f"{target}: {ending}: unknown format; give one of {', '.join(suffixes)}"

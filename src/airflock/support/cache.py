@@ -1,6 +1,6 @@
 """The cache: a folder that belongs to the user alone, for compiled drivers and studies behind papers.
 
-`AIRFLOCK_CACHE` names another place than the user's cache folder. Drivers that were not used for longest go first.
+`AIRFLOCK_CACHE` names another place than the user's cache folder. The least recently used drivers go first.
 """
 
 import atexit
@@ -22,25 +22,25 @@ OWNERS = hasattr(os, "geteuid")  # Windows has none: there a user's own folder i
 
 
 def cache_folder() -> Path:
-    """Folder for what is kept between runs; one of this process alone if the usual place is full or not safe to use."""
+    """Return the folder that is kept between runs; one of this process alone if that is full or not safe to use."""
     base = default_cache_folder()
     return base if not cache_folder_error(base) else private_folder()
 
 
 def default_cache_folder() -> Path:
-    """The place that the environment names, or the user's cache folder."""
+    """Return the folder that the environment names, or the user's cache folder."""
     named = os.environ.get("AIRFLOCK_CACHE")
     return Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "airflock"
 
 
 def cache_folder_error(base: Path) -> str:
-    """Why a folder cannot keep compiled code; empty if it can. It is made if it is missing."""
+    """Return why a folder cannot keep compiled code; empty if it can. A missing folder is made."""
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = base.stat()
-        if OWNERS and found.st_uid not in (0, os.geteuid()):
+        status = base.stat()
+        if OWNERS and status.st_uid not in (0, os.geteuid()):
             return f"{base} belongs to another user"
-        if OWNERS and found.st_mode & 0o022 and not found.st_mode & stat.S_ISVTX:
+        if OWNERS and status.st_mode & 0o022 and not status.st_mode & stat.S_ISVTX:
             return f"{base} may be written by other users"
         (base / DRIVERS).mkdir(mode=0o700, exist_ok=True)
         inner = os.lstat(base / DRIVERS)
@@ -52,13 +52,13 @@ def cache_folder_error(base: Path) -> str:
             (base / DRIVERS).chmod(0o700)
         with tempfile.TemporaryFile(dir=base / DRIVERS):
             return "" if shutil.disk_usage(base).free > ROOM else f"{base} has less than {ROOM / 1e6:.0f} MB free"
-    except OSError as fault:
-        return f"{base} cannot be written: {fault.strerror or fault}"
+    except OSError as error:
+        return f"{base} cannot be written: {error.strerror or error}"
 
 
 @cache
 def private_folder() -> Path:
-    """A folder of this process alone, whose name nobody can guess; it goes when the process ends."""
+    """Make a folder of this process alone, whose name nobody can guess; it is removed when the process ends."""
     folder = Path(tempfile.mkdtemp(prefix="airflock-"))
     (folder / DRIVERS).mkdir(mode=0o700)
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -66,8 +66,8 @@ def private_folder() -> Path:
 
 
 def list_drivers(base: Path) -> list[tuple[float, int, Path]]:
-    """Last use (s since 1970), bytes and folder of every driver, those of version 0.1 included; the oldest first."""
-    found = []
+    """Return last use (s since 1970), bytes and folder of every driver, also those of version 0.1, oldest first."""
+    drivers = []
     for parent in (base, base / DRIVERS):
         for folder in parent.iterdir() if parent.is_dir() else ():
             if re.fullmatch("[0-9a-f]{20}", folder.name) and folder.is_dir() and not folder.is_symlink():
@@ -76,12 +76,12 @@ def list_drivers(base: Path) -> list[tuple[float, int, Path]]:
                     with suppress(OSError):  # removed meanwhile
                         size += path.lstat().st_size
                 with suppress(OSError):
-                    found.append((folder.stat().st_mtime, size, folder))
-    return sorted(found)
+                    drivers.append((folder.stat().st_mtime, size, folder))
+    return sorted(drivers)
 
 
 def shrink(base: Path, max_bytes: int = MOST) -> int:
-    """Remove the drivers that were not used for longest until all take less than `max_bytes` bytes; how many."""
+    """Remove the least recently used drivers until all take less than `max_bytes` bytes; return how many."""
     known, count = list_drivers(base), 0
     total = sum(size for _, size, _ in known)
     for used, size, folder in known:
@@ -93,7 +93,7 @@ def shrink(base: Path, max_bytes: int = MOST) -> int:
 
 
 def clear_cache() -> tuple[int, int]:
-    """Remove all drivers; how many there were, and their bytes. Studies behind papers stay."""
+    """Remove all drivers; return how many there were, and their bytes. Studies behind papers stay."""
     known = list_drivers(default_cache_folder())
     for _, _, folder in known:
         shutil.rmtree(folder, ignore_errors=True)

@@ -1,7 +1,7 @@
-"""Coordinates: latitude and longitude to metres about a site, and north-east-down to east-north-up. Only here.
+"""Coordinates: latitude and longitude to metres about a site, and north-east-down to east-north-up.
 
-The local plane touches the WGS 84 ellipsoid at the site; a degree has the length that it has there. Within 1 km of the
-site and below 70° of latitude that is off from the true tangent plane by less than 0.5 m, the same for all drones.
+The local plane touches the WGS 84 ellipsoid at the site; a degree has the length that it has there. Within 1 km of
+the site and below 70° of latitude that is off the true tangent plane by less than 0.5 m, equally for all drones.
 """
 
 import math
@@ -20,7 +20,7 @@ class Geodetic(NamedTuple):
 
 
 class FlightSite:
-    """The point that is the origin of a flight's local coordinates: its arena's centre on the ground."""
+    """The origin of a flight's local coordinates: its arena's centre on the ground."""
 
     def __init__(self, latitude: float, longitude: float, altitude: float):
         self.origin = Geodetic(latitude, longitude, altitude)
@@ -33,17 +33,17 @@ class FlightSite:
         self._east = math.radians(1.0) * (normal + altitude) * math.cos(phi)
 
     def local(self, latitude: float, longitude: float, altitude: float) -> tuple[float, float, float]:
-        """East, north, up (m) of a point in degrees and metres; across the date line, too."""
+        """Return east, north, up (m) of a point in degrees and metres; across the date line, too."""
         around = (longitude - self.origin.longitude + 180.0) % 360.0 - 180.0
         north = (latitude - self.origin.latitude) * self._north
         return around * self._east, north, altitude - self.origin.altitude
 
     def to_geodetic(self, x: float, y: float, z: float) -> Geodetic:
-        """Latitude, longitude (degrees) and altitude (m) of a local point (m)."""
+        """Return latitude, longitude (degrees) and altitude (m) of a local point (m)."""
         longitude = (self.origin.longitude + x / self._east + 180.0) % 360.0 - 180.0
         return Geodetic(self.origin.latitude + y / self._north, longitude, self.origin.altitude + z)
 
 
 def swap_enu_ned(a: float, b: float, c: float) -> tuple[float, float, float]:
-    """East-north-up of north-east-down, and the other way round: the exchange is its own inverse."""
+    """Convert north-east-down to east-north-up, or back: the exchange is its own inverse."""
     return b, a, -c

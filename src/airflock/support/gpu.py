@@ -1,4 +1,4 @@
-"""Device: whether there is a GPU that can be used, what it is, and what is missing where there is none."""
+"""The GPU: whether one can be used, what it is, and why there is none."""
 
 import os
 from functools import cache
@@ -11,34 +11,34 @@ INSTALL = "pip install 'airflock[cuda]'"
 
 
 def cuda_runtime() -> Any:
-    """numba-cuda's runtime interface."""
+    """Return numba-cuda's runtime interface."""
     return import_module("numba.cuda")
 
 
 @cache
 def unavailable_reason() -> str | None:
-    """Why no GPU can be used here, as one line; None if one can."""
+    """Return why no GPU can be used here, as one line; None if one can."""
     try:
         import_module("numba_cuda")
         cuda = cuda_runtime()
-    except ImportError as fault:
-        missing = isinstance(fault, ModuleNotFoundError) and fault.name == "numba_cuda"
-        return f"numba-cuda is not installed; {INSTALL}" if missing else f"numba-cuda: {_first_line(fault)}"
+    except ImportError as error:
+        missing = isinstance(error, ModuleNotFoundError) and error.name == "numba_cuda"
+        return f"numba-cuda is not installed; {INSTALL}" if missing else f"numba-cuda: {_first_line(error)}"
     if is_simulated():
         return "the CUDA simulator is on (NUMBA_ENABLE_CUDASIM); it is only for tests"
     try:
         if not cuda.is_available():
             return f"no GPU can be used: {_driver_fault()}"
         cuda.get_current_device()
-    except Exception as fault:  # the driver's own faults come in many types
-        return f"the GPU cannot be used: {_first_line(fault)}"
+    except Exception as error:  # the driver's own faults come in many types
+        return f"the GPU cannot be used: {_first_line(error)}"
     return None
 
 
 def _driver_fault() -> str:
-    """What the driver says."""
-    fault = cuda_runtime().cuda_error()
-    return _first_line(fault) if fault else "no device found"
+    """Return the driver's own error."""
+    error = cuda_runtime().cuda_error()
+    return _first_line(error) if error else "no device found"
 
 
 def _first_line(fault: BaseException | str) -> str:
@@ -47,12 +47,12 @@ def _first_line(fault: BaseException | str) -> str:
 
 
 def is_simulated() -> bool:
-    """Whether Numba's CUDA simulator stands for a GPU."""
+    """Return True if Numba's CUDA simulator stands for a GPU."""
     return os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
 
 
 def is_available() -> bool:
-    """Whether a GPU can be used."""
+    """Return True if a GPU can be used."""
     return unavailable_reason() is None
 
 
@@ -60,31 +60,31 @@ def require_gpu(allow_simulator: bool = False) -> None:
     """Raise DeviceError with the reason if no GPU can be used."""
     if allow_simulator and is_simulated():
         return
-    fault = unavailable_reason()
-    if fault is not None:
-        raise DeviceError(f"device = cuda: {fault}; choose device = cpu or auto")
+    error = unavailable_reason()
+    if error is not None:
+        raise DeviceError(f"device = cuda: {error}; choose device = cpu or auto")
 
 
 def free_gpu_memory() -> int:
-    """Free bytes in the GPU's memory."""
+    """Return the free bytes in the GPU's memory."""
     return int(cuda_runtime().current_context().get_memory_info().free)
 
 
 def multiprocessor_count() -> int:
-    """Multiprocessors of the GPU."""
+    """Return the number of multiprocessors of the GPU."""
     return int(cuda_runtime().get_current_device().MULTIPROCESSOR_COUNT)
 
 
 def describe_gpus() -> list[dict[str, Any]]:
-    """Every GPU: name, compute capability, multiprocessors, memory in GB."""
+    """Describe every GPU: name, compute capability, multiprocessors, memory in GB."""
     if not is_available():
         return []
-    cuda, found = cuda_runtime(), []
+    cuda, gpus = cuda_runtime(), []
     for device in cuda.gpus:
         with device:
             memory = cuda.current_context().get_memory_info()
             name = device.name.decode() if isinstance(device.name, bytes) else str(device.name)
-            found.append(
+            gpus.append(
                 {
                     "name": name,
                     "compute_capability": ".".join(map(str, device.compute_capability)),
@@ -93,4 +93,4 @@ def describe_gpus() -> list[dict[str, Any]]:
                     "free_gb": round(memory.free / 1e9, 1),
                 }
             )
-    return found
+    return gpus

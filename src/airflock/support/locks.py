@@ -1,7 +1,7 @@
-"""Locks on open files, one holder at a time: of the system, which gives them back however the holder ends.
+"""Locks on open files, one holder at a time; the system releases them however the holder ends.
 
-POSIX locks the whole file with `flock`; Windows locks one byte with `msvcrt`, far beyond what any file of ours holds,
-so that others may still read it. Nothing waits here. Windows was not run by us.
+POSIX locks the whole file with `flock`; Windows locks one byte with `msvcrt`, far beyond the end of every file of
+ours, so that others may still read it. Nothing waits here. Windows was not run by us.
 """
 
 import errno
@@ -19,7 +19,7 @@ BYTE = 1 << 30  # which byte is locked, where it is bytes that are locked
 def lock(handle: int) -> None:
     """Lock an open file for this handle, until it is closed.
 
-    Raises BlockingIOError where somebody else holds it, and another OSError where the file system knows no locks.
+    Raises BlockingIOError where another process has it, and another OSError where the file system knows no locks.
     """
     if fcntl is not None:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -28,16 +28,16 @@ def lock(handle: int) -> None:
 
 
 def _lock_byte(handle: int) -> None:
-    """Lock the byte of a file that stands for all of it."""
+    """Lock the byte that stands for all of a file."""
     import msvcrt
 
     place = os.lseek(handle, 0, os.SEEK_CUR)
     os.lseek(handle, BYTE, os.SEEK_SET)
     try:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
-    except OSError as fault:
-        if fault.errno in (errno.EACCES, errno.EDEADLK):
-            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)) from fault
+    except OSError as error:
+        if error.errno in (errno.EACCES, errno.EDEADLK):
+            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)) from error
         raise
     finally:
         os.lseek(handle, place, os.SEEK_SET)

@@ -1,5 +1,6 @@
-"""Machine: the processor that this process runs on. Two kinds may round differently."""
+"""The machine: the processor and the memory of this process. Two kinds of processor may round differently."""
 
+import ctypes
 import os
 import platform
 from functools import cache
@@ -11,7 +12,7 @@ LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_by
 
 
 def processor_name() -> str:
-    """Model name of the processor, or what the system says of its kind."""
+    """Return the model name of the processor, or the system's name for its kind."""
     if CPUINFO.is_file():  # Linux
         for line in CPUINFO.read_text(encoding="utf-8", errors="replace").splitlines():
             if line.startswith("model name"):
@@ -21,10 +22,10 @@ def processor_name() -> str:
 
 @cache
 def target() -> tuple[str, frozenset[str]]:
-    """Kind of the processor for which drivers are compiled, for instance znver4, and its features, for instance avx2.
+    """Return the kind of processor for which drivers are compiled, such as znver4, and its features, such as avx2.
 
-    They are those of this machine unless NUMBA_CPU_NAME and NUMBA_CPU_FEATURES name others. Everything that depends on
-    a processor is decided by these two.
+    They are those of this machine unless NUMBA_CPU_NAME and NUMBA_CPU_FEATURES name others. Everything that depends
+    on a processor is decided by these two.
     """
     import llvmlite.binding as llvm
     from numba import config
@@ -36,19 +37,19 @@ def target() -> tuple[str, frozenset[str]]:
 
 
 def processor_kind() -> str:
-    """Kind of the processor for which drivers are compiled: flights of one seed have its bits."""
+    """Return the kind of processor for which drivers are compiled: flights of one seed have its bits."""
     return target()[0]
 
 
 def vector_bits() -> int:
-    """Width of the vectors of drivers: 512 from Ice Lake and Zen 4 on, which keep their clock with them."""
+    """Return the width of the vectors of drivers."""
     features = target()[1]
     return 512 if "avx512vbmi2" in features else 256 if "avx2" in features else 128
 
 
 @cache
 def toolchain_versions() -> str:
-    """Versions and processor that compiled code depends on."""
+    """Return the versions and the processor that compiled code depends on."""
     import llvmlite
     import numba
     import numpy
@@ -65,19 +66,27 @@ def toolchain_versions() -> str:
 
 
 def free_memory() -> int | None:
-    """Bytes that this process may still take: of the machine, or of its container if that is less; None if unknown."""
-    found = []
+    """Return the bytes that this process may still take, of the machine or of its container; None if unknown."""
+    limits = []
     try:
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
             if line.startswith("MemAvailable:"):
-                found.append(1024 * int(line.split()[1]))
+                limits.append(1024 * int(line.split()[1]))
     except (OSError, ValueError):
         names = os.sysconf_names if hasattr(os, "sysconf_names") else {}
         if {"SC_PHYS_PAGES", "SC_PAGE_SIZE"} <= set(names):
-            found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+            limits.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     for limit in map(Path, LIMITS):
         try:
-            found.append(int(limit.read_text(encoding="ascii")))
+            limits.append(int(limit.read_text(encoding="ascii")))
         except (OSError, ValueError):  # no container, or one without a limit
             continue
-    return min(found, default=None)
+    return min(limits, default=None)
+
+
+def trim_heap() -> None:
+    """Return freed small pieces of memory to the system, where the C library can (glibc)."""
+    try:
+        ctypes.CDLL(None).malloc_trim(0)
+    except (OSError, AttributeError, TypeError):  # another C library: nothing to do
+        return

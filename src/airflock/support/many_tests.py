@@ -1,11 +1,11 @@
-"""Many tests at once: p values corrected, so that a table of fifty rows is not rejected for its unluckiest one."""
+"""P values of many tests, corrected so that chance alone rejects no row of a long table."""
 
 import math
 from collections.abc import Sequence
 
 
 def holm_correction(p_values: Sequence[float]) -> list[float]:
-    """P values corrected by Holm's step-down method (1979), in their order; nan stays nan and counts as no test."""
+    """Correct p values by Holm's step-down method (1979), in their order; nan stays nan and counts as no test."""
     order = sorted((p, k) for k, p in enumerate(p_values) if math.isfinite(p))
     corrected, most = [math.nan] * len(p_values), 0.0
     for rank, (p, k) in enumerate(order):

@@ -12,28 +12,28 @@ _thread = local()  # of each worker: the event that tells it to give up its flig
 
 
 class Interrupted(Exception):
-    """A flight was given up because the work that it belongs to was interrupted."""
+    """A flight was abandoned because its work was interrupted."""
 
 
 def check_interrupted() -> None:
-    """Give up the flight of this thread if its work was interrupted. Raises GivenUp, which nobody waits for."""
+    """Raise Interrupted, which nobody waits for, if the work of this thread was interrupted."""
     event = getattr(_thread, "interrupted", None)
     if event is not None and event.is_set():
         raise Interrupted
 
 
 def available_cores() -> int:
-    """Processor cores that this process may use."""
+    """Return the number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def run_in_threads(
     jobs: Sequence[Callable[[], Any]], threads: int | None = None, on_done: Callable[[], None] | None = None
 ) -> Iterator[Any]:
-    """Results of jobs in their order, computed by several threads (compiled flights release the interpreter).
+    """Yield results of jobs in their order, computed by several threads (compiled flights release the interpreter).
 
-    `done` is called after each. Ctrl-C gives up the flights in the air, at any moment: this thread shares no lock of
-    Python's with the others, which an interruption between taking and giving back would leave taken (futures have one).
+    `on_done` is called after each. Ctrl-C abandons the running flights at any moment: this thread shares no lock of
+    Python's with the others, which an interruption between taking and releasing would leave taken (futures have one).
     """
     workers = max(1, min(threads or available_cores(), len(jobs)))
     if workers == 1:
@@ -75,33 +75,33 @@ class _Ended:
 def _work(
     jobs: Sequence[Callable[[], Any]], turns: Iterator[int], ended: "SimpleQueue[_Ended]", interrupted: Event
 ) -> None:
-    """Take one job after the other until none is left; the interpreter hands each turn to one thread only."""
+    """Run one job after the other until none is left; the interpreter hands each turn to one thread only."""
     _thread.interrupted = interrupted
     for number in turns:
         if interrupted.is_set():
             return
         try:
             ended.put(_Ended(number, jobs[number]()))
-        except BaseException as fault:  # raised again where the result is asked for
-            ended.put(_Ended(number, fault=fault))
+        except BaseException as error:  # raised again where the result is asked for
+            ended.put(_Ended(number, fault=error))
 
 
 def run_in_background(work: Callable[[], Any]) -> Future[Any]:
-    """Do some work in a thread of its own, which ends with the program.
+    """Run some work in a thread of its own, which ends with the program.
 
     It begins when the caller goes on: a thread that begins at once keeps the interpreter, and its caller waiting, for
     5 ms.
     """
     future: Future[Any] = Future()
-    asked = Event()
+    released = Event()
 
     def run() -> None:
-        asked.wait()
+        released.wait()
         try:
             future.set_result(work())
-        except Exception as fault:  # raised again where the result is asked for
-            future.set_exception(fault)
+        except Exception as error:  # raised again where the result is asked for
+            future.set_exception(error)
 
     Thread(target=run, daemon=True).start()
-    asked.set()
+    released.set()
     return future

@@ -1,8 +1,8 @@
-"""The one door for text from outside: files, attributes, rows and options are measured before they are parsed.
+"""The one entrance for text from outside: files, attributes, rows and options are measured before they are parsed.
 
-A stranger's text may be too large, nested too deeply, or of numbers without end; parsers then take minutes, gigabytes,
-or raise whatever they happen to. Here the size, the nesting (dotted keys count, too) and the digits are bounded first,
-and `as_error` turns everything that goes wrong behind the door into one line that names where the text came from.
+A stranger's text may be too large, nested too deeply, or of numbers without end; parsers then take minutes or
+gigabytes, or raise any exception. Here the size, the nesting (dotted keys count, too) and the digits are bounded
+first, and `as_error` turns every later exception into one line that names the source of the text.
 """
 
 import json
@@ -16,8 +16,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.parsers import expat
 
-from airflock.support.errors import AirflockError, CardError, RecordingError, ScenarioError, os_error_message, shortened
-from airflock.support.spelling import describe_error
+from airflock.support.errors import (
+    AirflockError,
+    CardError,
+    RecordingError,
+    ScenarioError,
+    describe_error,
+    os_error_message,
+    shortened,
+)
 
 MAX_BYTES = 5_000_000  # of one text; a polygon of 100,000 corners takes some 4 MB
 MOST_DEPTH = 32  # tables and lists inside each other
@@ -46,33 +53,33 @@ _UNQUOTED = re.compile(r"\s*([\w.-]+)\s*=\s*([-+]?[\d.]+ ?[a-zA-Zµ°%][\w/^°%]
 
 
 class TextError(AirflockError):
-    """A text from outside is too large, nested too deeply, or no text at all; says what, not where."""
+    """A text from outside is too large, nested too deeply, or no text at all; names the problem, not the file."""
 
 
 class FormatError(TextError):
-    """A text from outside that is not of the format that it should have."""
+    """A text from outside does not have the expected format."""
 
 
 @contextmanager
 def as_error(where: object, error_class: type[AirflockError] = ScenarioError) -> Iterator[None]:
-    """Whatever is raised while a text from outside is read or used becomes a `kind` of one line that begins `where`.
+    """Turn every exception of the block into an `error_class` of one line that begins with `where`.
 
     An AirflockError of another kind has its line already. The cause is kept for `AIRFLOCK_DEBUG=1`.
     """
     try:
         yield
-    except AirflockError as fault:
-        if not isinstance(fault, TextError):
+    except AirflockError as error:
+        if not isinstance(error, TextError):
             raise
-        raise _one(error_class, f"{where}: {fault}") from fault
-    except OSError as fault:
-        raise _one(error_class, f"{where}: {os_error_message(fault)}") from fault
-    except RecursionError as fault:
-        raise _one(error_class, f"{where}: is nested too deeply") from fault
-    except MemoryError as fault:
-        raise _one(error_class, f"{where}: needs more memory than there is") from fault
-    except Exception as fault:  # the last resort: a stranger's text must not end in a traceback
-        raise _one(error_class, f"{where}: cannot be used: {describe_error(fault)}") from fault
+        raise _one(error_class, f"{where}: {error}") from error
+    except OSError as error:
+        raise _one(error_class, f"{where}: {os_error_message(error)}") from error
+    except RecursionError as error:
+        raise _one(error_class, f"{where}: is nested too deeply") from error
+    except MemoryError as error:
+        raise _one(error_class, f"{where}: needs more memory than there is") from error
+    except Exception as error:  # the last resort: a stranger's text must not end in a traceback
+        raise _one(error_class, f"{where}: cannot be used: {describe_error(error)}") from error
 
 
 def _one(kind: type[AirflockError], line: str) -> AirflockError:
@@ -81,19 +88,19 @@ def _one(kind: type[AirflockError], line: str) -> AirflockError:
 
 
 def to_path(path: Any) -> Path:
-    """The name of a file as a path. Raises RecordingError for what is no name."""
+    """Return the name of a file as a path. Raises RecordingError for anything else."""
     if not isinstance(path, (str, os.PathLike)):
         raise RecordingError(f"{shortened(repr(path), 80)} is not a name of a file; give a text or a Path")
     return expand_path(path)
 
 
 def expand_path(name: str | os.PathLike[str]) -> Path:
-    """A path as a person writes it: ~ is the home folder, also where no shell has put it in."""
+    """Return a path with ~ as the home folder, also where no shell has expanded it."""
     return Path(os.path.expanduser(name))
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a path from outside is that of a file; a path that cannot be one (too long, a NUL inside) is not."""
+    """Return True for the path of a regular file; False for a text that cannot be a path (too long, a NUL inside)."""
     try:
         return stat.S_ISREG(expand_path(path).stat().st_mode)
     except (OSError, ValueError):
@@ -101,7 +108,7 @@ def is_file(path: str | os.PathLike[str]) -> bool:
 
 
 def read_text(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES) -> str:
-    """Text of a regular file in UTF-8, with or without a byte order mark; raises TextError or OSError."""
+    """Read a regular file in UTF-8, with or without a byte order mark; raises TextError or OSError."""
     source = expand_path(path)
     if not stat.S_ISREG(source.stat().st_mode):  # a named pipe would wait for ever
         raise TextError("is not a regular file")
@@ -111,36 +118,36 @@ def read_text(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES) -> str:
         raise TextError(f"is larger than {max_bytes / 1e6:g} MB, more than any file of this kind needs")
     try:
         return content.decode("utf-8-sig")
-    except UnicodeDecodeError as fault:
-        raise FormatError(f"is not text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}") from fault
+    except UnicodeDecodeError as error:
+        raise FormatError(f"is not text in UTF-8: byte {error.start} is 0x{content[error.start]:02x}") from error
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """A TOML file as a dict; raises TextError or OSError."""
+    """Read a TOML file as a dict; raises TextError or OSError."""
     return parse_toml(read_text(path))
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """A TOML text as a dict; raises FormatError where it is none and TextError where it is beyond bounds."""
+    """Parse a TOML text as a dict; raises FormatError where it is none and TextError beyond bounds."""
     _measure(text)
     try:
         document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as fault:
-        raise FormatError(f"{fault}{_quotes(text, str(fault))}") from fault
+    except tomllib.TOMLDecodeError as error:
+        raise FormatError(f"{error}{_quotes(text, str(error))}") from error
     _walk(document)
     return document
 
 
-def _quotes(text: str, said: str) -> str:
-    """What to write where the line that a parser stopped at holds a number with a unit."""
-    place = re.search(r"at line (\d+)", said)
+def _quotes(text: str, message: str) -> str:
+    """Return a hint where the line at which a parser stopped holds a number with a unit."""
+    place = re.search(r"at line (\d+)", message)
     line = text.splitlines()[int(place[1]) - 1] if place else ""
     with_unit = _UNQUOTED.fullmatch(line[:MOST_KEY])
     return f'; a number with its unit stands in quotes: {with_unit[1]} = "{with_unit[2]}"' if with_unit else ""
 
 
 def parse_toml_value(text: str) -> Any:
-    """A value as TOML writes it, or the text itself where it is none; raises TextError where it is more than one."""
+    """Parse a value as TOML writes it, or return the text where it is none; raises TextError for several values."""
     try:
         document = parse_toml(f"value = {text}")
     except FormatError:
@@ -151,25 +158,25 @@ def parse_toml_value(text: str) -> Any:
 
 
 def parse_json_object(text: Any) -> dict[str, Any]:
-    """A JSON text as a dict; raises FormatError where it is none and TextError where it is beyond bounds."""
-    found = parse_json(text)
-    if not isinstance(found, dict):
-        raise FormatError(f"holds {type(found).__name__} {shortened(repr(found), 40)}, not an object of keys")
-    return found
+    """Parse a JSON text as a dict; raises FormatError where it is none and TextError beyond bounds."""
+    document = parse_json(text)
+    if not isinstance(document, dict):
+        raise FormatError(f"holds {type(document).__name__} {shortened(repr(document), 40)}, not an object of keys")
+    return document
 
 
 def parse_json(text: Any) -> Any:
-    """A JSON text as plain values; raises FormatError where it is none and TextError where it is beyond bounds."""
+    """Parse a JSON text as plain values; raises FormatError where it is none and TextError beyond bounds."""
     if not isinstance(text, str):
         raise FormatError(f"is {type(text).__name__}, no text")
     if len(text) > MOST_SHORT or text.count("[") + text.count("{") > MOST_DEPTH:
         _measure(text)
     try:
-        found = json.loads(text)
-    except ValueError as fault:
-        raise FormatError(f"is not JSON: {fault}") from fault
-    _walk(found)
-    return found
+        document = json.loads(text)
+    except ValueError as error:
+        raise FormatError(f"is not JSON: {error}") from error
+    _walk(document)
+    return document
 
 
 class Element(NamedTuple):
@@ -182,7 +189,7 @@ class Element(NamedTuple):
 
 
 def parse_xml(text: str) -> Element:
-    """An XML text as its outermost element; raises FormatError where it is none, TextError where it is beyond bounds.
+    """Parse an XML text; return its outermost element. Raises FormatError where it is none, TextError beyond bounds.
 
     A document type is refused before anything of it is read, so that no entity is ever defined, expanded or fetched.
     """
@@ -213,13 +220,13 @@ def parse_xml(text: str) -> Element:
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
     try:
         parser.Parse(text.encode("utf-8"), True)
-    except expat.ExpatError as fault:
-        raise FormatError(f"is not XML: {fault}") from fault
+    except expat.ExpatError as error:
+        raise FormatError(f"is not XML: {error}") from error
     return around[0][3][0]
 
 
 def _measure(text: str) -> None:
-    """Refuse a text beyond bounds before it is parsed, in one pass over it."""
+    """Raise TextError for a text beyond bounds before it is parsed, in one pass over it."""
     if len(text) > MAX_BYTES:
         raise TextError(f"is larger than {MAX_BYTES / 1e6:g} MB, more than any text of this kind needs")
     depth = dots = values = 0
@@ -250,7 +257,7 @@ def _line(text: str, token: re.Match[str]) -> int:
 
 
 def _walk(document: Any) -> None:
-    """Refuse what a parser made of a text, where it is beyond bounds."""
+    """Raise TextError for a parsed document beyond bounds."""
     keys, left = 0, [(document, 0, "")]
     while left:
         value, depth, name = left.pop()

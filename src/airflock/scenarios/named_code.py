@@ -1,22 +1,23 @@
-"""Python files of the user's own: run only by consent, and whatever goes wrong in one is one line.
+"""Laws by name, and Python files of the user's own: these run only by consent, and each error in one is one line.
 
-A scenario or a study is data; a file of code that it names runs with all rights of the one who opens it. So it is
-imported only if the caller says so: `trust=True`, `--trust`, or by giving the law itself (`law=`, `--law`).
+A scenario or a study is data; a file of code that it names runs with all rights of the person who opens it. So it is
+imported only with consent: `trust=True`, `--trust`, or the law itself (`law=`, `--law`).
 """
 
 import hashlib
 import inspect
 import json
+import os
 import sysconfig
 import traceback
-from collections.abc import Callable
-from importlib import util
+from collections.abc import Callable, Mapping
+from importlib import import_module, util
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from airflock.core import Model, declarations
+from airflock.core import Model, declarations, model
 from airflock.support import (
     ParameterError,
     RuleError,
@@ -26,14 +27,51 @@ from airflock.support import (
     expand_path,
     is_file,
     shortened,
+    suggest,
     to_identifier,
 )
+
+MODELS = (
+    "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
+    "dimock_2003", "chen_2014", "couzin_2005",
+)  # fmt: skip
+
+
+def find_law(kind: Any, folder: Path | None = None, *, where: str = "model.kind", trust: bool = False) -> Model:
+    """Find a law by name, or in a user's own file (relative to the scenario file), which runs only with `trust`."""
+    if kind is None:
+        section, _, key = where.rpartition(".")
+        how = f'write a law under [{section}], for instance {key} = "{MODELS[0]}"'
+        others = f"known: {', '.join(MODELS)}, or a file that ends in .py"
+        raise ScenarioError([f'{where} is missing; {how}, or begin the file with extends = "PRESET"; {others}'])
+    if not isinstance(kind, str):
+        raise ScenarioError([f"{where} = {shortened(repr(kind), 80)} is not a name; known: {', '.join(MODELS)}"])
+    if kind in MODELS:
+        return model(import_module(f"airflock.parts.laws.{kind}"), kind)
+    if kind.endswith(".py"):
+        return build_from_file(model, where, kind, folder, trust=trust)
+    hint = suggest(kind, MODELS, f"known: {', '.join(MODELS)}, or a file that ends in .py", cutoff=0.4)
+    raise ScenarioError([f"{where} = {kind!r}: unknown model; {hint}"])
+
+
+def law_from_caller(law: Any) -> Model:
+    """Make the model of a law that the caller gives: giving it is consent to run it."""
+    if isinstance(law, Model):
+        return law
+    if isinstance(law, (str, os.PathLike)):
+        return find_law(str(law), where="law", trust=True)
+    if isinstance(law, Mapping) or hasattr(law, "__dict__"):
+        return model(law)
+    raise ScenarioError(
+        [f"law = {law!r} is not a law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"]
+    )
+
 
 T = TypeVar("T")
 
 
 def load_user_module(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
-    """Module of a Python file that a key names, beside the scenario file or else in the current folder.
+    """Import a Python file that a key names, beside the scenario file or else in the current folder.
 
     Raises what `import_user_file` raises.
     """
@@ -42,11 +80,11 @@ def load_user_module(key: str, name: str, folder: Path | None = None, *, trust: 
 
 
 def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
-    """Module of a Python file that a scenario or study names.
+    """Import a Python file that a scenario or study names.
 
-    told  : key and value that name it, for faults
-    trust : whether the caller consents to running it
-    Raises ScenarioError without consent or without the file, and RuleError for what its import raises.
+    where : key and value that name it, for errors
+    trust : True if the caller consents to running it
+    Raises ScenarioError without consent or without the file, and RuleError for exceptions of its import.
     """
     if not is_file(path):
         raise ScenarioError([f"{where}: no such file"])
@@ -60,15 +98,15 @@ def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
     module = util.module_from_spec(spec)
     try:  # the text as it is now: bytecode kept beside it may be of an earlier text, or of a stranger's
         exec(spec.loader.source_to_code(path.read_bytes(), str(path)), vars(module))
-    except (Exception, SystemExit, KeyboardInterrupt) as fault:  # the user's own file may fail in any way
-        lines = [frame.lineno for frame in traceback.extract_tb(fault.__traceback__) if frame.filename == str(path)]
+    except (Exception, SystemExit, KeyboardInterrupt) as error:  # the user's own file may fail in any way
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         place = f"{path}:{lines[-1]}" if lines else str(path)
-        raise RuleError(f"{place}: {shortened(describe_error(fault))}{_beside(path, fault)}") from fault
+        raise RuleError(f"{place}: {shortened(describe_error(error))}{_beside(path, error)}") from error
     return module
 
 
 def _beside(path: Path, fault: BaseException) -> str:
-    """What to do about a module that was not found, where it lies beside the file that asks for it."""
+    """Return a hint for a missing module that lies beside the file which imports it; "" for any other error."""
     wanted = str(fault.name).partition(".")[0] if isinstance(fault, ModuleNotFoundError) else ""
     if not wanted or not is_file(path.with_name(f"{wanted}.py")):
         return ""
@@ -78,7 +116,7 @@ def _beside(path: Path, fault: BaseException) -> str:
 def build_from_file(
     make: Callable[[ModuleType, str], T], key: str, name: str, folder: Path | None = None, *, trust: bool
 ) -> T:
-    """What is made of the module and the name of a user's own file; every fault names the file.
+    """Make an object from the module and the name of a user's own file; every error names the file.
 
     Raises what `import_user_file` and `make` raise.
     """
@@ -88,14 +126,14 @@ def build_from_file(
         if isinstance(record := getattr(module, "Parameters", None), type) and declarations(record):
             record()  # its defaults are checked by their own ranges
         return made
-    except (RuleError, ParameterError) as fault:
-        lines = str(fault).splitlines()
-        told = [line if Path(name).name in line else f"{name}: {line}" for line in lines]
-        raise type(fault)("\n".join(told)) from fault
+    except (RuleError, ParameterError) as error:
+        lines = str(error).splitlines()
+        named_lines = [line if Path(name).name in line else f"{name}: {line}" for line in lines]
+        raise type(error)("\n".join(named_lines)) from error
 
 
 def user_error_line(error: Exception) -> str:
-    """What code of the user's own raised, in a line with its place; empty if anything else raised it."""
+    """Return the line and place of an exception that the user's own code raised; "" if anything else raised it."""
     last = traceback.extract_tb(error.__traceback__)[-1]
     path = Path(last.filename).resolve()
     others = (
@@ -110,7 +148,7 @@ def user_error_line(error: Exception) -> str:
 
 
 def law_hash(law: Model) -> str:
-    """Hash of the text of a law's rules and of the functions of its own that they call."""
+    """Return a hash of the text of a law's rules and of the functions of its own that they call."""
     texts: dict[str, str] = {}
     left = [value for value in (*vars(law).values(), *law.decide_rules) if isinstance(value, FunctionType)]
     while left:

@@ -1,0 +1,328 @@
+"""The faults of a scenario: the entries of [[faults]], each checked as a whole, and their onsets in one flight.
+
+An onset is drawn before the flight, from seed, world and the number of its entry: when the fault begins, of which
+agent, and for how long.
+"""
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from airflock.core import ENTRY_KEYS, Fault, Parameters as Record, fault, quantity, random
+from airflock.parts.faults import KINDS
+from airflock.scenarios import schema
+from airflock.scenarios.groups import Group, read_members
+from airflock.scenarios.named_code import build_from_file
+from airflock.scenarios.units import convert_units
+from airflock.support import AirflockError, suggest
+
+if TYPE_CHECKING:
+    from airflock.scenarios.scenario import Scenario
+
+PERCEPTION = {"sense", "tell", "radio", "clock"}  # rules that disturb what agents know of each other
+MOST = 255  # entries of a file: each draws by a number of its own
+
+
+@dataclass(frozen=True, kw_only=True)
+class FaultTiming(Record):
+    """When a fault begins and ends, and how many it hits; beside the numbers of its kind."""
+
+    at: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it begins")
+    until: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it ends; after that no new one begins")
+    lasts: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="how long it lasts; by default until the end")
+    per_hour: float | None = quantity(
+        None, "1", low=0.0, high=1e6, meaning="how often per hour it hits the flock, at random times; give this or at"
+    )
+    number: float | None = quantity(
+        None,
+        "1",
+        low=1.0,
+        high=1e7,
+        meaning="how many agents it hits at once, drawn at random; by default all, or one with per_hour",
+    )
+
+
+@dataclass(frozen=True)
+class FaultEntry:
+    """One entry of [[faults]].
+
+    fault    : its kind; numbers : the kind's parameters
+    agents   : agents that it may affect; number : how many of them at once, drawn; None for all
+    at       : when it begins, s; None where it comes at random
+    per_hour : how often it hits the flock in an hour, at random
+    until, lasts : time at which it ends, and how long it lasts, s; inf without an end
+    """
+
+    fault: Fault
+    numbers: Any
+    agents: tuple[int, ...]
+    number: int | None
+    at: float | None
+    per_hour: float
+    until: float = math.inf
+    lasts: float = math.inf
+
+    def can_occur(self, duration: float) -> bool:
+        """Return True if the fault may occur in a flight of this duration, s."""
+        begin = 0.0 if self.at is None else self.at
+        due = self.per_hour > 0.0 if self.at is None else self.at < duration
+        return due and self.lasts > 0.0 and self.until > begin and bool(self.agents)
+
+
+def read_fault_entries(
+    tables: Any, agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None = None, *,
+    user_kinds: Mapping[str, Fault] | None = None, trust: bool = False,
+) -> tuple[tuple[FaultEntry, ...], list[str], list[str]]:  # fmt: skip
+    """Read the entries of [[faults]]; return them with notes on converted units and all errors, one line each.
+
+    user_kinds : kinds that the caller gives, by name
+    """
+    if not isinstance(tables, Sequence) or isinstance(tables, str) or not all(isinstance(e, Mapping) for e in tables):
+        return (), [], ["faults is not a list of tables; write [[faults]]"]
+    if len(tables) > MOST:
+        return (), [], [f"faults: {len(tables)} entries are more than {MOST}"]
+    entries: list[FaultEntry] = []
+    notes: list[str] = []
+    errors: list[str] = []
+    kinds = {**KINDS, **(user_kinds or {})}
+    for number, table in enumerate(tables):
+        entry, entry_notes, wrong = _entry(f"faults[{number}]", table, agents, groups, sequential, folder, kinds, trust)
+        notes += entry_notes
+        errors += wrong
+        entries += [entry] if entry and not wrong else []
+        if entry is not None:
+            if kinds.get(entry.fault.name, entry.fault) != entry.fault:
+                errors.append(f"faults[{number}].kind: {entry.fault.name} is the name of another kind already")
+            kinds[entry.fault.name] = entry.fault
+    return tuple(entries), notes, errors
+
+
+def _entry(
+    where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None,
+    kinds: Mapping[str, Fault], trust: bool,
+) -> tuple[FaultEntry | None, list[str], list[str]]:  # fmt: skip
+    kind, errors = _kind(where, table.get("kind"), folder, kinds, trust)
+    names = ("kind", "agents", "group")
+    timing = {key: value for key, value in table.items() if key in ENTRY_KEYS and key not in names}
+    when, notes, wrong = _record(where, timing, FaultTiming)
+    errors += wrong
+    numbers = None
+    if kind is not None:  # else nobody can judge its numbers
+        rest = {key: value for key, value in table.items() if key not in ENTRY_KEYS}
+        numbers, number_notes, wrong = _record(where, rest, kind.Parameters, ENTRY_KEYS)
+        notes, errors = notes + number_notes, errors + wrong
+    who, wrong = _who(where, table, agents, groups)
+    errors += wrong
+    if when is not None:
+        errors += _when_faults(where, when, agents if who is None else len(who))
+    if kind is None:
+        return None, notes, errors
+    if sequential and PERCEPTION & set(kind.rules):
+        errors.append(
+            f"{where}.kind = {kind.name!r} disturbs what agents know of each other; update = 'sequential' is for agents"
+            " that see each other as they are"
+        )
+    if when is None or numbers is None or who is None:
+        return None, notes, errors
+    errors += _end_faults(where, when, kind, numbers)
+    count = 1 if when.number is None and when.per_hour is not None else when.number
+    entry = FaultEntry(
+        kind, numbers, who, None if count is None else int(count), when.at, when.per_hour or 0.0,
+        math.inf if when.until is None else when.until, math.inf if when.lasts is None else when.lasts,
+    )  # fmt: skip
+    return entry, notes, errors
+
+
+def _record(
+    where: str, table: Mapping[str, Any], record: type, beside: Sequence[str] = ()
+) -> tuple[Any, list[str], list[str]]:
+    """Make a record from keys of an entry, in SI units; return it, or None, with notes and errors."""
+    document, notes, errors = convert_units({where: table}, {where: record})
+    result, wrong = schema.read_section(where, document[where], record, beside)
+    return (None if errors else result), notes, errors + wrong
+
+
+def _kind(
+    where: str, name: Any, folder: Path | None, kinds: Mapping[str, Fault], trust: bool
+) -> tuple[Fault | None, list[str]]:
+    """Find a kind by its name, or in a user's own file, which runs only with `trust`."""
+    if isinstance(name, str) and name in kinds:
+        return kinds[name], []
+    if isinstance(name, str) and name.endswith(".py"):
+        try:
+            return build_from_file(fault, f"{where}.kind", name, folder, trust=trust), []
+        except AirflockError as wrong:
+            return None, str(wrong).splitlines()
+    hint = suggest(name, kinds, f"known: {', '.join(kinds)}, or a file that ends in .py")
+    return None, [f"{where}.kind = {name!r}: unknown kind of fault; {hint}"]
+
+
+def _who(
+    where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group]
+) -> tuple[tuple[int, ...] | None, list[str]]:
+    """Return the agents that an entry may affect, or None, with the errors."""
+    if "agents" in table and "group" in table:
+        return None, [f"{where} names agents and a group; give one of them"]
+    if "agents" in table:
+        return read_members(f"{where}.agents", table["agents"], agents)
+    if "group" not in table:
+        return tuple(range(agents)), []
+    named = {group.name: group.agents for group in groups}
+    if table["group"] in named:
+        return named[table["group"]], []
+    known = f"known: {', '.join(named)}" if named else "the scenario has none; write [[groups]]"
+    return None, [f"{where}.group = {table['group']!r}: unknown group; {known}"]
+
+
+def _when_faults(where: str, when: FaultTiming, may: int) -> list[str]:
+    """Return the errors of times that are valid one by one; may : how many agents may be affected."""
+    errors = []
+    if (when.at is None) == (when.per_hour is None):
+        errors.append(f"{where}: give at, when it begins, or per_hour, how often it comes")
+    if when.until is not None and when.lasts is not None and when.at is not None:
+        errors.append(f"{where} says twice when it ends; give until or lasts")
+    if when.at is not None and when.until is not None and when.until <= when.at:
+        errors.append(f"{where}.until = {when.until:g} s is not after at = {when.at:g} s")
+    if when.number is not None and (when.number != int(when.number) or when.number > may):
+        errors.append(f"{where}.number = {when.number:g} is not a whole number up to {may}, the agents that it may hit")
+    return errors
+
+
+def _end_faults(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> list[str]:
+    """Return why a fault cannot end."""
+    errors = []
+    ends = when.lasts is not None or (when.at is not None and when.until is not None)
+    if ends and kind.time_to_absence(numbers) <= 0.0:
+        errors.append(
+            f"{where}: {kind.name} does not end, as an agent that drops out stays out; leave out until and lasts"
+        )
+    return errors
+
+
+ENDLESS = 1e9  # s; how long a fault lasts that does not end
+HOUR = 3600.0  # s
+
+
+class FaultOnset(NamedTuple):
+    """A fault of one agent that begins, or an agent that drops out.
+
+    step  : step before which it begins
+    kind  : of the fault; agent : the affected one
+    lasts : s; ENDLESS without an end
+    numbers : of the kind, by name
+    leaves  : the agent is absent from now on, by a fault that has begun earlier
+    entry   : number of its entry in [[faults]]; begin : step before which that fault begins
+    """
+
+    step: int
+    kind: str
+    agent: int
+    lasts: float
+    numbers: tuple[float, ...]
+    leaves: bool = False
+    entry: int = 0
+    begin: int = 0
+
+
+def draw_onsets(scenario: "Scenario", seed: int, world: int = 0) -> tuple[FaultOnset, ...]:
+    """Draw all fault onsets of a flight, in the order of their steps."""
+    onsets: list[FaultOnset] = []
+    for number, entry in enumerate(scenario.faults):
+        onsets += _onsets_of_entry(scenario, entry, number, seed, world)
+    return _in_order(onsets)
+
+
+def merge_onsets(
+    before: Sequence[FaultOnset], after: Sequence[FaultOnset], now: int, lasting: Collection[int]
+) -> tuple[FaultOnset, ...]:  # fmt: skip
+    """Merge the onsets of a flight with those of new entries that come into force before step `now`.
+
+    A fault that has begun goes on if the new entries name it as well, with their numbers, or if its entry stays. A
+    fault that the new entries would have begun earlier does not begin.
+
+    lasting : numbers of the entries before that stay as they are
+    """
+    named = {_which(onset): onset for onset in after}
+    begun = [named.get(_which(o), o) for o in before if o.begin < now and (_which(o) in named or o.entry in lasting)]
+    kept = {_which(onset)[:3] for onset in begun}
+    gone = [o for o in after if o.begin < now <= o.step and _which(o)[:3] in kept and o not in begun]
+    return _in_order([*begun, *gone, *(o for o in after if o.begin >= now)])
+
+
+def _in_order(found: Sequence[FaultOnset]) -> tuple[FaultOnset, ...]:
+    """Sort onsets by their steps; drop agents that leave by a fault which another of its kind has replaced."""
+    kept: list[FaultOnset] = []
+    last: dict[tuple[str, int], FaultOnset] = {}
+    for onset in sorted(found, key=lambda onset: onset.step):
+        other = last.get((onset.kind, onset.agent), onset)
+        if not onset.leaves:
+            last[onset.kind, onset.agent] = onset
+        elif other.step < onset.step and (other.step, other.entry) > (onset.begin, onset.entry):
+            continue
+        kept.append(onset)
+    return tuple(kept)
+
+
+def _which(onset: FaultOnset) -> tuple[str, int, int, bool]:
+    """Return the identity of a fault, whatever its numbers: kind, agent, step of its begin, and if the agent leaves."""
+    return onset.kind, onset.agent, onset.begin, onset.leaves
+
+
+def _onsets_of_entry(
+    scenario: "Scenario", entry: FaultEntry, number: int, seed: int, world: int
+) -> Iterator[FaultOnset]:
+    """Yield the onsets of one entry, whose number in [[faults]] selects its random numbers."""
+    dt, kind = scenario.flight.dt, entry.fault
+    numbers = tuple(float(getattr(entry.numbers, name)) for name in kind.fields)
+    for occurrence, at in enumerate(_occurrence_times(scenario, entry, number, seed, world)):
+        ends = min(entry.lasts, entry.until - at, ENDLESS)
+        lasts = ends if ends >= ENDLESS else round(ends / dt) * dt
+        if lasts <= 0.0:
+            continue
+        step = round(at / dt)
+        gone = kind.time_to_absence(entry.numbers)
+        for agent in _hit(entry, number, occurrence, seed, world):
+            yield FaultOnset(step, kind.name, agent, lasts, numbers, entry=number, begin=step)
+            if gone < lasts:
+                yield FaultOnset(step + round(gone / dt), kind.name, agent, lasts, numbers, True, number, step)
+
+
+def _occurrence_times(scenario: "Scenario", entry: FaultEntry, number: int, seed: int, world: int) -> Iterator[float]:
+    """Yield the times at which a fault begins, s: once, or with exponential waiting times."""
+    if entry.at is not None:
+        if entry.at < scenario.flight.duration:
+            yield entry.at
+        return
+    time, occurrence = 0.0, 0
+    while entry.per_hour > 0.0:
+        word = random.random_words(seed, random.FAULT, world, occurrence, number)[0]
+        time -= HOUR / entry.per_hour * math.log(random.uniform(word))
+        occurrence += 1
+        if time >= min(scenario.flight.duration, entry.until):
+            return
+        yield time
+
+
+def _hit(entry: FaultEntry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
+    """Return the agents that an occurrence affects: all that may be, or so many of them, drawn without replacement."""
+    may = entry.agents
+    if entry.number is None or entry.number >= len(may):
+        return list(may)
+    draw = {agent: random.random_words(seed, random.FAULT, world, occurrence, agent, 1 + number)[0] for agent in may}
+    return sorted(sorted(may, key=lambda agent: (draw[agent], agent))[: entry.number])
+
+
+def begun_faults(due: tuple[FaultOnset, ...], step: int, dt: float) -> list[dict[str, Any]]:
+    """Return the faults that began before a step, as dicts of kind, agent, begin and end (s; None without an end)."""
+    return [
+        {
+            "kind": onset.kind,
+            "agent": onset.agent,
+            "begin": onset.step * dt,
+            "end": None if onset.lasts >= ENDLESS else onset.step * dt + onset.lasts,
+        }
+        for onset in due
+        if onset.step < step and not onset.leaves
+    ]

@@ -1,0 +1,325 @@
+"""Build a scenario from the document of a file or a dict: check it as a whole and report all errors at once.
+
+The order of the work: settings are applied, parts are found, keys expanded and units converted; then each section is
+checked, then sections against each other, groups and faults; at last the notes are collected.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from airflock.core import Model
+from airflock.scenarios import formats, schema, short_keys
+from airflock.scenarios.fault_entries import read_fault_entries
+from airflock.scenarios.flight_world import scene_errors, scene_notes
+from airflock.scenarios.groups import GroupLawReader, group_errors, group_number_errors, read_groups
+from airflock.scenarios.named_code import MODELS
+from airflock.scenarios.part_kinds import (
+    METRIC_SET_KIND,
+    NO_CALLER_PARTS,
+    PART_KINDS,
+    TOPOLOGY_KIND,
+    CallerParts,
+    ScenarioParts,
+    collect_parts,
+)
+from airflock.scenarios.scenario import Scenario, default_separation
+from airflock.scenarios.scenario_checks import (
+    body_errors,
+    field_file_errors,
+    metric_errors,
+    sensor_errors,
+    silence_errors,
+    timing_errors,
+    topology_errors,
+    update_order_errors,
+    wing_errors,
+    world_errors,
+)
+from airflock.scenarios.scenario_notes import dubious_setting_notes, setting_notes
+from airflock.scenarios.sections import SECTIONS, Flight
+from airflock.scenarios.settings import (
+    TOP_LEVEL_KEYS,
+    apply_settings,
+    settings_dict,
+    with_fault_keys,
+    with_group_keys,
+    with_kinds,
+    with_vector_components,
+)
+from airflock.scenarios.units import convert_units
+from airflock.support import ParameterError, ScenarioError, is_file
+
+
+def build_scenario(
+    document: Mapping[str, Any],
+    where: str = "scenario",
+    settings: Mapping[str, Any] | None = None,
+    *,
+    folder: Path | None = None,
+    caller_parts: CallerParts = NO_CALLER_PARTS,
+    notes: tuple[str, ...] = (),
+    known_errors: tuple[str, ...] = (),
+    trust: bool = False,
+    started: bool = False,
+) -> Scenario:
+    """Build a scenario from a nested dict.
+
+    Parameters
+    ----------
+    where : name of the scenario, at the beginning of each error
+    folder : of the scenario file, where its files are looked for
+    caller_parts : rules that fly in place of those that the document names
+    notes, known_errors : notes and errors from the reading of the file
+    trust : True if code that the document names may run
+    started : True if the flight is in the air, so that its start is not checked
+
+    Raises
+    ------
+    ScenarioError
+        With all errors, one line each.
+    """
+    settings = settings_dict(settings, where)
+    document, settings, errors = with_group_keys(formats.to_current_format(document, where), settings)
+    document, settings, wrong = with_fault_keys(document, settings)
+    errors += wrong
+    short = {key: value for key, value in settings.items() if "." not in key and key not in TOP_LEVEL_KEYS}
+    document, left_out = with_kinds(document, settings)
+    whole, unknown = apply_settings(document, {key: value for key, value in settings.items() if key not in short})
+    flown, whole, more = collect_parts(whole, caller_parts, folder, trust=trust)
+    errors = [*known_errors, *unknown, *errors, *more]
+    records = ({"model": flown.law.Parameters} if flown.law else {}) | flown.records
+    whole, key_notes, more = _written_out(whole, settings, short, records)
+    errors += more
+    parts, more = _parts(whole, flown)
+    errors += more + _faults_between(parts, flown, started)
+    individuals, individual_notes, more = _individuals(whole, parts, flown, caller_parts, folder, trust)
+    published, wrong = _published(whole.get("published", {}))
+    errors += more + wrong
+    if errors or flown.law is None:
+        raise ScenarioError([f"{where}: {error}" for error in errors])
+    parts["scene"] = _beside(parts["scene"], folder)
+    scenario = Scenario(
+        name=where, model=flown.law, vehicle=flown.vehicle, sensor=flown.sensor, transceiver=flown.transceiver,
+        measures=flown.measures, own_topology=flown.own_topology, published=published,
+        document=whole, **parts, **individuals,
+    )  # fmt: skip
+    if errors := _derived_faults(scenario) or scene_errors(scenario, started):
+        raise ScenarioError([f"{where}: {error}" for error in errors])
+    notes = (
+        *notes,
+        *left_out,
+        *key_notes,
+        *individual_notes,
+        *setting_notes(scenario),
+        *dubious_setting_notes(scenario),
+        *scene_notes(scenario),
+    )
+    return replace(scenario, notes=notes)
+
+
+def _written_out(
+    document: dict[str, Any], settings: Mapping[str, Any], short: Mapping[str, Any], records: Mapping[str, type]
+) -> tuple[dict[str, Any], list[str], list[str]]:
+    """Expand last words to whole keys and vectors to components, convert to SI units; return notes and errors, too."""
+    named, notes, errors = short_keys.expand_short_keys(short, records, TOP_LEVEL_KEYS)
+    errors += [f"{key} is given twice, once by its last word" for key in named if key in settings]
+    document, more = with_vector_components(apply_settings(document, named)[0], records)
+    errors += more
+    document, converted, more = convert_units(document, {"": Flight, **records})
+    return document, [*notes, *converted], errors + more
+
+
+def _derived_faults(scenario: Scenario) -> list[str]:
+    """Return errors of numbers that follow from the scenario and lie outside their ranges."""
+    try:
+        scenario.resolved_metrics()
+    except ParameterError as error:
+        lines = [f"metrics.{line.partition('.')[2]}" for line in str(error).splitlines()]
+        return [f"{line}; it follows from the other keys unless it is given" for line in lines]
+    return []
+
+
+def _individuals(
+    document: Mapping[str, Any],
+    parts: Mapping[str, Any],
+    flown: ScenarioParts,
+    given: CallerParts,
+    folder: Path | None,
+    trust: bool,
+) -> tuple[dict[str, Any], list[str], list[str]]:
+    """Read the groups and faults of a scenario; return them with notes and errors."""
+    flight, law = parts["flight"], flown.law
+    if not {"groups", "faults"} & set(document) or flight is None:
+        return {}, [], []
+    records = {"body": flown.vehicle.Parameters, "sensors": flown.sensor.Parameters}
+    named = None
+    if law is not None:
+        records["model"] = law.Parameters
+    if law is not None and parts.get("parameters") is not None:
+        kind, world = document.get("model", {}).get("kind"), parts["world"]
+        walls = world is not None and (world.arena == "polygon" or bool(world.obstacles))
+        named = GroupLawReader(law, kind, parts["parameters"], given.laws, folder, trust, walls)
+    count = int(flight.agents)
+    flocks, notes, errors = read_groups(document.get("groups", ()), count, records, named)
+    errors += group_number_errors(flocks, law)
+    if law is not None and not errors:
+        errors += group_errors(flocks, parts, law, flown.vehicle, flown.sensor)
+    sequential = flight.update == "sequential"
+    entries, fault_notes, more = read_fault_entries(
+        document.get("faults", ()), count, flocks, sequential, folder, user_kinds=given.fault_kinds, trust=trust
+    )
+    return {"groups": flocks, "faults": entries}, notes + fault_notes, errors + more
+
+
+def _beside(scene: Any, folder: Path | None) -> Any:
+    """Return the scene; a mesh file that is not where its name says is looked for beside the scenario file."""
+    if scene.kind != "mesh" or folder is None or is_file(scene.file) or not is_file(folder / scene.file):
+        return scene
+    return replace(scene, file=str(folder / scene.file))
+
+
+def _parts(document: Mapping[str, Any], flown: ScenarioParts) -> tuple[dict[str, Any], list[str]]:
+    """Make the records of a scenario by section, None where one has an error; return them with all errors."""
+    parts: dict[str, Any] = {}
+    errors: list[str] = []
+    kinds = {family.section: family.records for family in PART_KINDS if family is not METRIC_SET_KIND}
+    for section, record in flown.records.items():
+        given = document.get(section, {})
+        if section in kinds and isinstance(given, Mapping) and not hasattr(record, "kind"):
+            given = {key: value for key, value in given.items() if key != "kind"}
+        parts[section], more = schema.read_section(section, given, record, kinds=kinds.get(section))
+        errors += more
+    top: dict[str, Any] = {key: document[key] for key in ("agents", "duration", "dt", "update") if key in document}
+    parts["flight"], more = schema.read_section("", top, Flight)
+    errors += more
+    table = document.get("model", {})
+    if flown.law is not None and isinstance(table, Mapping):
+        keys = {key: value for key, value in table.items() if key != "kind"}
+        parts["parameters"], more = schema.read_section("model", keys, flown.law.Parameters)
+        errors += more
+    return parts, errors
+
+
+def _faults_between(parts: Mapping[str, Any], flown: ScenarioParts, started: bool) -> list[str]:
+    """Return the errors of sections that are valid alone but do not fit each other."""
+    errors: list[str] = []
+    flight, law, world = parts["flight"], flown.law, parts["world"]
+    if flight is not None and flight.agents != int(flight.agents):
+        errors.append(f"agents = {flight.agents:g} is not a whole number")
+    begin: Any = parts["start"] or SECTIONS["start"]()
+    ours = parts["topology"] is not None and flown.own_topology is None
+    meets = TOPOLOGY_KIND.shipped[parts["topology"].kind] if ours else flown.own_topology
+    errors += topology_errors(meets, world, law)
+    errors += field_file_errors(world)
+    if world is not None:
+        separation = parts["start"].separation if parts["start"] is not None else 0.0
+        if separation is None and law is not None and parts.get("parameters") is not None:
+            separation = default_separation(law, parts["parameters"], begin, world)
+        count = int(flight.agents) if flight is not None else 1
+        errors += world_errors(world, count, separation or 0.0, begin, started=started)
+    if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
+        errors += timing_errors(flight, parts["sensors"].period, parts["metrics"])
+        errors += update_order_errors(flight, flown.sensor, parts["sensors"], flown.transceiver, parts["radio"])
+        errors += silence_errors(parts["silence"].rule, flight, law) if parts["silence"] is not None else []
+        errors += metric_errors(flown.measures, parts["metrics"], world)
+        errors += wing_errors(parts, law, flown.measures, started)
+    return errors + body_errors(flown.vehicle, parts, law, started) + sensor_errors(flown.sensor, parts)
+
+
+def _published(table: Any) -> tuple[dict[str, tuple[float, float | None]], list[str]]:
+    """Read a paper's numbers by name: mean, and standard deviation where it is given; return them with errors."""
+    if not isinstance(table, Mapping):
+        return {}, [f"published = {table!r} is not a table of order parameters"]
+    published: dict[str, tuple[float, float | None]] = {}
+    errors: list[str] = []
+    for key, entry in table.items():
+        if isinstance(entry, Mapping) and set(entry) <= {"mean", "sd"}:
+            numbers = [entry.get("mean"), *([entry["sd"]] if "sd" in entry else [])]
+        else:
+            numbers = list(entry) if isinstance(entry, (list, tuple)) else [entry]
+        if 1 <= len(numbers) <= 2 and all(map(_finite, numbers)):
+            published[key] = (float(numbers[0]), float(numbers[1]) if len(numbers) == 2 else None)
+        else:
+            errors.append(f"published.{key} = {entry!r}: give a number, [mean, sd], or {{ mean = ..., sd = ... }}")
+    return published, errors
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
+
+
+FIXED_KEYS = {"agents": "the number of agents", "dt": "the motion step"}  # keys at the top that a flight cannot change
+
+
+def rebuilt(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = False) -> Scenario:
+    """Return the scenario with keys changed, checked as a whole as if it came from a file.
+
+    Parts of the user's own (law, body, sensor, radio, topology and order parameters) stay as they are, unless their
+    kind is changed. The start is not checked again for a flight that has `started`.
+    Raises ScenarioError with one line per error.
+    """
+    document = {**scenario.document}
+    if scenario.scene.kind == "mesh":  # which was looked for beside the scenario file
+        document["scene"] = {**document.get("scene", {}), "file": scenario.scene.file}
+    shipped = document.get("model", {}).get("kind") in MODELS
+    if not shipped and scenario.is_aerodynamic:
+        raise ScenarioError(["aero: a law of one's own with drag descent cannot be changed in flight"])
+    own = {
+        each.field: getattr(scenario, each.field)
+        for each in PART_KINDS
+        if f"{each.section}.kind" not in settings
+        and document.get(each.section, {}).get("kind", "") not in ("", *each.shipped)
+    }
+    kinds = {entry.fault.name: entry.fault for entry in scenario.faults}
+    if "faults" not in settings and "faults" in document:
+        document["faults"] = named_fault_entries(scenario)
+    law = None if shipped or "model.kind" in settings else scenario.model
+    caller_parts = CallerParts(law=law, fault_kinds=kinds, laws=user_laws(scenario), **own)
+    return build_scenario(document, scenario.name, settings, caller_parts=caller_parts, started=started)
+
+
+def user_laws(scenario: Scenario) -> dict[str, Model]:
+    """Return the laws of groups that are not of the package, by their names in the document."""
+    given = zip(scenario.document.get("groups", ()), scenario.groups, strict=True)
+    kinds = {table.get("model", {}).get("kind"): group.law for table, group in given}
+    return {kind: law[0] for kind, law in kinds.items() if law is not None and kind is not None and kind not in MODELS}
+
+
+def named_fault_entries(scenario: Scenario) -> list[dict[str, Any]]:
+    """Return the entries of [[faults]], with kinds from files of the user's own by their names in the flight."""
+    given = scenario.document.get("faults", ())
+    return [{**entry, "kind": found.fault.name} for entry, found in zip(given, scenario.faults, strict=True)]
+
+
+def with_faults_starting(scenario: Scenario, count: int, at: float) -> Scenario:
+    """Return the scenario with its last `count` faults beginning at a time, s; itself where they do already."""
+    entries = named_fault_entries(scenario)
+    last = entries[len(entries) - count :]
+    if all(entry["at"] == at for entry in last):
+        return scenario
+    return rebuilt(
+        scenario, {"faults": [*entries[: len(entries) - count], *({**entry, "at": at} for entry in last)]}, started=True
+    )
+
+
+def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
+    """Return the scenario with keys like "model.p_rep" changed, for a flight in the air.
+
+    A flight can take all keys of a scenario file but the number of agents, the dimensions, the motion step and the
+    start. Raises ScenarioError with one line per error.
+    """
+    new = rebuilt(scenario, settings, started=True)
+    errors = [
+        f"{key} = {getattr(new.flight, key):g}: {what} cannot change in flight; open another flight"
+        for key, what in FIXED_KEYS.items()
+        if getattr(new.flight, key) != getattr(scenario.flight, key)
+    ]
+    if new.dimensions != scenario.dimensions:
+        errors.append(f"world.dimensions = {new.dimensions}: cannot change in flight; open another flight")
+    if new.start != scenario.start:
+        errors.append("start: the flight has started; open another flight")
+    if errors:
+        raise ScenarioError([f"{scenario.name}: {error}" for error in errors])
+    return new

@@ -1,0 +1,319 @@
+"""Settings: keys that a caller sets from outside, applied to a document before it is checked.
+
+A key is whole ("radio.delay"), or names a number of a group (`groups.NAME.SECTION.KEY`, a tolerance with `.spread`
+behind it) or of a fault (`faults.KIND.KEY` or `faults.NUMBER.KEY`). Keys by their last word: `short_keys`.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from airflock.core import Declaration, declarations, expand_vectors, without_replaced
+from airflock.scenarios.groups import LETTERS
+from airflock.scenarios.part_kinds import PART_KINDS
+from airflock.scenarios.schema import value_of
+from airflock.scenarios.sections import SECTIONS
+from airflock.support import ScenarioError, suggest, to_identifier
+
+TOP_LEVEL_KEYS = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
+
+
+def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """Return a document without the numbers of each part for which settings name another kind, and notes on it.
+
+    The published values of a law go with its numbers.
+    """
+    notes: list[str] = []
+    for family in PART_KINDS:
+        section = family.section
+        table, key = document.get(section, {}), f"{section}.kind"
+        if key not in settings or not isinstance(table, Mapping):
+            continue
+        kept = family.kept(table, str(settings[key]))
+        if set(table) - {"kind", *kept}:
+            notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {family.kind(document)} are left out")
+        document = {**document, section: kept}
+    law = document.get("model", {})
+    before = value_of(law.get("kind")) if isinstance(law, Mapping) else None
+    if "model.kind" in settings and before not in (None, settings["model.kind"]):
+        if set(law) - {"kind"}:
+            notes.append(f"model.kind = {settings['model.kind']!r}: the numbers of the file's {before} are left out")
+        document = {**document, "model": {}, "published": {}}
+    return document, tuple(notes)
+
+
+def settings_dict(settings: Any, where: str) -> dict[str, Any]:
+    """Return settings as a dict of plain values, empty for None. Raises ScenarioError for anything else."""
+    if settings is None:
+        return {}
+    if not isinstance(settings, Mapping) or not all(isinstance(key, str) for key in settings):
+        raise ScenarioError([f"{where}: settings {settings!r} are no keys with values, such as {{'dt': '10 ms'}}"])
+    return {key: _plain(value) for key, value in settings.items()}
+
+
+def _plain(value: Any) -> Any:
+    """Convert NumPy's types to Python's at any depth, as a file holds them: a recording stores settings as JSON."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    return type(value)(map(_plain, value)) if type(value) in (list, tuple) else value
+
+
+def apply_settings(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """Return a copy of a document with keys like "model.p_rep" set, and errors for unknown keys."""
+    result: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in document.items()}
+    errors: list[str] = []
+    for key, value in settings.items():
+        section, _, name = key.partition(".")
+        if name and not isinstance(result.setdefault(section, {}), dict):
+            errors.append(f"{key}: unknown key")
+        elif name:
+            result[section] = {**without_replaced(result[section], {name: value}), name: value}
+        else:
+            result[section] = value
+    return result, errors + [_unknown(key, value) for key, value in result.items() if key not in TOP_LEVEL_KEYS]
+
+
+def _unknown(key: str, value: object) -> str:
+    """Return the error line for a key that no scenario has, also where a key of the top stands in a section."""
+    above = next((name for name in value if name in TOP_LEVEL_KEYS), None) if isinstance(value, Mapping) else None
+    if above is not None:
+        return f"{key}.{above}: unknown key; did you mean {above}?"
+    return f"{key}: unknown key; {suggest(key, TOP_LEVEL_KEYS, 'known: ' + ', '.join(TOP_LEVEL_KEYS))}"
+
+
+def with_vector_components(document: dict[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str]]:
+    """Return a document in which each vector is its components, and the errors of vectors that are given whole."""
+    errors: list[str] = []
+    for section, record in records.items():
+        if isinstance(table := document.get(section), Mapping) and getattr(record, "VECTORS", None):
+            document[section], more = expand_vectors(section, table, record)
+            errors += more
+    return document, errors
+
+
+GROUP_PREFIX, SPREAD = "groups.", "spread"
+GROUP_FORM = "write groups.NAME.SECTION.KEY, for instance groups.heavy.body.tau"
+
+
+def is_group_key(key: str) -> bool:
+    """Return True if a key begins with `groups.`."""
+    return key.startswith(GROUP_PREFIX)
+
+
+def split_key(key: str) -> tuple[str, str, str]:
+    """Split a key of a group into group, section and name (with `.spread`); empty words where it is too short."""
+    rest = key.removeprefix(GROUP_PREFIX).rsplit(".", 3)
+    if len(rest) == 4 and rest[1] in LETTERS and rest[3] == SPREAD:
+        return rest[0], rest[1], f"{rest[2]}.{SPREAD}"
+    return (".".join(rest[:-2]), rest[-2], rest[-1]) if len(rest) > 2 else ("", "", "")
+
+
+def with_group_keys(
+    document: Mapping[str, Any], settings: Mapping[str, Any]
+) -> tuple[Mapping[str, Any], dict[str, Any], list[str]]:
+    """Set the keys of groups in a document; return it, the other settings, and the errors of these keys."""
+    group_settings = {key: value for key, value in settings.items() if is_group_key(key)}
+    others = {key: value for key, value in settings.items() if key not in group_settings}
+    entries = others.get("groups", document.get("groups", ()))
+    if (
+        not group_settings
+        or not entries
+        or not isinstance(entries, (list, tuple))
+        or not all(isinstance(table, Mapping) for table in entries)
+    ):
+        return (
+            document,
+            others,
+            [f"{key}: the scenario has no [[groups]]; write them in a file" for key in group_settings],
+        )
+    tables = [dict(table) for table in entries]
+    names = [table.get("name", f"group_{number}") for number, table in enumerate(tables)]
+    errors = []
+    for key, value in group_settings.items():
+        group, section, name = split_key(key)
+        if section not in LETTERS and _belongs_to_file(key, names):
+            errors.append(
+                f"{key}: a setting changes only {', '.join(LETTERS)} of a group; write it in the file's [[groups]]"
+            )
+        elif section not in LETTERS or not name:
+            hint = _group_key_hint(key, document, dict(zip(map(str, names), tables, strict=True)))
+            errors.append(f"{key}: unknown key; {hint}")
+        elif group not in names:
+            hint = suggest(group, [str(known) for known in names], f"known: {', '.join(map(str, names))}")
+            errors.append(f"{key}: unknown group {group!r}; {hint}")
+        else:
+            table = tables[names.index(group)]
+            own, (name, _, spread) = table.get(section, {}), name.partition(".")
+            if isinstance(own, Mapping):
+                before = own.get(name)
+                table[section] = {
+                    **own,
+                    name: _with_spread(before, value) if spread else with_old_spread(before, value),
+                }
+    return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, errors
+
+
+def _belongs_to_file(key: str, names: list[str]) -> bool:
+    """Return True if a key is a group's name or its agents, which only the file may set."""
+    group, _, word = key.removeprefix(GROUP_PREFIX).rpartition(".")
+    return word in ("name", "agents") and group in names
+
+
+def _group_key_hint(key: str, document: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return what to write instead of a key without a section: the nearest group, and the word at the end of the key.
+
+    Known are the words that the file writes for the flock or for the group; for any other word the section stays open.
+    """
+    rest, _, word = key.removeprefix(GROUP_PREFIX).rpartition(".")
+    group = next(iter(get_close_matches(rest, list(tables), n=1, cutoff=0.5)), "")
+    sections = f"sections: {', '.join(LETTERS)}"
+    if not rest or not group:
+        return f"{GROUP_FORM}; {sections}"
+    places: dict[str, str] = {}
+    for section in LETTERS:
+        for table in (document.get(section), tables[group].get(section)):
+            places |= {name: section for name in table} if isinstance(table, Mapping) else {}
+    near = next(iter(get_close_matches(word, list(places), n=1)), "")
+    if not near:
+        return f"did you mean {GROUP_PREFIX}{group}.SECTION.{word}; {sections}"
+    return f"did you mean {GROUP_PREFIX}{group}.{places[near]}.{near}?"
+
+
+def with_old_spread(before: Any, value: Any) -> Any:
+    """Return a value with the spread that the number had before, which keeps its unit."""
+    if not isinstance(before, Mapping) or "spread" not in before or isinstance(value, Mapping):
+        return value
+    unit = {"unit": before["unit"]} if "unit" in before else {}
+    return {"value": {"value": value} if unit else value, "spread": before["spread"], **unit}
+
+
+def _with_spread(before: Any, spread: Any) -> dict[str, Any]:
+    """Return a group's number with another spread; the value keeps its unit."""
+    if not isinstance(before, Mapping):
+        return {"spread": spread} if before is None else {"value": before, "spread": spread}
+    if "value" not in before:
+        return {"spread": spread}
+    value = {"value": before["value"], "unit": before["unit"]} if "unit" in before else before["value"]
+    return {"value": value, "spread": spread}
+
+
+def group_declarations(scenario: Any) -> Iterator[tuple[str, Declaration, Any]]:
+    """Yield key, declaration and value of the groups' own numbers; all numbers of a law that only groups fly by."""
+    for group in scenario.groups:
+        for section, letter in LETTERS.items():
+            law = group.law if section == "model" else None
+            record = law[1] if law else scenario.records[section]
+            for name, declared, _ in declarations(record):
+                if law or (letter, name) in group.numbers or (letter, name) in group.spread:
+                    value = group.numbers.get((letter, name), getattr(record, name))
+                    yield f"{GROUP_PREFIX}{group.name}.{section}.{name}", declared, value
+
+
+def group_key_value(scenario: Any, key: str) -> Any:
+    """Return the value of a key of a group; that of the flock where the group has none of its own."""
+    group, section, name = split_key(key)
+    owner = next(each for each in scenario.groups if each.name == group)
+    record = owner.law[1] if owner.law and section == "model" else scenario.records[section]
+    return owner.numbers.get((LETTERS[section], name), getattr(record, name))
+
+
+FAULT_PREFIX = "faults."
+FAULT_FORM = "write faults.KIND.KEY or faults.NUMBER.KEY, for instance faults.motor.share"
+
+
+def with_fault_keys(
+    document: Mapping[str, Any], settings: Mapping[str, Any]
+) -> tuple[Mapping[str, Any], dict[str, Any], list[str]]:
+    """Set the keys of faults in a document; return it, the other settings, and the errors of these keys."""
+    fault_settings = {key: value for key, value in settings.items() if key.startswith(FAULT_PREFIX)}
+    others = {key: value for key, value in settings.items() if key not in fault_settings}
+    if not fault_settings:
+        return document, others, []
+    entries = others.get("faults", document.get("faults", ()))
+    if (
+        not entries
+        or not isinstance(entries, (list, tuple))
+        or not all(isinstance(table, Mapping) for table in entries)
+    ):
+        return (
+            document,
+            others,
+            [f"{key}: the scenario has no [[faults]]; write them in a file" for key in fault_settings],
+        )
+    tables = [dict(table) for table in entries]
+    errors = []
+    for key, value in fault_settings.items():
+        entry, _, name = key.removeprefix(FAULT_PREFIX).rpartition(".")
+        number, error = _find_entry(entry, name, tables)
+        if number is None:
+            errors.append(f"{key}: {error}")
+        elif value is None:  # as it is without
+            tables[number].pop(name, None)
+        else:
+            tables[number][name] = value
+    return {**document, "faults": tables}, {key: v for key, v in others.items() if key != "faults"}, errors
+
+
+def is_fault_key(key: str) -> bool:
+    """Return True if a key begins with `faults.`."""
+    return key.startswith(FAULT_PREFIX)
+
+
+def entry_of_key(tables: Sequence[Mapping[str, Any]], key: str) -> tuple[int | None, str]:
+    """Return the number of the entry that a key means, None where there is none, and the name behind it."""
+    entry, _, name = key.removeprefix(FAULT_PREFIX).rpartition(".")
+    return _find_entry(entry, name, tables)[0], name
+
+
+def fault_declarations(entries: Sequence[Any]) -> Iterator[tuple[str, str, Declaration, Any]]:
+    """Yield key, kind, declaration and value of the numbers of each fault.
+
+    Keys count the entries: a kind may occur again while a flock flies.
+    """
+    for number, entry in enumerate(entries):
+        for name, declared, _ in declarations(entry.numbers):
+            yield f"{FAULT_PREFIX}{number}.{name}", entry.fault.name, declared, getattr(entry.numbers, name)
+
+
+def has_fault(scenario: Any, key: str) -> bool:
+    """Return True if a scenario has the fault that a key names."""
+    return entry_of_key(_kind_tables(scenario), key)[0] is not None
+
+
+def fault_key_value(scenario: Any, key: str) -> Any:
+    """Return the value of a key of a fault; None where there is no such fault, or its begin or end is left open."""
+    number, name = entry_of_key(_kind_tables(scenario), key)
+    if number is None:
+        return None
+    written = scenario.document["faults"][number].get(name)
+    return getattr(scenario.faults[number].numbers, name, written)
+
+
+def _kind_tables(scenario: Any) -> list[dict[str, str]]:
+    return [{"kind": entry.fault.name} for entry in scenario.faults]
+
+
+def _find_entry(entry: str, name: str, tables: Sequence[Mapping[str, Any]]) -> tuple[int | None, str]:
+    """Return the number of the entry that a key names by its kind or number; or None, and the error."""
+    if not entry or not name:
+        return None, f"unknown key; {FAULT_FORM}"
+    if entry.isascii() and entry.isdecimal():
+        if int(entry) < len(tables):
+            return int(entry), ""
+        return None, f"there is no fault {entry[:20]}; the scenario has the faults 0 to {len(tables) - 1}"
+    kinds = [_kind_name(value_of(table.get("kind"))) for table in tables]
+    numbers = [number for number, kind in enumerate(kinds) if kind == entry]
+    if len(numbers) == 1:
+        return numbers[0], ""
+    if numbers:
+        several = ", ".join(f"{FAULT_PREFIX}{number}.{name}" for number in numbers[:3])
+        return None, f"{len(numbers)} faults are of this kind; write one of {several}"
+    return None, f"the scenario has no fault {entry!r}; {suggest(entry, kinds, 'known: ' + ', '.join(kinds))}"
+
+
+def _kind_name(kind: Any) -> str:
+    """Return the name of a kind in a key: that of a file is the file's name."""
+    return to_identifier(Path(kind).stem) if isinstance(kind, str) and kind.endswith(".py") else str(kind)
