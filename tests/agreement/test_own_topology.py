@@ -9,8 +9,6 @@ import pytest
 import airflock
 from airflock.engine import fly_world, plan_of
 from airflock.fleets.card_document import make_card_document
-from airflock.recordings.files import replay_recording
-from airflock.fleets.prepare import make_card_document
 from airflock.recordings.recording_files import replay_recording
 from airflock.scenarios.files import load
 from airflock.support.errors import AirflockError, CardError, RecordingError, RuleError, ScenarioError

@@ -22,9 +22,6 @@ import xarray as xr
 
 import airflock
 from airflock.estimate.inference.law_inference import LAWS, InferResult, ends_text
-from airflock.scenarios.making import build_scenario
-from airflock.estimate.inference.result import InferResult, ends_text
-from airflock.estimate.inference.run import LAWS
 from airflock.scenarios.scenario_builder import build_scenario
 
 NOISE, MISSING = 0.02, 0.02

@@ -390,10 +390,8 @@ def commanded(words, folder, tell=False):
 @cache
 def no_flights():
     """Whatever would compile or fly in this process ends there."""
-    from airflock.displays import show
-    from airflock.fleets.lockstep import LockstepFleet
     from airflock.displays import shows as show
-    from airflock.fleets import lockstep
+    from airflock.fleets.lockstep import LockstepFleet
     from inside import drivers, interpreted, measuring, simulate, store
 
     def flown(*_, **__):

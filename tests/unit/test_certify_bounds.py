@@ -19,8 +19,6 @@ from airflock.certificates.bounds import (
 )
 from airflock.certificates.hazard import event_timing
 from airflock.recordings.rare_events import upper_probability_bound
-from airflock.scenarios.change import rebuilt
-from airflock.recordings.rare import upper_probability_bound
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import rebuilt
 from airflock.search.study import load_study
