@@ -16,8 +16,9 @@ from airflock.cli.main import app
 PACKAGES = {"plots", "measures"}
 CLASSES = {"AirflockError", "Scenario", "Flight", "Parameters"}
 HOMES = {
-    "evolve": "airflock.search.run", "certify": "airflock.certificates.run", "display": "airflock.displays.displays",
-    "tune": "airflock.search.tune.run", "identify": "airflock.estimate.identification.run",
+    "evolve": "airflock.search.evolution", "certify": "airflock.certificates.certification",
+    "display": "airflock.displays.displays",
+    "tune": "airflock.search.tuning_run", "identify": "airflock.estimate.identification.run",
     "infer": "airflock.estimate.inference.run",
     "body": "airflock.core.contract", "fleet": "airflock.fleets.flying",
 }  # fmt: skip

@@ -12,7 +12,7 @@ import several_terms
 from airflock.core.parameters import declarations, number_names
 from airflock.engine import driver_text, fly_world
 from airflock.engine.text.generate import DriverSource
-from airflock.runs.space import full_space
+from airflock.runs.search_space import full_space
 from airflock.scenarios.families import CallerParts
 from airflock.scenarios.making import build_scenario
 from airflock.studio.controls import scenario_controls
