@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from splitting import counted
 
-from airflock.certificates.bounds import look_schedule, take_look
+from airflock.certificates.limits import look_schedule, take_look
 
 REPETITIONS, ALPHA, ONCE, MOST = 200, 0.05, 4000, 100.0  # MOST events expected in a repetition
 

@@ -10,11 +10,11 @@ import time
 from pathlib import Path
 
 from airflock.engine import score_flight, score_flights
-from airflock.runs.executors.in_process import ThreadExecutor
-from airflock.runs.space import with_parameters
-from airflock.runs.store import CandidateBatch, FlightStore
-from airflock.search.run import study_executor
-from airflock.search.search import run_search
+from airflock.runs.executors import ThreadExecutor
+from airflock.runs.flight_store import CandidateBatch, FlightStore
+from airflock.runs.search_space import with_parameters
+from airflock.search.evolution import study_executor
+from airflock.search.generations import run_search
 from airflock.search.study import load_study
 
 NAME = "vasarhelyi_2018/6ms"

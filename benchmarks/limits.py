@@ -18,10 +18,9 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 import airflock
-from airflock.certificates.chance import reliability_index, reliability_indices
-from airflock.certificates.limit import parse_limit
-from airflock.search.cmaes import CMAES
-from airflock.search.safe import allowed_probability, rank_by_excess
+from airflock.certificates.limits import parse_limit, reliability_index, reliability_indices
+from airflock.search.limit_excess import allowed_probability, rank_by_excess
+from airflock.search.optimisers import CMAES
 
 AXES, SD, GENERATIONS, POPULATION, FLIGHTS = 11, 1.5, 300, 24, 2
 SCENARIO = airflock.load("vasarhelyi_2018/6ms")

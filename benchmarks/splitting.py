@@ -17,10 +17,15 @@ import numpy as np
 from scipy.stats import beta
 
 from airflock import __version__
-from airflock.certificates.branches import REPETITIONS, record_falls, sample_period, start_repetition
 from airflock.certificates.counting import COUNT_BATCH
-from airflock.certificates.splitting import estimate_probability
-from airflock.runs.store import FlightStore
+from airflock.certificates.splitting import (
+    REPETITIONS,
+    estimate_probability,
+    record_falls,
+    sample_period,
+    start_repetition,
+)
+from airflock.runs.flight_store import FlightStore
 from airflock.scenarios.files import load
 from airflock.support import atomic
 

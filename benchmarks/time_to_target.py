@@ -24,17 +24,17 @@ from surrogate import LqCMAES
 
 from airflock import __version__
 from airflock.engine import score_flight, score_flights
+from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import open_folder
-from airflock.runs.space import with_parameters
-from airflock.runs.store import CandidateBatch, FlightStore
+from airflock.runs.search_space import with_parameters
 from airflock.scenarios.files import load
-from airflock.search import search
-from airflock.search.intervals import mean_interval
+from airflock.search import generations
+from airflock.search.evolution import run_study, study_executor
+from airflock.search.generations import averaged_means
 from airflock.search.optimisers import make_optimiser
-from airflock.search.run import run_study, study_executor
-from airflock.search.search import averaged_means
-from airflock.search.search_table import FAST
+from airflock.search.search_settings import FAST
 from airflock.search.study import load_study
+from airflock.search.study_result import mean_interval
 from airflock.support import atomic
 
 NAME, FULL, COARSE = "vasarhelyi_2018/6ms", "vasarhelyi_2018/evolved_6ms", {"dt": 0.05, "metrics.period": 1.0}
@@ -84,7 +84,7 @@ def searched(what, seed, folder):
     shutil.rmtree(folder, ignore_errors=True)  # of one that was cut off: its processor time is not known
     study = study_of(what, seed)
     executor = study_executor(study, threads=1)
-    search.make_optimiser = lq_optimiser if "lq" in what else make_optimiser
+    generations.make_optimiser = lq_optimiser if "lq" in what else make_optimiser
     score_flight(study.scenario, 0)
     open_folder(folder, study, resume=False)
     begin = time.process_time()

@@ -17,10 +17,10 @@ import numpy as np
 
 from airflock.engine import score_flights
 from airflock.runs.folder import open_folder
-from airflock.runs.space import with_parameters
-from airflock.search.intervals import mean_interval
-from airflock.search.run import run_study, study_executor
+from airflock.runs.search_space import with_parameters
+from airflock.search.evolution import run_study, study_executor
 from airflock.search.study import load_study
+from airflock.search.study_result import mean_interval
 from airflock.support import atomic
 
 NAME, DELAYS = "vasarhelyi_2018/two_delays", (0.4, 1.0)

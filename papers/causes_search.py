@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from airflock.search.genetic import BinaryGenetic, decode, minimise_over_bits
+from airflock.search.optimisers import BinaryGenetic, decode, minimise_over_bits
 from airflock_papers.breaks import in_words
 from airflock_papers.dimock_2003.flights import Birds, Start, Task, holds_vee, in_row, spacing
 from airflock_papers.dimock_2003.ga import (

@@ -49,7 +49,7 @@ def gpu():
 @pytest.fixture
 def undrawn(monkeypatch):
     """Studies end without their pictures, which take longer than all the rest; tests/unit/test_studies.py has them."""
-    monkeypatch.setattr(import_module("airflock.search.run"), "draw", lambda *_: [])
+    monkeypatch.setattr(import_module("airflock.search.evolution"), "draw_study", lambda *_: [])
 
 
 @pytest.fixture

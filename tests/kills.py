@@ -21,11 +21,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import toys
-from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.executors import ThreadExecutor
+from airflock.runs.flight_store import FILE, FlightStore
 from airflock.runs.folder import STUDY_FILE, open_folder, program_versions, remove_unfinished
-from airflock.runs.store import FILE, FlightStore
-from airflock.search.search import run_search
-from airflock.search.winner import conclude_study
+from airflock.search.finals import conclude_study
+from airflock.search.generations import run_search
 from airflock.support import atomic
 
 RUN, NAMED = program_versions(), ("result.toml", "best.toml", "study.toml")
@@ -62,8 +62,8 @@ def rows(folder):
 def certify(folder):
     """A campaign of toy flights, so many in all, and its certificate."""
     from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
-    from airflock.certificates.limit import parse_limits
-    from airflock.certificates.run import run_campaign
+    from airflock.certificates.certification import run_campaign
+    from airflock.certificates.limits import parse_limits
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_6ms")
@@ -93,10 +93,10 @@ def tune(folder):
 
     from airflock.scenarios.scenario_builder import build_scenario
 
-    tuning = import_module("airflock.search.tune.run")
+    tuning = import_module("airflock.search.tuning_run")
     tuning.rate_of = lambda *_: 300.0
-    import_module("airflock.search.run").draw = lambda *_: None
-    import_module("airflock.search.tune.report").save = lambda found: atomic.write_file(
+    import_module("airflock.search.evolution").draw_study = lambda *_: None
+    import_module("airflock.search.tune_report").save = lambda found: atomic.write_file(
         found.folder / "report.html", repr(found)
     )
     # the limit is shown after its first looks, whatever the time
@@ -269,8 +269,8 @@ def under_deaths(what, folder, kills, seed, life):
 
 def workers(folder, kills, seed):
     """Kill workers of dask under studies until so many have died."""
-    from airflock.runs.executors.cluster import DaskCluster
-    from airflock.search.run import run_study
+    from airflock.runs.dask_cluster import DaskCluster
+    from airflock.search.evolution import run_study
 
     best, space = dict(toys.BEST), toys.SPACE
 
@@ -315,11 +315,10 @@ def sweeps(folder, kills, seed):
 
 def certificates(folder, kills, seed):
     """Kill workers of dask under campaigns of real flights until so many have died."""
-    from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
-    from airflock.certificates.flights import CampaignTask
-    from airflock.certificates.limit import parse_limits
-    from airflock.certificates.run import run_campaign
-    from airflock.runs.executors.cluster import DaskCluster
+    from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign, CampaignTask
+    from airflock.certificates.certification import run_campaign
+    from airflock.certificates.limits import parse_limits
+    from airflock.runs.dask_cluster import DaskCluster
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_4ms", {"agents": 10, "duration": 300.0})

@@ -34,7 +34,7 @@ _MOVED = {
     "sensors": "parts.sensors",
     "stage": "view.stage",
     "topology": "parts.topologies",
-    "tune": "search.tune",
+    "tune": "search",
     **dict.fromkeys(
         ("asked", "atomic", "cache", "errors", "gpu", "hardware", "locks", "machine", "memory", "numeric", "spelling"),
         "support",

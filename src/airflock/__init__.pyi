@@ -1,5 +1,5 @@
 # What a type checker, an editor and `lazy_loader` read: each public name stands here once.
-from .certificates.run import certify as certify
+from .certificates.certification import certify as certify
 from .check.bodies import check_body as check_body
 from .check.metrics import check_metric as check_metric
 from .check.models import check_model as check_model
@@ -51,10 +51,9 @@ from .scenarios.files import (
 from .scenarios.keys import keys as keys
 from .scenarios.scaling import starting_set as starting_set
 from .scenarios.scenario import Scenario as Scenario
-from .search.harden import harden as harden
-from .search.run import evolve as evolve
-from .search.tune.run import tune as tune
-from .search.validation import validate as validate
+from .search.evolution import evolve as evolve, validate as validate
+from .search.hardening import harden as harden
+from .search.tuning_run import tune as tune
 from .studio.watch import watch as watch
 from .support.errors import AirflockError as AirflockError
 from .view import plots as plots

@@ -10,19 +10,22 @@ import warnings
 import pytest
 
 import toys
-from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
-from airflock.certificates.flights import CampaignTask, limit_score_function, with_distance_metrics
-from airflock.certificates.limit import parse_limits
-from airflock.certificates.run import run_campaign as certified
-from airflock.runs.executors import Flight, cluster as executors_cluster
-from airflock.runs.executors.cluster import DaskCluster
-from airflock.runs.executors.in_process import ThreadExecutor
-from airflock.runs.executors.scores import score_scenarios
+from airflock.certificates.campaign import (
+    CAMPAIGN_KIND,
+    Campaign,
+    CampaignTask,
+    limit_score_function,
+    with_distance_metrics,
+)
+from airflock.certificates.certification import run_campaign as certified
+from airflock.certificates.limits import parse_limits
+from airflock.runs import dask_cluster as executors_cluster
+from airflock.runs.dask_cluster import DaskCluster
+from airflock.runs.executors import Flight, ThreadExecutor, score_scenarios
+from airflock.runs.flight_store import FlightStore
 from airflock.runs.folder import open_folder
-from airflock.runs.store import FlightStore
 from airflock.scenarios.files import load
-from airflock.search.run import run_study
-from airflock.search.task import study_tasks
+from airflock.search.evolution import run_study, study_tasks
 from airflock.support.errors import FlightError, StudyError
 from needed import needed
 
@@ -155,7 +158,7 @@ def test_workers_with_different_processors_are_named(cluster, monkeypatch):
 
 def test_a_task_flies_the_same_flight_as_this_process():
     from airflock.engine import score_flight
-    from airflock.runs.space import with_parameters
+    from airflock.runs.search_space import with_parameters
     from airflock.search.study import load_study
 
     study = load_study("vasarhelyi_2018/4ms", settings={"duration": 2.0, "agents": 10})
@@ -220,7 +223,7 @@ def test_a_flight_that_goes_wrong_on_a_worker_is_one_line(cluster, monkeypatch):
             (None, f"seed {seed}: agent 0 left the finite numbers", 0.0, "worker") if seed == 3 else ({}, "", 0.0, "")
         )
 
-    monkeypatch.setattr("airflock.runs.executors.cluster.ScenarioTask", lambda scenario, precision: task)
+    monkeypatch.setattr("airflock.runs.dask_cluster.ScenarioTask", lambda scenario, precision: task)
     with pytest.raises(FlightError, match="^seed 3: agent 0 left the finite numbers$"):
         score_scenarios([load("vicsek_1995/ordered")] * 5, range(5), scheduler=cluster.scheduler_address)
 

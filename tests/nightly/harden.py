@@ -31,6 +31,10 @@ from airflock.search.held import SAFETY, SLACK
 from airflock.search.intervals import mean_interval
 from airflock.search.steps import ScoreColumns, fly_parameters
 from airflock.search.tune.start import prepare_start
+from airflock.search.hardening import COST, SAFETY, SLACK, harden
+from airflock.search.hardening_steps import ScoreColumns, fly_parameters
+from airflock.search.study_result import mean_interval
+from airflock.search.tuning_run import prepare_start
 from airflock.support import atomic
 from airflock.support.errors import ScenarioError, StudyError
 

@@ -183,7 +183,7 @@ def _certificate(target):
 
 def _store(target):
     from airflock.runs.executors import Flight, FlightResult
-    from airflock.runs.store import CandidateBatch, FlightStore
+    from airflock.runs.flight_store import CandidateBatch, FlightStore
 
     target.mkdir()
     with FlightStore(target) as store:
@@ -207,8 +207,8 @@ def stored():
 
 def _evaluations(target):
     """Tables of all flights of a study."""
-    from airflock.runs.store import FlightStore
-    from airflock.search.tables import export
+    from airflock.runs.flight_store import FlightStore
+    from airflock.search.study_result import export
 
     with FlightStore(stored(), write=False) as store:
         export(store, target.parent)

@@ -58,7 +58,7 @@ def certificate():
     """A certificate of a few flights."""
     import tempfile
 
-    from airflock.certificates.run import certify
+    from airflock.certificates.certification import certify
     from airflock.scenarios.files import load
 
     with tempfile.TemporaryDirectory() as folder:
@@ -252,7 +252,7 @@ def _check_certificate(path):
     def flown(*_, **__):
         raise mutations.Flown
 
-    check = import_module("airflock.certificates.check")
+    check = import_module("airflock.certificates.certificate")
     check._flown_again = flown
     check.check(path)
 
@@ -289,13 +289,13 @@ def _memory(path):
 
 
 def _plan(path):
-    from airflock.search.tune.folder import read_plan
+    from airflock.search.tune_stages import read_plan
 
     read_plan(path)
 
 
 def _hardening(path):
-    from airflock.search.tune.folder import read_steps
+    from airflock.search.tune_stages import read_steps
 
     read_steps(path)
 

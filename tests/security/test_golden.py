@@ -7,8 +7,7 @@ import pytest
 from mutations import GOLDEN
 
 import airflock
-from airflock.certificates.certificate import certificate_checksum
-from airflock.certificates.check import check_certificate
+from airflock.certificates.certificate import certificate_checksum, check_certificate
 from airflock.drones.onboard.card import read_card
 from airflock.recordings.recording_files import replay_recording
 from airflock.search.study import load_study

@@ -133,7 +133,7 @@ def python(text):
 
 NAMES = {
     "airflock": airflock, "load_study": load_study, "Path": Path, "read_card": read_card,
-    "hardened": import_module("airflock.search.tune.stages").run_hardening_stage,
+    "hardened": import_module("airflock.search.tune_stages").run_hardening_stage,
 }  # fmt: skip
 CONSENT = "would run the code in "
 WAYS = {

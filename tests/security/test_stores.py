@@ -5,8 +5,8 @@ import math
 import pytest
 
 from airflock.runs.executors import Flight, FlightResult
-from airflock.runs.store import FILE, CandidateBatch, FlightStore
-from airflock.search import tables
+from airflock.runs.flight_store import FILE, CandidateBatch, FlightStore
+from airflock.search import study_result as tables
 from airflock.support.errors import StudyError
 
 BATCH = CandidateBatch("search", 0, 0)

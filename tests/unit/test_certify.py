@@ -9,22 +9,25 @@ import pytest
 import tomlkit
 from typer.testing import CliRunner
 
-from airflock.certificates.bounds import rate_per_hour, take_look
-from airflock.certificates.campaign import CAMPAIGN_KIND, Campaign
-from airflock.certificates.certificate import NOT_SAID, scores_digest, with_checksum
-from airflock.certificates.check import check_certificate
-from airflock.certificates.environment import check_environment_keys, used_and_unused_keys
-from airflock.certificates.flyer import CampaignFlyer
-from airflock.certificates.limit import parse_limit, parse_limits
-from airflock.certificates.run import certify, run_campaign
-from airflock.certificates.seeds import COUNT_PURPOSE, certificate_seed, scenario_identity
+from airflock.certificates.campaign import (
+    CAMPAIGN_KIND,
+    COUNT_PURPOSE,
+    Campaign,
+    certificate_seed,
+    check_environment_keys,
+    scenario_identity,
+    used_and_unused_keys,
+)
+from airflock.certificates.certificate import NOT_SAID, check_certificate, scores_digest, with_checksum
+from airflock.certificates.certification import certify, run_campaign
+from airflock.certificates.counting import CampaignFlyer
+from airflock.certificates.limits import parse_limit, parse_limits, rate_per_hour, take_look
 from airflock.certificates.tolerance import ValueScreen, value_batch
 from airflock.cli.main import app
 from airflock.engine import score_flights
-from airflock.runs.executors import FlightResult
-from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.executors import FlightResult, ThreadExecutor
 from airflock.runs.folder import Interrupted, open_folder
-from airflock.runs.space import with_parameters
+from airflock.runs.search_space import with_parameters
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.support.errors import AirflockError, ScenarioError, StudyError

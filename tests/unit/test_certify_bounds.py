@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.stats import binomtest
 
-from airflock.certificates import seeds
-from airflock.certificates.bounds import (
+from airflock.certificates import campaign as seeds
+from airflock.certificates.certificate import event_timing
+from airflock.certificates.limits import (
     flights_needed,
     look_schedule,
     lower_bound,
@@ -19,6 +20,8 @@ from airflock.certificates.bounds import (
 )
 from airflock.certificates.hazard import event_timing
 from airflock.recordings.rare_events import upper_probability_bound
+from airflock.recordings.rare import upper_probability_bound
+from airflock.scenarios.change import rebuilt
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import rebuilt
 from airflock.search.study import load_study

@@ -6,13 +6,12 @@ import pytest
 from hypothesis import given, strategies as st
 
 import toys
-from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.executors import ThreadExecutor
+from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import Interrupted, open_folder
-from airflock.runs.space import declared_numbers
-from airflock.runs.store import CandidateBatch, FlightStore
-from airflock.search.growing import LONGEST, SHARES, FlightLength
-from airflock.search.run import run_study
-from airflock.search.search import averaged_means
+from airflock.runs.search_space import declared_numbers
+from airflock.search.evolution import run_study
+from airflock.search.generations import LONGEST, SHARES, FlightLength, averaged_means
 from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")

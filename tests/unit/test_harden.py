@@ -6,14 +6,13 @@ import pytest
 import toys
 from airflock.cli import harden as cli_harden
 from airflock.parts.radios.links import received
-from airflock.runs.executors.in_process import ThreadExecutor
-from airflock.runs.store import FlightStore
+from airflock.runs.executors import ThreadExecutor
+from airflock.runs.flight_store import FlightStore
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import harden
-from airflock.search.measures import CARRIED, STOPS, measures
-from airflock.search.sensitivity import run_sensitivity
-from airflock.search.steps import StepResult
+from airflock.search.evolution import run_sensitivity
+from airflock.search.hardening_steps import CARRIED, STOPS, StepResult, measures
 from airflock.support.errors import ScenarioError
 from inside import simulate
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 import toys
-from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.executors import ThreadExecutor
+from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import Interrupted, open_folder
-from airflock.runs.store import CandidateBatch, FlightStore
-from airflock.search.request import study_from_request
-from airflock.search.run import run_study
-from airflock.search.search import run_search, total_flights, windowed_means
+from airflock.search.evolution import run_study, study_from_request
+from airflock.search.generations import run_search, total_flights, windowed_means
 from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -21,7 +20,7 @@ SAFE = 0.288  # where expected() is largest
 
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch):
-    monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
+    monkeypatch.setattr("airflock.search.evolution.draw_study", lambda *_: None)
 
 
 def courage(parameters):

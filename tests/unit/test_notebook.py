@@ -12,11 +12,11 @@ import airflock
 import toys
 from airflock.parts.metrics import registry
 from airflock.recordings.measures import milling
-from airflock.runs.executors.in_process import ThreadExecutor
-from airflock.runs.store import FlightStore
-from airflock.search.search import run_search
+from airflock.runs.executors import ThreadExecutor
+from airflock.runs.flight_store import FlightStore
+from airflock.search.finals import conclude_study
+from airflock.search.generations import run_search
 from airflock.search.study import load_study
-from airflock.search.winner import conclude_study
 from airflock.support.errors import ParameterError, RecordingError, ScenarioError
 from processes import called
 

@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 
 import toys
-from airflock.runs.executors.in_process import ThreadExecutor
-from airflock.runs.store import FlightStore
-from airflock.search.evaluator import Evaluator
-from airflock.search.fitness import Objective, candidate_losses
-from airflock.search.genetic import BinaryGenetic, decode, minimise_over_bits
-from airflock.search.nondominated import pareto_front
-from airflock.search.optimisers import make_optimiser
-from airflock.search.race import race_candidates
+from airflock.runs.executors import ThreadExecutor
+from airflock.runs.flight_store import FlightStore
+from airflock.search.finals import race_candidates
+from airflock.search.generations import Evaluator
+from airflock.search.objectives import Objective, candidate_losses
+from airflock.search.optimisers import BinaryGenetic, decode, make_optimiser, minimise_over_bits, pareto_front
 from airflock.support.errors import StudyError
 
 

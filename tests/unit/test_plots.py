@@ -21,7 +21,7 @@ from matplotlib.text import Text
 from typer.testing import CliRunner
 
 import airflock
-from airflock.certificates.bounds import take_look
+from airflock.certificates.limits import take_look
 from airflock.cli.main import app
 from airflock.core.maths import bell, braking_curve, excess, peak, rising
 from airflock.parts.laws import vasarhelyi_2018

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 import toys
-from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.executors import ThreadExecutor
 from airflock.runs.folder import Interrupted, open_folder
-from airflock.search.racing import remaining_candidates
-from airflock.search.run import run_study
+from airflock.search.evolution import run_study
+from airflock.search.generations import remaining_candidates
 from airflock.support.errors import ScenarioError
 
 pytestmark = pytest.mark.usefixtures("undrawn")

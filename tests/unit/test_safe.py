@@ -12,13 +12,12 @@ from scipy.stats import norm
 from test_harden import flown_by
 
 import toys
-from airflock.certificates.chance import estimated_probability, reliability_indices
-from airflock.certificates.limit import parse_limit
-from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.certificates.limits import estimated_probability, parse_limit, reliability_indices
+from airflock.runs.executors import ThreadExecutor
 from airflock.scenarios.files import load
 from airflock.search import harden
-from airflock.search.run import run_study
-from airflock.search.safe import allowed_probability, flights_per_event, limit_excess, rank_by_excess
+from airflock.search.evolution import run_study
+from airflock.search.limit_excess import allowed_probability, flights_per_event, limit_excess, rank_by_excess
 from airflock.search.study import make_study
 from airflock.support.errors import ScenarioError
 
@@ -55,7 +54,7 @@ def searched(folder, limits=()):
 
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch):
-    monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
+    monkeypatch.setattr("airflock.search.evolution.draw_study", lambda *_: None)
 
 
 def test_a_search_with_a_limit_finds_the_safe_optimum_and_one_without_leaves_it(tmp_path):

@@ -4,14 +4,14 @@ import pytest
 
 import toys
 from airflock.engine import score_flight
-from airflock.runs.executors.in_process import ThreadExecutor
-from airflock.runs.space import declared_numbers, with_parameters
-from airflock.runs.store import FlightStore
+from airflock.runs.executors import ThreadExecutor
+from airflock.runs.flight_store import FlightStore
+from airflock.runs.search_space import declared_numbers, with_parameters
 from airflock.scenarios.files import load, presets
-from airflock.search.bounds import default_space, unread_keys
-from airflock.search.search import run_search
+from airflock.search.finals import conclude_study
+from airflock.search.generations import run_search
 from airflock.search.study import load_study, make_study
-from airflock.search.winner import conclude_study
+from airflock.search.study_space import default_space, unread_keys
 from airflock.support.errors import StudyError
 
 OWN = {"agents": 12, "world.side": 120.0}

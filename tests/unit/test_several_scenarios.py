@@ -13,20 +13,17 @@ import airflock
 import toys
 from airflock.cli.harden import _optima
 from airflock.engine import score_flight, score_flights
-from airflock.runs.executors.cluster import rebuild_scenario
-from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.dask_cluster import rebuild_scenario
+from airflock.runs.executors import ThreadExecutor
+from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import Interrupted, open_folder
-from airflock.runs.space import with_parameters
-from airflock.runs.store import CandidateBatch, FlightStore
+from airflock.runs.search_space import with_parameters
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import harden
-from airflock.search.batched import BatchExecutor
-from airflock.search.evaluator import Evaluator
-from airflock.search.run import run_study, study_executor
-from airflock.search.several import combine_scenarios
-from airflock.search.study import load_study, make_study
-from airflock.search.task import study_tasks
+from airflock.search.evolution import BatchExecutor, run_study, study_executor, study_tasks
+from airflock.search.generations import Evaluator
+from airflock.search.study import combine_scenarios, load_study, make_study
 from airflock.support.errors import ScenarioError
 from inside import simulate
 

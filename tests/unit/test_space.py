@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from airflock.runs.space import full_space, with_parameters
+from airflock.runs.search_space import full_space, with_parameters
 from airflock.scenarios.files import load
-from airflock.search.space_table import read_space
+from airflock.search.study_space import read_space
 from airflock.support.errors import ParameterError
 
 SCENARIO = load("zapotecatl_2016/best")

@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from airflock.certificates.branches import LineageFlyer
 from airflock.certificates.campaign import Campaign
-from airflock.certificates.flyer import CampaignFlyer
-from airflock.certificates.limit import parse_limits
-from airflock.certificates.splitting import Lineage, LineageFlight, Repetition, estimate_probability, run_repetition
-from airflock.runs.store import FlightStore
+from airflock.certificates.counting import CampaignFlyer
+from airflock.certificates.limits import parse_limits
+from airflock.certificates.splitting import (
+    Lineage,
+    LineageFlight,
+    LineageFlyer,
+    Repetition,
+    estimate_probability,
+    run_repetition,
+)
+from airflock.runs.flight_store import FlightStore
 from airflock.scenarios.files import load
 
 STEPS, HEIGHT = 100, 100.0
@@ -78,7 +84,7 @@ def test_a_branch_changes_nothing_before_it():
 def test_splitting_that_goes_on_after_more_flights_takes_no_flight_of_the_one_before_for_its_own(tmp_path, monkeypatch):
     """It starts from other flights then, so that flights of the same number are other ones."""
     monkeypatch.setattr(
-        "airflock.certificates.branches.record_falls", lambda _, lineage, *rest: [list(f) for f in walk(lineage)]
+        "airflock.certificates.splitting.record_falls", lambda _, lineage, *rest: [list(f) for f in walk(lineage)]
     )
     scenario = load("vasarhelyi_2018/real_6ms")
     with FlightStore(tmp_path) as store:

@@ -14,14 +14,18 @@ import pytest
 
 import airflock
 import toys
-from airflock.runs.executors import Flight
-from airflock.runs.executors.in_process import ThreadExecutor
+from airflock.runs.executors import Flight, ThreadExecutor
+from airflock.runs.flight_store import FILE, CandidateBatch, FlightStore
 from airflock.runs.folder import Interrupted, differences, open_folder
-from airflock.runs.space import with_parameters
-from airflock.runs.store import FILE, CandidateBatch, FlightStore
-from airflock.search.batched import BatchExecutor
-from airflock.search.request import check_study_device, evolve_request, study_from_request
-from airflock.search.run import run_study, study_score
+from airflock.runs.search_space import with_parameters
+from airflock.search.evolution import (
+    BatchExecutor,
+    check_study_device,
+    evolve_request,
+    run_study,
+    study_from_request,
+    study_score,
+)
 from airflock.search.study import load_study, shipped_studies
 from airflock.support.errors import ScenarioError, StudyError
 from airflock_papers.dimock_2003.units import gains

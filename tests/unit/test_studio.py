@@ -20,8 +20,8 @@ from airflock.engine import Flight
 from airflock.parts.laws import vasarhelyi_2018
 from airflock.recordings.recording_files import load_recording
 from airflock.scenarios.files import presets
-from airflock.search.bounds import shipped_study_axes
 from airflock.search.study import load_study
+from airflock.search.study_space import shipped_study_axes
 from airflock.studio import charts, door, measures
 from airflock.studio.collisions import BOTH_PANES, CollisionList
 from airflock.studio.controls import fault_controls, scenario_controls, slider_span

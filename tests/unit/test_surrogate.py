@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 from surrogate import LqCMAES  # noqa: E402
 
-from airflock.search.cmaes import CMAES  # noqa: E402
+from airflock.search.optimisers import CMAES  # noqa: E402
 
 
 def bowl(x):

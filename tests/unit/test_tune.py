@@ -9,15 +9,15 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from airflock.search.tune import run as tuning
 from hypothesis import given, strategies as st
 
 import airflock
-from airflock.certificates.request import campaign_from_request
-from airflock.certificates.seeds import scenario_identity
+from airflock.certificates.campaign import campaign_from_request, scenario_identity
 from airflock.cli.options import parse_seconds
 from airflock.engine import score_flights
+from airflock.runs.flight_store import FlightStore
 from airflock.runs.folder import Interrupted
-from airflock.runs.store import FlightStore
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.race import RACE_ROUNDS
@@ -30,6 +30,20 @@ from airflock.search.tune.plan import CERTIFY_SHARE, HARDEN, POPULATION, SEARCH,
 from airflock.search.tune.request import default_limits
 from airflock.search.tune.run import tune
 from airflock.search.tune.start import prepare_start
+from airflock.scenarios.making import build_scenario
+from airflock.search.finals import RACE_ROUNDS
+from airflock.search.tune_report import default_rows, replay_files
+from airflock.search.tune_stages import (
+    CERTIFY_SHARE,
+    HARDEN,
+    MOST_SEEDS,
+    POPULATION,
+    SEARCH,
+    TRIED,
+    make_plan,
+    read_plan,
+)
+from airflock.search.tuning_run import default_limits, infeasible_limit_lines, prepare_start, tune
 from airflock.support.errors import RecordingError, ScenarioError, StudyError
 
 SEEDS = "SELECT seed FROM flight WHERE stage=?"
@@ -104,9 +118,9 @@ def done(tmp_path_factory, seen):
     folder = tmp_path_factory.mktemp("tuned") / "out"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tuning, "rate_of", lambda *_: 300.0)
-        patch.setattr("airflock.search.run.draw", lambda *_: None)  # the study's own pictures
+        patch.setattr("airflock.search.evolution.draw_study", lambda *_: None)  # the study's own pictures
         patch.setattr(
-            "airflock.certificates.environment.used_and_unused_keys", lambda _: ("radio.delay", "agents")
+            "airflock.certificates.campaign.used_and_unused_keys", lambda _: ("radio.delay", "agents")
         )  # one driver
         return tune(
             build_scenario(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"], watch=seen.append
@@ -171,8 +185,8 @@ def test_numbers_of_groups_are_assumed():
 def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch):
     found, folder = done
     monkeypatch.setattr(tuning, "rate_of", lambda *_: pytest.fail("the plan is kept"))
-    monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.certificates.environment.used_and_unused_keys", lambda _: ("radio.delay", "agents"))
+    monkeypatch.setattr("airflock.search.evolution.draw_study", lambda *_: None)
+    monkeypatch.setattr("airflock.certificates.campaign.used_and_unused_keys", lambda _: ("radio.delay", "agents"))
     with pytest.raises(StudyError, match="holds a tuning already; continue it with --resume"):
         tune(build_scenario(MINE, "mine"), folder)
     with pytest.raises(StudyError, match="holds the tuning of another scenario"):
@@ -218,8 +232,8 @@ def test_a_plan_with_margins_of_an_earlier_version_is_refused_in_one_line(done, 
 
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
-    monkeypatch.setattr("airflock.search.run.draw", lambda *_: None)
-    monkeypatch.setattr("airflock.certificates.environment.used_and_unused_keys", lambda _: ("radio.delay",))
+    monkeypatch.setattr("airflock.search.evolution.draw_study", lambda *_: None)
+    monkeypatch.setattr("airflock.certificates.campaign.used_and_unused_keys", lambda _: ("radio.delay",))
     how = {"like": build_scenario(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
     found = tune([logs], tmp_path / "a", **how)
     tau = load(tmp_path / "a" / "identified.toml").body.tau
@@ -232,7 +246,7 @@ def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs,
     page = (tmp_path / "a" / "report.html").read_text()
     for text in ("What was identified", "body.tau", told["radio.delay"]["reason"], "log.csv"):
         assert text in page
-    monkeypatch.setattr("airflock.search.tune.logs.identify", lambda *_, **__: pytest.fail("identified already"))
+    monkeypatch.setattr("airflock.search.tuning_run.identify", lambda *_, **__: pytest.fail("identified already"))
     again = tune([logs], tmp_path / "a", resume=True, **how)
     assert again.identify_report == found.identify_report and scenario_identity(again.scenario) == scenario_identity(
         found.scenario

@@ -15,6 +15,9 @@ from airflock.engine.text.generate import DriverSource
 from airflock.runs.space import full_space
 from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario_builder import build_scenario
+from airflock.runs.search_space import full_space
+from airflock.scenarios.families import CallerParts
+from airflock.scenarios.making import build_scenario
 from airflock.studio.controls import scenario_controls
 from airflock.support.errors import ParameterError, RuleError, ScenarioError
 from flocks import interpreted

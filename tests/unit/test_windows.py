@@ -68,7 +68,7 @@ def test_one_writer_at_a_time_opens_a_store(tmp_path):
     code = """
 import os
 from airflock.support.errors import StudyError
-from airflock.runs import store
+from airflock.runs import flight_store as store
 from pathlib import Path
 handle = store._lock(Path("."))
 try:
@@ -90,7 +90,7 @@ import airflock
 from airflock.support import cache
 from pathlib import Path
 print(cache.cache_folder_error(Path("kept")) == "" and Path("kept/drivers").is_dir())
-from airflock.runs.store import FlightStore
+from airflock.runs.flight_store import FlightStore
 Path("study").mkdir()
 with FlightStore(Path("study"), write=True) as kept:
     print(Path("study/evaluations.sqlite").exists())

@@ -1,43 +1,40 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from . import request as request
-from .branches import check_split as check_split
 from .campaign import (
     CAMPAIGN_KIND as CAMPAIGN_KIND,
     Campaign as Campaign,
+    campaign_from_request as campaign_from_request,
+    check_confidence as check_confidence,
+    check_flight_count as check_flight_count,
+    check_flight_options as check_flight_options,
+    check_workers as check_workers,
+    scenario_identity as scenario_identity,
+    tolerance_keys as tolerance_keys,
+    used_and_unused_keys as used_and_unused_keys,
 )
 from .certificate import (
     Certificate as Certificate,
+    check_certificate as check_certificate,
     upper_bound_in_unit as upper_bound_in_unit,
 )
-from .chance import (
-    ScoreRow as ScoreRow,
-    estimated_probability as estimated_probability,
-    reliability_index as reliability_index,
-    reliability_indices as reliability_indices,
+from .certification import (
+    COUNT_BUDGET_SHARE as COUNT_BUDGET_SHARE,
+    campaign_executor as campaign_executor,
+    flight_folder as flight_folder,
+    run_campaign as run_campaign,
+    with_planned_flights as with_planned_flights,
 )
-from .check import check_certificate as check_certificate
 from .counting import (
     COUNT_BATCH as COUNT_BATCH,
     CountProgress as CountProgress,
     flights_to_show as flights_to_show,
 )
-from .environment import used_and_unused_keys as used_and_unused_keys
-from .executing import (
-    campaign_executor as campaign_executor,
-    flight_folder as flight_folder,
-    with_planned_flights as with_planned_flights,
-)
-from .limit import (
+from .limits import (
     EventLimit as EventLimit,
+    ScoreRow as ScoreRow,
+    estimated_probability as estimated_probability,
     parse_limits as parse_limits,
+    reliability_index as reliability_index,
+    reliability_indices as reliability_indices,
 )
-from .maps import check_map_axes as check_map_axes
-from .request import (
-    campaign_from_request as campaign_from_request,
-    check_confidence as check_confidence,
-)
-from .run import (
-    COUNT_BUDGET_SHARE as COUNT_BUDGET_SHARE,
-    run_campaign as run_campaign,
-)
-from .seeds import scenario_identity as scenario_identity
+from .splitting import check_split as check_split
+from .tolerance import check_map_axes as check_map_axes

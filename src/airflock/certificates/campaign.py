@@ -1,18 +1,31 @@
 """Campaign: what is to be shown about a scenario and how; everything that decides the result, but not the time."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import hashlib
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from airflock import __version__
-from airflock.certificates import seeds
-from airflock.certificates.flights import with_distance_metrics
-from airflock.certificates.limit import EventLimit
-from airflock.runs import fingerprint
-from airflock.scenarios import Scenario
+from airflock.certificates.limits import R_COLL_METRICS, EventLimit, parse_limits
+from airflock.core import Quantity, declarations
+from airflock.engine import driver_text
+from airflock.parts.sensors import DEFAULT_SENSOR
+from airflock.runs import (
+    ScenarioTask,
+    ScoreFunction,
+    check_timeout,
+    check_worker_device,
+    declared_numbers,
+    fingerprint,
+    with_parameters,
+)
+from airflock.scenarios import FaultTiming, Scenario
+from airflock.support import ErrorCollector, ScenarioError, StudyError, check_precision, suggest
 
 LAYOUT = 1  # of the folder; raised whenever an older folder could not be continued
 CAMPAIGN_KIND = "campaign"  # campaign.toml in the folder of flights
@@ -39,7 +52,7 @@ class Campaign:
     @cached_property
     def hash(self) -> str:
         """Identity of the scenario, which fixes the seeds."""
-        return seeds.scenario_identity(self.scenario)
+        return scenario_identity(self.scenario)
 
     @cached_property
     def flown(self) -> Scenario:
@@ -109,3 +122,281 @@ def read_intervals(document: Mapping[str, Any]) -> dict[str, tuple[float, float]
                 low, high = entry["interval"]
                 found[f"{section}.{name}" if name else section] = (float(low), float(high))
     return found
+
+
+def campaign_from_request(
+    scenario: Scenario,
+    limit: str | Sequence[str],
+    confidence: float = 0.95,
+    flights: int | None = None,
+    *,
+    uncertain: bool = False,
+    precision: int = 32,
+    device: str = "cpu",
+) -> Campaign:
+    """The campaign that is asked for. Raises ScenarioError, all faults together."""
+    asked = ErrorCollector()
+    limits = asked.read(parse_limits, [limit] if isinstance(limit, str) else list(limit), scenario)
+    asked.read(check_confidence, confidence)
+    asked.read(check_flight_count, flights)
+    asked.read(check_flight_options, precision, device)
+    bits = 64 if device == "python" else precision
+    campaign = Campaign(scenario, limits, confidence, bits, flights, uncertain, device)
+    if uncertain and not campaign.number_intervals:
+        asked.note(f"{scenario.name}: no number has an interval; airflock identify --uncertain writes them")
+    asked.raise_errors()
+    return campaign
+
+
+def check_confidence(confidence: float) -> None:
+    """Refuse what is no confidence of a certificate."""
+    if not 0.5 <= confidence < 1.0:
+        raise ScenarioError([f"confidence = {confidence:g} lies outside [0.5, 1); 0.95 is usual"])
+
+
+def check_flight_count(flights: int | None) -> None:
+    """Refuse a number of flights that cannot be numbered."""
+    if flights is not None and not 1 <= flights < 1 << 30:
+        raise ScenarioError([f"flights = {flights} lies outside [1, {(1 << 30) - 1}]"])
+
+
+def check_flight_options(precision: int, device: str) -> None:
+    """Refuse a precision and a device on which no certificate flies."""
+    asked = ErrorCollector()
+    asked.read(check_precision, precision)
+    if device not in ("cpu", "python"):
+        asked.note(f"device = {device!r}: a certificate flies on cpu or python")
+    asked.raise_errors()
+
+
+def tolerance_keys(scenario: Scenario, tolerance: bool | Sequence[str]) -> tuple[str, ...]:
+    """Keys whose tolerance is asked for; ScenarioError where one cannot be varied."""
+    if not tolerance:
+        return ()
+
+    return used_and_unused_keys(scenario) if tolerance is True else check_environment_keys(scenario, list(tolerance))
+
+
+def check_certify_budget(budget: float) -> None:
+    """Refuse a time in which nothing could fly."""
+    if not budget > 0.0:
+        raise StudyError(f"budget = {budget:g} s is not positive")
+
+
+def check_workers(timeout: float | None, scheduler: str | None, device: str) -> None:
+    """Refuse a time in which no flight could fly on a worker, and a scheduler's workers in plain Python."""
+    asked = ErrorCollector()
+    asked.read(check_timeout, timeout)
+    asked.read(check_worker_device, scheduler, device)
+    asked.raise_errors()
+
+
+# number of the environment → which way is worse
+WORSE = {
+    "radio.delay": 1, "radio.range": -1, "radio.far": -1, "radio.received_far": -1, "radio.loss": 1,
+    "sensors.noise": 1, "sensors.sd": 1, "sensors.jump_rate": 1, "sensors.outage_rate": 1, "sensors.lag": 1,
+    "sensors.period": 1, "body.noise": 1, "body.tau": 1, "body.a_max": -1, "wind.gust": 1, "wind.at_6m": 1,
+    "agents": 1,
+}  # fmt: skip
+# number that may be zero → first value above zero that is tried
+FIRST_VALUE = {
+    "radio.loss": 0.1,
+    "wind.gust": 1.0,
+    "sensors.jump_rate": 1.0 / 600.0,
+    "sensors.outage_rate": 1.0 / 600.0,
+}
+READ_AS = {"sensors": "s", "radio": "k", "wind": "a"}  # section → what a driver calls its numbers
+
+EnvironmentNumbers = dict[str, tuple[Quantity, float]]
+
+
+def environment_numbers(scenario: Scenario) -> EnvironmentNumbers:
+    """Key → declaration and value of all numbers of the environment that a scenario has, those of faults included."""
+    known = declared_numbers(scenario)
+    dryden = scenario.wind.kind == "dryden"
+    left_out = {"wind.gust" if dryden else "wind.at_6m"}
+    found = {key: (known[key][0], float(known[key][1] or 0.0)) for key in WORSE if key in known and key not in left_out}
+    return found | _of_faults(scenario)
+
+
+def used_and_unused_keys(scenario: Scenario) -> tuple[str, ...]:
+    """Numbers of the environment that a scenario uses, and those that it leaves at zero and would read above it.
+
+    The latter come last: another driver has to be compiled for some of them.
+    """
+    links = scenario.transceiver.keeps_packets
+    unused = {"radio.range"} if links else {"radio.far", "radio.received_far"}
+    known = environment_numbers(scenario)
+    used = [key for key, (_, value) in known.items() if value and key not in unused]
+    zero = [key for key, (_, value) in known.items() if not value and key in FIRST_VALUE and _read(scenario, key)]
+    return (*used, *zero)
+
+
+def check_environment_keys(scenario: Scenario, keys: list[str]) -> tuple[str, ...]:
+    """The keys that are named; ScenarioError for one that cannot be varied."""
+    known, faults = environment_numbers(scenario), []
+    for key in keys:
+        if key not in known:
+            hint = f"known: {', '.join(known)}"
+            hint = hint if key in WORSE else suggest(key, list(known), hint)
+            of = "a number of this scenario" if key in WORSE else "a number of the environment"
+            faults.append(f"tolerance: {key} is not {of}; {hint}")
+        elif not known[key][1] and key not in FIRST_VALUE:
+            faults.append(f"tolerance: {key} = 0 in {scenario.name}; give it a value that a factor can change")
+        elif not known[key][1] and not _read(scenario, key):
+            faults.append(f"tolerance: {key}: nothing reads it in {scenario.name}")
+    if faults:
+        raise ScenarioError(faults)
+    return tuple(dict.fromkeys(keys))
+
+
+def worse_direction(key: str) -> int:
+    """1 where a larger value is worse, -1 where a smaller one is."""
+    return WORSE.get(key, 1)
+
+
+def _of_faults(scenario: Scenario) -> EnvironmentNumbers:
+    """How often each fault strikes at random, or how many agents it hits at its time."""
+    known = {name: how for name, how, _ in declarations(FaultTiming()) if isinstance(how, Quantity)}
+    found: EnvironmentNumbers = {}
+    for i, entry in enumerate(scenario.faults):
+        if entry.at is None and entry.per_hour > 0.0:
+            found[f"faults[{i}].per_hour"] = (known["per_hour"], entry.per_hour)
+        elif entry.at is not None and entry.number is not None and entry.number < len(entry.agents):
+            most = known["number"]._replace(high=float(len(entry.agents)), whole=True)
+            found[f"faults[{i}].number"] = (most, float(entry.number))
+    return found
+
+
+def _read(scenario: Scenario, key: str) -> bool:
+    """Whether flights read a number once it is above zero."""
+    section, _, name = key.partition(".")
+    if section == "wind" and scenario.wind.kind == "dryden":
+        return False
+    above = with_parameters(replace(scenario, groups=()) if scenario.groups else scenario, {key: FIRST_VALUE[key]})
+    return bool(re.search(rf"\b{READ_AS[section]}\.{name}\b", driver_text(above)))
+
+
+PARTS = 60  # of a flight that is flown again: when an event happened is known to a sixtieth of its duration
+
+
+def with_distance_metrics(scenario: Scenario, limits: Sequence[EventLimit]) -> Scenario:
+    """The scenario, measured so that no approach within the largest distance of a limit is missed.
+
+    Collisions are looked for at every motion step, so its radius becomes that distance, unless other limits mind it.
+    """
+    radii = [limit.value for limit in limits if limit.score == "r_min"]
+    if not radii:
+        return scenario
+    if any(metric.name == "collisions" for metric in scenario.order_parameters):
+        if any(limit.score in R_COLL_METRICS for limit in limits):
+            return scenario
+        return replace(scenario, metrics=replace(scenario.metrics, r_coll=max(radii), collision_period=None))
+    return sampled_every_step(scenario)
+
+
+def sampled_every_step(scenario: Scenario) -> Scenario:
+    """The scenario, sampled at every motion step."""
+    return replace(scenario, metrics=replace(scenario.metrics, period=0.0, collision_period=None))
+
+
+def limit_score_function(
+    scenario: Scenario, limits: Sequence[EventLimit], precision: int, device: str = "cpu"
+) -> ScoreFunction:
+    """Parameters and a seed → scores; with `closest` (m) and `first` (s) where an event of a limit happened.
+
+    scenario : as `with_distance_metrics` gives it
+    """
+    from airflock.engine import fly_world, score_flight
+
+    watched = [limit for limit in limits if limit.is_timed]
+    radius = max((limit.value for limit in limits if limit.score == "r_min"), default=0.0)
+
+    def score(parameters: Mapping[str, float], seed: int) -> Mapping[str, Any]:
+        flown = with_parameters(scenario, parameters) if parameters else scenario
+        if device == "cpu":
+            values = score_flight(flown, seed, precision=precision)
+        else:
+            values = flown.judged(fly_world(flown, seed, precision=precision, device=device).values)
+        found = {name: value for name, value in values.items() if isinstance(value, (int, float))}
+        near = radius > 0.0 and (found["r_min"] <= radius or found.get("n_coll", 0.0) > 0.0)
+        if near or any(limit.has_happened(found) for limit in watched):
+            found |= event_details(flown, seed, watched, precision, device)
+        return found
+
+    return score
+
+
+def event_details(
+    scenario: Scenario, seed: int, limits: Sequence[EventLimit], precision: int, device: str = "cpu"
+) -> dict[str, Any]:
+    """Smallest distance at any motion step (`closest`, m) and when each event had happened (`first`, s or None)."""
+    from airflock.engine import Flight
+
+    flight = Flight(sampled_every_step(scenario), seed, precision=precision, device=device)
+    part = max(1, round(scenario.flight.duration / scenario.flight.dt / PARTS))
+    first: list[float | None] = [None] * len(limits)
+    scores: Mapping[str, Any] = {}
+    while not flight.over:
+        scores = flight.advance(steps=part).scores()
+        for i, limit in enumerate(limits):
+            if first[i] is None and limit.has_happened(scores):
+                first[i] = flight.time
+    scores = flight.finish()
+    for i, limit in enumerate(limits):
+        if first[i] is None and limit.has_happened(scores):
+            first[i] = flight.time
+    return {"closest": scores.get("r_min"), "first": first}
+
+
+class CampaignTask(ScenarioTask):
+    """What a worker of a dask scheduler is sent: the scenario as text, the limits, and how to measure."""
+
+    def __init__(self, scenario: Scenario, limits: Sequence[EventLimit], precision: int):
+        """Raises StudyError for a law that exists only in this process."""
+        super().__init__(scenario, precision)
+        self.limits = tuple(limits)
+
+    def flown(self, scenario: Scenario) -> Scenario:
+        """The scenario with the distances measured that the limits ask for."""
+        return with_distance_metrics(scenario, self.limits)
+
+    def score_function(self, scenario: Scenario) -> ScoreFunction:
+        """Parameters and seed → what the limits look at."""
+        return limit_score_function(scenario, self.limits, self.precision)
+
+
+FIRST = 1 << 62
+BITS = 30  # numbers of flights within one part
+COUNT_PURPOSE, TOLERANCE_PURPOSE, SPLIT_PURPOSE, MAP_PURPOSE = range(4)  # parts of a certificate; they share no seed
+
+
+def scenario_identity(scenario: Scenario) -> str:
+    """Hash of everything that decides a flight of a scenario but its seed: its laws by name, its numbers and choices.
+
+    What is only told (title, sources, published values) and how a flight is scored do not count.
+    """
+    told: dict[str, Any] = {
+        key: {name: getattr(record, name) for name in record.__dataclass_fields__}
+        for key, record in scenario.records.items()
+        if key != "metrics"
+    }
+    stands = hashlib.sha256(scenario.stands().shapes.tobytes()).hexdigest() if scenario.scene.draw == "once" else ""
+    told["scene"] = {**told["scene"], "file": "", "stands": stands}
+    if not told["start"]["wall_clearance"]:  # as in flights from before there was one
+        del told["start"]["wall_clearance"]
+    told["laws"] = [scenario.model.name, scenario.vehicle.name]
+    if scenario.sensor.name != DEFAULT_SENSOR:  # so that certificates from before there were others stay what they are
+        told["laws"].append(scenario.sensor.name)
+    if "kind" not in told["radio"]:  # which tells those of the usual record apart
+        told["laws"].append(scenario.transceiver.name)
+    if scenario.own_topology is not None:
+        told["laws"].append(scenario.own_topology.name)
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+
+
+def certificate_seed(scenario_hash: str, purpose: int, index: int) -> int:
+    """Seed of a flight of a certificate: of a part, COUNT or another, and its number from 0 on."""
+    if not 0 <= index < 1 << BITS:
+        raise StudyError(f"a certificate numbers at most {1 << BITS} flights; this would be number {index}")
+    return FIRST + ((int(scenario_hash, 16) % (1 << 30)) << (BITS + 2)) + (purpose << BITS) + index

@@ -2,25 +2,67 @@
 
 import hashlib
 import json
+import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
-from airflock.certificates.bounds import rate_per_hour
-from airflock.certificates.campaign import Campaign
-from airflock.certificates.counting import LimitVerdict
-from airflock.certificates.hazard import EventTiming
-from airflock.certificates.seeds import COUNT_PURPOSE, certificate_seed
-from airflock.runs import to_toml_values, write_toml_file
-from airflock.support import expand_path
+from scipy.stats import binomtest
+
+from airflock import __version__
+from airflock.certificates.campaign import COUNT_PURPOSE, Campaign, certificate_seed, limit_score_function
+from airflock.certificates.counting import LimitVerdict, looks_due
+from airflock.certificates.limits import EventLimit, parse_limits, rate_per_hour, take_look
+from airflock.runs import program_versions, to_toml_values, write_toml_file
+from airflock.scenarios import Scenario, build_scenario
+from airflock.support import StudyError, as_error, expand_path, read_toml
+
+MIN_EVENTS = 10  # events below which nothing is said
+SUSPICIOUS = 0.01  # a chance of less than this is no chance
+
+
+@dataclass(frozen=True)
+class EventTiming:
+    """Events of the first half of flights against what an even rate would give.
+
+    events, early : first events of a flight, and those in its first half
+    expected : share in the first half if the rate is even; chance : of a difference as large as this one
+    """
+
+    events: int
+    early: int
+    expected: float
+    chance: float
+
+    @property
+    def verdict(self) -> str:
+        """even, uneven, or too few events to say."""
+        if self.events < MIN_EVENTS:
+            return "too few events to say"
+        return "uneven" if self.chance < SUSPICIOUS else "even"
+
+
+def event_timing(times: Sequence[float], flights: int, duration: float) -> EventTiming:
+    """Compare the times (s) of first events of so many flights with an even rate.
+
+    An even rate h leaves 1 - p = exp(-h T) of the flights without an event, and of those with one the share
+    (1 - sqrt(1 - p)) / p has it in the first half.
+    """
+    events, early = len(times), sum(1 for t in times if t <= 0.5 * duration)
+    p = min(events / max(flights, 1), 1.0 - 1e-9)
+    expected = 0.5 if p <= 0.0 else (1.0 - math.sqrt(1.0 - p)) / p
+    chance = float(binomtest(early, events, expected).pvalue) if events else 1.0
+    return EventTiming(events, early, expected, chance)
+
 
 CERTIFICATE_FORMAT = 1
 LOOK = ("flights", "events", "above", "below", "low", "high")
 CHECKED = 100  # every so many flights one is kept for a check
-FEWEST = 20  # of them at least, where there are so many
+MIN_CHECKED = 20  # of them at least, where there are so many
 WORST = 5  # flights of each limit
 UNIT_WORDS = {"h": "per flock hour", "drone-h": "per drone hour", "flight": "per flight"}
 ALONE = "the confidence covers chance within this scenario,"
@@ -39,7 +81,7 @@ class Certificate:
     verdicts  : one for each limit; hazards: whether events came evenly, by limit, where that can be asked
     rows      : scores of all flights that were counted, in the order of their seeds
     tolerance : plain values of `airflock.certificates.tolerance`, empty if not asked for
-    splitting : the same of `airflock.certificates.branches`; over: of `airflock.certificates.maps`
+    splitting : the same of `airflock.certificates.splitting`; over: of `airflock.certificates.tolerance`
     versions  : of what flew, and on which processor
     seconds, rate : of this process, s; flights per second
     where     : file or name of the scenario, by which flights are flown again
@@ -100,7 +142,7 @@ class Certificate:
         >>> airflock.certify(short, "n_coll<1 at 90%", flights=100).document()["flights"]["count"]
         100
         """
-        c, step = self.campaign, max(1, min(CHECKED, len(self.rows) // FEWEST))
+        c, step = self.campaign, max(1, min(CHECKED, len(self.rows) // MIN_CHECKED))
         digests = [scores_digest(row) for row in self.rows]
         made = {
             "format": CERTIFICATE_FORMAT,
@@ -151,7 +193,7 @@ class Certificate:
         return target
 
     def check(self, threads: int | None = None) -> Any:
-        """Fly one flight in a hundred again and compare the bits; see `airflock.certificates.check.check_document`.
+        """Fly one flight in a hundred again and compare the bits; see `check_document`.
 
         threads : of the flights, all processors by default
 
@@ -164,7 +206,6 @@ class Certificate:
         >>> airflock.certify(short, "n_coll<1 at 90%", flights=100).check().same
         True
         """
-        from airflock.certificates.check import check_document
 
         return check_document(self.document(), "certificate", scenario=self.campaign.scenario, threads=threads)
 
@@ -307,3 +348,220 @@ def certificate_checksum(document: Mapping[str, Any]) -> str:
 def with_checksum(document: dict[str, Any]) -> dict[str, Any]:
     """A certificate's content with its checksum."""
     return {"seal": certificate_checksum(document), **document}
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """What a check found.
+
+    flown : flights that were flown again; faults: what does not hold, one line each; notes: what may explain it
+    """
+
+    flown: int
+    total: int
+    faults: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def same(self) -> bool:
+        """Whether everything agrees."""
+        return not self.faults
+
+    def __repr__(self) -> str:
+        said = "; ".join(self.faults) or "all bits agree, all bounds are right"
+        return f"<check: {self.flown} of {self.total:,} flights flown again: {said}>"
+
+
+def check_certificate(
+    path: str | os.PathLike[str],
+    *,
+    threads: int | None = None,
+    trust: bool = False,
+    on_done: Callable[[], None] | None = None,
+) -> CheckReport:
+    """Check a certificate file.
+
+    path    : of certificate.toml; threads : of the flights, all processors by default
+    trust   : whether a law in a Python file that the scenario names may run
+    done    : called after each flight
+
+    Raises StudyError where the file is no certificate, of another format, version or scenario than it says; and an
+    AirflockError where it cannot be read.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> from airflock.certificates.certificate import check
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
+    >>> path = airflock.certify(short, "n_coll<1 at 90%", flights=100).save("certificate.toml")
+    >>> check(path).same
+    True
+    """
+    with as_error(path, StudyError):
+        document = read_toml(expand_path(path))
+    return check_document(document, str(path), threads=threads, trust=trust, on_done=on_done)
+
+
+def check_document(
+    document: Mapping[str, Any],
+    where: str,
+    *,
+    scenario: Scenario | None = None,
+    threads: int | None = None,
+    trust: bool = False,
+    on_done: Callable[[], None] | None = None,
+) -> CheckReport:
+    """Check the content of a certificate, whose scenario `scenario` replaces. Raises like `check_certificate`."""
+    if not {"seal", "format", "limit", "flights", "scenario"} <= set(document):
+        raise StudyError(f"{where}: is not a certificate; airflock certify writes one")
+    if document["format"] != CERTIFICATE_FORMAT:
+        raise StudyError(f"{where}: is of format {document['format']}; this Airflock reads format {CERTIFICATE_FORMAT}")
+    faults = _shape_faults(document)
+    if faults:
+        raise StudyError(f"{where}: is damaged: {'; '.join(faults)}")
+    with as_error(f"{where}: is damaged", StudyError):
+        flown = document["flown"]
+        if flown["airflock"] != __version__:
+            raise StudyError(
+                f"{where}: made by airflock {flown['airflock']}, this is {__version__}; check it with that"
+            )
+        faults = (
+            ["was changed after it was written (its checksum differs)"]
+            if certificate_checksum(document) != document["seal"]
+            else []
+        )
+        campaign = _campaign(document, where, scenario, trust)
+        faults += _sums(document, campaign)
+        rules = campaign.document()["rules"]
+        if rules != flown["rules"]:
+            raise StudyError(f"{where}: its flights were computed by other rules (text {flown['rules']}, here {rules})")
+        found, notes = _flown_again(document, campaign, threads, on_done), _differences(flown)
+    return CheckReport(len(document["check"]["digests"]), int(document["flights"]["count"]), (*faults, *found), notes)
+
+
+MOST_DIGESTS = 1_000_000  # flights that a certificate may ask to be flown again
+KeyTypes = Mapping[str, tuple[type, ...]]
+_NUMBER = (int, float)
+_TABLES: dict[str, KeyTypes] = {
+    "flown": {"airflock": (str,), "rules": (str,), "precision": (int,), "device": (str,)},
+    "flights": {
+        "count": (int,), "looks": (str,), "uncertain": (bool,), "identity": (str,), "first_seed": (int,),
+    },
+    "check": {"every": (int,), "digests": (list,)},
+    "scenario": {"name": (str,)},
+}  # fmt: skip
+_LIMIT: KeyTypes = {"text": (str,), "looks": (list,), "high": _NUMBER, "low": _NUMBER, "shown": (bool,)}
+_LOOK: KeyTypes = {"flights": (int,), "events": (int,), "above": _NUMBER, "below": _NUMBER}
+
+
+def _shape_faults(document: Mapping[str, Any]) -> list[str]:
+    """Keys of a certificate that are missing or of another kind than it is written with."""
+    faults = [] if _is(document.get("confidence"), _NUMBER) else ["confidence"]
+    for name, kinds in _TABLES.items():
+        faults += _wrong(name, document.get(name), kinds)
+    limits = document["limit"]
+    for i, limit in enumerate(limits if isinstance(limits, list) and limits else [None]):
+        faults += _wrong(f"limit[{i}]", limit, _LIMIT)
+        looks = limit.get("looks") if isinstance(limit, Mapping) else None
+        for j, each in enumerate(looks if isinstance(looks, list) else []):
+            faults += _wrong(f"limit[{i}].looks[{j}]", each, _LOOK)
+    if not faults:
+        digests, every = document["check"]["digests"], document["check"]["every"]
+        if not all(isinstance(text, str) for text in digests) or len(digests) > MOST_DIGESTS or every < 1:
+            faults.append("check")
+    return [f"{fault} is missing or of another type than a certificate has there" for fault in faults[:5]]
+
+
+def _wrong(name: str, table: Any, kinds: KeyTypes) -> list[str]:
+    if not isinstance(table, Mapping):
+        return [name]
+    return [f"{name}.{key}" for key, kind in kinds.items() if not _is(table.get(key), kind)]
+
+
+def _is(value: Any, kinds: tuple[type, ...]) -> bool:
+    return isinstance(value, kinds) and (not isinstance(value, bool) or bool in kinds)
+
+
+def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None, trust: bool) -> Campaign:
+    told = dict(document["scenario"])
+    name = str(told.pop("name"))
+    if scenario is None:
+        scenario = build_scenario(told, name, folder=Path(where).parent, trust=trust)
+    flights, flown = document["flights"], document["flown"]
+    campaign = Campaign(
+        scenario,
+        parse_limits([entry["text"] for entry in document["limit"]], scenario),
+        float(document["confidence"]),
+        int(flown["precision"]),
+        int(flights["count"]) if str(flights["looks"]).startswith("fixed") else None,
+        bool(flights["uncertain"]),
+        str(flown["device"]),
+    )
+    if campaign.hash != flights["identity"]:
+        raise StudyError(f"{where}: its flights were those of another scenario than the one that it holds")
+    return campaign
+
+
+def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
+    """Bounds and verdicts that do not follow from the counts."""
+    faults = []
+    if document["flights"]["first_seed"] != certificate_seed(campaign.hash, COUNT_PURPOSE, 0):
+        faults.append("its seeds are not those that the scenario fixes")
+    for entry, limit in zip(document["limit"], campaign.limits, strict=True):
+        told = [(int(x["flights"]), int(x["events"]), float(x["above"]), float(x["below"])) for x in entry["looks"]]
+        again = [take_look(*each) for each in told]
+        high, low = min((x.high for x in again), default=1.0), max((x.low for x in again), default=0.0)
+        paid = max(sum(x.above for x in again), sum(x.below for x in again))
+        probability = campaign.probability(limit)
+        shown = high < 1.0 if probability is None else high <= probability
+        right = abs(high - entry["high"]) <= 1e-9 * high and abs(low - entry["low"]) <= 1e-9 and shown == entry["shown"]
+        if not right or paid > campaign.alpha * (1.0 + 1e-9):
+            faults.append(f"limit '{limit.text}': its bounds do not follow from its counts")
+        elif not _fixed(told, campaign, limit, int(document["flights"]["count"])):
+            faults.append(f"limit '{limit.text}': its looks are not those that the limit fixes")
+    return faults
+
+
+def _fixed(told: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: EventLimit, count: int) -> bool:
+    """Whether looks are the first of those that a limit fixes, at flights that there are, and no event is undone."""
+    known = list(islice(looks_due(campaign, limit), len(told)))
+    sizes = [(flights, above, below) for flights, _, above, below in told]
+    same = len(known) == len(told) and all(
+        each[0] == right[0] and all(math.isclose(a, b, rel_tol=1e-9) for a, b in zip(each[1:], right[1:], strict=True))
+        for each, right in zip(sizes, known, strict=True)
+    )
+    events = [0, *(events for _, events, _, _ in told)]
+    grow = all(old <= new for old, new in pairwise(events))
+    return same and grow and all(events <= flights <= count for flights, events, _, _ in told)
+
+
+def _flown_again(
+    document: Mapping[str, Any], campaign: Campaign, threads: int | None, done: Callable[[], None] | None
+) -> list[str]:
+    from airflock.engine import compile_for
+    from airflock.support import run_in_threads
+
+    wanted, every = document["check"]["digests"], int(document["check"]["every"])
+    numbers = [every * i for i in range(len(wanted))]
+    score = limit_score_function(campaign.flown, campaign.limits, campaign.bits, campaign.device)
+    if campaign.device == "cpu" and numbers:
+        compile_for(campaign.flown, precision=campaign.bits)
+
+    def job(number: int) -> Callable[[], str]:
+        own = certificate_seed(campaign.hash, COUNT_PURPOSE, number)
+        return lambda: scores_digest(score(campaign.parameters(own), own))
+
+    flown = run_in_threads([job(number) for number in numbers], 1 if campaign.device != "cpu" else threads, done)
+    other = [number for number, now, then in zip(numbers, flown, wanted, strict=True) if now != then]
+    return [
+        f"flight {number}, seed {certificate_seed(campaign.hash, COUNT_PURPOSE, number)}: other bits"
+        for number in other[:5]
+    ] + ([f"and {len(other) - 5} more flights with other bits"] if len(other) > 5 else [])
+
+
+def _differences(flown: Mapping[str, Any]) -> tuple[str, ...]:
+    """Versions that differ from those of the certificate: what may explain other bits."""
+    now = program_versions()
+    return tuple(
+        f"{name}: {flown[name]} then, {value} now" for name, value in now.items() if flown.get(name, value) != value
+    )

@@ -2,18 +2,56 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any
 
-from airflock.certificates.bounds import InterimLook, alpha_share, flights_needed, look_schedule, take_look
-from airflock.certificates.campaign import Campaign
-from airflock.certificates.flyer import CampaignFlyer
-from airflock.certificates.limit import EventLimit
-from airflock.certificates.seeds import COUNT_PURPOSE, certificate_seed
-from airflock.runs import CandidateBatch, Flight, FlightStore
+from airflock.certificates.campaign import COUNT_PURPOSE, Campaign, certificate_seed
+from airflock.certificates.limits import EventLimit, InterimLook, alpha_share, flights_needed, look_schedule, take_look
+from airflock.runs import CandidateBatch, Executor, Flight, FlightResult, FlightStore
 from airflock.support import StudyError
+
+
+@dataclass(frozen=True)
+class CampaignFlyer:
+    """A campaign with its store of flights, who flies them and until when.
+
+    until : moment of `time.monotonic` at which the budget of time is spent, s
+    note  : told in a few words what begins
+    """
+
+    campaign: Campaign
+    store: FlightStore
+    executor: Executor
+    until: float = math.inf
+    note: Callable[[str], None] | None = None
+
+    def with_budget(self, budget: float) -> "CampaignFlyer":
+        """The same, with so much time from now on, s."""
+        return replace(self, until=time.monotonic() + budget)
+
+    @property
+    def left(self) -> float:
+        """Time that is left, s; negative once it is over."""
+        return self.until - time.monotonic()
+
+    @property
+    def is_time_over(self) -> bool:
+        """Whether the budget is spent."""
+        return self.left < 0.0
+
+    def fly(self, batch: CandidateBatch, tasks: Sequence[Flight]) -> Iterator[FlightResult]:
+        """Yield each flight as soon as it is over and stored."""
+        for landed in self.executor.fly(tasks):
+            self.store.land(batch, landed)
+            yield landed
+
+    def report(self, text: str) -> None:
+        """Report what begins, if anybody asked for that."""
+        if self.note:
+            self.note(text)
+
 
 COUNT_BATCH = CandidateBatch("count", 0, 0)
 CHUNK = 2.0  # s of flights that are handed out together

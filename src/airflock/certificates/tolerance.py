@@ -1,29 +1,38 @@
 """Tolerance: how far each number of the environment may move until a limit can no longer be shown.
 
 Every value that is tried flies the same seeds, so that values differ by nothing but themselves. A value is safe where
-the upper bound falls below the limit, and not shown where it does not within MOST flights, or where the lower bound
-exceeds it. Rare limits would need too many flights at each value: they are screened at LEVEL per flight. Numbers that
-are zero are moved up from a first value (`environment.FIRST_VALUE`).
+the upper bound falls below the limit. It is not shown where the bound does not fall below the limit within
+MAX_FLIGHTS_FACTOR times the fewest flights that could show it, or where the lower bound exceeds the limit. Rare limits
+would need too many flights at each value: they are screened at LEVEL per flight. Numbers that are zero are moved up
+from a first value (`FIRST_VALUE`).
 """
 
 import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import takewhile
+from itertools import product, takewhile
 from typing import Any
 
-from airflock.certificates.bounds import InterimLook, alpha_share, flights_needed, look_schedule, take_look
-from airflock.certificates.campaign import Campaign, read_intervals
-from airflock.certificates.counting import CountResult
-from airflock.certificates.environment import FIRST_VALUE, environment_numbers, worse_direction
-from airflock.certificates.flyer import CampaignFlyer
-from airflock.certificates.seeds import TOLERANCE_PURPOSE, certificate_seed
+from airflock.certificates.campaign import (
+    FIRST_VALUE,
+    MAP_PURPOSE,
+    TOLERANCE_PURPOSE,
+    Campaign,
+    certificate_seed,
+    environment_numbers,
+    read_intervals,
+    worse_direction,
+)
+from airflock.certificates.counting import CampaignFlyer, CountResult
+from airflock.certificates.limits import InterimLook, alpha_share, flights_needed, look_schedule, take_look
 from airflock.core import Quantity
-from airflock.runs import CandidateBatch, Flight
+from airflock.runs import CandidateBatch, Flight, declared_numbers
+from airflock.scenarios import Scenario
+from airflock.support import ScenarioError, suggest
 
 LEVEL = 0.02  # probability per flight at which rare limits are screened
-MOST = 4.0  # flights at one value, as a multiple of those that show the level without an event
+MAX_FLIGHTS_FACTOR = 4.0  # flights at one value, as a multiple of those that show the level without an event
 REACH = 8.0  # factor up to which a number is moved; of zero: of the first value
 HALVINGS = 3  # after a value that is safe and one that is not are known
 TIME_OVER = "time was over"
@@ -66,7 +75,7 @@ class ValueScreen:
     def __init__(self, flyer: CampaignFlyer, level: float, purpose: int = TOLERANCE_PURPOSE):
         self.flyer, self.level, self.purpose, self.end = flyer, level, purpose, flyer.until
         alpha = 1.0 - flyer.campaign.confidence
-        most = MOST * flights_needed(level, alpha * alpha_share(1))
+        most = MAX_FLIGHTS_FACTOR * flights_needed(level, alpha * alpha_share(1))
         self.look_schedule = list(takewhile(lambda due: due[0] <= most, look_schedule(level, alpha)))
 
     def begin(self, batch: CandidateBatch, parameters: Mapping[str, float]) -> None:
@@ -184,3 +193,51 @@ def _kind(campaign: Campaign, key: str) -> str:
 
 def _whole(how: Quantity, value: float) -> float:
     return float(round(value)) if how.whole else value
+
+
+MAX_CELLS = 400  # cells
+
+
+def check_map_axes(scenario: Scenario, axes: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
+    """The two axes of a map; ScenarioError with everything that is wrong with them."""
+    known, faults = declared_numbers(scenario), []
+    if len(axes) != 2:
+        faults.append(f"map: needs two keys, not {len(axes)}")
+    for key, values in axes.items():
+        if key not in known:
+            faults.append(f"map: {key} is not a number of {scenario.name}{suggest(key, known, lead='; ')}")
+            continue
+        how = known[key][0]
+        for value in values:
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not how.low <= value <= how.high:
+                faults.append(f"map: {key} = {value!r} lies outside {how.span}")
+        if len(set(values)) < 2 or sorted(values) != list(values):
+            faults.append(f"map: {key}: give at least two values that grow")
+    if math.prod(len(values) for values in axes.values()) > MAX_CELLS:
+        faults.append(f"map: more than {MAX_CELLS} cells")
+    if faults:
+        raise ScenarioError(faults)
+    return {key: [float(value) for value in values] for key, values in axes.items()}
+
+
+def map_bounds(flyer: CampaignFlyer, axes: Mapping[str, Sequence[float]]) -> dict[str, Any]:
+    """Verdict and bounds of every cell, on seeds that all cells share.
+
+    Returns plain values: level, keys, their units, values, and for each cell values, verdict, low, high (per flight),
+    flights.
+    """
+    screen = ValueScreen(flyer, screening_level(flyer.campaign), MAP_PURPOSE)
+    cells = []
+    for number, values in enumerate(product(*axes.values())):
+        flyer.report(f"map: cell {number + 1} of {math.prod(len(v) for v in axes.values())}")
+        parameters = dict(zip(axes, values, strict=True))
+        batch = value_batch("map", parameters)
+        flyer.store.ask(batch, [list(values)], [parameters])
+        verdict, found = screen.judged(batch, parameters)
+        cell: dict[str, Any] = {"values": list(values), "verdict": verdict, "low": 0.0, "high": 1.0, "flights": 0}
+        if found is not None:
+            cell |= {"low": found.low, "high": found.high, "flights": found.flights, "events": found.events}
+        cells.append(cell)
+    units = [declared_numbers(flyer.campaign.scenario)[key][0].unit for key in axes]
+    told: dict[str, Any] = {"level": screen.level, "keys": list(axes), "units": units}
+    return told | {"axes": [list(values) for values in axes.values()], "cell": cells}

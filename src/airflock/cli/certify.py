@@ -112,7 +112,16 @@ def certify(
         )
         _check(scenario, threads, trust, as_json)
         return
-    from airflock.certificates import check_map_axes, check_split, request
+    from airflock.certificates import (
+        campaign_from_request,
+        check_confidence,
+        check_flight_count,
+        check_flight_options,
+        check_map_axes,
+        check_split,
+        check_workers,
+        tolerance_keys,
+    )
     from airflock.cli.sweep import parse_axis
 
     asked.read(options.check_writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
@@ -120,19 +129,19 @@ def certify(
     loaded = options.collect_scenario(
         asked, scenario, options.collect_settings(asked, changes, agents, duration), law, trust=trust
     )
-    asked.read(request.check_confidence, confidence)
-    asked.read(request.check_flight_count, flights)
-    asked.read(request.check_flight_options, precision, device)
+    asked.read(check_confidence, confidence)
+    asked.read(check_flight_count, flights)
+    asked.read(check_flight_options, precision, device)
     how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-    campaign = asked.read(request.campaign_from_request, loaded, limit or [], confidence, flights, **how)
+    campaign = asked.read(campaign_from_request, loaded, limit or [], confidence, flights, **how)
     also: dict[str, Any] = {"split": split, "axes": {}}
-    also["keys"] = asked.read(request.tolerance_keys, loaded, tolerance_of or tolerance)
+    also["keys"] = asked.read(tolerance_keys, loaded, tolerance_of or tolerance)
     if split:
         asked.read(check_split, campaign)
     if over:
         axes = asked.collect_each(partial(parse_axis, option="--map"), over)
         also["axes"] = asked.read(check_map_axes, loaded, asked.read(dict, axes))
-    asked.read(request.check_workers, timeout, scheduler, device)
+    asked.read(check_workers, timeout, scheduler, device)
     if resume and out is None:
         asked.note("--resume: name the certificate whose flights are to be continued with --out")
     asked.raise_errors()

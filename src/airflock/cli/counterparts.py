@@ -108,7 +108,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             "changes": LOAD_OPTIONS["changes"],
             "trust": "airflock.load",
             "duration": "airflock.load",
-            "out": "airflock.search.harden.hardened_document",
+            "out": "airflock.search.hardening.hardened_document",
         },
     ),
     "certify": PythonCounterpart(
@@ -119,7 +119,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             "limit": "limit",
             "out": "airflock.certificates.certificate.Certificate.save",
             "tolerance_of": "tolerance",
-            "check": "airflock.certificates.check.check_certificate",
+            "check": "airflock.certificates.certificate.check_certificate",
             "changes": "settings",
             **CODE_OPTIONS,
             "agents": 'settings["agents"]',

@@ -1,18 +1,23 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from .executors import (
-    Executor as Executor,
-    Flight as Flight,
-    FlightResult as FlightResult,
-    ScoreFunction as ScoreFunction,
-)
-from .executors.cluster import (
+from .dask_cluster import (
     DaskCluster as DaskCluster,
     ScenarioTask as ScenarioTask,
     check_timeout as check_timeout,
     check_worker_device as check_worker_device,
 )
-from .executors.in_process import ThreadExecutor as ThreadExecutor
-from .executors.scores import score_scenarios as score_scenarios
+from .executors import (
+    Executor as Executor,
+    Flight as Flight,
+    FlightResult as FlightResult,
+    ScoreFunction as ScoreFunction,
+    ThreadExecutor as ThreadExecutor,
+    score_scenarios as score_scenarios,
+)
+from .flight_store import (
+    CandidateBatch as CandidateBatch,
+    FlightStore as FlightStore,
+    parse_values as parse_values,
+)
 from .folder import (
     STUDY_FILE as STUDY_FILE,
     Interrupted as Interrupted,
@@ -24,7 +29,7 @@ from .folder import (
     to_toml_values as to_toml_values,
     write_toml_file as write_toml_file,
 )
-from .space import (
+from .search_space import (
     SearchAxis as SearchAxis,
     SearchSpace as SearchSpace,
     TiedParameter as TiedParameter,
@@ -32,9 +37,4 @@ from .space import (
     default_scale as default_scale,
     full_space as full_space,
     with_parameters as with_parameters,
-)
-from .store import (
-    CandidateBatch as CandidateBatch,
-    FlightStore as FlightStore,
-    parse_values as parse_values,
 )

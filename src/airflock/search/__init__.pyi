@@ -1,40 +1,34 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from .bounds import shipped_study_axes as shipped_study_axes
-from .cmaes import CMAES as CMAES
-from .genetic import (
-    decode as decode,
-    minimise_over_bits as minimise_over_bits,
+from .evolution import (
+    ValidationReport as ValidationReport,
+    check_sensitivity_method as check_sensitivity_method,
+    check_study_device as check_study_device,
+    evolve_request as evolve_request,
+    resolve_device as resolve_device,
+    run_study as run_study,
+    study_executor as study_executor,
+    validate as validate,
 )
-from .harden import (
+from .finals import RACE_ROUNDS as RACE_ROUNDS
+from .generations import SearchProgress as SearchProgress
+from .hardening import (
     MAX_ROUNDS as MAX_ROUNDS,
     harden as harden,
     hardened_document as hardened_document,
     hardening_request as hardening_request,
 )
-from .race import RACE_ROUNDS as RACE_ROUNDS
-from .request import (
-    check_sensitivity_method as check_sensitivity_method,
-    check_study_device as check_study_device,
-    evolve_request as evolve_request,
+from .limit_excess import limit_report_line as limit_report_line
+from .optimisers import (
+    CMAES as CMAES,
+    decode as decode,
+    minimise_over_bits as minimise_over_bits,
 )
-from .result import (
+from .study import load_study as load_study
+from .study_result import (
     BEST_FILE as BEST_FILE,
     EvolveResult as EvolveResult,
     further_best_files as further_best_files,
 )
-from .run import (
-    resolve_device as resolve_device,
-    run_study as run_study,
-    study_executor as study_executor,
-)
-from .safe import limit_report_line as limit_report_line
-from .search import SearchProgress as SearchProgress
-from .study import load_study as load_study
-from .tune.folder import load_plan as load_plan
-from .tune.request import make_request as make_request
-from .tune.run import tune as tune
-from .tune.start import prepare_start as prepare_start
-from .validation import (
-    ValidationReport as ValidationReport,
-    validate as validate,
-)
+from .study_space import shipped_study_axes as shipped_study_axes
+from .tune_stages import load_plan as load_plan
+from .tuning_run import make_request as make_request, prepare_start as prepare_start, tune as tune

@@ -1,11 +1,244 @@
 """Optimisers by name, behind one interface: ask for points of the unit cube, tell their losses."""
 
-from typing import Protocol
+import warnings
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.search.cmaes import CMAES, START_SIGMA
+from airflock.support import StudyError
+
+INSIDE = 0.01  # a start on a bound lies on the edge of what pycma's smooth transformation reaches
+MIDDLE, START_SIGMA = 0.5, 1.0 / 6.0  # Methods, "Fitness function", last paragraph
+
+
+class CMAES:
+    """Ask for a generation of points in the unit cube, tell their losses (candidate, 1)."""
+
+    def __init__(
+        self,
+        dimension: int,
+        population: int,
+        seed: int,
+        sigma: float = START_SIGMA,
+        start: NDArray[np.float64] | None = None,
+    ):
+        """Start at a point (axis,) of the cube, by default its middle.
+
+        `seed` decides all random numbers; no generator is shared with anybody.
+        """
+        import cma
+
+        self.dimension = dimension
+        draw = np.random.default_rng(seed).standard_normal
+        options = {
+            "popsize": population,
+            "bounds": [0.0, 1.0],
+            "CMA_elitist": 0,
+            "verbose": -9,
+            "seed": np.nan,  # leave NumPy's shared generator alone
+            "randn": lambda *shape: draw(shape if shape else None),
+        }
+        # pycma knows no single dimension: a second coordinate goes along that nobody looks at
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            first = [MIDDLE] * max(dimension, 2)
+            if start is not None:
+                first[:dimension] = np.clip(start, INSIDE, 1.0 - INSIDE).tolist()
+            self.strategy: Any = cma.CMAEvolutionStrategy(first, sigma, options)
+        self.asked: list[Any] = []
+
+    def ask(self) -> NDArray[np.float64]:
+        """Next generation (candidate, axis)."""
+        self.asked = self.strategy.ask()
+        return np.array(self.asked)[:, : self.dimension]
+
+    def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
+        """Losses (candidate, 1) of the points that were asked for."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of flat fitness: a first generation of which nobody flies
+            self.strategy.tell(self.asked, losses[:, 0].tolist())
+
+    def centre(self) -> NDArray[np.float64]:
+        """Mean of the distribution (axis,): where the evolution stands, and not the luckiest of its candidates."""
+        return np.array(self.strategy.result.xfavorite)[: self.dimension]
+
+
+BITS = 10  # per parameter; 50 bits for five of them
+MUTATION = 0.01
+BitArray = NDArray[np.bool_]
+
+
+def decode(bits: BitArray, bits_per_parameter: int = BITS) -> NDArray[np.float64]:
+    """Numbers in [0, 1) from bits (..., parameter * per), the highest bit first: (..., parameter).
+
+    The divisor is 1024: the published controller lies on k / 1024 and not on k / 1023.
+    """
+    shape = (*bits.shape[:-1], -1, bits_per_parameter)
+    weights = 2.0 ** np.arange(bits_per_parameter - 1, -1, -1)
+    return np.asarray(np.asarray(bits, float).reshape(shape) @ weights / 2.0**bits_per_parameter)
+
+
+class BinaryGenetic:
+    """Generational genetic algorithm: ask for bits (candidate, bit), tell losses (candidate,)."""
+
+    def __init__(
+        self, bits: int, population: int = 50, seed: int = 0, *, mutation: float = MUTATION, crossover: float = 1.0
+    ):
+        """`mutation` flips each bit, `crossover` is the probability that a pair of parents is cut at all."""
+        if population % 2:
+            raise StudyError(
+                f"population = {population} is odd: pairs of parents have two children; give an even number"
+            )
+        self.algorithm = _pymoo_genetic(bits, population, seed, mutation, crossover)
+        self.asked: Any = None
+
+    def ask(self) -> BitArray:
+        """Next generation (candidate, bit)."""
+        self.asked = self.algorithm.ask()
+        return np.array(self.asked.get("X"), bool)
+
+    def tell(self, losses: NDArray[np.float64]) -> None:
+        """Losses (candidate,) of the generation that was asked for; less is better."""
+        self.asked.set("F", np.asarray(losses, float).reshape(-1, 1))
+        self.algorithm.tell(infills=self.asked)
+
+
+class GeneticResult(NamedTuple):
+    """Best chromosome ever, its loss, and the best and the mean loss of each generation."""
+
+    bits: BitArray
+    loss: float
+    best: list[float]
+    mean: list[float]
+
+
+def minimise_over_bits(
+    losses: Callable[[BitArray], NDArray[np.float64]],
+    bits: int,
+    *,
+    population: int = 50,
+    generations: int = 150,
+    mutation: float = MUTATION,
+    crossover: float = 1.0,
+    seed: int = 0,
+) -> GeneticResult:
+    """Minimise over bits. `losses` takes a whole generation (candidate, bit) and returns (candidate,)."""
+    state = BinaryGenetic(bits, population, seed, mutation=mutation, crossover=crossover)
+    winner, least, best, mean = np.zeros(bits, bool), np.inf, [], []
+    for _ in range(generations):
+        chromosomes = state.ask()
+        found = np.asarray(losses(chromosomes), float)
+        state.tell(found)
+        i = int(np.argmin(found))
+        if found[i] < least:
+            winner, least = chromosomes[i].copy(), float(found[i])
+        best.append(float(found[i]))
+        mean.append(float(found.mean()))
+    return GeneticResult(winner, least, best, mean)
+
+
+class GeneticSearch:
+    """The genetic algorithm on a study's unit cube, ten bits an axis."""
+
+    def __init__(self, dimension: int, population: int, seed: int):
+        """Chromosomes of ten bits for each of `dimension` axes."""
+        self.state = BinaryGenetic(BITS * dimension, population, seed)
+
+    def ask(self) -> NDArray[np.float64]:
+        """Next generation (candidate, axis)."""
+        return decode(self.state.ask())
+
+    def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
+        """Losses (candidate, 1) of the points that were asked for."""
+        self.state.tell(losses[:, 0])
+
+    def centre(self) -> None:
+        """None: a population of chromosomes has no mean."""
+
+
+def _pymoo_genetic(bits: int, population: int, seed: int, mutation: float, crossover: float) -> Any:
+    try:
+        from pymoo.algorithms.soo.nonconvex.ga import GA
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+        from pymoo.operators.crossover.pntx import SinglePointCrossover
+        from pymoo.operators.mutation.bitflip import BitflipMutation
+        from pymoo.operators.sampling.rnd import BinaryRandomSampling
+        from pymoo.operators.selection.tournament import TournamentSelection
+    except ModuleNotFoundError as fault:
+        raise StudyError("the genetic algorithm needs pymoo: pip install 'airflock[evolve]'") from fault
+
+    class Generational(GA):  # type: ignore[misc]
+        """Children replace their parents, even better ones."""
+
+        def _advance(self, infills: Any = None, **_: Any) -> None:
+            self.pop = infills
+
+    def fitter(population: Any, pairs: Any, random_state: Any = None, **_: Any) -> Any:
+        loss = population.get("F")[:, 0][pairs]
+        return pairs[np.arange(len(pairs)), np.argmin(loss, axis=1)][:, None]
+
+    algorithm = Generational(
+        pop_size=population,
+        sampling=BinaryRandomSampling(),
+        selection=TournamentSelection(func_comp=fitter, pressure=2),
+        crossover=SinglePointCrossover(prob=crossover),
+        mutation=BitflipMutation(prob=1.0, prob_var=mutation),
+        eliminate_duplicates=False,
+    )
+    algorithm.setup(Problem(n_var=bits, n_obj=1, vtype=bool), termination=NoTermination(), seed=seed, verbose=False)
+    return algorithm
+
+
+class NonDominatedSorting:
+    """Ask for points of the unit cube, tell their losses (candidate, objective)."""
+
+    def __init__(self, dimension: int, objectives: int, population: int, seed: int):
+        """Set up NSGA-II with pymoo's default operators."""
+        self.algorithm = _pymoo_nsga2(dimension, objectives, population, seed)
+        self.asked: Any = None
+
+    def ask(self) -> NDArray[np.float64]:
+        """Next generation (candidate, axis)."""
+        self.asked = self.algorithm.ask()
+        return np.array(self.asked.get("X"), float)
+
+    def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
+        """Losses (candidate, objective) of the points that were asked for."""
+        self.asked.set("F", np.asarray(losses, float))
+        self.algorithm.tell(infills=self.asked)
+
+    def centre(self) -> None:
+        """None: a front has no mean."""
+
+
+def pareto_front(losses: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Indices of the candidates that no other one betters in all objectives; losses (candidate, objective)."""
+    order = np.lexsort(losses.T[::-1])
+    kept = np.empty(len(losses), np.int64)
+    n = 0
+    for i in order:
+        row = losses[i]
+        better = losses[kept[:n]]
+        if np.isfinite(row).all() and not ((better <= row).all(axis=1) & (better < row).any(axis=1)).any():
+            kept[n], n = i, n + 1
+    return np.sort(kept[:n])
+
+
+def _pymoo_nsga2(dimension: int, objectives: int, population: int, seed: int) -> Any:
+    try:
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+    except ModuleNotFoundError as fault:
+        raise StudyError("nsga2 needs pymoo: pip install 'airflock[evolve]'") from fault
+    algorithm = NSGA2(pop_size=population, eliminate_duplicates=False)
+    problem = Problem(n_var=dimension, n_obj=objectives, xl=np.zeros(dimension), xu=np.ones(dimension))
+    algorithm.setup(problem, termination=NoTermination(), seed=seed, verbose=False)
+    return algorithm
+
 
 ALGORITHMS = ("cmaes", "ga", "nsga2")
 MULTI_OBJECTIVE = "nsga2"  # the one for several objectives
@@ -37,8 +270,6 @@ def make_optimiser(
     """A fresh optimiser; CMA-ES starts with a standard deviation `spread` at the point `start`, else in the middle."""
     if algorithm == "cmaes":
         return CMAES(dimension, population, seed, spread, start)
-    from airflock.search.genetic import GeneticSearch
-    from airflock.search.nondominated import NonDominatedSorting
 
     if algorithm == "ga":
         return GeneticSearch(dimension, population, seed)

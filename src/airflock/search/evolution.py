@@ -1,0 +1,544 @@
+"""The public door: a study from beginning to end in one folder, begun or continued."""
+
+import hashlib
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from airflock.engine import plan_of
+from airflock.recordings import load_recording, replay_recording
+from airflock.runs import (
+    STUDY_FILE,
+    CandidateBatch,
+    DaskCluster,
+    Executor,
+    Flight,
+    FlightResult,
+    FlightStore,
+    Interrupted,
+    ScenarioTask,
+    ScoreFunction,
+    ThreadExecutor,
+    check_timeout,
+    check_worker_device,
+    open_folder,
+    program_versions,
+    read_toml_file,
+    remove_unfinished,
+    to_toml_values,
+    with_parameters,
+)
+from airflock.scenarios import Scenario, load, scenario_variant, value_of
+from airflock.search.finals import conclude_study
+from airflock.search.generations import Evaluator, OnSearchProgress, run_search
+from airflock.search.objectives import Objective, UserFitness
+from airflock.search.search_settings import fast_search_keys as fast_keys
+from airflock.search.study import Study, is_study, load_study, make_study
+from airflock.search.study_result import EvolveResult, draw_study
+from airflock.support import AirflockError, ErrorCollector, StudyError, atomic, expand_path
+
+
+def evolve(
+    scenario: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario],
+    out: str | os.PathLike[str],
+    *,
+    resume: bool = False,
+    settings: Mapping[str, Any] | None = None,
+    space: Mapping[str, Any] | None = None,
+    objective: Mapping[str, Any] | None = None,
+    fitness: UserFitness | None = None,
+    limit: str | Sequence[str] = (),
+    over_scenarios: str | None = None,
+    scheduler: str | None = None,
+    threads: int | None = None,
+    device: str = "cpu",
+    timeout: float | None = None,
+    sensitivity: str = "",
+    watch: OnSearchProgress | None = None,
+    trust: bool = False,
+    fast: bool = False,
+    **search_keys: Any,
+) -> EvolveResult:
+    """Evolve the parameters of a flock, in a folder that survives whatever ends the process.
+
+    Parameters
+    ----------
+    scenario : str, path, Scenario or Study, or several scenarios
+        A preset, a scenario or study file, a Scenario, or a Study. Of a list of presets, files and Scenarios one set
+        of numbers is searched that flies in all of them.
+    out : str or path
+        The study's folder.
+    resume : bool
+        Continue the study in the folder to the identical end. What is not asked for again is as in the first call.
+    settings : mapping, optional
+        Keys of the scenario to change, such as {"duration": 300.0}.
+    space : mapping, optional
+        Sections of parameters that vary, as in a study file: {"model": {"p_rep": {"low": 0.0, "high": 1.0}}}.
+    objective : mapping, optional
+        {"maximise": ..., "minimise": ..., "over_seeds": ..., "quantile": ...}, names of order parameters.
+    fitness : callable, optional
+        Instead of it, a function of your own: order parameters of one flight → number, more is better.
+    limit : str or sequence of str
+        What may happen how rarely, such as "r_min<3 at 0.01/h", as `airflock.certify` takes it. Candidates that look as
+        if they kept all limits, with a reserve of ten (`reserve`), come before all others, whatever their fitness; each
+        flies twice unless `seeds` says otherwise.
+    over_scenarios : str, optional
+        "mean" or "worst": what counts of the fitness in several scenarios; by default the mean.
+    scheduler : str, optional
+        Address of a dask scheduler; by default flights fly in this process.
+    threads : int, optional
+        Flights side by side; by default one per core.
+    device : str
+        cpu, cuda, or auto.
+    timeout : float, optional
+        Time that a flight may take on a dask worker, s.
+    sensitivity : str
+        "sobol" or "morris": also fly what tells which parameters matter; table sensitivity.csv.
+    watch : callable, optional
+        Called with a Progress after each flight.
+    trust : bool
+        Whether code that files name may run: a law, fitness functions.
+    fast : bool
+        A third of the flights: a small population, with ever more flights of each candidate (docs/evolve.md).
+    **search_keys
+        Keys of the table [search]: algorithm, population, generations, seeds, seed, restarts, ...
+
+    Returns
+    -------
+    Result
+        The optimum, its fitness on fresh seeds, and working ranges; the same stands in the folder as result.toml,
+        best.toml, tables and pictures.
+
+    Raises
+    ------
+    ScenarioError, StudyError
+        If the scenario, the study or its folder cannot be used.
+    Interrupted
+        At Ctrl-C; what has flown is kept.
+
+    Notes
+    -----
+    CMA-ES is that of pycma; stages after the search and their reasons are on the page "Evolving a flock".
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> vary = {"model": {"p_rep": {"low": 0.0, "high": 1.0}}}
+    >>> few = {"population": 4, "generations": 2, "pool": 2, "top": 1, "final_seeds": 2}
+    >>> result = airflock.evolve(short, "study", space=vary, **few)
+    >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
+    True
+    """
+    folder = expand_path(out)
+    asked = ErrorCollector()
+    found = asked.read(
+        evolve_request,
+        scenario,
+        settings,
+        search_keys,
+        limit,
+        fast=fast,
+        folder=folder if resume else None,
+        space=space,
+        objective=objective,
+        fitness=fitness,
+        over_scenarios=over_scenarios,
+        trust=trust,
+    )
+    asked.read(check_sensitivity_method, sensitivity)
+    asked.read(check_timeout, timeout)
+    asked.read(check_study_device, device, scheduler)
+    asked.raise_errors()
+    study = resolve_device(found[0], device)
+    open_folder(folder, study, resume=resume)
+    executor = study_executor(study, scheduler, threads, timeout)
+    return run_study(study, folder, executor, watch, sensitivity=sensitivity)
+
+
+def study_score(study: Study, scenario_index: int = 0) -> ScoreFunction:
+    """Parameters and a seed → order parameters, for one of the study's scenarios."""
+    from airflock.engine import score_flight
+
+    precision = int(study.search.precision)
+
+    def score(parameters: Mapping[str, float], seed: int) -> Mapping[str, Any]:
+        return score_flight(with_parameters(study.scenarios[scenario_index], parameters), seed, precision=precision)
+
+    return score
+
+
+def resolve_device(study: Study, device: str) -> Study:
+    """The study for a device: cpu, cuda, or what auto picks for a generation of it. A missing one is one line."""
+    check_study_device(device)
+    if device == "cpu":
+        return study
+    from airflock.engine import pick_device
+
+    generation = [study.scenario] * study.population(0) * study.whole("seeds")
+    return replace(study, device=pick_device(generation, device, precision=int(study.search.precision)))
+
+
+def study_executor(
+    study: Study, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
+) -> Executor:
+    """Who flies: this process, or the workers of a dask scheduler."""
+    if study.device != "cpu":
+        return BatchExecutor(study, study.device)
+    if scheduler is not None:
+        return DaskCluster(study_tasks(study), scheduler, timeout=timeout)
+    from airflock.engine import compile_for
+    from airflock.scenarios import uses_all_cores
+    from airflock.support import available_cores
+
+    # compiled once, before threads ask for it; a second processor has nothing to do until then
+    for scenario in study.scenarios:
+        compile_for(scenario, precision=int(study.search.precision))
+    alone = any(uses_all_cores(scenario) for scenario in study.scenarios)
+    scores = [study_score(study, place) for place in range(len(study.scenarios))]
+    return ThreadExecutor(scores[0], 1 if alone else threads or available_cores(), scores[1:])
+
+
+def run_study(
+    study: Study,
+    folder: Path,
+    executor: Executor,
+    on_progress: OnSearchProgress | None = None,
+    notify: Callable[[bool], None] | None = None,
+    *,
+    sensitivity: str = "",
+) -> EvolveResult:
+    """Search and conclude in a folder that `open_folder` has accepted; closes the executor."""
+    try:
+        with FlightStore(folder) as store:
+            store.begin(program_versions())
+            remove_unfinished(folder)
+            try:
+                centres = run_search(study, store, executor, on_progress)
+                result = conclude_study(study, store, executor, centres, folder, notify)
+                if sensitivity:
+                    shares = run_sensitivity(study, store, executor, method=sensitivity, on_flight=notify)
+                    atomic.write_file(folder / "sensitivity.csv", shares.to_csv(index=False))
+            except KeyboardInterrupt as stop:
+                raise Interrupted(
+                    f"interrupted: {store.count()} flights of the search are stored in {folder}; continue with --resume"
+                ) from stop
+            draw_study(study, store, result, folder)
+            return result
+    finally:
+        executor.close()
+
+
+def evolve_request(
+    scenario: Any,
+    settings: Mapping[str, Any] | None = None,
+    search_keys: Mapping[str, Any] | None = None,
+    limit: str | Sequence[str] = (),
+    *,
+    fast: bool = False,
+    folder: Path | None = None,
+    **others: Any,
+) -> tuple[Study, str]:
+    """As `study_from_request`, which takes the others; if a folder is given, what is not asked for is as that holds it.
+
+    Also a note of what the folder gave.
+    """
+
+    def ask(changes: Mapping[str, Any] | None, keys: Mapping[str, Any], limits: Any, *, quick: bool = False) -> Study:
+        return study_from_request(scenario, changes, search_keys=keys, limit=limits, fast=quick, **others)
+
+    limits = [limit] if isinstance(limit, str) else list(limit)
+    study = ask(settings, search_keys or {}, limits, quick=fast)
+    if folder is None or isinstance(scenario, Study):
+        return study, ""
+    keys = fast_keys(search_keys or {}, limits=bool(limits)) if fast else search_keys or {}
+    return resume_study(folder, study, settings or {}, keys, limits, ask)
+
+
+def study_from_request(
+    what: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario],
+    settings: Mapping[str, Any] | None = None,
+    space: Mapping[str, Any] | None = None,
+    objective: Mapping[str, Any] | None = None,
+    fitness: UserFitness | None = None,
+    search_keys: Mapping[str, Any] | None = None,
+    over_scenarios: str | None = None,
+    limit: str | Sequence[str] = (),
+    *,
+    trust: bool = False,
+    fast: bool = False,
+) -> Study:
+    """The study that `evolve` is asked for."""
+    if isinstance(what, Study):
+        asked: dict[str, Any] = {"settings": settings, "space": space, "objective": objective, "fitness": fitness}
+        asked |= {"limit": limit, "over_scenarios": over_scenarios, "fast": fast}
+        beside = [*(key for key, value in asked.items() if value), *(search_keys or {})]
+        if beside:
+            said = ", ".join(beside)
+            raise StudyError(f"{said}: a Study object sets this itself; give a preset, a file or a Scenario")
+        return what
+    search_keys = fast_keys(search_keys or {}, limits=bool(limit)) if fast else search_keys
+    limits = [limit] if isinstance(limit, str) else list(limit)
+    given = {"space": space, "objective": objective, "over_scenarios": over_scenarios}
+    tables = {key: value for key, value in given.items() if value is not None}
+    if isinstance(what, Scenario) or (isinstance(what, Sequence) and not isinstance(what, str)):
+        several = [what] if isinstance(what, Scenario) else list(what)
+        scenarios = [scenario_variant(each, settings, trust=trust) for each in several]
+        if not scenarios:
+            raise StudyError("evolve is given an empty list of scenarios")
+        where = ", ".join(scenario.name for scenario in scenarios)
+        study = make_study(tables, where, search=search_keys, scenario=scenarios, limits=limits, trust=trust)
+    else:
+        study = load_study(what, settings=settings, search=search_keys, tables=tables, limits=limits, trust=trust)
+    if fitness is not None:
+        code = getattr(fitness, "__code__", None)
+        text = _text_of(code) if code is not None else ""
+        name = getattr(fitness, "__name__", "fitness")
+        study = replace(study, objectives=(Objective(name, own=fitness, text=text),))
+    return study
+
+
+def _text_of(code: Any) -> str:
+    """Hash of what a function does, the same in every process."""
+    constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
+    return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
+
+
+def check_sensitivity_method(sensitivity: str) -> None:
+    """Refuse a method of finding sensitivities that nobody knows."""
+    if sensitivity and sensitivity not in SENSITIVITY_METHODS:
+        raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(SENSITIVITY_METHODS)}")
+
+
+def check_study_device(device: str, scheduler: str | None = None) -> None:
+    """Refuse a device on which no study flies, and another one than their cpu for a scheduler's workers."""
+    check_worker_device(scheduler, device)
+    if device not in ("cpu", "cuda", "auto"):
+        raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
+
+
+OWN = ("layout", "airflock")  # of the version that made the folder: nothing that can be asked for
+
+
+def resume_study(
+    folder: Path,
+    study: Study,
+    settings: Mapping[str, Any],
+    search: Mapping[str, Any],
+    limit: Sequence[str],
+    make_request: Callable[[dict[str, Any], dict[str, Any], list[str]], Study],
+) -> tuple[Study, str]:
+    """The study as its folder holds it, and a note of what was taken from there; what is asked for anew stays so.
+
+    study : as it would be without the folder; settings, search, limit : what is asked for now
+    ask   : the study for other settings, keys of the search, and limits
+    """
+    if not (folder / STUDY_FILE).is_file():
+        return study, ""
+    held, now = read_toml_file(folder / STUDY_FILE), to_toml_values(study.document())
+    if any(held.get(key) != now[key] for key in OWN):
+        return study, ""  # `open_folder` says so
+    named = {key.rpartition(".")[2] for key in settings}
+    flown = {
+        key: value
+        for key, value in _changed(held.get("scenario", {}), now["scenario"])
+        if key not in settings and key.rpartition(".")[2] not in named
+    }
+    keys = {key: value for key, value in held.get("search", {}).items() if key not in search}
+    searched = {f"search.{key}": value for key, value in keys.items() if now["search"].get(key) != value}
+    limits = list(limit) or list(held.get("limits", []))
+    held_to = {"limit": limits} if limits != list(limit) and limits != now.get("limits", []) else {}
+    taken = flown | searched | held_to
+    if not taken:
+        return study, ""
+    told = ", ".join(f"{key} = {value_of(value)}" for key, value in taken.items())
+    said = f"goes on with what {folder} holds: {told}"
+    return make_request({**settings, **flown}, {**keys, **search}, limits if held_to or limit else []), said
+
+
+def _changed(held: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> list[tuple[str, Any]]:
+    """Keys of a scenario that have another value in the folder, with that value."""
+    found: list[tuple[str, Any]] = []
+    for key, value in held.items():
+        other = now.get(key)
+        if isinstance(value, Mapping) and isinstance(other, Mapping) and "value" not in value:
+            found += _changed(value, other, f"{at}{key}.")
+        elif value_of(value) != value_of(other):
+            found.append((f"{at}{key}", value))
+    return found
+
+
+class ValidationReport(NamedTuple):
+    """What a valid file is, in one sentence, and notes on it for a person to read."""
+
+    verdict: str
+    notes: tuple[str, ...]
+
+
+def validate(
+    name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False
+) -> ValidationReport:
+    """Check a scenario, a study or a recording; a recording is flown again and its bits are compared.
+
+    Parameters
+    ----------
+    name : str or path
+        A preset, a scenario file, a study file, or a recording (.nc).
+    settings : mapping, optional
+        Keys to change before the check. Of a recording only {"metrics.kind": "mine.py"} and the like: the file of what
+        it was flown with and does not hold.
+    law : optional
+        A flocking law of your own, or one by its name or file, instead of the file's; for a recording that was flown
+        with a law of its own, that law.
+    trust : bool
+        Whether code that the file names may run.
+
+    Returns
+    -------
+    Valid
+        Verdict and notes.
+
+    Raises
+    ------
+    AirflockError
+        With one line for each fault: key, value, unit, allowed range, and the nearest right key.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.validate("vasarhelyi_2018/4ms").verdict
+    'valid; vasarhelyi_2018, 100 agents, 600 s'
+    >>> airflock.validate("vasarhelyi_2018/4ms", {"radio.delay": -1.0})
+    Traceback (most recent call last):
+    airflock.support.errors.ScenarioError: vasarhelyi_2018/4ms: radio.delay = -1 s lies outside [0, 30] s
+    """
+    text = str(name)
+    if text.lower().endswith(".nc"):
+        same, differences = replay_recording(load_recording(name), law, settings, trust=trust)
+        if not same:
+            told = "".join(f"\n{text}: {line}" for line in differences)
+            reason = "see below" if differences else "although nothing relevant differs"
+            raise AirflockError(f"{text}: flown again, the positions differ, {reason}{told}")
+        return ValidationReport("flown again with the same bits", tuple(differences))
+    if is_study(text):
+        if law is not None:
+            raise AirflockError(f"{text}: is a study; --law is for scenarios and recordings")
+        study = load_study(text, settings=settings, trust=trust)
+        for scenario in study.scenarios:
+            plan_of(scenario)
+        where = ", ".join(study.labels)
+        what = f"{len(study.space.axes)} parameters of {where} vary"
+        return ValidationReport(f"valid study; {what}; begin it with airflock evolve {text} --out DIR", ())
+    found = load(name, settings, law, trust=trust)
+    plan_of(found)  # probes the rules
+    return ValidationReport(
+        f"valid; {found.model.name}, {found.agents} agents, {found.flight.duration:g} s", found.notes
+    )
+
+
+SENSITIVITY_METHODS = ("sobol", "morris")
+
+
+def run_sensitivity(
+    study: Study,
+    store: FlightStore,
+    executor: Executor,
+    *,
+    method: str = "morris",
+    samples: int = 16,
+    on_flight: Callable[[bool], None] | None = None,
+) -> pd.DataFrame:
+    """Effect of each parameter on the first objective over the study's whole space.
+
+    samples : base samples: sobol takes samples · (axes + 2) candidates, samples a power of two; morris
+              samples · (axes + 1), in trajectories
+    Returns one row a parameter. sobol: S1, ST (shares of the variance, alone and with all interactions) and their 95 %
+    half-widths; morris: mu_star (mean absolute effect over the range), its half-width, and sigma (its spread).
+    """
+    try:
+        from SALib.analyze import morris as analyse_morris, sobol as analyse_sobol
+        from SALib.sample import morris as sample_morris, sobol as sample_sobol
+    except ModuleNotFoundError as fault:
+        raise StudyError("sensitivity needs SALib: pip install 'airflock[evolve]'") from fault
+    if method not in SENSITIVITY_METHODS:
+        raise StudyError(f"method = {method!r} is none of {', '.join(SENSITIVITY_METHODS)}")
+    n = len(study.space.axes)
+    problem: Any = {"num_vars": n, "names": list(study.space.keys), "bounds": [[0.0, 1.0]] * n}
+    seed = study.whole("seed")
+    if method == "sobol":
+        points = sample_sobol.sample(problem, samples, calc_second_order=False, seed=seed)
+    else:
+        points = sample_morris.sample(problem, samples, seed=seed)
+    batch = CandidateBatch(method, samples, 0)
+    k = study.whole("seeds")
+    seeds = [[study.seed(3, j) for j in range(k)]] * len(points)  # common: chance must not pass for an effect
+    rows = Evaluator(study, store, executor, on_flight).evaluate(batch, np.asarray(points), seeds=seeds)
+    values = np.array([np.nan if row[0] is None else row[0] for row in rows])
+    if not np.isfinite(values).any():
+        raise StudyError("every candidate failed: no sensitivity")
+    values[~np.isfinite(values)] = np.nanmin(values) if study.objectives[0].maximise else np.nanmax(values)
+    if method == "sobol":
+        found = analyse_sobol.analyze(problem, values, calc_second_order=False, seed=seed)
+        columns: tuple[str, ...] = ("S1", "S1_conf", "ST", "ST_conf")
+    else:
+        found = analyse_morris.analyze(problem, np.asarray(points), values, seed=seed)
+        columns = ("mu_star", "mu_star_conf", "sigma")
+    return pd.DataFrame({"parameter": list(study.space.keys), **{c: np.asarray(found[c], float) for c in columns}})
+
+
+class BatchExecutor:
+    """One call of the engine for each batch; a flight that goes wrong is found by halves, and the others stand."""
+
+    def __init__(self, study: Study, device: str):
+        """`device` as `airflock.engine.score_flights` takes it."""
+        self.study, self.device = study, device
+
+    def fly(self, tasks: Sequence[Flight]) -> Iterator[FlightResult]:
+        """Yield all flights of a scenario once they are over."""
+        for place in sorted({flight.place for flight in tasks}):
+            yield from self._fly([flight for flight in tasks if flight.place == place])
+
+    def _fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
+        from airflock.engine import score_flights
+
+        begin = time.perf_counter()
+        try:
+            scenarios = [with_parameters(self.study.scenarios[flight.place], flight.parameters) for flight in flights]
+            precision = int(self.study.search.precision)
+            rows = score_flights(scenarios, [f.seed for f in flights], precision=precision, device=self.device)
+        except (AirflockError, ArithmeticError) as fault:
+            if len(flights) == 1:
+                reason = str(fault).splitlines()[0] if str(fault) else type(fault).__name__
+                yield FlightResult(flights[0], None, reason, time.perf_counter() - begin, self.device)
+                return
+            half = len(flights) // 2
+            yield from self._fly(flights[:half])
+            yield from self._fly(flights[half:])
+            return
+        each = (time.perf_counter() - begin) / len(flights)
+        for flight, values in zip(flights, rows, strict=True):
+            yield FlightResult(flight, values, "", each, self.device)
+
+    def close(self) -> None:
+        """Nothing was taken."""
+
+
+class StudyTask(ScenarioTask):
+    """Flies a scenario with the parameters of a candidate."""
+
+    def score_function(self, scenario: Scenario) -> ScoreFunction:
+        """Parameters and seed → order parameters."""
+        from airflock.engine import score_flight
+
+        return lambda p, seed: score_flight(with_parameters(scenario, p), seed, precision=self.precision)
+
+
+def study_tasks(study: Study) -> tuple[StudyTask, ...]:
+    """The task of each scenario of a study; raises StudyError for a law that exists only in this process."""
+    return tuple(StudyTask(scenario, int(study.search.precision)) for scenario in study.scenarios)

@@ -1,0 +1,426 @@
+"""The search itself: generations are asked for, flown where the store does not hold them yet, and told.
+
+A study that was ended, however roughly, is continued by running it again: the optimiser is fed with the stored flights
+from its first generation on and comes to the very state in which it was left. No state is pickled.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.runs import CandidateBatch, Executor, Flight, FlightStore, declared_numbers, parse_values
+from airflock.scenarios import Scenario
+from airflock.search.limit_excess import batch_excess, rank_by_excess
+from airflock.search.objectives import Objective, candidate_losses
+from airflock.search.optimisers import make_optimiser
+from airflock.search.study import Study, combine_scenarios
+from airflock.search.study_result import DURATION_COLUMN
+from airflock.support import StudyError
+
+FlightScores = dict[tuple[int, int], Mapping[str, Any] | None]  # (candidate, repeat) → order parameters, None: failed
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """A study with its store of flights and who flies them.
+
+    note : called after each flight, with whether it is a new one
+    """
+
+    study: Study
+    store: FlightStore
+    executor: Executor
+    note: Callable[[bool], None] | None = None
+
+    def evaluate(
+        self,
+        batch: CandidateBatch,
+        points: NDArray[np.float64],
+        *,
+        seeds: Sequence[Sequence[int]] | None = None,
+        duration_share: float = 1.0,
+        racing: bool = False,
+    ) -> list[list[float | None]]:
+        """Fitness (candidate, objective) of a batch; flies what the store lacks and stores it. None: failed.
+
+        points : (candidate, axis) of the unit cube
+        seeds  : (candidate, repeat); by default those of the search
+        share  : of the scenarios' duration that is flown
+        racing : whether seeds are flown in turn, and no further by candidates that cannot reach the better half
+        """
+        study = self.study
+        parameters = [study.space.parameters(point) for point in points]
+        numbers = _seeds(study, batch, len(points)) if seeds is None else seeds
+        places = [_shortened(scenario, duration_share) for scenario in study.scenarios]
+        self.store.ask(batch, points.tolist(), [{**each, **places[0]} for each in parameters])
+        flown: FlightScores = self.store.flown(batch)
+        if self.note:
+            for _ in flown:
+                self.note(False)
+        n, last = len(places), max(len(row) for row in numbers)
+        alive = list(range(len(parameters)))
+        for seen in range(1, last + 1) if racing else [last]:
+            missing = [
+                Flight(i, j * n + k, {**parameters[i], **shorter}, seed, k)
+                for i in alive
+                for j, seed in enumerate(numbers[i][:seen])
+                for k, shorter in enumerate(places)
+                if (i, j * n + k) not in flown
+            ]
+            self._fly(batch, missing, flown)
+            if seen < last:
+                alive = self._still_needed(flown, alive, seen, last)
+        rows = [
+            [
+                self._fitness(objective, [flown[i, r] for r in range(len(row) * n) if (i, r) in flown])
+                for objective in study.objectives
+            ]
+            for i, row in enumerate(numbers)
+        ]
+        self.store.tell(batch, rows)
+        return rows
+
+    def _fly(self, batch: CandidateBatch, missing: Sequence[Flight], flown: FlightScores) -> None:
+        """Fly what is missing; each flight is stored and known as soon as it lands."""
+        for landed in self.executor.fly(missing):
+            self.store.land(batch, landed)
+            if landed.values is not None and all(values is None for values in flown.values()):
+                for objective in self.study.objectives:  # a fault in one shows at the first flight
+                    objective.of_flight(landed.values)
+            flown[landed.flight.candidate_index, landed.flight.repeat] = landed.values
+            if self.note:
+                self.note(True)
+
+    def _still_needed(self, flown: FlightScores, alive: Sequence[int], seen: int, last: int) -> list[int]:
+        """Candidates that fly on after `seen` of `last` seeds; later flights that are stored already do not count."""
+        first, n = self.study.objectives[0], len(self.study.scenarios)
+        candidates = 1 + max(i for i, _ in flown)
+        values = [
+            [
+                self._fitness(first, [flown[i, j * n + k] for k in range(n)])
+                for j in range(seen)
+                if all((i, j * n + k) in flown for k in range(n))
+            ]
+            for i in range(candidates)
+        ]
+        return remaining_candidates(values, alive, last - seen, first.maximise)
+
+    def _fitness(self, objective: Objective, flights: Sequence[Mapping[str, Any] | None]) -> float | None:
+        """Fitness of a candidate from its flights in their order: over the seeds of each scenario, then over these."""
+        n = len(self.study.scenarios)
+        each = [objective.of_candidate(flights[place::n]) for place in range(n)]
+        return combine_scenarios(each, self.study.over_scenarios, objective.maximise)
+
+
+def _shortened(scenario: Scenario, share: float) -> dict[str, float]:
+    """Parameters of a flight that make it shorter than the scenario's; none for a whole one."""
+    return {} if share == 1.0 else {DURATION_COLUMN: share * scenario.flight.duration}
+
+
+def _seeds(study: Study, batch: CandidateBatch, candidates: int) -> list[list[int]]:
+    """Seeds (candidate, repeat) of a generation of the search."""
+    k, most = study.seeds(batch.generation), max(study.whole("seeds"), study.whole("late_seeds"))
+    before = sum(study.population(run) for run in range(batch.run)) * study.whole("generations")
+    first = before + batch.generation * study.population(batch.run)
+    how = study.search.random_numbers
+    return [
+        [study.seed(0, most * {"fresh": first + i, "generation": first, "study": 0}[how] + j) for j in range(k)]
+        for i in range(candidates)
+    ]
+
+
+SeedValues = Sequence[float | None]
+
+
+def remaining_candidates(
+    values: Sequence[SeedValues], remaining: Sequence[int], seeds_left: int, maximise: bool
+) -> list[int]:
+    """Which candidates of `alive` fly on.
+
+    values : (candidate, seed so far) of all candidates of the generation; None: failed, which ends a candidate
+    left   : seeds that are still to come
+    """
+    sign = 1.0 if maximise else -1.0
+    told = [[sign * value for value in row if value is not None] for row in values]
+    failed = [len(row) < len(given) for row, given in zip(told, values, strict=True)]
+    means = [-float("inf") if lost or not row else sum(row) / len(row) for row, lost in zip(told, failed, strict=True)]
+    best = max((value for row in told for value in row), default=0.0)
+    needed = sorted(means, reverse=True)[(len(means) + 1) // 2 - 1]
+    return [
+        i
+        for i in remaining
+        if not failed[i] and (sum(told[i]) + seeds_left * best) / (len(told[i]) + seeds_left) >= needed
+    ]
+
+
+SHARES = (0.125, 0.25, 0.5, 1.0)  # of the scenario's duration
+LONGEST = 8  # of all generations, at most one in so many has each length but the last
+
+
+class FlightLength:
+    """Share of a whole flight that the next generation flies; told of each generation's first objective."""
+
+    def __init__(self, generations: int, maximise: bool, *, growing: bool):
+        """`generations` of the whole run; without `growing` all flights are whole."""
+        self.left = list(SHARES) if growing else [1.0]
+        self.most, self.sign = max(1, generations // LONGEST), 1.0 if maximise else -1.0
+        self.flown, self.aim = 0, 0.0
+
+    @property
+    def share(self) -> float:
+        """Of the scenario's duration."""
+        return self.left[0]
+
+    @property
+    def whole(self) -> bool:
+        """Whether flights are as long as the scenario says."""
+        return len(self.left) == 1
+
+    def end_generation(self, values: Sequence[float | None]) -> None:
+        """First objective of all candidates of a generation; None: failed, worse than all others."""
+        if self.whole:
+            return
+        found = [-float("inf") if value is None else self.sign * value for value in values]
+        if not self.flown:
+            self.aim = max(found)
+        self.flown += 1
+        reached = self.flown > 1 and median(found) >= self.aim
+        if reached or max(found) == min(found) or self.flown >= self.most:
+            self.left, self.flown = self.left[1:], 0
+
+
+EARLY = 3  # generations after which a search that has seen nothing but one value ends
+FEWEST = 40  # candidates of which that can be said
+ZERO_FITNESS = 1e-6  # a product of partial fitnesses below this does not fly
+# partial fitness → what it says if it is zero, and what may be changed
+ADVICE = {
+    "f_speed": "the flock is too slow: lower model.v_flock, or take fewer agents, walls and obstacles",
+    "f_coll": "agents collide: take fewer agents, a larger arena, a smaller metrics.r_coll, or a shorter radio.delay",
+    "f_disc": "agents are too far from all others: raise radio.range, or take a smaller arena",
+    "f_cluster": "the flock falls apart: raise radio.range or metrics.r_cluster, or take a smaller arena",
+    "f_wall": "agents leave the arena or enter obstacles: lower model.v_flock, raise metrics.r_tol, or take more room",
+    "f_corr": "neighbours do not fly the same way: lower radio.delay, the noise or model.v_flock",
+}
+
+
+def refuse_flat(study: Study, store: FlightStore, generation: int, values: Sequence[float | None]) -> None:
+    """Raise StudyError once a search has seen one value only; what it is and why, in one line.
+
+    generation : number of the generation, of those with whole flights, from 0
+    values     : first objective of every candidate so far that flew a whole flight
+    """
+    found = [value for value in values if value is not None]
+    last = generation + 1 == study.whole("generations")
+    if len(found) < FEWEST or not (generation + 1 == EARLY or (last and generation < EARLY)):
+        return
+    if max(found) - min(found) <= 1e-12 * max(1.0, abs(max(found))):
+        name = study.objectives[0].name
+        raise StudyError(
+            f"{study.scenario.name}: nothing to search: {name} = {found[0]:g} for all of {len(found)} candidates"
+            f"{zero_fitness_reason(search_scores(store)) if found[0] == 0.0 else ''}"
+        )
+
+
+def dead_reason(study: Study, scores: Sequence[Mapping[str, Any] | None]) -> str:
+    """Why a winner does not fly, if its fitness, a product, is zero in all flights on fresh seeds; else empty."""
+    sound = [row for row in scores if row is not None]
+    if study.objectives[0].name != "fitness" or not sound or not _parts(sound):
+        return ""
+    if max(float(row["fitness"]) for row in sound) >= ZERO_FITNESS:
+        return ""
+    return f"no candidate flies, so there is no best one{zero_fitness_reason(sound)}"
+
+
+def search_scores(store: FlightStore) -> list[Mapping[str, Any]]:
+    """Scores of all flights of the search."""
+    return [
+        parse_values(scores) for (scores,) in store.rows("SELECT scores FROM flight WHERE stage='search'") if scores
+    ]
+
+
+def zero_fitness_reason(scores: Sequence[Mapping[str, Any]]) -> str:
+    """Which partial fitness is zero most often, in how many flights, and what may be changed; empty if none is."""
+    shares = {name: sum(float(row[name]) < ZERO_FITNESS for row in scores) / len(scores) for name in _parts(scores)}
+    worst = sorted(((share, name) for name, share in shares.items() if share > 0.5), reverse=True)
+    if not worst:
+        return ""
+    told = ", ".join(f"{name} is zero in {100.0 * share:.0f} % of flights" for share, name in worst)
+    advice = ADVICE.get(worst[0][1], "")
+    return f": {told}{f'; {advice}' if advice else ''}"
+
+
+def _parts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Partial fitnesses that all flights have."""
+    names = [name for name, value in (rows[0] if rows else {}).items() if name.startswith("f_") and _number(value)]
+    return [name for name in names if all(_number(row.get(name)) for row in rows)]
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not math.isnan(value)
+
+
+SAME = 1e-9  # a rebuilt optimiser may differ from the stored points by rounding on another machine, not by more
+
+
+@dataclass(frozen=True)
+class SearchProgress:
+    """How far a search is, after each flight and each generation.
+
+    done, total : flights, those of the store included; fresh : flights of this process
+    best, mean  : first objective of the best candidate so far and of the last generation, of those that keep all
+                  limits; None before there are any
+    """
+
+    run: int
+    generation: int
+    done: int
+    total: int
+    fresh: int
+    best: float | None
+    mean: float | None
+
+
+OnSearchProgress = Callable[[SearchProgress], None]
+
+
+@dataclass
+class ProgressTally:
+    """Counts of a search so far, reported to `watch`."""
+
+    total: int
+    watch: OnSearchProgress | None
+    run: int = 0
+    generation: int = 0
+    done: int = 0
+    fresh: int = 0
+    best: float | None = None
+    mean: float | None = None
+
+    def note(self, is_new: bool) -> None:
+        """One more flight, flown now or found in the store."""
+        self.done, self.fresh = self.done + 1, self.fresh + is_new
+        if self.watch:
+            self.watch(
+                SearchProgress(self.run, self.generation, self.done, self.total, self.fresh, self.best, self.mean)
+            )
+
+    def end_generation(self, values: Sequence[float | None], maximise: bool) -> None:
+        """First objective of a generation's candidates."""
+        found = [value for value in values if value is not None]
+        if not found:
+            return
+        self.mean = sum(found) / len(found)
+        known = [*found, *([] if self.best is None else [self.best])]
+        self.best = max(known) if maximise else min(known)
+
+
+def total_flights(study: Study) -> int:
+    """Flights of the whole search."""
+    runs = range(study.whole("restarts") + 1)
+    each = sum(study.seeds(generation) for generation in range(study.whole("generations")))
+    return sum(study.population(run) for run in runs) * each * len(study.scenarios)
+
+
+def run_search(
+    study: Study, store: FlightStore, executor: Executor, on_progress: OnSearchProgress | None = None
+) -> list[NDArray[np.float64]]:
+    """Run a study to its end, or to Ctrl-C.
+
+    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if asked for.
+    """
+    tally = ProgressTally(total_flights(study), on_progress)
+    evaluator = Evaluator(study, store, executor, tally.note)
+    centres: list[NDArray[np.float64]] = []
+    for run in range(study.whole("restarts") + 1):
+        means = _run(evaluator, run, tally)
+        if means:
+            found = averaged_means(means, study.whole("averages")) + windowed_means(means, study.whole("windows"))
+            centres += [means[-1], *found]
+    return centres
+
+
+def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[np.float64]]:
+    """One run of the optimiser; returns its mean (axis,) after each generation of whole flights, if it has one."""
+    study, store = evaluator.study, evaluator.store
+    first = study.objectives[0]
+    state = make_optimiser(
+        study.search.algorithm, len(study.space.axes), len(study.objectives), study.population(run),
+        (study.whole("seed") << 16) + run, spread=study.search.spread, start=_start(study),
+    )  # fmt: skip
+    length = FlightLength(study.whole("generations"), first.maximise, growing=study.search.flights == "growing")
+    means: list[NDArray[np.float64]] = []
+    seen: list[float | None] = []
+    whole = 0
+    for generation in range(study.whole("generations")):
+        tally.run, tally.generation = run, generation
+        batch = CandidateBatch("search", run, generation)
+        points = _asked(store, batch, state.ask())
+        begun = tally.done
+        racing = study.search.racing == "optimistic"
+        rows = evaluator.evaluate(batch, points, duration_share=length.share, racing=racing)
+        tally.total -= len(points) * study.seeds(generation) * len(study.scenarios) - (tally.done - begun)
+        values, told = [row[0] for row in rows], candidate_losses(rows, study.objectives)
+        sound = values
+        if study.limits:
+            broken = batch_excess(study, store, batch, length.share)
+            told, sound = (
+                rank_by_excess(told, broken),
+                [v for v, much in zip(values, broken, strict=True) if much == 0.0],
+            )
+        state.tell(points, told)
+        centre = state.centre()
+        if length.whole:
+            tally.end_generation(sound, first.maximise)
+            seen += values
+            if run == 0:
+                refuse_flat(study, store, whole, seen)
+            whole += 1
+            means += [] if centre is None else [np.clip(centre, 0.0, 1.0)]
+        length.end_generation(values)
+    return means
+
+
+def averaged_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
+    """Average (axis,) of the last half of all means, of the last quarter, and so on, as many as asked for.
+
+    On a plateau a mean wanders by chance; the average of many wanders less (Polyak & Juditsky 1992).
+    """
+    spans = (max(1, len(means) >> (k + 1)) for k in range(windows))
+    return [np.mean(means[-span:], axis=0) for span in spans]
+
+
+def windowed_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
+    """Average (axis,) of the means in each of so many equal parts of the last half.
+
+    CMA-ES ranks single flights and so ends where most flights are good, which is not where their mean is best if a few
+    are bad: on its way it may pass a better place.
+    """
+    late = np.array(means[len(means) // 2 :])
+    return [part.mean(axis=0) for part in np.array_split(late, min(windows, len(late)))] if windows else []
+
+
+def _start(study: Study) -> NDArray[np.float64] | None:
+    """Where the optimiser starts: None for the middle, or the scenario's own numbers."""
+    if study.search.start == "middle":
+        return None
+    known = declared_numbers(study.scenario)
+    return study.space.point({key: float(known[key][1] or 0.0) for key in study.space.keys})
+
+
+def _asked(store: FlightStore, batch: CandidateBatch, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The points that an optimiser asks for, as the store has them if it has."""
+    stored = store.asked(batch)
+    if not stored:
+        return points
+    known = np.array(stored)
+    if known.shape != points.shape or not np.allclose(known, points, rtol=0.0, atol=SAME):
+        raise StudyError(
+            f"{store.path}: run {batch.run}, generation {batch.generation} cannot be rebuilt here: the optimiser asks "
+            "for other candidates than are stored; continue with the versions that the table session names"
+        )
+    return known

@@ -1,0 +1,289 @@
+"""Result of a study: the winner, its score and its working ranges; the files that hold them."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from airflock.core import Quantity, declarations
+from airflock.runs import FlightStore, parse_values, to_toml_values
+from airflock.scenarios import Scenario, format_number, formats, html_table
+from airflock.search.optimisers import pareto_front
+from airflock.search.study import Study
+from airflock.support import FormatError, StudyError, as_error, atomic, parse_json
+
+RESULT_FILE, BEST_FILE = "result.toml", "best.toml"
+
+
+@dataclass(frozen=True)
+class EvolveResult:
+    """What a study found.
+
+    parameters : of the winner, by key; scenario : with these parameters
+    fitness, sd, low, high, seeds : of the winner on fresh seeds, with Student's 95 % interval of the
+                 mean; the fitness in the unit of the objective
+    largest    : best candidate of the search, luck included, in the same unit of the objective
+    origin     : "mean" or "top": what the winner was
+    ranges     : key → (low, high) over the `above` candidates of the search that reach the winner's fitness
+    finalists  : one row each: origin, parameters, fitness on fresh seeds
+    failed     : candidates of the search that failed
+    scenarios  : of several: what each is called → mean, low and high of the winner's fitness in it
+    limits     : what the winner's fresh flights say of each limit: events, flights, estimated and allowed probability
+    dead       : why nothing flies, in words; then no best.toml is written; empty if something flies
+    """
+
+    folder: Path
+    scenario: Scenario
+    parameters: dict[str, float]
+    fitness: float
+    sd: float
+    low: float
+    high: float
+    seeds: int
+    largest: float
+    origin: str
+    ranges: dict[str, tuple[float, float]]
+    above: int
+    candidate_count: int
+    failed: int
+    finalists: pd.DataFrame
+    dead_reason: str = ""
+    scenarios: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    limits: tuple[Mapping[str, Any], ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<{result_summary(self)}>"
+
+    def _repr_html_(self) -> str:
+        """A table of the winner's parameters, for a notebook."""
+        return result_html(self)
+
+    def document(self) -> dict[str, Any]:
+        """The result as plain values, for result.toml and --json.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+        >>> vary = {"model": {"p_rep": {"low": 0.0, "high": 1.0}}}
+        >>> few = {"population": 4, "generations": 2, "pool": 2, "top": 1, "final_seeds": 2}
+        >>> airflock.evolve(short, "study", space=vary, **few).document()["fitness"]["seeds"]
+        2
+        """
+        return {
+            "scenario": self.scenario.name,
+            "fitness": {
+                "mean": self.fitness,
+                "sd": self.sd,
+                "low": self.low,
+                "high": self.high,
+                "seeds": self.seeds,
+                "largest_in_search": self.largest,
+            },
+            "origin": self.origin,
+            **({"dead": self.dead_reason} if self.dead_reason else {}),
+            "parameters": self.parameters,
+            **({"limits": [dict(entry) for entry in self.limits]} if self.limits else {}),
+            **({"scenarios": [_told(name, *span) for name, span in self.scenarios.items()]} if self.scenarios else {}),
+            "working_ranges": {
+                "candidates": self.candidate_count,
+                "failed": self.failed,
+                "above_mean": self.above,
+                "range": {key: list(span) for key, span in self.ranges.items()},
+            },
+        }
+
+
+def _told(name: str, mean: float, low: float, high: float) -> dict[str, Any]:
+    return {"scenario": name, "mean": mean, "low": low, "high": high}
+
+
+def best_files(study: Study) -> list[str]:
+    """Files that hold the winner: best.toml, and best_2.toml and so on for further scenarios."""
+    return [BEST_FILE, *(f"best_{place}.toml" for place in range(2, len(study.scenarios) + 1))]
+
+
+def further_best_files(folder: Path) -> list[Path]:
+    """Files of the winner in the further scenarios of a study's folder, in their order."""
+    found = (folder / f"best_{place}.toml" for place in itertools.count(2))
+    return list(itertools.takewhile(Path.is_file, found))
+
+
+def best_document(
+    study: Study, parameters: dict[str, float], result: EvolveResult, folder: Path, scenario_index: int = 0
+) -> dict[str, Any]:
+    """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along.
+
+    place : which of the study's scenarios
+    """
+    scenario = study.scenarios[scenario_index]
+    document = {formats.KEY: formats.FORMAT, **to_toml_values(scenario.document)}
+    document.pop("published", None)
+    law = Path(scenario.name).parent / str(document.get("model", {}).get("kind", ""))
+    if law.suffix == ".py" and law.is_file():
+        atomic.write_file(folder / law.name, law.read_bytes())
+        document["model"]["kind"] = law.name
+    source = f"evolved: {study.search.algorithm}, {result.candidate_count} evaluations, seed {study.whole('seed')}"
+    units = {axis.key: axis.unit for axis in study.space.axes}
+    for key, value in parameters.items():
+        section, _, name = key.rpartition(".")
+        entry: dict[str, Any] = {"value": value, "source": source}
+        if key in units:
+            entry = {"value": value, "unit": units[key], "source": source}
+        (document.setdefault(section, {}) if section else document)[name] = entry
+    document["title"] = f"evolved from {scenario.name}: {study.objectives[0].name} {result.fitness:.4f}"
+    return dict(document)
+
+
+def result_summary(result: EvolveResult) -> str:
+    """How good the winner is, on fresh seeds."""
+    if result.dead_reason:
+        return f"Result {result.folder}: nothing flies: {result.dead_reason}"
+    span = f"{result.fitness:.3g} (95 %: {result.low:.3g} to {result.high:.3g}) on {result.seeds} fresh seeds"
+    return f"Result {result.folder}: {result.scenario.name}, fitness {span}"
+
+
+def result_html(result: EvolveResult) -> str:
+    """A table of the winner's parameters, and of the ranges in which candidates of the search were as good."""
+    units = {
+        f"{section}.{name}".lstrip("."): declared.unit
+        for section, record in result.scenario.records.items()
+        for name, declared, _ in declarations(record)
+        if isinstance(declared, Quantity)
+    }
+    rows = [
+        (key, format_number(value), units.get(key, ""), " … ".join(map(format_number, result.ranges.get(key, ()))))
+        for key, value in result.parameters.items()
+    ]
+    heads = ("parameter", "winner", "unit", "candidates as good")
+    return f"<p><b>{escape(result_summary(result))}</b></p>{html_table(heads, rows)}"
+
+
+DURATION_COLUMN = "duration"  # key of the scenario that short flights set, column of their table
+FLOWN = "duration_flown"  # that column beside `duration`, the time that a flight took
+KEY = ["stage", "run", "generation", "candidate"]
+
+
+def candidate_table(store: FlightStore, objectives: Sequence[str], stage: str = "search") -> pd.DataFrame:
+    """One row a candidate: its parameters by key, then its fitness, one column for each objective; nan: failed."""
+    rows = store.rows(
+        "SELECT run, generation, candidate, parameters, fitness FROM candidate WHERE stage=? AND fitness IS NOT NULL "
+        "ORDER BY run, generation, candidate",
+        (stage,),
+    )
+    found = []
+    for run, generation, candidate, parameters, fitness in rows:
+        place = {"run": run, "generation": generation, "candidate": candidate}
+        with as_error(f"{store.path}: candidate {candidate} of generation {generation}", StudyError):
+            told = dict(zip(objectives, _fitness(fitness, len(objectives)), strict=True))
+            found.append({**place, **parse_values(parameters), **told})
+    return pd.DataFrame(found)
+
+
+def flight_table(store: FlightStore, stage: str | None = None) -> pd.DataFrame:
+    """One row a flight: parameters by key, seed, order parameters, why it failed, duration (s), worker, versions.
+
+    A flight of another length than the scenario's tells it as `duration_flown` (s, simulated).
+    """
+    rows = store.rows(
+        "SELECT f.stage, f.run, f.generation, f.candidate, f.repeat, f.seed, c.parameters, f.scores, f.reason, "
+        "f.duration, f.worker, s.versions FROM flight f JOIN candidate c USING (stage, run, generation, candidate) "
+        "LEFT JOIN session s USING (session) WHERE ? IS NULL OR f.stage=? "
+        "ORDER BY f.stage, f.run, f.generation, f.candidate, f.repeat",
+        (stage, stage),
+    )
+    found = []
+    for *key, parameters, scores, reason, duration, worker, versions in rows:
+        place = dict(zip([*KEY, "repeat", "seed"], key, strict=True))
+        about = {"reason": reason, "duration": duration, "worker": worker, "versions": versions}
+        with as_error(f"{store.path}: a flight of {' '.join(map(str, key))}", StudyError):
+            values = {name: v for name, v in parse_values(scores or "{}").items() if not isinstance(v, list)}
+            given = {FLOWN if key == DURATION_COLUMN else key: value for key, value in parse_values(parameters).items()}
+            found.append({**place, **given, **values, **about})
+    return pd.DataFrame(found)
+
+
+def _fitness(text: Any, count: int) -> list[float]:
+    """Fitness of a row, one number for each objective; nan: failed."""
+    found = parse_json(text)
+    sound = isinstance(found, list) and len(found) == count
+    if not sound or not all(value is None or isinstance(value, (int, float)) for value in found):
+        raise FormatError(f"fitness is not a list of {count} numbers")
+    return [math.nan if value is None else float(value) for value in found]
+
+
+def export(store: FlightStore, folder: Path, scenarios: Sequence[str] = ()) -> list[Path]:
+    """Write all flights as evaluations.csv, and as evaluations.parquet where pyarrow is installed.
+
+    scenarios : what those of the study are called; of several, each flight tells its own
+    """
+    table = flight_table(store)
+    if len(scenarios) > 1:
+        table["scenario"] = [scenarios[repeat % len(scenarios)] for repeat in table["repeat"]]
+    written = [folder / "evaluations.csv"]
+    try:
+        atomic.write_file(written[0], table.to_csv(index=False))
+        if _has_parquet():
+            written.append(folder / "evaluations.parquet")
+            with atomic.atomic_path(written[1]) as temporary:
+                table.to_parquet(temporary, index=False)
+    except OSError as fault:
+        raise StudyError(f"{folder}: tables cannot be written: {fault.strerror or fault}") from fault
+    return written
+
+
+def _has_parquet() -> bool:
+    try:
+        import pyarrow  # noqa: F401
+    except ModuleNotFoundError:
+        return False
+    return True
+
+
+def sort_by_fitness(table: pd.DataFrame, objective: str, maximise: bool) -> Any:
+    """Candidates without the failed ones, the best first; of equals the earlier."""
+    sound = table[table[objective].notna()]
+    return sound.sort_values(objective, ascending=not maximise, kind="stable")
+
+
+def full_length_candidates(table: pd.DataFrame, growing: bool) -> pd.DataFrame:
+    """Candidates that flew as long as the scenario says; those of a search's short flights compare with each other."""
+    return table[table[DURATION_COLUMN].isna()] if growing and DURATION_COLUMN in table else table
+
+
+def mean_interval(values: Sequence[float]) -> tuple[float, float, float, float]:
+    """Mean, SD, and Student's 95 % interval of the mean."""
+    x = np.array(values, float)
+    mean, sd = float(x.mean()), float(x.std(ddof=1)) if len(x) > 1 else 0.0
+    half = float(stats.t.ppf(0.975, len(x) - 1)) * sd / len(x) ** 0.5 if len(x) > 1 else 0.0
+    return mean, sd, mean - half, mean + half
+
+
+def draw_study(study: Study, store: FlightStore, result: EvolveResult, folder: Path) -> list[Path]:
+    """Convergence, fitness against parameters, pairwise slices; with several objectives the front."""
+    from airflock.view import convergence, fitness_scatter, pareto, save_figure, slices
+
+    first = study.objectives[0]
+    names = [objective.name for objective in study.objectives]
+    table = full_length_candidates(candidate_table(store, names), study.search.flights == "growing")
+    units = {axis.key: axis.unit for axis in study.space.axes}
+    bounds = {axis.key: (axis.low, axis.high) for axis in study.space.axes}
+    name = study.scenario.name
+    figures = {
+        "convergence": convergence(table, first.name, maximise=first.maximise, what=name),
+        "scatter": fitness_scatter(table, units, first.name, result.parameters, what=name),
+    }
+    if len(bounds) > 1:
+        figures["slices"] = slices(table, bounds, first.name, result.parameters, maximise=first.maximise, what=name)
+    if len(names) > 1:
+        sound = table.dropna(subset=names).reset_index(drop=True)
+        signs = [-1.0 if objective.maximise else 1.0 for objective in study.objectives]
+        figures["pareto"] = pareto(sound, pareto_front(sound[names].to_numpy() * signs).tolist(), names, what=name)
+    return [save_figure(figure, folder / f"{key}.png") for key, figure in figures.items()]

@@ -1,0 +1,271 @@
+"""The table [space] of a study file: reading it, and everything that can be wrong with it, all faults at once."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+from airflock.core import Quantity, format_with_unit, number_names
+from airflock.runs import SearchAxis, SearchSpace, TiedParameter, declared_numbers, default_scale, full_space
+from airflock.scenarios import Scenario, largest_extension, load
+from airflock.support import read_toml, suggest
+
+ENTRY = ("low", "high", "unit", "scale", "integer", "above", "fixed", "tied", "factor", "offset", "source", "note")
+
+
+def read_space(table: Any, scenario: Scenario) -> tuple[SearchSpace | None, list[str]]:
+    """Space from the table [space] of a study file, or None; and all faults in it. Only what is listed varies."""
+    known = declared_numbers(scenario)
+    entries, faults = _entries(table)
+    axes: list[SearchAxis] = []
+    fixed: dict[str, float] = {}
+    tied: dict[str, TiedParameter] = {}
+    for key, entry in entries.items():
+        if key not in known:
+            hint = suggest(key, known, lead="; ", prefix="space.")
+            if key.startswith("aero.") and not scenario.is_aerodynamic:
+                hint = f", which has no section [aero]; --set {key}=VALUE adds drag descent to it"
+            faults.append(f"space.{key} is not a number of {scenario.name}{hint}")
+            continue
+        more = _entry_faults(key, entry, known[key][0], known)
+        faults += more
+        if more:
+            continue
+        if "fixed" in entry:
+            fixed[key] = float(entry["fixed"])
+        elif "tied" in entry:
+            tied[key] = TiedParameter(
+                str(entry["tied"]), float(entry.get("factor", 1.0)), float(entry.get("offset", 0.0))
+            )
+        else:
+            axes.append(_axis(key, entry, known[key][0]))
+    for axis in axes:  # a number that another one must stay above takes part even if it does not vary
+        other = axis.above
+        if other in known and other not in {a.key for a in axes} | set(fixed) and known[other][1] is not None:
+            fixed[other] = float(known[other][1] or 0.0)
+    space = SearchSpace(tuple(axes), fixed, tied)
+    faults += _faults_between(space, known, bool(faults))
+    return (None if faults else space), faults
+
+
+def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> SearchAxis:
+    low, high = float(entry.get("low", how.low)), float(entry.get("high", how.high))
+    scale = str(entry.get("scale", default_scale(low, high)))
+    return SearchAxis(
+        key, how.unit, low, high, scale, how.whole or bool(entry.get("integer", False)), str(entry.get("above", ""))
+    )
+
+
+def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
+    """Key → entry, from sections or dotted keys."""
+    found: dict[str, Mapping[str, Any]] = {}
+    faults = []
+    if not isinstance(table, Mapping):
+        return {}, [f"space = {table!r} is not a table of keys"]
+    for section, entries in table.items():
+        if not isinstance(entries, Mapping):
+            faults.append(f"space.{section} = {entries!r} is not a table; write {{ low = ..., high = ... }}")
+        elif "." in section or (entries and set(entries) <= set(ENTRY)):
+            found[section] = entries
+        else:
+            for name, entry in entries.items():
+                if isinstance(entry, Mapping):
+                    found[f"{section}.{name}"] = entry
+                else:
+                    faults.append(
+                        f"space.{section}.{name} = {entry!r} is not a table; write {{ low = ..., high = ... }}"
+                    )
+    return found, faults
+
+
+def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapping[str, Any]) -> list[str]:
+    """What is wrong with one entry by itself."""
+    faults = []
+    for name, value in entry.items():
+        numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if name not in ENTRY:
+            faults.append(f"space.{key}.{name}: unknown key; {suggest(name, ENTRY, ', '.join(ENTRY))}")
+        elif name in ("low", "high", "fixed", "factor", "offset") and not numeric:
+            faults.append(f"space.{key}.{name} = {value!r} is not a number; give {how.span}")
+        elif name in ("low", "high", "fixed") and not how.low <= value <= how.high:
+            faults.append(
+                f"space.{key}.{name} = {format_with_unit(f'{value:g}', how.unit)} lies outside the declared {how.span}"
+            )
+        elif name == "unit" and value != how.unit:
+            faults.append(f"space.{key}.unit = {value!r}: the unit is {how.unit}")
+        elif name == "scale" and value not in ("linear", "log"):
+            faults.append(f"space.{key}.scale = {value!r} is none of linear, log")
+        elif name == "integer" and not isinstance(value, bool):
+            faults.append(f"space.{key}.integer = {value!r} is none of true, false")
+        elif how.whole and (name == "tied" or (name == "integer" and not value)):
+            faults.append(f"space.{key}.{name} = {str(value).lower()}: only whole numbers make sense")
+        elif how.whole and name == "fixed" and value != int(value):
+            faults.append(f"space.{key}.fixed = {value:g} is not a whole number")
+        elif name in ("above", "tied") and not (isinstance(value, str) and value in known):
+            faults.append(f"space.{key}.{name} = {value!r} is not a number{suggest(value, known, lead='; ')}")
+    if faults or "fixed" in entry or "tied" in entry:
+        return faults
+    return _range_faults(_axis(key, entry, how))
+
+
+def _range_faults(axis: SearchAxis) -> list[str]:
+    where, span = f"space.{axis.key}", format_with_unit(f"[{axis.low:g}, {axis.high:g}]", axis.unit)
+    if not axis.low < axis.high:
+        word = "empty" if axis.low == axis.high else "inverted"
+        return [f"{where}: the range {span} is {word}; low must lie below high"]
+    if axis.scale == "log" and axis.low <= 0.0:
+        return [f"{where}: low = {format_with_unit(f'{axis.low:g}', axis.unit)} must be above 0 on a logarithmic scale"]
+    if axis.integer and math.floor(axis.high) < math.ceil(axis.low):
+        return [f"{where}: the range {span} holds no whole number"]
+    return []
+
+
+def _faults_between(space: SearchSpace, known: Mapping[str, tuple[Quantity, float | None]], told: bool) -> list[str]:
+    """Ties and orders that cannot hold."""
+    faults = []
+    axes = {axis.key: axis for axis in space.axes}
+    for axis in space.axes:
+        chain = [axis.key]
+        while axes.get(chain[-1]) and axes[chain[-1]].above:
+            chain.append(axes[chain[-1]].above)
+            if chain[-1] in chain[:-1]:
+                faults.append(f"space.{axis.key}: above runs in a circle: {' > '.join(chain)}")
+                break
+        if axis.above and axis.above not in axes and axis.above not in space.fixed:
+            faults.append(f"space.{axis.key}.above = {axis.above!r} neither varies nor is fixed")
+        lower = axes[axis.above].high if axis.above in axes else space.fixed.get(axis.above, axis.low)
+        if axis.above and lower > axis.high:
+            high = format_with_unit(f"{axis.high:g}", axis.unit)
+            faults.append(f"space.{axis.key}.high = {high} lies below {axis.above} = {lower:g}")
+    for key, tie in space.tied.items():
+        if tie.of not in axes and tie.of not in space.fixed:
+            faults.append(f"space.{key}.tied = {tie.of!r} neither varies nor is fixed")
+            continue
+        ends = (axes[tie.of].low, axes[tie.of].high) if tie.of in axes else (space.fixed[tie.of],)
+        how = known[key][0]
+        for end in ends:
+            value = tie.factor * end + tie.offset
+            if not how.low <= value <= how.high:
+                reached = format_with_unit(f"{value:g}", how.unit)
+                faults.append(f"space.{key} = {reached} at {tie.of} = {end:g} lies outside {how.span}")
+    if not space.axes and not told:
+        faults.append("space: nothing varies; give at least one key low and high")
+    return faults
+
+
+AROUND = 10.0  # factor about a scenario's own value, where no study is shipped
+SCALED = {"m": 1, "m/s": 1}  # units that grow with the speed; times and rates stay
+
+
+def default_space(scenario: Scenario) -> tuple[SearchSpace, list[str]]:
+    """The numbers of the model that matter, between bounds in which it may fly; and what was done, for a person."""
+    dead = unread_keys(scenario)
+    searched = [axis for axis in full_space(scenario).axes if axis.key not in dead]
+    found = _nearest_study(scenario)
+    if found is None:
+        axes = [_around(scenario, axis) for axis in searched]
+        notes = [f"no study of {scenario.model.name} is shipped: bounds a factor of {AROUND:g} about its own values"]
+    else:
+        name, speed, known = found
+        ratio = _speed(scenario) / speed if speed else 1.0
+        # what the study held fixed stays as the scenario has it
+        axes = [_scaled(scenario, known[axis.key], axis, ratio) for axis in searched if axis.key in known]
+        told = f", lengths and speeds times {ratio:.3g}" if ratio != 1.0 else ""
+        notes = [f"bounds of the study {name}{told}"]
+    if dead:
+        notes.append(f"not searched, because nothing reads them here: {', '.join(sorted(dead))}")
+    return SearchSpace(tuple(_ordered(axes))), notes
+
+
+def shipped_study_axes(scenario: Scenario) -> dict[str, tuple[float, float]]:
+    """Bounds of the shipped study of the same law that is nearest in speed, by key; none where no study is shipped."""
+    found = _nearest_study(scenario)
+    if found is None:
+        return {}
+    _, speed, known = found
+    ratio = _speed(scenario) / speed if speed else 1.0
+    scaled = [_scaled(scenario, known[own.key], own, ratio) for own in full_space(scenario).axes if own.key in known]
+    return {axis.key: (axis.low, axis.high) for axis in scaled}
+
+
+def unread_keys(scenario: Scenario) -> set[str]:
+    """Keys of the model's numbers that no rule reads under the scenario's choices."""
+    from airflock.engine import driver_text
+
+    text = driver_text(scenario)
+    read = set(re.findall(r"\bp\.(\w+)", text)) | set(scenario.model.usual)
+    return {f"model.{name}" for name in number_names(scenario.parameters) if name not in read}
+
+
+def _speed(scenario: Scenario) -> float:
+    """Preferred speed, m/s; 0 where the model has none."""
+    preferred = scenario.model.preferred_speed
+    return float(preferred(scenario.parameters)) if preferred else 0.0
+
+
+def _nearest_study(scenario: Scenario) -> tuple[str, float, dict[str, SearchAxis]] | None:
+    """Name, speed (m/s) and axes of the shipped study of the same law, nearest in speed; None if there is none."""
+    speed, best = _speed(scenario), None
+    for name, model, theirs, axes in _studies():
+        if model != scenario.model.name or not axes:
+            continue
+        away = abs(math.log(speed / theirs)) if speed > 0.0 and theirs > 0.0 else 0.0
+        if name == scenario.name:
+            away = -1.0
+        if best is None or away < best[0]:
+            best = (away, name, theirs if speed > 0.0 else 0.0, {axis.key: axis for axis in axes})
+    return None if best is None else best[1:]
+
+
+@lru_cache(maxsize=1)
+def _studies() -> list[tuple[str, str, float, tuple[SearchAxis, ...]]]:
+    """Name, law, speed and axes of the shipped studies."""
+    from airflock.search.study import shipped_studies
+
+    found = []
+    for name, path in shipped_studies().items():
+        document = read_toml(path)
+        if "scenario" not in document:  # one set for several scenarios: no speed of its own
+            continue
+        scenario = load(str(document["scenario"]), document.get("set"))
+        space, _ = read_space(document["space"], scenario) if "space" in document else (None, [])
+        found.append((name, scenario.model.name, _speed(scenario), space.axes if space else ()))
+    return found
+
+
+def _scaled(scenario: Scenario, axis: SearchAxis, own: SearchAxis, ratio: float) -> SearchAxis:
+    """An axis of a study at another speed, stretched to hold the scenario's own value; `own` has the declared ends."""
+    factor = ratio ** SCALED.get(axis.unit, 0)
+    low, high = axis.low * factor, axis.high * factor
+    if axis.unit == "m" and (arena := largest_extension(scenario.world)):
+        high = min(high, arena)
+    value = float(declared_numbers(scenario)[axis.key][1] or 0.0)
+    low, high = max(own.low, min(low, value)), min(own.high, max(high, value))
+    scale = axis.scale if low > 0.0 else "linear"
+    return replace(axis, low=low, high=high, scale=scale)
+
+
+def _around(scenario: Scenario, axis: SearchAxis) -> SearchAxis:
+    """An axis about the scenario's own value; from 0 where that is 0."""
+    how, value = declared_numbers(scenario)[axis.key]
+    own = float(value or 0.0)
+    size = abs(own) if own else _typical(scenario, how)
+    low, high = (own / AROUND, own * AROUND) if own > 0.0 else (-size, size)
+    low, high = max(axis.low, low), min(axis.high, high)
+    return replace(axis, low=low, high=high, scale=default_scale(low, high))
+
+
+def _typical(scenario: Scenario, how: Quantity) -> float:
+    """Size of a quantity of which nothing is known but its unit."""
+    sizes: dict[str, Any] = {
+        "m": 0.25 * (largest_extension(scenario.world) or scenario.radio.range), "m/s": _speed(scenario),
+    }  # fmt: skip
+    return min(float(sizes.get(how.unit) or 1.0), how.high - how.low)
+
+
+def _ordered(axes: list[SearchAxis]) -> list[SearchAxis]:
+    """Axes without an order that no longer holds: above a number that is not searched."""
+    keys = {axis.key for axis in axes}
+    return [axis if axis.above in keys or not axis.above else replace(axis, above="") for axis in axes]

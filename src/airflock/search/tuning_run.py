@@ -1,0 +1,386 @@
+"""The public door: start, evolve, harden, certify, report; each stage is continued where it was left."""
+
+import hashlib
+import json
+import math
+import os
+import time
+import tomllib
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from airflock.certificates import COUNT_BUDGET_SHARE, Campaign, campaign_from_request, flights_to_show
+from airflock.estimate import IdentifyResult, identify, read_heard
+from airflock.parts.metrics import scalar_names
+from airflock.runs import Interrupted, write_toml_file
+from airflock.scenarios import Scenario, build_scenario, load, rebuilt, scenario_variant, starting_set
+from airflock.search.limit_excess import flights_per_event
+from airflock.search.study_space import default_space
+from airflock.search.tune_stages import (
+    CERTIFY_SHARE,
+    DEFAULT_CONFIDENCE,
+    BudgetPlan,
+    Notify,
+    OnTuneProgress,
+    TuneProgress,
+    TuneResult,
+    load_plan,
+    make_plan,
+    measure_flight_rate,
+    run_certificate_stage,
+    run_hardening_stage,
+    run_search_stage,
+    save_plan,
+)
+from airflock.support import (
+    ErrorCollector,
+    RecordingError,
+    ScenarioError,
+    StudyError,
+    as_error,
+    atomic,
+    expand_path,
+    parse_json_object,
+    read_text,
+    value_or_default,
+)
+
+SCENARIO, REPORT_FILE = "identified.toml", "identified.json"
+Paths = Sequence[str | os.PathLike[str]]
+
+
+@dataclass(frozen=True)
+class IdentifiedFleet:
+    """What logs say of a fleet: the scenario with its numbers, its file's content, and what to tell of it.
+
+    told : files with their hashes, the law's scenario, numbers with intervals or the reason why not, notes
+    """
+
+    scenario: Scenario
+    document: Mapping[str, Any]
+    told: Mapping[str, Any]
+
+    def save(self, folder: Path) -> None:
+        """Write identified.toml and identified.json, the latter last: it says that the stage is over."""
+        write_toml_file(folder / SCENARIO, self.document, "Identified from logs by airflock tune.")
+        atomic.write_file(folder / REPORT_FILE, json.dumps(self.told))
+
+
+def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> IdentifiedFleet:
+    """What the folder holds of these logs, or what they say now.
+
+    Raises StudyError where the folder holds what other logs said, RecordingError or AirflockError for bad logs.
+    """
+    asked = _asked(logs, like, heard)
+    if (folder / REPORT_FILE).is_file():
+        with as_error(folder / REPORT_FILE, StudyError):
+            told = parse_json_object(read_text(folder / REPORT_FILE))
+        for key, value in asked.items():
+            if told.get(key) != value:
+                raise StudyError(f"{folder}: holds the tuning of other logs ({key} differs); give another --out")
+        return IdentifiedFleet(load(folder / SCENARIO), {}, told)
+    found = identify(list(logs), like, heard=None if heard is None else read_heard(heard))
+    document = found.document()
+    # by the name of the file that it becomes, so that a tuning that is resumed is the same one
+    return IdentifiedFleet(build_scenario(document, str(folder / SCENARIO)), document, {**asked, **_told(found)})
+
+
+def _asked(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> dict[str, Any]:
+    """What decides the outcome, as plain values."""
+    files = [*logs, *([] if heard is None else [heard])]
+    like_document = {key: value for key, value in like.document.items() if key != "published"}
+    return {
+        "logs": {Path(path).name: _hash(path) for path in files},
+        "like": hashlib.sha256(json.dumps(like_document, sort_keys=True, default=str).encode()).hexdigest()[:12],
+    }
+
+
+def _hash(path: str | os.PathLike[str]) -> str:
+    try:
+        with expand_path(path).open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()[:12]
+    except OSError as fault:
+        raise RecordingError(f"{path}: {fault.strerror or fault}") from fault
+
+
+def _told(found: IdentifyResult) -> dict[str, Any]:
+    """Every number with its interval, or the reason why the logs do not tell it; and notes."""
+    numbers = [
+        {"key": n.key, "value": n.value, "low": n.low, "high": n.high, "origin": n.origin}
+        if n.told
+        else {"key": n.key, "reason": n.reason or "not found in the logs"}
+        for n in found.numbers.values()
+    ]
+    return {"name": found.like.name, "drones": found.logs.drones, "numbers": numbers, "notes": list(found.notes)}
+
+
+SCALES = "vasarhelyi_2018"  # the law whose scaling with the speed is published
+
+
+def prepare_start(scenario: Scenario) -> tuple[Scenario, list[str]]:
+    """The scenario to start from, and what was set, for a person to read.
+
+    Only numbers that the scenario's document does not give are set; every other value stays.
+    """
+    values, told = _scaled(scenario)
+    start = rebuilt(scenario, values) if values else scenario
+    for room in _off_the_walls(scenario):
+        with suppress(ScenarioError):  # they have no place so far from the walls
+            why = f"no agent starts nearer than {room:g} m to walls and obstacles"
+            away = rebuilt(start, {"start.wall_clearance": room})
+            return away, [*told, f"{why} (start.wall_clearance, which is not given)"]
+    return start, told
+
+
+def measures_walls(scenario: Scenario) -> bool:
+    """Whether its order parameters tell how near agents come to walls and obstacles, and some stand there."""
+    stand = scenario.world.arena != "none" or bool(scenario.world.obstacles)
+    return stand and "clearance" in scalar_names(scenario.measures, scenario.metrics)
+
+
+def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
+    """Numbers of the law, scaled to the speed of the scenario."""
+    if scenario.model.name != SCALES:
+        return {}, [
+            f"{scenario.model.name}: no scaling with the speed is published; the search starts from its own values"
+        ]
+    speed = float(scenario.parameters.v_flock)
+    scaled: Mapping[str, Any] = tomllib.loads(starting_set(speed))["model"]
+    given = scenario.document.get("model", {})
+    values = {
+        f"model.{name}": entry["value"]
+        for name, entry in scaled.items()
+        if isinstance(entry, dict) and name not in given and name != "v_max"
+    }
+    if not values:
+        return {}, ["all numbers of the law are given; the search starts from them"]
+    return values, [f"{len(values)} numbers of the law scaled to {speed:g} m/s, as Tables S1 and S3 of {SCALES} say"]
+
+
+def _off_the_walls(scenario: Scenario) -> list[float]:
+    """Room at walls and obstacles when a flight begins, m, where the document gives none; less where that is too much.
+
+    Half of what agents have between them, or r_coll. Without it the nearest that most flights come to a wall is where
+    somebody was put at the start, whatever the law does.
+    """
+    drawn = scenario.start.kind in ("arena", "ball", "box")
+    if not (measures_walls(scenario) and drawn) or "wall_clearance" in scenario.document.get("start", {}):
+        return []
+    least = float(scenario.metrics.r_coll)
+    return sorted({max(least, 0.5 * scenario.separation()), least}, reverse=True)
+
+
+@dataclass(frozen=True)
+class TuneRequest:
+    """What a tuning is asked for.
+
+    campaign : what its certificate is to show; limits: the texts of its limits
+    """
+
+    campaign: Campaign
+    limits: list[str]
+
+
+def make_request(
+    start: Scenario,
+    limit: Sequence[str] = (),
+    confidence: float | None = None,
+    plan: BudgetPlan | None = None,
+) -> TuneRequest:
+    """What is asked for; what is not given is as in the plan of a tuning that goes on, or else as usual.
+
+    Raises ScenarioError, all faults together.
+    """
+    asked = ErrorCollector()
+    limits = list(limit) or (plan.limits if plan else []) or asked.read(default_limits, start)
+    sure = (plan.confidence if plan else DEFAULT_CONFIDENCE) if confidence is None else confidence
+    campaign = asked.read(campaign_from_request, start, limits, sure)
+    asked.raise_errors()
+    return TuneRequest(campaign, limits)
+
+
+def check_tune_budget(budget: float) -> None:
+    """Refuse a time in which nothing could be tuned, and one without an end."""
+    if not 0.0 < budget < math.inf:
+        raise StudyError(f"budget = {budget:g} s is not positive")
+
+
+def default_limits(scenario: Scenario) -> list[str]:
+    """Collisions, and contacts where there are walls or obstacles, rarer than once in a hundred flock hours each.
+
+    Raises ScenarioError where distances are not measured.
+    """
+    if "r_min" not in scalar_names(scenario.measures, scenario.metrics):
+        kind = scenario.measures.name
+        raise ScenarioError(
+            [f"{scenario.name}: metrics.kind = {kind!r} has no r_min to limit; say what is to be shown with --limit"]
+        )
+    contacts = ["clearance<0 at 0.01/h"] if measures_walls(scenario) else []
+    return [f"r_min<{scenario.metrics.r_coll:g} at 0.01/h", *contacts]
+
+
+def infeasible_limit_lines(campaign: Campaign, plan: BudgetPlan) -> list[str]:
+    """A line for each limit that the plan's flights could not show even if nothing ever happened in them."""
+    able = int(COUNT_BUDGET_SHARE * plan.seconds * plan.rate)
+    return [
+        f"{limit.text}: needs {flights:,} flights without an event to be shown, and there is time for {able:,}; "
+        f"give --budget {_time(1.1 * flights / plan.rate / CERTIFY_SHARE / COUNT_BUDGET_SHARE)}, "
+        "or ask for a larger limit"
+        for limit in campaign.limits
+        if (flights := flights_to_show(campaign, limit)) > able
+    ]
+
+
+def _time(seconds: float) -> str:
+    """At least so long, as --budget takes it."""
+    return f"{math.ceil(seconds / 3600.0)}h" if seconds > 7200.0 else f"{math.ceil(seconds / 60.0)}min"
+
+
+def tune(
+    scenario: Scenario | str | os.PathLike[str] | Paths,
+    out: str | os.PathLike[str],
+    *,
+    budget: float = 1200.0,
+    limit: Sequence[str] = (),
+    confidence: float | None = None,
+    like: Scenario | str | os.PathLike[str] | None = None,
+    heard: str | os.PathLike[str] | None = None,
+    warm: bool = False,
+    resume: bool = False,
+    settings: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+    watch: OnTuneProgress | None = None,
+    note: Notify | None = None,
+    trust: bool = False,
+) -> TuneResult:
+    """From a scenario or logs of your own to a set that is evolved, hardened and certified, with a report.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path, or a list of paths
+        Your drones, field and speed; numbers of the law that it does not give are scaled to its speed. With `like`, log
+        files of your drones, as `airflock.identify` reads them.
+    out : str or path
+        Folder of everything: start, study, hardening, certificate, report, and tuned.toml to fly.
+    budget : float
+        Time to spend, s.
+    limit : sequence of str
+        What is to be shown, as `airflock.certify` takes it; by default that collisions (`metrics.r_coll`) are rarer
+        than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
+        that look as if they kept these limits before all others.
+    confidence : float, optional
+        Confidence of the certificate, a share in [0.5, 1); by default 0.95.
+    like : Scenario, str or path, optional
+        The scenario whose law, field and speed are tuned with the numbers that the logs tell of the drones.
+    heard : str or path, optional
+        Table of packets of these logs, as `airflock identify --heard` takes it.
+    warm : bool
+        Search from the start's own numbers on, which its speed scales, instead of the middle of all ranges.
+    resume : bool
+        Continue the work in the folder; limits and confidence that are not given are as in the first call.
+    settings : mapping, optional
+        Keys of the scenario to change.
+    threads : int, optional
+        Flights side by side; by default one per core.
+    watch, note : callable, optional
+        Told as each stage begins and of its flights (`airflock.search.tune_stages.TuneProgress`); told in a line,
+        before they begin, of each limit that the budget leaves too little time to show.
+    trust : bool
+        Whether code that files name may run.
+
+    Returns
+    -------
+    Tuned
+        The scenario to fly, what each stage found, and whether the limit is shown.
+
+    Raises
+    ------
+    ScenarioError, StudyError
+        If the scenario or the folder cannot be used, the budget is too small, or nothing flies.
+    Interrupted
+        At Ctrl-C.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.tune("vasarhelyi_2018/4ms", "tuned", limit=["r_mim<3 at 1%"])  # refused before anything flies
+    Traceback (most recent call last):
+    airflock.support.errors.ScenarioError: limit 'r_mim<3 at 1%': r_mim: unknown order parameter; did you mean r_min?
+    """
+    began = time.monotonic()
+    folder = expand_path(out)
+    parts = ErrorCollector()  # all of it is refused before anything flies
+    parts.read(check_tune_budget, budget)
+    if like is not None:
+        parts.raise_errors()  # before logs are read, which takes long
+    begun = parts.read(_begun, scenario, like, heard, settings, folder, trust)
+    start = parts.read(lambda found: found.start, begun)
+    plan = parts.read(load_plan, folder, start, resume)
+    asked = parts.read(make_request, start, limit, confidence, value_or_default(plan, None))
+    parts.raise_errors()
+    logs = begun.logs
+    sure, rated = asked.campaign.confidence, [each for each in asked.campaign.limits if each.rate is not None]
+    if plan is None:
+        telling = flights_per_event(rated, start)
+        made = make_plan(budget, measure_flight_rate(start, threads), warm=warm, flights_for_limits=telling)
+        plan = replace(made, limits=asked.limits, confidence=sure)
+        save_plan(folder, start, plan)
+    searched = [each.text for each in rated]
+    if logs is not None and not (folder / REPORT_FILE).is_file():
+        logs.save(folder)
+    short = infeasible_limit_lines(asked.campaign, plan)
+    for line in short:
+        if note is not None:
+            note(line)
+    notes = [*begun.notes, *default_space(start)[1], *short]
+    watch = watch or (lambda stage: None)
+    try:
+        result = run_search_stage(folder, start, plan, searched, threads, watch)
+        if result.dead_reason:
+            raise StudyError(f"{start.name}: {result.dead_reason}")
+        tuned, steps, why = run_hardening_stage(folder, plan, searched, threads, trust, watch)
+        shown = run_certificate_stage(folder, tuned, asked.limits, sure, plan, threads, watch)
+        found = TuneResult(
+            folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
+            {} if logs is None else logs.told,
+        )  # fmt: skip
+        watch(TuneProgress("report"))
+        from airflock.search.tune_report import save
+
+        save(found)
+    except KeyboardInterrupt as stop:
+        raise Interrupted(f"interrupted: stages that are over are kept in {folder}; continue with --resume") from stop
+    return found
+
+
+class _Begun(NamedTuple):
+    """Where a tuning begins: its scenario, what was set in it, and what logs told if it began with logs."""
+
+    start: Scenario
+    notes: list[str]
+    logs: IdentifiedFleet | None
+
+
+def _begun(
+    what: Scenario | str | os.PathLike[str] | Paths,
+    like: Scenario | str | os.PathLike[str] | None,
+    heard: str | os.PathLike[str] | None,
+    settings: Mapping[str, Any] | None,
+    folder: Path,
+    trust: bool,
+) -> _Begun:
+    paths = [what] if isinstance(what, (Scenario, str, os.PathLike)) else list(what)
+    if like is None:
+        if len(paths) != 1 or heard is not None:
+            raise ScenarioError(
+                ["tune takes one scenario; for logs, give --like PRESET, the scenario with their law, field and speed"]
+            )
+        return _Begun(*prepare_start(scenario_variant(paths[0], settings, trust=trust)), None)
+    files = [path for path in paths if not isinstance(path, Scenario)]
+    if not files or len(files) != len(paths):
+        raise ScenarioError(["like is given, so give log files, not a scenario"])
+    found = identify_fleet(folder, files, scenario_variant(like, settings, trust=trust), heard)
+    return _Begun(*prepare_start(found.scenario), found)
