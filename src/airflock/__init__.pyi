@@ -55,11 +55,11 @@ from .search.harden import harden as harden
 from .search.run import evolve as evolve
 from .search.tune.run import tune as tune
 from .search.validation import validate as validate
-from .studio.watch import watch as watch
+from .studio.live_page import watch as watch
 from .support.errors import AirflockError as AirflockError
 from .view import plots as plots
-from .view.plots.picture import plot as plot
-from .view.plots.video import video as video
-from .view.replays.build import replay as replay
+from .view.plot_by_kind import plot as plot
+from .view.video_writer import video as video
+from .view.replay_page import replay as replay
 
 __version__: str

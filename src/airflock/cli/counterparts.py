@@ -125,7 +125,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             "agents": 'settings["agents"]',
             "duration": 'settings["duration"]',
             **JSON_OPTIONS,
-            "plot": "airflock.view.plots.certificate.plot_certificate",
+            "plot": "airflock.view.result_plots.plot_certificate",
             **{
                 name: name
                 for name in (
@@ -285,8 +285,10 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             "changes": "airflock.load",
             **JSON_OPTIONS,
             "out": "airflock.estimate.identification.run.IdentifyResult.document",
-            **dict.fromkeys(("conservative", "uncertain"), "airflock.estimate.identification.run.IdentifyResult.document"),
-            "plot": "airflock.view.plots.identified.plot_identified",
+            **dict.fromkeys(
+                ("conservative", "uncertain"), "airflock.estimate.identification.run.IdentifyResult.document"
+            ),
+            "plot": "airflock.view.result_plots.plot_identified",
             "plan": "airflock.estimate.identification.plan.flight_card",
             "flights": "airflock.estimate.identification.check.check_against_logs",
             **dict.fromkeys(("map", "unit", "time_unit", "axes", "decimal", "delimiter"), "options"),
@@ -304,7 +306,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             "trust": "trust",
             **JSON_OPTIONS,
             "out": "airflock.estimate.inference.result.InferResult.document",
-            "plot": "airflock.view.plots.inferred.plot_inferred",
+            "plot": "airflock.view.result_plots.plot_inferred",
         },
     ),
     "fleet": PythonCounterpart(
