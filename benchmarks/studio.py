@@ -63,10 +63,9 @@ def receive(address):
 
 def opened(name, settings, links, against=None):
     """A page that flies in a thread, with a client and a counter of frames."""
-    from airflock.studio.flights import FlightRequest
-    from airflock.studio.page import FlightPage
-    from airflock.studio.player import Player
-    from airflock.studio.view import BrowserView
+    from airflock.studio.browser_view import BrowserView
+    from airflock.studio.flight_page import FlightPage
+    from airflock.studio.player import FlightRequest, Player
 
     player = Player(FlightRequest(name, settings, 1, compared_with=against))
     player.start()

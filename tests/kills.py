@@ -144,8 +144,7 @@ def of_tracks(folder):
 
 def studio(folder):
     """What the live page writes: a tuned scenario, the flight again as a recording, its replay."""
-    from airflock.studio.flights import FlightRequest
-    from airflock.studio.player import Player
+    from airflock.studio.player import FlightRequest, Player
 
     folder.mkdir(exist_ok=True)
     player = Player(FlightRequest("vasarhelyi_2018/4ms", {"agents": 4}, seed=3))

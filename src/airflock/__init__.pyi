@@ -54,11 +54,11 @@ from .scenarios.scenario import Scenario as Scenario
 from .search.evolution import evolve as evolve, validate as validate
 from .search.hardening import harden as harden
 from .search.tuning_run import tune as tune
-from .studio.watch import watch as watch
+from .studio.live_page import watch as watch
 from .support.errors import AirflockError as AirflockError
 from .view import plots as plots
-from .view.plots.picture import plot as plot
-from .view.plots.video import video as video
-from .view.replays.build import replay as replay
+from .view.plot_by_kind import plot as plot
+from .view.video_writer import video as video
+from .view.replay_page import replay as replay
 
 __version__: str

@@ -7,7 +7,7 @@ import pytest
 from pixels import chart, coloured, places, shot
 from test_watch import flying, opened, until
 
-from airflock.view.stage import shades
+from airflock.view import agent_colours
 
 pytestmark = pytest.mark.browser
 NEAR = {"metrics.r_coll": 8.0}  # m; so that there are many
@@ -88,6 +88,6 @@ def test_a_radio_that_is_silenced_in_flight_is_heard_by_nobody(browser, tab):
         tab.get_by_label("colour by").first.click()
         tab.get_by_role("option", name="fault", exact=True).click()
         until(lambda: "radio_silent" in tab.inner_text("body"), "the key does not name the fault")
-        tone = shades.category_colours(1)[0]
+        tone = agent_colours.category_colours(1)[0]
         until(lambda: places(np.abs(shot(tab)[160:615, 140:640] - tone).max(axis=2) < 70) >= 1, "nobody is coloured")
         assert not tab.faults

@@ -7,10 +7,9 @@ from contextlib import contextmanager
 import pytest
 from pixels import coloured, places, shot
 
-from airflock.studio.flights import FlightRequest
-from airflock.studio.page import FlightPage
-from airflock.studio.player import Player
-from airflock.studio.view import BrowserView
+from airflock.studio.browser_view import BrowserView
+from airflock.studio.flight_page import FlightPage
+from airflock.studio.player import FlightRequest, Player
 
 pytestmark = pytest.mark.browser
 PATIENCE = 120.0  # s

@@ -27,8 +27,18 @@ from airflock.fleets.radio_channel import SOFTWARE_KEY
 from airflock.fleets.realtime import fly_in_realtime
 from airflock.studio.fleet_tables import drone_html, faults_html, fleet_warning, members_html, notes_html
 from airflock.studio.fleet_watch import open_card_and_radios
+from airflock.drones.onboard.ports import UdpAddresses, UdpPort
+from airflock.fleets import compare, realtime
+from airflock.fleets.befalling import DroneFaults
+from airflock.fleets.faults import INJECTED_KINDS, InjectedFault
+from airflock.fleets.lockstep import START_TIME
+from airflock.fleets.observer import FleetObserver
+from airflock.fleets.starting import SOFTWARE_KEY, OperatorStation, write_card_and_key
+from airflock.fleets.teller import SCENARIO_FAULT_NAMES, TelemetryBroadcast
+from airflock.studio.fleet_page import drone_html, faults_html, fleet_warning, members_html, notes_html
+from airflock.studio.live_page import open_card_and_radios
 from airflock.support.errors import AirflockError, CardError, StudioError
-from airflock.view.stage.field import card_scene
+from airflock.view.scene_solids import card_scene
 from fleets import PRIVATE, card, fleet, scenario
 
 START = [State(20.0 * i, 0.0, 0.0, 2.0, 0.0, 0.0) for i in range(3)]

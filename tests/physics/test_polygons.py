@@ -10,7 +10,7 @@ from shapely.geometry import LineString, Point, Polygon
 
 from airflock.scenarios.flight_world import FlightWorld as Seen
 from airflock.support.errors import ScenarioError
-from airflock.view.stage.scene import prism_solid as drawn_prism
+from airflock.view.scene_solids import prism_solid as drawn_prism
 from airflock.world import arena, polygon
 from airflock.world.place import WorldMap, edge_rows
 from airflock.world.shapes import from_triangle

@@ -90,6 +90,9 @@ def results():
     from airflock.recordings.recording_files import load_recording
     from airflock.view.plots.trajectories import trajectories
     from airflock.view.replays.build import replay
+    from airflock.recordings.files import load_recording
+    from airflock.view.replay_page import replay
+    from airflock.view.trajectory_plots import trajectories
 
     recording = load_recording(GOLDEN / "recording.nc")
     table = pd.DataFrame({"a": range(5000), "b": [0.1] * 5000})
@@ -152,13 +155,13 @@ def _recording(target):
 
 
 def _figure(target):
-    from airflock.view.plots.save import save_figure
+    from airflock.view.style import save_figure
 
     save_figure(results()[1], target)
 
 
 def _video(target):
-    from airflock.view.plots.video import video
+    from airflock.view.video_writer import video
 
     video(results()[0], target, fps=5, speed=4.0)
 

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from airflock.view.stage import colours
+from airflock.view import agent_colours
 
 SEEN = {
     "all cones": np.eye(3),
@@ -35,18 +35,18 @@ def lab(rgb, seen):
 
 @pytest.mark.parametrize("who", SEEN)
 def test_names_have_colours_that_anybody_tells_apart(who):
-    found = lab([*colours.CATEGORY_COLOURS, colours.COLLISION_COLOUR], SEEN[who])
+    found = lab([*agent_colours.CATEGORY_COLOURS, agent_colours.COLLISION_COLOUR], SEEN[who])
     assert min(np.linalg.norm(a - b) for a, b in combinations(found, 2)) > AT_A_GLANCE
 
 
 @pytest.mark.parametrize("who", SEEN)
 def test_a_scale_becomes_lighter_all_along(who):
-    lightness = lab(colours.ramp_colours(np.linspace(0.0, 1.0, 30)), SEEN[who])[:, 0]
+    lightness = lab(agent_colours.ramp_colours(np.linspace(0.0, 1.0, 30)), SEEN[who])[:, 0]
     assert (np.diff(lightness) > 0.0).all()
 
 
 @pytest.mark.parametrize("who", SEEN)
 def test_opposite_headings_look_different(who):
     turn = np.linspace(0.0, 0.5, 12, endpoint=False)
-    one, other = (lab(colours.wheel_colours(turn + half), SEEN[who]) for half in (0.0, 0.5))
+    one, other = (lab(agent_colours.wheel_colours(turn + half), SEEN[who]) for half in (0.0, 0.5))
     assert np.linalg.norm(one - other, axis=1).min() > AT_A_GLANCE

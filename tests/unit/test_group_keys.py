@@ -7,8 +7,7 @@ import airflock
 from airflock.engine import fly_world
 from airflock.scenarios.cost import estimated_seconds
 from airflock.scenarios.files import load
-from airflock.studio.controls import scenario_controls, set_options
-from airflock.studio.side import scenario_value
+from airflock.studio.flight_pane import scenario_controls, scenario_value, set_options
 from airflock.support.errors import ScenarioError
 
 PAPER = "vasarhelyi_2018/4ms"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import toys
-from airflock.cli import harden as cli_harden
+from airflock.cli import search_verbs as cli_harden
 from airflock.parts.radios.links import received
 from airflock.runs.executors import ThreadExecutor
 from airflock.runs.flight_store import FlightStore
@@ -233,7 +233,7 @@ def test_a_narrow_terminal_is_told_every_number(monkeypatch, capsys):
         for name, verdict in (("optimum", ""), (named, "undone: gains no distance and no room at walls"))
     ]  # fmt: skip
     monkeypatch.setenv("COLUMNS", "80")
-    cli_harden._print("mine.toml", steps, 60)
+    cli_harden._print_hardened("mine.toml", steps, 60)
     told = capsys.readouterr().out
     assert "…" not in told
     for text in ("0.7123", "33.8", "0.125", "0.987", "100 %", "-12.3", "0.0123 (-0.005 to 0.0295)", "1.62 m (1.12 to"):

@@ -5,9 +5,9 @@ import pytest
 from typer.testing import CliRunner
 
 import airflock
-from airflock.cli.usage import expand_home
+from airflock.cli.command import expand_home
 from airflock.support.untrusted import expand_path
-from airflock.view.plots.save import save_figure
+from airflock.view.style import save_figure
 
 mpl.use("agg")
 SCENARIO = 'extends = "vasarhelyi_2018/4ms"\nagents = 3\nduration = 1.0\n'

@@ -11,6 +11,8 @@ from airflock.engine import Flight
 from airflock.scenarios.named_code import import_user_file
 from airflock.studio.flights import FlightRequest
 from airflock.studio.player import Player
+from airflock.scenarios.own_code import import_user_file
+from airflock.studio.player import FlightRequest, Player
 from airflock.support.errors import RuleError, ScenarioError
 
 
@@ -156,7 +158,7 @@ def test_a_rule_that_raises_in_flight_ends_in_a_line_with_its_place(raising):
 def test_a_page_stops_the_flight_of_a_rule_that_raises_and_goes_on(raising, monkeypatch):
     """As the first seconds are flown, until there is a driver."""
     plainly = lambda *given, **named: Flight(*given, **{**named, "device": "python"})  # noqa: E731
-    monkeypatch.setattr("airflock.studio.origin.Flight", plainly)
+    monkeypatch.setattr("airflock.studio.flight_pane.Flight", plainly)
     path, told = raising
     player = Player(FlightRequest("vasarhelyi_2018/4ms", {"agents": 3}, law=path))
     assert not player.fly(50) and player.failure_message == f"stopped: {told}"

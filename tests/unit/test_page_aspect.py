@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from airflock.studio.view import FULL_ASPECT, camera_for_aspect
+from airflock.studio.browser_view import FULL_ASPECT, camera_for_aspect
 
 AIM = {"position": (10.0, -3.0, 200.0), "look_at": (10.0, 5.0, 0.0), "fov": 0.8, "near": 2.0, "far": 4000.0}
 

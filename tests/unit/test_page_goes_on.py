@@ -6,11 +6,9 @@ from types import SimpleNamespace
 import pytest
 
 from airflock.engine import Flight
-from airflock.studio.flights import FlightRequest
-from airflock.studio.opening import OpeningPanel
-from airflock.studio.panel import Widgets
-from airflock.studio.player import Player
-from airflock.studio.playing import PlaybackPanel
+from airflock.studio.browser_view import Widgets
+from airflock.studio.page_panels import OpeningPanel, PlaybackPanel
+from airflock.studio.player import FlightRequest, Player
 from airflock.support import atomic
 
 PRESET = "vasarhelyi_2018/4ms"
@@ -20,7 +18,7 @@ PRESET = "vasarhelyi_2018/4ms"
 def player(monkeypatch):
     """An interpreted flight that has begun, and what is told of it."""
     plainly = lambda *given, **named: Flight(*given, **{**named, "device": "python"})  # noqa: E731
-    monkeypatch.setattr("airflock.studio.origin.Flight", plainly)
+    monkeypatch.setattr("airflock.studio.flight_pane.Flight", plainly)
     made = Player(FlightRequest(PRESET, {"agents": 5}, seed=3))
     made.faults = []
     made.fault = made.faults.append
@@ -110,7 +108,7 @@ def test_a_field_shows_what_flies_where_another_number_is_refused(player):
 
 def test_the_end_of_the_longest_flight_is_told(player, monkeypatch):
     assert not player.over and player.status == ""
-    monkeypatch.setattr("airflock.studio.origin.MAX_DURATION", 1.0)
+    monkeypatch.setattr("airflock.studio.flight_pane.MAX_DURATION", 1.0)
     player.reset()
     player.fly(100)
     then = player.flight.step

@@ -32,18 +32,14 @@ from airflock.recordings.scores import time_series_names
 from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.support.errors import AirflockError, RecordingError
-from airflock.view.plots import flight as flight_view, style
-from airflock.view.plots.certificate import extrapolated_tail, plot_certificate
-from airflock.view.plots.film_stage import VideoFrame
-from airflock.view.plots.heatmap import heatmap
-from airflock.view.plots.responses import alignment_curve, allowed_difference_curve, repulsion_curve, wall_curve
-from airflock.view.plots.rules import rules
-from airflock.view.plots.save import PictureError, save_figure
-from airflock.view.plots.series import SmoothedLines, rotations, series
-from airflock.view.plots.trajectories import trajectories
-from airflock.view.plots.transfer import transfer
-from airflock.view.plots.video import frame_count, video
-from airflock.view.stage.arrows import vector_fields
+from airflock.view import flight_paths as flight_view, style
+from airflock.view.law_vectors import vector_fields
+from airflock.view.order_parameter_plots import SmoothedLines, heatmap, rotations, series, transfer
+from airflock.view.result_plots import extrapolated_tail, plot_certificate
+from airflock.view.rules_plot import alignment_curve, allowed_difference_curve, repulsion_curve, rules, wall_curve
+from airflock.view.style import PictureError, save_figure
+from airflock.view.trajectory_plots import trajectories
+from airflock.view.video_writer import VideoFrame, frame_count, video
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 
@@ -521,7 +517,7 @@ def test_pictures_of_one_panel_are_drawn_into_axes_that_are_given():
 
 def test_where_ffmpeg_is_not_installed_the_command_says_so_before_it_flies(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.setattr("airflock.view.plots.picture.recording_or_flight", lambda *_, **__: pytest.fail("flew"))
+    monkeypatch.setattr("airflock.view.plot_by_kind.recording_or_flight", lambda *_, **__: pytest.fail("flew"))
     said = CliRunner().invoke(app, ["video", "vasarhelyi_2018/4ms", "--out", str(tmp_path / "a.mp4")])
     assert "videos need imageio-ffmpeg: pip install 'airflock[video]'" in str(said.exception)
     with pytest.raises(PictureError, match="videos need imageio-ffmpeg"):
@@ -544,7 +540,7 @@ def test_a_chart_beside_a_video_moves_with_it():
 
 @pytest.mark.parametrize(("chart", "said"), [("phi_velo", "did you mean phi_vel?"), ("mood", "phi_vel, ")])
 def test_a_chart_of_what_a_flight_does_not_have_is_refused_before_it_is_flown(tmp_path, monkeypatch, chart, said):
-    monkeypatch.setattr("airflock.view.plots.picture.recording_or_flight", lambda *_, **__: pytest.fail("flew"))
+    monkeypatch.setattr("airflock.view.plot_by_kind.recording_or_flight", lambda *_, **__: pytest.fail("flew"))
     path = tmp_path / "a.mp4"
     told = CliRunner().invoke(app, ["video", "vasarhelyi_2018/4ms", "--chart", chart, "--out", str(path)])
     assert isinstance(told.exception, RecordingError) and said in str(told.exception) and not path.exists()

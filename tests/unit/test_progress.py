@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from airflock.cli.progress import (
+from airflock.cli.terminal import (
     FIRST_LINE_AFTER,
     LINE_INTERVAL,
     LogProgress,
@@ -87,7 +87,7 @@ def test_times_are_spoken():
 
 
 def test_a_command_that_is_quiet_tells_nothing(capsys, monkeypatch):
-    monkeypatch.setattr("airflock.cli.progress.FIRST_LINE_AFTER", 0.0)
+    monkeypatch.setattr("airflock.cli.terminal.FIRST_LINE_AFTER", 0.0)
     with counting_parts("flights", 2, quiet=True) as done:
         done()
     with progress_line(quiet=True) as silent:

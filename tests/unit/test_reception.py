@@ -8,7 +8,7 @@ import airflock
 from airflock.core.radio import lost
 from airflock.recordings.packet_ages import packet_age
 from airflock.support.errors import RecordingError
-from airflock.view.plots.reception import received
+from airflock.view.result_plots import received
 
 FLIGHT = {"agents": 10, "duration": 20.0, "sensors.period": 0.2, "radio.delay": 0.6, "metrics.period": 0.2}
 

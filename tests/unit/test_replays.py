@@ -15,9 +15,8 @@ from hypothesis.extra.numpy import arrays
 import airflock
 from airflock.cli import main as run_main
 from airflock.support.errors import RecordingError
-from airflock.view.replays import check_colour
-from airflock.view.replays.pack import PackedPositions, pack_positions, unpack_positions
-from airflock.view.stage.clusters import cluster_labels
+from airflock.view.agent_colours import cluster_labels
+from airflock.view.replay_page import PackedPositions, check_colour, pack_positions, unpack_positions
 
 MOTOR = {"kind": "motor", "agents": [7]}
 FRAMES = st.tuples(st.integers(1, 9), st.integers(2, 3), st.integers(1, 4))
@@ -163,7 +162,7 @@ def test_colours_of_a_flight_are_known_before_it_is_flown(name):
 
 
 def test_a_wrong_colour_is_refused_before_the_flight(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("airflock.view.plots.picture.simulate", lambda *_, **__: pytest.fail("it was flown"))
+    monkeypatch.setattr("airflock.view.plot_by_kind.simulate", lambda *_, **__: pytest.fail("it was flown"))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["airflock", "replay", "vasarhelyi_2018/4ms", "--colour", "spede"])
     with pytest.raises(SystemExit) as ended:
@@ -174,11 +173,11 @@ def test_a_wrong_colour_is_refused_before_the_flight(tmp_path, monkeypatch, caps
 
 
 def three():
-    return (resources.files("airflock.view.replays") / "three.min.js").read_text(encoding="utf-8")
+    return (resources.files("airflock.view") / "replays" / "three.min.js").read_text(encoding="utf-8")
 
 
 def test_the_library_is_the_one_that_is_named():
-    root = resources.files("airflock.view.replays")
+    root = resources.files("airflock.view") / "replays"
     stored = (root / "three.min.js").read_bytes()
     assert len(stored) < 1_000_000
     assert hashlib.sha256(stored).hexdigest() in (root / "three.md").read_text(encoding="utf-8")

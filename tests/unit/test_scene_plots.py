@@ -9,25 +9,25 @@ import pytest
 from matplotlib.collections import LineCollection
 
 import airflock
-from airflock.cli import tables
+from airflock.cli import terminal
 from airflock.parts.aero.wing import pitch
 from airflock.recordings.dataset import make_dataset
 from airflock.recordings.simulation import to_plain_values
 from airflock.support.errors import RecordingError
-from airflock.view.plots.film_stage import VideoFrame
-from airflock.view.plots.flight import paths_in_window, projection
-from airflock.view.plots.flocked import flocked
-from airflock.view.plots.rays import rays, rays_at_frame
-from airflock.view.plots.scene_paths import (
+from airflock.view.flight_paths import paths_in_window, projection
+from airflock.view.order_parameter_plots import flocked
+from airflock.view.trajectory_plots import (
     VIEW_ELEVATION_DEG,
     outlines_in_space,
+    rays,
+    rays_at_frame,
     scenery_lines,
     shapes_near_paths,
     through,
+    trajectories,
 )
-from airflock.view.plots.trajectories import trajectories
-from airflock.view.plots.video import video
-from airflock.view.plots.wash import downwash, solve_formation, wash
+from airflock.view.video_writer import VideoFrame, video
+from airflock.view.wash_plot import downwash, solve_formation, wash
 from airflock.world.shapes import BOX, CYLINDER
 
 
@@ -81,7 +81,7 @@ def test_rays_of_an_agent_are_those_that_its_model_casts():
 
 
 def test_share_flocked_is_drawn_with_goals_and_collisions(monkeypatch):
-    module = import_module("airflock.view.plots.flocked")
+    module = import_module("airflock.view.order_parameter_plots")
     index = pd.Index(np.arange(40) / 60.0, name="time")
     course = pd.DataFrame({"flocked": 1.0, "polarisation": 0.5, "n_clusters": 1.0, "n_coll": 1.0}, index=index)
     monkeypatch.setattr(module, "measure", lambda *_: ({"time_to_goal": [0.2, np.nan]}, course))
@@ -108,20 +108,20 @@ def test_a_video_shows_the_scene(tmp_path):
 
 def test_statistics_of_lists_and_of_what_never_happened():
     rows = [{"time_to_goal": [1.0, 4.0], "t": float("nan")}, {"time_to_goal": [3.0, float("nan")], "t": float("nan")}]
-    found = tables.column_statistics(rows)
+    found = terminal.column_statistics(rows)
     assert found["mean"]["time_to_goal"] == [2.0, 4.0] and found["median"]["time_to_goal"] == [2.0, 4.0]
-    assert tables.to_json_value(found)["mean"]["t"] is None and tables.to_json_value(rows[1]) == {
+    assert terminal.to_json_value(found)["mean"]["t"] is None and terminal.to_json_value(rows[1]) == {
         "time_to_goal": [3.0, None],
         "t": None,
     }
-    assert tables.format_number([1.25, float("nan")]) == "1.25, never"
+    assert terminal.format_number([1.25, float("nan")]) == "1.25, never"
 
 
 def test_only_the_time_of_an_event_is_never(capsys):
     nan = float("nan")
     rows = [{"time_to_flock": nan, "time_to_goal": [1.0, nan], "clearance": nan, "power": float("inf")}] * 2
     for count in (1, 2):
-        tables.print_score_table("flight", rows[:count], {}, {})
+        terminal.print_score_table("flight", rows[:count], {}, {})
         out = capsys.readouterr().out
         shown = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line.strip()}
         assert shown["time_to_flock"] == ["never"] * count and shown["time_to_goal"][:2] == ["1,", "never"]

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 
 import airflock
 import toys
-from airflock.cli.harden import _optima
+from airflock.cli.search_verbs import _optima
 from airflock.engine import score_flight, score_flights
 from airflock.runs.dask_cluster import rebuild_scenario
 from airflock.runs.executors import ThreadExecutor

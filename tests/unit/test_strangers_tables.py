@@ -6,7 +6,7 @@ import xarray as xr
 
 import airflock
 from airflock.support.errors import RecordingError
-from airflock.view.plots.trajectories import trajectories
+from airflock.view.trajectory_plots import trajectories
 
 TIMES = np.arange(40) * 0.5
 

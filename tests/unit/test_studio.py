@@ -38,11 +38,34 @@ from airflock.studio.shading import AgentColouring, available_colourings, joined
 from airflock.studio.side import FlightPane, scenario_value
 from airflock.studio.trails import FRAMES_PER_PIECE, Trails
 from airflock.studio.tuning import KEY_EXAMPLE, parse_setting
+from airflock.studio import access_token, browser_view, page_measures as measures
+from airflock.studio.browser_view import FRAMES_PER_PIECE, Trails
+from airflock.studio.flight_pane import (
+    FlightPane,
+    FlightSource,
+    fault_controls,
+    scenario_controls,
+    scenario_value,
+    slider_span,
+)
+from airflock.studio.page_measures import difference_table_html, scenario_differences
+from airflock.studio.page_panels import OpeningPanel
+from airflock.studio.page_scene import (
+    BOTH_PANES,
+    AgentColouring,
+    CollisionList,
+    DrawnFlock,
+    arrival_curve,
+    available_colourings,
+    joined_colours,
+)
+from airflock.studio.player import FlightRequest, KeptSnapshots, PageClock, Player
+from airflock.studio.selection_panel import PerceptLines, _named_vectors
+from airflock.studio.tuning_panel import KEY_EXAMPLE, parse_setting
 from airflock.support.errors import ParameterError, RuleError, ScenarioError, StudioError
-from airflock.view.stage import colours, shades
-from airflock.view.stage.clusters import cluster_labels
-from airflock.view.stage.scene import dart_mesh, scenario_geometry, velocity_quaternions
-from airflock.view.stage.shades import AgentColours
+from airflock.view import agent_colours
+from airflock.view.agent_colours import AgentColours, cluster_labels
+from airflock.view.scene_solids import dart_mesh, scenario_geometry, velocity_quaternions
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}
@@ -62,7 +85,7 @@ def decide(own, p):
 def interpreted(monkeypatch):
     """Flights are interpreted: compiling them would add nothing to what is tested."""
     plainly = lambda *given, **named: Flight(*given, **{**named, "device": "python"})  # noqa: E731
-    monkeypatch.setattr("airflock.studio.origin.Flight", plainly)
+    monkeypatch.setattr("airflock.studio.flight_pane.Flight", plainly)
 
 
 @pytest.fixture
@@ -366,11 +389,11 @@ def test_a_stage_holds_the_flock_and_what_stands_in_its_world(interpreted, name)
     assert bool(stage.solids) == (name in ("vasarhelyi_2018/obstacles", "kidger/city"))
 
 
-@pytest.mark.parametrize("way", shades.MOTION_COLOURINGS)
+@pytest.mark.parametrize("way", agent_colours.MOTION_COLOURINGS)
 def test_colours_of_different_motions_differ(way):
     velocity = np.array([[1.0, 0.0, 0.0], [0.0, 4.0, 0.0], [-2.0, 0.0, 0.0]])
     position = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [0.0, 0.0, 9.0]])
-    found = shades.motion_colours(way, position, velocity, 4.0, (0.0, 10.0))
+    found = agent_colours.motion_colours(way, position, velocity, 4.0, (0.0, 10.0))
     assert len({tuple(c) for c in found.colours.tolist()}) == 3
     assert way in found.key
 
@@ -427,28 +450,31 @@ def test_two_flocks_have_one_scale_and_one_list_of_names():
 
 def test_only_the_token_or_its_cookie_opens_the_page():
     name, token = "airflock_8080", "abc"
-    assert door.check_access("/?token=abc", "", name, token) == (True, True)
-    assert door.check_access("/x.js", "airflock_8080=abc", name, token) == (True, False)
+    assert access_token.check_access("/?token=abc", "", name, token) == (True, True)
+    assert access_token.check_access("/x.js", "airflock_8080=abc", name, token) == (True, False)
     for path, cookie in (("/", ""), ("/?token=", ""), ("/?token=ab", "airflock_8081=abc"), ("/", "airflock_8080=abd")):
-        assert door.check_access(path, cookie, name, token)[0] is False
+        assert access_token.check_access(path, cookie, name, token)[0] is False
 
 
 @pytest.mark.parametrize("path", ["//[", "//[v1.x]:1]/?token=abd", "/?token=%ff", "", "?", "//a:b:c/?token"])
 def test_what_is_no_address_is_turned_away(path):
-    assert door.check_access(path, "airflock_8080=abd", "airflock_8080", "abc") == (False, False)
-    assert door.check_access("/", "airflock_8080=abc", "airflock_8080", "abc", "http://[", "localhost:8080")[0] is False
+    assert access_token.check_access(path, "airflock_8080=abd", "airflock_8080", "abc") == (False, False)
+    assert (
+        access_token.check_access("/", "airflock_8080=abc", "airflock_8080", "abc", "http://[", "localhost:8080")[0]
+        is False
+    )
 
 
 def test_a_page_of_another_port_cannot_use_the_cookie():
     given = "/", "airflock_8080=abc", "airflock_8080", "abc"
-    assert door.check_access(*given, "http://localhost:8080", "localhost:8080") == (True, False)
+    assert access_token.check_access(*given, "http://localhost:8080", "localhost:8080") == (True, False)
     for origin in ("http://localhost:9999", "http://evil.example", "null"):
-        assert door.check_access(*given, origin, "localhost:8080")[0] is False
+        assert access_token.check_access(*given, origin, "localhost:8080")[0] is False
 
 
 @pytest.mark.parametrize("host", ["256.1.1.1", "::1", "192.0.2.1"])
 def test_a_host_that_is_not_this_machine_is_named_in_one_line(host):
-    from airflock.studio.view import BrowserView
+    from airflock.studio.browser_view import BrowserView
 
     for port in (0, 8080):
         with pytest.raises(StudioError, match=f"host = {re.escape(host)}: .*; give"):
@@ -456,7 +482,7 @@ def test_a_host_that_is_not_this_machine_is_named_in_one_line(host):
 
 
 def test_a_port_in_use_is_one_line():
-    from airflock.studio.view import BrowserView
+    from airflock.studio.browser_view import BrowserView
 
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
@@ -660,7 +686,7 @@ def test_rays_of_a_selected_boid_end_where_the_world_begins():
     side.flight = airflock.open(side.preset, 1, device="python").advance(steps=30)
     points, tones = PerceptLines().of(side, 0, 1.0, 60.0).lines["rays"]
     length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
-    free = (tones == colours.GREEN).all(axis=1)
+    free = (tones == agent_colours.GREEN).all(axis=1)
     assert len(points) >= 1 and (length <= side.scenario.parameters.r_ray + 1e-4).all()
     np.testing.assert_allclose(length[free], length.max(), rtol=1e-4)
     assert (length[~free] < length[free].max(initial=np.inf)).all()
@@ -680,13 +706,13 @@ def test_a_bird_tells_what_the_wakes_of_others_save_it():
 @given(st.floats(-1e3, 1e5), st.floats(0.0, 1e5), st.integers(0, 600))
 def test_an_axis_ends_at_round_numbers_just_beyond_what_is_shown(first, span, count):
     values = first + slider_span * np.linspace(0.0, 1.0, count)
-    low, high = charts.round_ends(values)
+    low, high = browser_view.round_ends(values)
     assert low < high
     if count:
         slack = 1e-6 * (high - low)
         assert low - slack <= values[0] and values[-1] <= high + slack
     if count > 1 and slider_span > 1e-3:
-        part = (values[-1] - values[0]) / charts.PARTS_PER_SPAN * 2.5  # at most: the next of 1, 2, 5
+        part = (values[-1] - values[0]) / browser_view.PARTS_PER_SPAN * 2.5  # at most: the next of 1, 2, 5
         assert values[0] - low <= part * 1.001 and high - values[-1] <= part * 1.001
 
 
@@ -699,7 +725,7 @@ def test_an_axis_is_told_only_where_a_round_end_is_passed():
             Handle.told += name == "scales"
 
     handle = Handle()
-    made = charts.Chart(handle)
+    made = browser_view.Chart(handle)
     for count in range(2, 500):  # 100 s, five moments a second
         time = 0.2 * np.arange(count)
         made.data = time, time**2
@@ -713,9 +739,9 @@ def test_a_chart_with_missing_values_is_told_ends_that_hold_the_others(values, m
     """B has no value of its own before it was changed: nan ends the axis of the page nowhere, and nothing is drawn."""
     time = np.arange(float(len(values) + missing))
     first, second = np.array([*values, *values[:1] * missing]), np.array([math.nan] * missing + values)
-    low, high = charts.axis_ranges((time, first, second))["y"]
+    low, high = browser_view.axis_ranges((time, first, second))["y"]
     assert low < high and low <= min(values) + 1e-6 * (high - low) and max(values) <= high + 1e-6 * (high - low)
-    low, high = charts.axis_ranges((time, np.full(len(time), math.nan)))["y"]
+    low, high = browser_view.axis_ranges((time, np.full(len(time), math.nan)))["y"]
     assert low < high
 
 
@@ -724,13 +750,13 @@ def test_a_chart_of_equal_values_is_told_ends_apart_from_each_other(value, share
     """Fish fly at 3 m/s but for rounding; ends that the page found itself were the same number, and it hung."""
     time = np.arange(float(count))
     values = value * (1.0 + share * np.linspace(-1.0, 1.0, count))
-    low, high = charts.axis_ranges((time, values, values[::-1]))["y"]
+    low, high = browser_view.axis_ranges((time, values, values[::-1]))["y"]
     assert low - 1e-12 <= values.min() and values.max() <= high + 1e-12 and high - low >= max(abs(value), 1e-12)
 
 
 def test_a_page_scales_the_values_of_a_chart_itself_where_it_can():
     time = np.arange(30.0)
-    assert charts.axis_ranges((time, time**2, np.sqrt(time))) == {"x": charts.round_ends(time)}
+    assert browser_view.axis_ranges((time, time**2, np.sqrt(time))) == {"x": browser_view.round_ends(time)}
 
 
 @given(st.lists(st.floats(0.0, 30.0), min_size=1, max_size=200))

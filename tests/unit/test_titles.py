@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 import airflock
 from airflock.cli.main import app
 from airflock.support.errors import RecordingError
-from airflock.view.plots.convergence import convergence
-from airflock.view.plots.series import series
-from airflock.view.plots.trajectories import trajectories
+from airflock.view.order_parameter_plots import series
+from airflock.view.search_plots import convergence
+from airflock.view.trajectory_plots import trajectories
 
 pytestmark = pytest.mark.usefixtures("scored_plainly")
 

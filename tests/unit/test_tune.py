@@ -274,7 +274,7 @@ def test_the_worst_flight_of_each_limit_is_played(tmp_path, monkeypatch):
     monkeypatch.setattr("airflock.recordings.simulation.simulate", lambda _, seed: seed)
     shows = []
     monkeypatch.setattr(
-        "airflock.view.replays.build.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed))
+        "airflock.view.replay_page.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed))
     )
     worst = [{"limit": limit, "seed": seed} for limit, seeds in (("a", (1, 2, 3)), ("b", (4, 1))) for seed in seeds]
     made = SimpleNamespace(worst=worst, campaign=SimpleNamespace(parameters=lambda _: {}))
@@ -350,13 +350,13 @@ def test_logs_without_a_law_and_laws_without_logs_are_one_line(logs, tmp_path):
 
 
 def test_what_was_said_before_the_search_is_not_said_again(capsys):
-    from airflock.cli.tune import _print
+    from airflock.cli.search_verbs import _print_campaign
 
     evolved = SimpleNamespace(fitness=0.5, low=0.4, high=0.6, seeds=10, limits=[])
     told = SimpleNamespace(statements=["r_min<3: shown"])
     made = SimpleNamespace(
         notes=("scaled", "out of reach"), result=evolved, steps=(), why="no", certificate=told, folder="tuned"
     )
-    _print(made, ["out of reach"])
+    _print_campaign(made, ["out of reach"])
     printed = capsys.readouterr().out
     assert "start: scaled" in printed and "out of reach" not in printed

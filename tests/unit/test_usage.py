@@ -9,12 +9,12 @@ import pytest
 from typer.main import get_command
 
 import airflock
+from airflock.cli.flight_verbs import merge_similar_notes
 from airflock.cli.main import app, main
-from airflock.cli.sweep import merge_similar_notes
 from airflock.recordings.sweeps import metric_to_show
 from airflock.scenarios.files import load
 from airflock.support.errors import AirflockError
-from airflock.view.plots.picture import KINDS
+from airflock.view.plot_by_kind import KINDS
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from airflock.scenarios.scenario_builder import build_scenario
 from airflock.runs.search_space import full_space
 from airflock.scenarios.families import CallerParts
 from airflock.scenarios.making import build_scenario
-from airflock.studio.controls import scenario_controls
+from airflock.studio.flight_pane import scenario_controls
 from airflock.support.errors import ParameterError, RuleError, ScenarioError
 from flocks import interpreted
 from reference.flight import fly_plainly

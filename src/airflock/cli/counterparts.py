@@ -125,7 +125,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             "agents": 'settings["agents"]',
             "duration": 'settings["duration"]',
             **JSON_OPTIONS,
-            "plot": "airflock.view.plots.certificate.plot_certificate",
+            "plot": "airflock.view.result_plots.plot_certificate",
             **{
                 name: name
                 for name in (
@@ -289,7 +289,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
                 ("conservative", "uncertain"),
                 "airflock.estimate.identification.vehicle_identification.IdentifyResult.document",
             ),
-            "plot": "airflock.view.plots.identified.plot_identified",
+            "plot": "airflock.view.result_plots.plot_identified",
             "plan": "airflock.estimate.identification.vehicle_identification.flight_card",
             "flights": "airflock.estimate.identification.log_check.check_against_logs",
             **dict.fromkeys(("map", "unit", "time_unit", "axes", "decimal", "delimiter"), "options"),
@@ -307,7 +307,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             "trust": "trust",
             **JSON_OPTIONS,
             "out": "airflock.estimate.inference.law_inference.InferResult.document",
-            "plot": "airflock.view.plots.inferred.plot_inferred",
+            "plot": "airflock.view.result_plots.plot_inferred",
         },
     ),
     "fleet": PythonCounterpart(

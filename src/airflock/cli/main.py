@@ -17,28 +17,13 @@ import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cli import (
-    certify,
-    display,
-    evolve,
-    fleet,
-    fly,
-    harden,
-    identify,
-    imports,
-    infer,
-    inspect,
-    keys,
-    look,
-    paper,
-    run,
-    sweep,
-    tune,
-    types,
-    watch,
-)
-from airflock.cli.usage import expand_home, usage_error
-from airflock.cli.verb import VerbCommand
+from airflock.cli.command import VerbCommand, expand_home, usage_error
+from airflock.cli.drone_verbs import fleet, fly_app
+from airflock.cli.estimate_verbs import export, identify, import_tracks, infer
+from airflock.cli.flight_verbs import display, plot, replay, run, score, sweep, video, watch
+from airflock.cli.inspection_verbs import doctor, keys, presets, types, validate
+from airflock.cli.papers import paper_verb
+from airflock.cli.search_verbs import certify, evolve, harden, tune
 from airflock.support import AirflockError, os_error_message, printable, shortened, shortened_lines
 
 PROGRAM_HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
@@ -97,21 +82,21 @@ app = typer.Typer(
 )
 VERBS_BY_PANEL: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Fly, measure, look": {
-        "run": run.run, "watch": watch.watch, "plot": look.plot, "video": look.video, "replay": look.replay,
-        "score": run.score, "sweep": sweep.sweep, "display": display.display,
+        "run": run, "watch": watch, "plot": plot, "video": video, "replay": replay,
+        "score": score, "sweep": sweep, "display": display,
     },
     "Search and make safe": {
-        "evolve": evolve.evolve, "harden": harden.harden, "certify": certify.certify,
-        "tune": tune.tune,
+        "evolve": evolve, "harden": harden, "certify": certify,
+        "tune": tune,
     },
     "Recordings of others": {
-        "import": imports.import_tracks, "identify": identify.identify, "infer": infer.infer,
-        "export": imports.export,
+        "import": import_tracks, "identify": identify, "infer": infer,
+        "export": export,
     },
-    "Towards real drones": {"fleet": fleet.fleet, "fly": fly.app},
+    "Towards real drones": {"fleet": fleet, "fly": fly_app},
     "Look something up": {
-        "presets": inspect.presets, "keys": keys.keys, "validate": inspect.validate, "types": types.types,
-        "paper": paper.paper, "doctor": inspect.doctor,
+        "presets": presets, "keys": keys, "validate": validate, "types": types,
+        "paper": paper_verb, "doctor": doctor,
     },
 }  # fmt: skip
 for _panel, _verbs in VERBS_BY_PANEL.items():

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.cli.verb import ERRORS_KEY
+from airflock.cli.command import ERRORS_KEY
 from airflock.support import (
     ErrorCollector,
     ScenarioError,
@@ -147,7 +147,7 @@ def check_writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequenc
 
 def announce_run_time(scenarios: Sequence[Any], threads: int | None, device: str) -> None:
     """Tell beforehand about how long flights on the processor will take, where that is more than a minute."""
-    from airflock.cli.tables import print_message
+    from airflock.cli.terminal import print_message
     from airflock.scenarios import run_time_note
     from airflock.support import available_cores
 

@@ -1,9 +1,16 @@
 """The door to the papers, which are a distribution of their own: airflock-papers."""
 
+from collections import Counter
 from importlib import import_module
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
+import typer
+
+from airflock.cli import options, terminal
 from airflock.support import AirflockError
+
+# ---- airflock.paper
 
 PACKAGE = "airflock_papers"  # looked for when it is asked for: Airflock flies without it
 
@@ -69,3 +76,122 @@ def require_papers() -> None:
         import_module(PACKAGE)
     except ModuleNotFoundError as fault:
         raise AirflockError("papers need airflock-papers: pip install -e ./papers in a clone of Airflock") from fault
+
+
+# ---- airflock paper
+
+
+def paper_verb(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A publication, for instance vasarhelyi_2018; or all.")],
+    only: Annotated[
+        str | None, typer.Option(help="Recompute only this part, for instance s2 or fig1.", show_default="all")
+    ] = None,
+    quick: Annotated[bool, typer.Option(help="Use the small form, with few seeds.")] = False,
+    seeds: Annotated[int | None, typer.Option(min=2, help="Flights per number.", show_default="the paper's")] = None,
+    breaks: Annotated[
+        bool, typer.Option(help="For each claim, make the change that must turn it red, and judge it again.")
+    ] = False,
+    keep: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="For all: folder for finished work.", show_default="the cache")
+    ] = None,
+    threads: options.Threads = None,
+    as_json: options.Json = False,
+) -> None:
+    """Recompute a paper's numbers and figures; print each claim with its verdict.
+
+    Needs airflock-papers; in a clone of the repository: pip install -e ./papers
+
+    `all --quick` flies the small form of every paper, and fails if a verdict differs from the one committed for this
+    kind of processor. `all --breaks` makes the change of every claim, and fails if a claim still holds under its
+    change, or does not hold without it, unless it was seen to turn red on another kind of processor.
+
+    Example: airflock paper vasarhelyi_2018 --quick --only s2
+    """
+    if name == "all":
+        _all(quick, breaks, keep, threads, as_json, {"--only": only, "--seeds": seeds})
+        return
+    if breaks:
+        _breaks(name, only, seeds, threads, as_json)
+        return
+
+    claims = paper(name, only=only, quick=quick, seeds=seeds, threads=threads)
+    if as_json:
+        terminal.print_json([claim.as_dict() for claim in claims])
+        return
+    from airflock_papers.claims import print_claims
+
+    print_claims(claims)
+
+
+def _all(
+    quick: bool, breaks: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]
+) -> None:
+    """Every paper: in its small form, or every claim under its change, against what is committed."""
+    from airflock.cli.papers import require_papers
+    from airflock.support import AirflockError, cache_folder
+
+    require_papers()
+    from airflock_papers import quick as tier
+
+    wrong = [option for option, given in others.items() if given]
+    if wrong or quick == breaks:
+        told = "takes days; add --quick or --breaks, or name one paper"
+        told = "give --quick or --breaks, not both" if quick else told
+        raise AirflockError(f"all: {', '.join(wrong)} is of one paper; name it" if wrong else f"all: {told}")
+    if breaks:
+        _all_breaks(keep or cache_folder() / "papers" / "breaks", threads, as_json)
+        return
+    before = tier.committed()
+    rows = tier.fly(keep or cache_folder() / "papers" / "quick", terminal.print_message, threads)
+    changed = tier.changed(before, rows)
+    if as_json:
+        terminal.print_json({"claims": [row._asdict() for row in rows], "changed": [row._asdict() for row in changed]})
+    else:
+        for row in changed:
+            told = f"{row.committed or 'not committed'} is now {row.found or 'not flown'}"
+            why = f" (not judged: committed as flown on {row.elsewhere})" if row.elsewhere else ""
+            typer.echo(f"{row.paper} {row.id}: {told}{why}")
+        typer.echo(f"{len(rows)} claims in their small form, {len(changed)} of another verdict than the committed one")
+        if any(row.elsewhere for row in changed):
+            typer.echo("On another kind of processor the same seeds give other flights; a few verdicts may differ.")
+    if not all(row.elsewhere for row in changed):
+        raise typer.Exit(1)
+
+
+def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
+    """Every claim of every paper under its change, against what is committed."""
+    from airflock_papers import breaks
+
+    before = breaks.committed()
+    rows = breaks.fly_all(folder, terminal.print_message, threads)
+    worse = breaks.worse(before, rows)
+    if as_json:
+        listed = [each.row._asdict() | {"elsewhere": each.elsewhere} for each in worse]
+        terminal.print_json({"claims": [row._asdict() for row in rows], "worse": listed})
+    else:
+        for row, elsewhere in worse:
+            why = f" (not judged: turned red on {elsewhere})" if elsewhere else ""
+            typer.echo(f"{row.paper} {row.id}: {row.result} with {row.change} ({row.ours}, then {row.changed}){why}")
+        told = ", ".join(f"{number} {result}" for result, number in Counter(row.result for row in rows).items())
+        typer.echo(f"{len(rows)} claims under their changes: {told}")
+    if not all(each.elsewhere for each in worse):
+        raise typer.Exit(1)
+
+
+def _breaks(name: str, only: str | None, seeds: int | None, threads: int | None, as_json: bool) -> None:
+    """Each claim under the change that must break it."""
+    from airflock.cli.papers import find_paper
+
+    paper_verb = find_paper(name)
+    from airflock_papers import breaks
+
+    rows = breaks.fly(paper_verb, only=only, seeds=seeds, threads=threads)
+    if as_json:
+        terminal.print_json([row._asdict() for row in rows])
+    else:
+        for row in rows:
+            typer.echo(f"{row.id}: {row.result} with {row.change} ({row.ours:.4g}, then {row.changed:.4g})")
+        count = {result: sum(row.result == result for row in rows) for result in breaks.RESULTS}
+        typer.echo(", ".join(f"{number} {result}" for result, number in count.items()))
+    if any(row.result == breaks.GREEN for row in rows):
+        raise typer.Exit(1)

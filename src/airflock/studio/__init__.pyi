@@ -1,2 +1,2 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from .watch import watch as watch
+from .live_page import watch as watch

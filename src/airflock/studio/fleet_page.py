@@ -9,13 +9,275 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.fleets import FleetObserver
-from airflock.studio.fleet_drawing import FLEET_COLOURINGS, FLEET_FOLLOW_CHOICES, FLEET_LINK_CHOICES, FleetScene
-from airflock.studio.fleet_tables import drone_html, faults_html, fleet_warning, members_html, notes_html
-from airflock.studio.measures import MAX_CHART_POINTS, AgentPairs
-from airflock.studio.requests import ActionQueue
-from airflock.studio.room import small_print_html, status_html
-from airflock.studio.view import BrowserView
+from airflock.drones import HEARD_WITHIN, MissionPhase, Peer
+from airflock.fleets import INJECTED_KINDS, SCENARIO_FAULT_NAMES, FleetObserver, is_on_ground
+from airflock.parts.faults import KINDS as OURS
+from airflock.studio import page_measures as measures
+from airflock.studio.browser_view import BrowserView, Trails
+from airflock.studio.flight_pane import ABSENT_HEIGHT, ABSENT_SPACING
+from airflock.studio.page_measures import MAX_CHART_POINTS, AgentPairs
+from airflock.studio.page_panels import small_print_html, status_html
+from airflock.studio.player import ActionQueue
+from airflock.view import AgentColours, agent_colours, card_scene, velocity_quaternions
+
+# ---- Tables
+
+MAX_NOTES = 14  # notes
+MAX_ROWS = 60  # drones that have a row of their own
+MIN_REFUSED = 10  # datagrams of other keys after which it is said that none fits
+REFUSAL_REASONS = {
+    "signature": "signed with a different key than this card's mission uses",
+    "clock": "from another time: the clocks differ by more than the card allows, or the card's limit is too small",
+    "card": "from another card",
+    "mission": "from another mission",
+    "stranger": "from systems that are not members",
+}
+FAULT_TEXTS = {  # what is said of faults whose amount the ether does not tell
+    "loss": "some packets to these drones are lost",
+    "jitter": "packets to these drones are late",
+    "duplicate": "some packets to these drones arrive twice",
+    "corrupt": "some packets to these drones arrive with a wrong bit",
+    "rogue": "somebody without the key sends packets as these drones, from another place",
+    "impostor": "somebody with the key sends packets as these drones, from another place",
+    "battery": "the battery reports a wrong level",
+    "clock": "the node's clock is wrong",
+}
+TABLE_TAG = "<table style='width:100%;font-size:0.8em;border-collapse:collapse;text-align:right'>"
+
+
+def members_html(observer: FleetObserver, now: float) -> str:
+    """A row for each drone: phase, height, speed, battery, whom it hears, age of its last packet."""
+    heads = ("", "phase", "m", "m/s", "%", "hears", "s ago")
+    rows = [f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"]
+    members = observer.card.members
+    for member in members[:MAX_ROWS]:
+        rows.append(_member_row(member, observer.peers[member], now))
+    more = small_print_html(f"and {len(members) - MAX_ROWS} more") if len(members) > MAX_ROWS else ""
+    return f"<div style='padding:0 0.75em'>{TABLE_TAG}{''.join(rows)}</table></div>{more}"
+
+
+def _member_row(member: int, peer: Peer, now: float) -> str:
+    if peer.status is None or peer.state is None:
+        said = "another card" if peer.has_other_card else "not heard"
+        return f"<tr style='color:#777'><th>{member}</th><td>{said}</td>{'<td>–</td>' * 5}</tr>"
+    s, age = peer.state, now - peer.heard_at
+    speed = (s.vx * s.vx + s.vy * s.vy + s.vz * s.vz) ** 0.5
+    tone = " style='color:#b00020'" if age > HEARD_WITHIN else ""
+    cells = (peer.phase.name.lower(), f"{s.z:.1f}", f"{speed:.1f}", f"{peer.status.battery}", f"{peer.status.peers}",
+             f"{age:.1f}")  # fmt: skip
+    return f"<tr{tone}><th>{member}</th>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+
+def drone_html(observer: FleetObserver, member: int, now: float) -> str:
+    """All that one drone tells of itself."""
+    peer = observer.peers[member]
+    if peer.status is None or peer.state is None:
+        return small_print_html(f"<b>drone {member}</b>: not heard yet")
+    s, told = peer.state, peer.status
+    hears = [b if a == member else a for a, b in observer.links(now) if member in (a, b)]
+    linked = f"; packets between it and {', '.join(map(str, sorted(hears)))}" if hears else ""
+    others, age = len(observer.card.members) - 1, now - peer.heard_at
+    return small_print_html(
+        f"<b>drone {member}</b>: {peer.phase.name.lower()}, {'in the air' if told.is_airborne else 'on the ground'}<br>"
+        f"at east {s.x:.1f}, north {s.y:.1f}, {s.z:.1f} m above the site, known to {told.accuracy:.1f} m<br>"
+        f"flies {s.vx:.1f}, {s.vy:.1f}, {s.vz:.1f} m/s; battery {told.battery} %; clock off by {told.clock_error:.2f} s"
+        f"<br>hears {told.peers} of {others}{linked}; last packet {age:.1f} s ago"
+    )
+
+
+def faults_html(observer: FleetObserver) -> str:
+    """Faults that hold, with what they do."""
+    said = (
+        INJECTED_KINDS
+        | FAULT_TEXTS
+        | {told: _first_sentence(OURS[kind].doc) for kind, told in SCENARIO_FAULT_NAMES.items()}
+    )
+    lines = [f"<b>{kind}</b>, {observer.named(who)}: {said[kind]}" for kind, who in observer.faults.items()]
+    return small_print_html("<br>".join(lines)) if lines else ""
+
+
+def _first_sentence(doc: str) -> str:
+    """What a kind of fault does, by the first sentence of its own words."""
+    return doc.partition(": ")[2].partition(".")[0]
+
+
+def notes_html(observer: FleetObserver) -> str:
+    """What happened, newest first."""
+    lines = []
+    for told in list(observer.notes)[: -MAX_NOTES - 1 : -1]:
+        who = f"drone {told.member}: " if told.member else ""
+        lines.append(f"{told.time - observer.begun:.1f} s · {who}{html.escape(told.text)}")
+    return small_print_html("<br>".join(lines))
+
+
+def fleet_warning(observer: FleetObserver, now: float) -> str:
+    """What is wrong with the whole: nothing arrives, or what arrives is not believed."""
+    refused = observer.refused
+    most = max(refused, key=refused.__getitem__, default="")
+    if not observer.accepted_count and sum(refused.values()) >= MIN_REFUSED:
+        return f"{sum(refused.values())} packets were refused, and none believed: {REFUSAL_REASONS.get(most, most)}"
+    if not observer.accepted_count:
+        return "nothing has been heard yet" if now - observer.begun > HEARD_WITHIN else ""
+    return "" if observer.heard(now) else "no drone is heard any more"
+
+
+# ---- Scene
+
+# phases in the air, in the order of their colours; on the ground a drone is grey
+AIR_PHASES = (
+    MissionPhase.FLOCK,
+    MissionPhase.GATHER,
+    MissionPhase.RETURN,
+    MissionPhase.TAKEOFF,
+    MissionPhase.GOTO,
+    MissionPhase.HOLD,
+    MissionPhase.MANUAL,
+    MissionPhase.LAND,
+    MissionPhase.FAULT,
+)
+FLEET_COLOURINGS = (
+    "phase",
+    "speed",
+    "heading",
+    "height",
+    "battery",
+    "neighbours heard",
+    "packet age",
+    "fault",
+    "drone",
+)
+FLEET_LINK_CHOICES = ("packets that arrive", "three nearest", "none")
+FLEET_FOLLOW_CHOICES = ("nothing", "the fleet", "the selected drone")
+DARTS_PER_HALF_WIDTH = 26.0  # darts in half the picture
+PANEL_OFFSET = np.array([0.2, 0.1, 0.0])  # half widths; the panel stands there
+ONE_WAY_GREY = 225  # grey of a link on which packets arrive one way only
+
+
+class FleetScene:
+    """The scene of a page that watches a fleet.
+
+    way, links, follow : what its controls say; trails : behind the drones
+    shown : the last shade, whose key stands on the page
+    """
+
+    def __init__(self, observer: FleetObserver, view: BrowserView):
+        self.observer, self.view = observer, view
+        self.colouring, self.links, self.follow_choice, self.trails = (
+            FLEET_COLOURINGS[0],
+            FLEET_LINK_CHOICES[0],
+            FLEET_FOLLOW_CHOICES[0],
+            Trails(view),
+        )
+        self.members = observer.card.members
+        self.field = card_scene(observer.card)
+        self.size = self.field.span * min(1.0, (100.0 / len(self.members)) ** 0.25) / DARTS_PER_HALF_WIDTH
+        self.shown = agent_colours.individual_colours(0)
+        self._build()
+
+    def _build(self) -> None:
+        view, field = self.view, self.field
+        with view.atomic():
+            view.ground("ground", field.span, 0.0, field.centre * (1.0, 1.0, 0.0))
+            for solid in field.solids:
+                view.solid(solid)
+            for lines in field.lines:
+                view.lines(lines)
+            view.agents(
+                len(self.members), self.size, {kind: agent_colours.LINE_STYLES[kind] for kind in ("links", "heard")}
+            )
+        view.look_at(field.centre + field.span * PANEL_OFFSET, field.span, False)
+
+    def frame(self, now: float, selected: int | None) -> None:
+        """Draw the fleet as it is known now; `chosen`: place of a drone among the members."""
+        position, velocity, known = self._motion(now)
+        self.shown = self._agent_colours(now, velocity, position)
+        tone = self.shown.colours
+        tone[self._silent(now)] = agent_colours.NO_VALUE_COLOUR
+        trail = tone.copy()
+        if selected is not None:
+            tone[selected] = agent_colours.SELECTED_COLOUR
+        self.view.move(position, velocity_quaternions(velocity), tone)
+        self.trails.draw(
+            position, trail, lambda before: np.where((before[:, 2] <= 0.5 * ABSENT_HEIGHT)[:, None], position, before)
+        )
+        self._lines(now, position, known, selected)
+        if self.follow_choice == FLEET_FOLLOW_CHOICES[1] and known.any():
+            self.view.follow(position[known].mean(axis=0).astype(float))
+        elif self.follow_choice == FLEET_FOLLOW_CHOICES[2] and selected is not None and known[selected]:
+            self.view.follow(position[selected].astype(float))
+
+    def positions(self, now: float) -> NDArray[np.float64]:
+        """Places of all members (drone, 3), m; far below who was never heard."""
+        return self._motion(now)[0].astype(float)
+
+    def _motion(self, now: float) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+        """Positions and velocities (drone, 3), and who was ever heard."""
+        count = len(self.members)
+        position, velocity, known = np.zeros((count, 3), np.float32), np.zeros((count, 3), np.float32), []
+        for number, member in enumerate(self.members):
+            place, peer = self.observer.place(member, now), self.observer.peers[member]
+            known.append(place is not None)
+            position[number] = (ABSENT_SPACING * number, 0.0, ABSENT_HEIGHT) if place is None else place
+            if peer.state is not None:
+                velocity[number] = peer.state[3:]
+        return position, velocity, np.array(known)
+
+    def _silent(self, now: float) -> list[int]:
+        heard = set(self.observer.heard(now))
+        return [number for number, member in enumerate(self.members) if member not in heard]
+
+    def _lines(self, now: float, position: NDArray[np.float32], known: NDArray[np.bool_], selected: int | None) -> None:
+        index = {member: number for number, member in enumerate(self.members)}
+        links = {(index[a], index[b]): both for (a, b), both in self.observer.links(now).items()}
+        links = {pair: both for pair, both in links.items() if known[list(pair)].all()}
+        heard = np.zeros((0, 2, 3), np.float32)
+        if selected is not None:
+            heard = position[[pair for pair in links if selected in pair]].reshape(-1, 2, 3)
+        points, tones = np.zeros((0, 2, 3), np.float32), np.zeros((0, 3), np.uint8)
+        if self.links == FLEET_LINK_CHOICES[0] and links:
+            points = position[list(links)]
+            dark = np.array(agent_colours.LINE_STYLES["links"][0])
+            tones = np.array([dark if both else (ONE_WAY_GREY,) * 3 for both in links.values()], np.uint8)
+        elif self.links == FLEET_LINK_CHOICES[1] and known.sum() > 1:
+            points = measures.AgentPairs(position[known]).neighbours()
+            tones = np.tile(np.array(agent_colours.LINE_STYLES["links"][0], np.uint8), (len(points), 1))
+        self.view.extra("links", points, tones)
+        self.view.extra("heard", heard)
+
+    def _agent_colours(self, now: float, velocity: NDArray[np.float32], position: NDArray[np.float32]) -> AgentColours:
+        peers, card, way = [self.observer.peers[member] for member in self.members], self.observer.card, self.colouring
+        if way == "phase":
+            values = [-1 if is_on_ground(peer.phase) else AIR_PHASES.index(peer.phase) for peer in peers]
+            names = tuple(phase.name.lower() for phase in AIR_PHASES)
+            return AgentColours(
+                way, agent_colours.CATEGORIES, np.array(values), names=names, told="on the ground, or silent"
+            )
+        if way == "fault":
+            faults = self.observer.faults
+            values = [next((k for k, who in enumerate(faults.values()) if m in who), -1) for m in self.members]
+            return AgentColours(
+                way, agent_colours.CATEGORIES, np.array(values), names=tuple(faults), told="none, or silent"
+            )
+        if way == "drone":
+            return agent_colours.individual_colours(len(peers))
+        if way in agent_colours.MOTION_COLOURINGS:
+            return agent_colours.motion_colours(way, position, velocity, card.safety.speed_max, (0.0, card.high))
+        told = [peer.status for peer in peers]
+        if way == "battery":
+            return AgentColours(way, agent_colours.NUMBERS, _with_nan([s and s.battery for s in told]), 0.0, 100.0, "%")
+        if way == "neighbours heard":
+            most = max(len(peers) - 1.0, 1.0)
+            return AgentColours(way, agent_colours.NUMBERS, _with_nan([s and s.peers for s in told]), 0.0, most)
+        return AgentColours(
+            way, agent_colours.NUMBERS, np.array([now - peer.at for peer in peers]), 0.0, HEARD_WITHIN, "s"
+        )
+
+
+def _with_nan(values: list[int | None]) -> NDArray[np.float64]:
+    return np.array([np.nan if value is None else value for value in values], float)
+
+
+# ---- Page
 
 FRAMES_PER_SECOND = 30  # per second
 CHARTS_PER_SECOND = 5  # per second

@@ -1,62 +1,67 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from . import plots as plots
-from .plots.certificate import plot_certificate as plot_certificate
-from .plots.convergence import convergence as convergence
-from .plots.display import stood as stood
-from .plots.film_stage import check_chart as check_chart
-from .plots.fitness_scatter import fitness_scatter as fitness_scatter
-from .plots.flocked import flocked as flocked
-from .plots.heatmap import heatmap as heatmap
-from .plots.identified import plot_identified as plot_identified
-from .plots.inferred import plot_inferred as plot_inferred
-from .plots.pareto import pareto as pareto
-from .plots.picture import (
+from . import (
+    agent_colours as agent_colours,
+    plots as plots,
+)
+from .agent_colours import (
+    MOTION_COLOURINGS as MOTION_COLOURINGS,
+    AgentColours as AgentColours,
+    cluster_distance as cluster_distance,
+    cluster_labels as cluster_labels,
+    varied_number_units as varied_number_units,
+)
+from .law_vectors import (
+    arrow_lines as arrow_lines,
+    rays_and_command as rays_and_command,
+    term_name_and_unit as term_name_and_unit,
+    vector_values as vector_values,
+)
+from .order_parameter_plots import (
+    flocked as flocked,
+    heatmap as heatmap,
+)
+from .plot_by_kind import (
     naming_file as naming_file,
     plot as plot,
     recording_or_flight as recording_or_flight,
 )
-from .plots.rays import rays as rays
-from .plots.save import (
-    print_settings as print_settings,
-    save_figure as save_figure,
-)
-from .plots.scene_paths import through as through
-from .plots.slices import slices as slices
-from .plots.trajectories import trajectories as trajectories
-from .plots.video import (
-    frame_count as frame_count,
-    import_ffmpeg as import_ffmpeg,
-    video as video,
-)
-from .replays.build import (
+from .replay_page import (
     check_colour as check_colour,
     replay as replay,
 )
-from .stage import (
-    colours as colours,
-    shades as shades,
+from .result_plots import (
+    plot_certificate as plot_certificate,
+    plot_identified as plot_identified,
+    plot_inferred as plot_inferred,
+    stood as stood,
 )
-from .stage.arrows import (
-    arrow_lines as arrow_lines,
-    term_name_and_unit as term_name_and_unit,
-    vector_values as vector_values,
-)
-from .stage.clusters import (
-    cluster_distance as cluster_distance,
-    cluster_labels as cluster_labels,
-)
-from .stage.field import card_scene as card_scene
-from .stage.rays import rays_and_command as rays_and_command
-from .stage.scene import (
+from .scene_solids import (
     SceneGeometry as SceneGeometry,
     SceneLines as SceneLines,
     SceneSolid as SceneSolid,
+    card_scene as card_scene,
     dart_mesh as dart_mesh,
     scenario_geometry as scenario_geometry,
     velocity_quaternions as velocity_quaternions,
 )
-from .stage.shades import (
-    MOTION_COLOURINGS as MOTION_COLOURINGS,
-    AgentColours as AgentColours,
-    varied_number_units as varied_number_units,
+from .search_plots import (
+    convergence as convergence,
+    fitness_scatter as fitness_scatter,
+    pareto as pareto,
+    slices as slices,
+)
+from .style import (
+    print_settings as print_settings,
+    save_figure as save_figure,
+)
+from .trajectory_plots import (
+    rays as rays,
+    through as through,
+    trajectories as trajectories,
+)
+from .video_writer import (
+    check_chart as check_chart,
+    frame_count as frame_count,
+    import_ffmpeg as import_ffmpeg,
+    video as video,
 )

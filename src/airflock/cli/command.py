@@ -1,0 +1,220 @@
+"""Verb: a command that tells all that is wrong with its options at once."""
+
+import inspect
+import math
+import os
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import typer
+from typer.core import TyperCommand
+
+from airflock.support import INVALID, AirflockError, suggest
+
+# ---- Errors of a command line
+
+OUTPUT_OPTIONS = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
+SIMILARITY_CUTOFF = 0.75  # of options, as in `spelling.suggest`: both begin with --, and --budget is not --quiet
+SEED_OPTION = "--seed"  # written for the seed of a flight, one letter from --seeds, which says how many fly
+
+
+def expand_home(word: str) -> str:
+    """A word of a command line, ~ being the home folder, also where a shell leaves it in: --save=~/flight.nc."""
+    option, equals, value = word.partition("=")
+    return f"{option}={os.path.expanduser(value)}" if equals else os.path.expanduser(word)
+
+
+def usage_error(error: Any, words: Sequence[str]) -> str:
+    """One line for what typer refuses; `words` are those of the command line.
+
+    Typer's classes of faults have moved between its versions, so they are told apart by what they carry.
+    """
+    context = getattr(error, "ctx", None)
+    verb = _command_path(context).partition(" ")[2]
+    return f"{verb}: {_message(error, context, words)}" if verb else _message(error, context, words)
+
+
+def non_finite_errors(context: Any) -> list[tuple[str, str]]:
+    """Options with a range that were given nan or inf: the parameter's name, and one line."""
+    faults = []
+    for parameter in context.command.params:
+        value, ends = context.params.get(parameter.name), _range_ends(parameter)
+        if isinstance(value, float) and not math.isfinite(value) and ends != (None, None):
+            verb = _command_path(context).partition(" ")[2]
+            said = f"{verb}: {_parameter_name(parameter)} {value:g} is not a finite number; give {_range_text(*ends)}"
+            faults.append((str(parameter.name), said))
+    return faults
+
+
+def _message(error: Any, context: Any, words: Sequence[str]) -> str:
+    kind, message = type(error).__name__, str(getattr(error, "message", "") or error.format_message())
+    parameter = getattr(error, "param", None)
+    if kind == "NoSuchOption":
+        known = [name for one in context.command.params for name in one.opts] if context is not None else []
+        same = [name for name in OUTPUT_OPTIONS if name in known and error.option_name in (*OUTPUT_OPTIONS, "--output")]
+        hint = (
+            f"; did you mean {same[0]}?"
+            if same
+            else _suggestion(error.option_name, [*known, "--help"], context, SIMILARITY_CUTOFF)
+        )
+        if error.option_name == SEED_OPTION and "--first-seed" in known:
+            hint = "; did you mean --first-seed (of one flight), or --seeds (how many flights)?"
+        return f"{error.option_name}: unknown option{hint}"
+    unknown = re.match(r"No such command '(.*?)'", message)
+    if unknown is not None:
+        return f"{unknown[1]}: unknown command{_suggestion(unknown[1], list(context.command.commands), context)}"
+    if kind == "MissingParameter" and parameter is not None:
+        return f"{_parameter_name(parameter)} is missing{_example_text(context)}"
+    if kind == "BadParameter" and parameter is not None:
+        return _value_error_text(parameter, words, message)
+    if kind == "BadOptionUsage":
+        if "does not take a value" in message:
+            return f"{error.option_name} takes no value; write it alone"
+        return f"{error.option_name} needs a value"
+    extra = re.match(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)", message)
+    if extra is not None:
+        takes = [_parameter_name(one) for one in context.command.params if one.param_type_name == "argument"]
+        more = f"; it takes {' '.join(takes)} and options" if takes else "; it takes options alone"
+        return f"unexpected {extra[1]}{more}{_example_text(context)}"
+    return str(error.format_message()).strip().rstrip(".") + _example_text(context)
+
+
+def _command_path(context: Any) -> str:
+    """The command as a person writes it, however Python was started."""
+    names = []
+    while context is not None and context.parent is not None:
+        names.append(context.info_name)
+        context = context.parent
+    return " ".join(["airflock", *reversed(names)])
+
+
+def _suggestion(name: str, known: Sequence[str], context: Any, cutoff: float = 0.5) -> str:
+    return suggest(name, known, f"; {_command_path(context)} --help lists them", lead="; ", cutoff=cutoff)
+
+
+def _example_text(context: Any) -> str:
+    """The example of a verb's help."""
+    text = getattr(getattr(context, "command", None), "help", None) or ""
+    match = re.search(r"Example: (.+)", text)
+    return f"; for instance: {match[1].strip()}" if match else ""
+
+
+def _parameter_name(parameter: Any) -> str:
+    """What a person writes: the longest name of an option, or the metavar of an argument."""
+    options = [name for name in parameter.opts if name.startswith("-")]
+    if options:
+        return str(max(options, key=len))
+    return str(parameter.metavar or parameter.name.upper())
+
+
+def _value_error_text(parameter: Any, words: Sequence[str], message: str) -> str:
+    """A value that has the wrong kind, lies outside its range, or is none of its choices."""
+    name, value = _parameter_name(parameter), _given_value(parameter, words)
+    choices = _choices(parameter)
+    if value is not None and choices:
+        return f"{name} {value} is none of {', '.join(choices)}{suggest(value, choices, lead='; ')}"
+    low, high = _range_ends(parameter)
+    if value is None or (low is None and high is None and "valid" not in message):
+        return f"{name}: {message.strip().rstrip('.')}"
+    span = _range_text(low, high)
+    give = "" if low is None and high is None else f"; give {span}"
+    try:
+        number = float(value)
+    except ValueError:
+        return f"{name} {value} is not a number{give}"
+    outside = (low is not None and number < low) or (high is not None and number > high)
+    return f"{name} {value} lies outside {span}" if outside else f"{name} {value} is not a whole number{give}"
+
+
+def _given_value(parameter: Any, words: Sequence[str]) -> str | None:
+    """The last value that a command line gives to an option; None if that cannot be told."""
+    last = None
+    for word, after in zip(words, [*words[1:], None], strict=True):
+        name, equals, value = word.partition("=")
+        if name in parameter.opts:
+            last = value if equals else after
+    return last
+
+
+def _range_ends(parameter: Any) -> tuple[float | None, float | None]:
+    """Lowest and highest allowed number of an option."""
+    ends = []
+    for name in ("min", "max"):
+        end = getattr(parameter, name, getattr(getattr(parameter, "type", None), name, None))
+        ends.append(None if end is None else float(end))
+    return ends[0], ends[1]
+
+
+def _range_text(low: float | None, high: float | None) -> str:
+    """A range for a person."""
+    return f"[{'-inf' if low is None else f'{low:.10g}'}, {'inf' if high is None else f'{high:.10g}'}]"
+
+
+def _choices(parameter: Any) -> list[str]:
+    """The words that an option may be."""
+    kind = getattr(parameter, "type_descriptor", None) or getattr(parameter, "type", None)
+    return [str(getattr(choice, "value", choice)) for choice in getattr(kind, "choices", None) or ()]
+
+
+# ---- Verbs
+
+ERRORS_KEY = "airflock.parts.faults"  # of a command line, in the context of its verb
+VALUE_ERROR_NAMES = ("BadParameter", "MissingParameter")  # faults of one option alone
+NUMBER_TYPE_NAMES = ("IntParamType", "FloatParamType", "IntRange", "FloatRange")  # kinds of options
+
+
+class VerbCommand(TyperCommand):
+    """A command whose options are judged one by one; nan and inf are refused where an option has a range.
+
+    A verb that takes its context goes on with numbers that are `WRONG`, and refuses them with all else that it finds
+    wrong (`options.collect_option_errors`); any other ends before it begins.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words of a command line."""
+        faults: list[str] = []
+        carried = True  # whether everything that is wrong is a number
+        try:
+            rest = super().parse_args(ctx, list(args))
+        except Exception as fault:
+            if type(fault).__name__ not in VALUE_ERROR_NAMES:
+                raise
+            rest, faults, carried = self._one_by_one(ctx, args)
+        for name, line in non_finite_errors(ctx):
+            ctx.params[name] = INVALID
+            faults.append(line)
+        ctx.meta[ERRORS_KEY] = faults
+        if faults and not (carried and _takes_context(self.callback)):
+            raise AirflockError("\n".join(faults))
+        return rest
+
+    def _one_by_one(self, ctx: Any, args: list[str]) -> tuple[list[str], list[str], bool]:
+        """What is left of the words, the faults of all options, and whether each is a number's."""
+        given, rest, _ = self.make_parser(ctx).parse_args(args=list(args))
+        faults, carried = [], True
+        for parameter in self.get_params(ctx):
+            try:
+                _, rest = parameter.handle_parse_result(ctx, given, rest)
+            except Exception as fault:
+                if type(fault).__name__ not in VALUE_ERROR_NAMES:
+                    raise
+                faults.append(usage_error(fault, args))
+                number = (
+                    type(fault).__name__ == VALUE_ERROR_NAMES[0] and type(parameter.type).__name__ in NUMBER_TYPE_NAMES
+                )
+                carried = carried and number and not parameter.multiple
+                ctx.params[parameter.name] = INVALID
+        if rest and not ctx.allow_extra_args:
+            carried = False
+            try:
+                ctx.begin_fault(f"Got unexpected extra argument(s) ({' '.join(rest)})")
+            except Exception as fault:
+                faults.append(usage_error(fault, args))
+        return rest, faults, carried
+
+
+def _takes_context(callback: Callable[..., Any] | None) -> bool:
+    """Whether a verb asks for its context, with which it refuses what is wrong with its numbers."""
+    wanted = () if callback is None else inspect.signature(callback).parameters.values()
+    return any(each.annotation is typer.Context for each in wanted)

@@ -1,0 +1,570 @@
+"""Verb fleet: a scenario flown by nodes and vehicles that speak MAVLink, beside the simulator if wanted."""
+
+import gc
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import typer
+from typer.core import TyperGroup
+
+from airflock.cli import options, terminal
+from airflock.cli.command import VerbCommand
+from airflock.cli.terminal import counting_parts
+from airflock.support import (
+    INVALID,
+    RECORDINGS,
+    CardError,
+    ErrorCollector,
+    ScenarioError,
+    is_file,
+    suggest,
+    value_or_default,
+)
+
+# ---- fleet
+
+ALL_SYSTEM_IDS = tuple(range(1, 251))  # ids that drones may have
+
+
+def fleet(
+    ctx: typer.Context,
+    scenario: options.Where,
+    seeds: options.Seeds = 1,
+    first_seed: options.FirstSeed = 0,
+    changes: options.Set = None,
+    trust: options.Trust = False,
+    agents: options.Agents = None,
+    duration: options.Duration = None,
+    vehicle: Annotated[str, typer.Option(help="Autopilot that the vehicles imitate: px4 or ardupilot.")] = "px4",
+    body: Annotated[
+        str | None,
+        typer.Option(metavar="multirotor|quadrotor", help="How the vehicles move.", show_default="the scenario's"),
+    ] = None,
+    mode: Annotated[
+        str,
+        typer.Option(
+            help="lockstep: on a virtual clock, the same bits each time. tasks, processes: on the real clock over UDP "
+            "on this computer, in one process or with a process for each node and each vehicle."
+        ),
+    ] = "lockstep",
+    join: Annotated[
+        int,
+        typer.Option(
+            min=1024,
+            max=65000,
+            help="On the real clock: port where the first vehicle contacts MAVSDK, MAVProxy or QGroundControl; "
+            "the others use the next ones.",
+        ),
+    ] = 14540,
+    faults: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help=r"Faults to inject: tables \[\[fault]].")
+    ] = None,
+    against: Annotated[
+        str | None, typer.Option(metavar="simulator", help="Fly the simulator beside it, and compare.")
+    ] = None,
+    silence: Annotated[
+        bool | None,
+        typer.Option(
+            "--silence/--no-silence",
+            show_default=False,
+            help="Stop while a neighbour that is lost could be near; by default yes, but beside the simulator as its "
+            "silence.rule says.",
+        ),
+    ] = None,
+    ground: Annotated[
+        bool, typer.Option("--ground", help="Take off, gather, flock, return and land, instead of starting in the air.")
+    ] = False,
+    card_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--card",
+            metavar="FILE.json",
+            help="On the real clock: write the flight card and its key here; airflock watch FILE.json shows the fleet.",
+        ),
+    ] = None,
+    save: options.SaveFile = None,
+    as_json: options.Json = False,
+) -> None:
+    """Fly a fleet in software: one node and one MAVLink vehicle per drone, in lock-step or on the real clock.
+
+    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 10 --duration 60 --seeds 5 --against simulator
+
+    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 60 --mode processes --vehicle ardupilot
+
+    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 300 --mode processes --card fleet.json,
+    and beside it airflock watch fleet.json
+    """
+    from airflock.fleets import SECONDS_BEFORE_START, compare, flying
+
+    asked, live = options.collect_option_errors(ctx), mode != flying.LOCKSTEP_MODE
+    asked.read(options.check_writable, (save, RECORDINGS), (card_file, (".json",)))
+    settings = options.collect_settings(asked, changes, agents, duration)
+    if body in flying.VEHICLE_BODIES:
+        settings = asked.read(lambda given: given | {"body.kind": body}, settings)
+    loaded = options.collect_scenario(asked, scenario, settings, trust=trust)
+    loaded = asked.read(
+        lambda found: compare.with_metric_period(found, found.sensors.period or found.flight.dt), loaded
+    )
+    numbers = asked.read(options.seeds_from, first_seed, seeds)
+    members = asked.read(lambda found: tuple(range(1, found.agents + 1)), loaded)
+    broken = asked.read(_broken, faults, value_or_default(members, ALL_SYSTEM_IDS), live)
+    asked.note(*_option_errors(vehicle, body, mode, card_file, against))
+    asked.read(_check_one_card, card_file, loaded, numbers)
+    asked.raise_errors()
+    terminal.print_notes(loaded.notes)
+    how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "ground": ground, "join": join, "card_file": card_file}
+    how["silent"] = True if silence is None and not against else silence
+    series = flying.FleetRuns(loaded, vehicle)
+    ticks = seeds * int(loaded.flight.duration + (SECONDS_BEFORE_START if ground else 0.0))
+    with counting_parts(f"{loaded.name}: fleet", ticks, quiet=as_json) as done, _frozen_imports():
+        how |= {"on_done": done, "notify": terminal.print_message}
+        for flown in flying.fly_seeds(loaded, numbers, faults=broken, **how):
+            series.add(flown, with_simulator=against is not None, starts_alike=not ground and not live)
+            _save(save, flown.seed, seeds, flown)
+    _print_runs(series, as_json)
+
+
+def _broken(file: Path | None, members: tuple[int, ...], live: bool) -> Sequence[Any]:
+    """Faults of a file, if there is one, that such a fleet can suffer."""
+    from airflock.fleets import read_injected_faults, realtime
+
+    found = () if file is None else read_injected_faults(file, members)
+    options.raise_errors(realtime.lockstep_only_errors(found) if live else [])
+    return found
+
+
+def _check_one_card(file: Path | None, scenario: Any, seeds: Sequence[int]) -> None:
+    """Refuse one card for several seeds where each seed has drones of its own."""
+    if file is not None and scenario.varied and len(seeds) > 1:
+        options.raise_errors([f"--card {file}: with tolerances each seed has its own card; add --seeds 1"])
+
+
+def _option_errors(vehicle: str, body: str | None, mode: str, card_file: Path | None, against: str | None) -> list[str]:
+    """What is wrong with options that do not concern the scenario."""
+    from airflock.fleets import FLEET_MODES, VEHICLE_BODIES, VEHICLE_KINDS
+
+    faults = [
+        f"{option} {word} is none of {', '.join(known)}{suggest(word, known, lead='; ')}"
+        for option, word, known in (
+            ("--vehicle", vehicle, VEHICLE_KINDS),
+            ("--body", body, VEHICLE_BODIES),
+            ("--mode", mode, FLEET_MODES),
+        )
+        if word is not None and word not in known
+    ]
+    if card_file is not None and mode == FLEET_MODES[0]:
+        faults.append(f"--card {card_file}: in lock-step it flies too fast to watch; add --mode tasks or processes")
+    if against not in (None, "simulator"):
+        faults.append(f"--against {against}: only simulator is known")
+    return faults
+
+
+@contextmanager
+def _frozen_imports() -> Iterator[None]:
+    """Let the collector leave alone what is there already; a look at it all takes a tenth of a second, now and then."""
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+
+
+def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:
+    if save is None:
+        return
+    from airflock.fleets import fleet_recording
+    from airflock.recordings import save as save_recording
+
+    path = save if seeds == 1 else save.with_name(f"{save.stem}-seed{seed}{save.suffix}")
+    terminal.print_message(f"saved {save_recording(fleet_recording(flown), path)}")
+
+
+def _print_runs(series: Any, as_json: bool) -> None:
+    """Print what was flown."""
+    from airflock.parts.metrics import reported_values
+
+    scenario, lines, seeds = series.scenario, series.comparison, len(series.runs)
+    if as_json:
+        about = {"name": scenario.name, "agents": scenario.agents, "vehicle": series.vehicle, "seeds": seeds}
+        content = {"fleet": about, "runs": series.runs, "comparison": [line._asdict() for line in lines]}
+        terminal.print_json(content | ({"departure": series.divergence._asdict()} if series.divergence else {}))
+        return
+    flown = f"{scenario.flight.duration:g} s, {seeds} seed{'s' if seeds > 1 else ''}"
+    title = f"{scenario.name}: fleet of {scenario.agents} {series.vehicle}, {flown}"
+    terminal.print_score_table(title, series.measured, {}, reported_values(scenario.measures))
+    for run in series.runs:
+        _print_load(run.get("load"))
+    for instant, member, note in series.runs[0]["notes"][:40]:
+        terminal.print_message(f"{instant:8.2f} s  drone {member:3d}  {note}")
+    if series.divergence:
+        terminal.print_message(
+            "largest distance to the simulated flight, m; and of the simulation itself after a nudge of 1 cm"
+        )
+        if scenario.has_sensor_error and scenario.sensor.error is not None:
+            terminal.print_message(
+                "(a drone sends the position that it flies by; a simulated one has two errors: they part)"
+            )
+        for t, ours, theirs in zip(*series.divergence, strict=True):
+            terminal.print_message(f"  after {t:g} s: {ours:.4f}   {theirs:.4f}")
+    for line in lines:
+        terminal.print_message(
+            f"  {line.name:16s} simulator {line.simulator:10.4f}  fleet {line.fleet:10.4f}  z {line.z:+.2f}  "
+            f"p (Holm) {line.p:.2f}"
+        )
+    if series.simulated and not lines:
+        terminal.print_message("note: a table of differences needs two or more seeds: --seeds 2")
+
+
+def _print_load(load: dict[str, Any] | None) -> None:
+    """Tell what a fleet on the real clock cost, and how late it was."""
+    if load is None:
+        return
+    parts = ""
+    if load["nodes"] is not None:
+        parts = f" (nodes {load['nodes']:.2f}, vehicles and ether {load['vehicles']:.2f})"
+    terminal.print_message(
+        f"processor: {load['cores']:.2f} of a core{parts}; load of this computer {load['others']:.1f}"
+    )
+    share = load["late"] / max(load["ticks"], 1)
+    terminal.print_message(
+        f"ticks of the nodes: {load['ticks']}, {load['late']} ({share:.1%}) late by more than half a period, at most "
+        f"by {load['worst']:.2f} s"
+    )
+
+
+# ---- fly prepare
+
+DATAGRAM_BYTES = 95  # bytes of a signed status packet
+OVERHEAD_BYTES = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64
+PREAMBLE_SECONDS = 2e-4  # s of a packet before its first bit; WiFi's long preamble
+DEFAULT_SITE = (0.0, 0.0, 0.0)
+MAX_AIRTIME_SHARE = 0.6  # of the channel's time that a flock may take; our choice: random access breaks down beyond
+FAST_BITS, SLOW_BITS = 6e6, 250e3  # bit/s: WiFi's multicast rate as it should be set; IEEE 802.15.4
+
+
+def prepare(
+    ctx: typer.Context,
+    scenario: options.Where,
+    site: Annotated[
+        str, typer.Option(metavar="LAT,LON,ALT", help="Centre of the arena on the ground; ALT above sea level, m.")
+    ],
+    members: Annotated[str, typer.Option(metavar="1-10", help="System ids of the drones, such as 1-10 or 1,2,5.")],
+    changes: options.Set = None,
+    trust: options.Trust = False,
+    autopilot: Annotated[str, typer.Option(help="px4 or ardupilot.")] = "px4",
+    height: Annotated[
+        float | None, typer.Option(help="Height of the flock, m above the site.", show_default="20")
+    ] = None,
+    margin: Annotated[float, typer.Option(min=0.0, help="Distance of the fence outside the law's walls, m.")] = 30.0,
+    hours: Annotated[float, typer.Option(min=0.1, max=168.0, help="How long card and key stay valid, h.")] = 12.0,
+    limits: Annotated[
+        list[str] | None, typer.Option("--limit", metavar="KEY=VALUE", help="Change a limit, for instance brake=2.")
+    ] = None,
+    fast_bits: Annotated[float, typer.Option(min=100.0, help="Bits per second of the fast radio.")] = FAST_BITS,
+    slow_bits: Annotated[float, typer.Option(min=100.0, help="Bits per second of the slow radio.")] = SLOW_BITS,
+    out: Annotated[Path, typer.Option(metavar="FILE.json", help="The card; keys are written beside it.")] = Path(
+        "mission.json"
+    ),
+    as_json: options.Json = False,
+) -> None:
+    """Write the flight card, the mission's key and the operator's key.
+
+    Card and mission.key go to every drone; mission.operator stays with the operator.
+
+    Example: airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10 --out mission.json
+    """
+    import secrets
+
+    from airflock.drones import card_hash, new_operator_keys, parse_card
+    from airflock.fleets import DEFAULT_FENCE_MARGIN, deviation_notes, make_card_document, omission_notes
+
+    asked = options.collect_option_errors(ctx)
+    where, systems = asked.read(options.parse_position, "--site", site), asked.read(_members, members)
+    asked.read(options.check_writable, (out, (".json",)))
+    files = MissionFiles(out, out.with_suffix(".key"), out.with_suffix(".operator"))
+    asked.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
+    loaded = options.collect_scenario(asked, scenario, asked.read(options.parse_settings, changes), trust=trust)
+    safety = _limits(limits, loaded, asked)
+    private, public = new_operator_keys()
+
+    def card_for(scenario: Any) -> dict[str, Any]:
+        made = make_card_document(
+            scenario,
+            site=value_or_default(where, DEFAULT_SITE),
+            members=value_or_default(systems, [1]),
+            mission=1 + secrets.randbelow(2**32 - 1),
+            expires=int(time.time() + 3600.0 * value_or_default(hours, 1.0)),
+            operator=public,
+            autopilot=autopilot,
+            height=value_or_default(height, None),
+            margin=value_or_default(margin, DEFAULT_FENCE_MARGIN),
+            safety=safety,
+        )
+        parse_card({**made, "hash": card_hash(made)}, str(out))
+        return made
+
+    document = asked.read(card_for, loaded)
+    loads = asked.read(_check_airtimes, systems, document, fast_bits, slow_bits)
+    asked.raise_errors()
+    card = _write_mission(files, document, private)
+    beside = deviation_notes(loaded, card.safety, len(card.members))
+    terminal.print_notes([*loaded.notes, *omission_notes(loaded), *beside])
+    if as_json:
+        radio = {each.radio: each.share for each in loads}
+        terminal.print_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})
+    else:
+        _print_summary(files, card, loads)
+
+
+class MissionFiles(NamedTuple):
+    """What a preparation writes: the card, the mission's key and the operator's key."""
+
+    card: Path
+    key: Path
+    operator: Path
+
+
+class Airtime(NamedTuple):
+    """How much of a radio's time a flock takes.
+
+    radio : fast or slow; limit : which of the card's limits sets its rate; share : of the time, 0 to 1
+    """
+
+    radio: str
+    limit: str
+    share: float
+
+    def fault(self, count: int) -> str:
+        """Why so many drones cannot use it, and what helps."""
+        return (
+            f"{self.radio} radio: {count} drones would take {self.share:.0%} of its time; "
+            f"at most {MAX_AIRTIME_SHARE:.0%}: "
+            f"lower the rate (--limit {self.limit}=...) or raise --{self.radio}-bits"
+        )
+
+
+def radio_airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
+    """What `count` drones take of the fast and the slow radio, from their rates in bit/s and the card's limits."""
+    loads = []
+    for radio, limit, bits in (("fast", "status_period", fast), ("slow", "slow_period", slow)):
+        packet = PREAMBLE_SECONDS + 8.0 * (DATAGRAM_BYTES + OVERHEAD_BYTES) / bits
+        loads.append(Airtime(radio, limit, count * packet / float(safety[limit])))
+    return loads
+
+
+def _check_airtimes(systems: list[int], document: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
+    """What the drones of a card take of their radios. Raises CardError where that is too much."""
+    loads = radio_airtimes(len(systems), document["safety"], fast, slow)
+    if faults := [each.fault(len(systems)) for each in loads if each.share > MAX_AIRTIME_SHARE]:
+        raise CardError(faults)
+    return loads
+
+
+def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> dict[str, Any]:
+    """Limits of the card that --limit changes; what is wrong is noted, and left out."""
+    from airflock.core import declarations
+    from airflock.drones import SafetyLimits
+    from airflock.fleets import default_safety
+
+    known = [name for name, _, _ in declarations(SafetyLimits)]
+    safety = value_or_default(errors.read(options.parse_settings, pairs, option="--limit"), {})
+    wrong = [name for name in safety if name not in known]
+    errors.note(*(f"--limit {name}: is not a limit; {suggest(name, known, ', '.join(known))}" for name in wrong))
+    safety = {name: value for name, value in safety.items() if name in known}
+    changed = errors.read(lambda flown: replace(default_safety(flown), **safety), scenario)
+    return {} if changed is INVALID else safety
+
+
+def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes) -> Any:
+    """Write card and keys, all of them or none; private: the operator's key. The card that was written."""
+    import secrets
+
+    from airflock.drones import write_card, write_key
+
+    try:
+        card = write_card(files.card, document)
+        write_key(files.key, secrets.token_bytes(32))
+        write_key(files.operator, private)
+    except BaseException:  # a full disk, Ctrl-C: a card without its keys is of no use
+        for path in files:
+            path.unlink(missing_ok=True)
+        raise
+    return card
+
+
+def _print_summary(files: MissionFiles, card: Any, loads: list[Airtime]) -> None:
+    """Say what was written, how high the drones may fly, and how autopilots have to be set."""
+    terminal.print_message(f"wrote {files.card} (hash {card.hash[:8]}), {files.key}, {files.operator}")
+    top = card.layer(card.members[-1])
+    terminal.print_message(f"fence {card.low:g} to {card.high:g} m above the site; layers up to {top:g} m")
+    for load in loads:
+        terminal.print_message(f"{load.radio} radio: {load.share:.0%} of its time, by an estimate from its bit rate")
+    for guard in card.autopilot.parameter_checks:
+        why = guard.reason(card.safety.speed_max, card.safety.response)
+        terminal.print_message(f"set {guard.name} {guard.told()}: {why}")
+
+
+def _members(text: str) -> list[int]:
+    """System ids, as they are written in a line."""
+    members: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.partition("-")
+        last = last if dash else first
+        if not (first.isdigit() and last.isdigit() and 0 <= int(last) - int(first) <= 250):
+            raise CardError([f"--members {text}: write 1-10 or 1,2,5"])
+        members += range(int(first), int(last) + 1)
+    return members
+
+
+# ---- fly order
+
+KILL_NOTE = "; the motors stop when kill --confirm follows within 5 s"
+
+
+def order(
+    card_file: Annotated[Path, typer.Argument(metavar="CARD", help="The flight card.", show_default=False)],
+    do: Annotated[
+        str, typer.Argument(metavar="ORDER", help="start, go, goto, hold, resume, return, land, kill or ping.")
+    ],
+    radio: Annotated[str, typer.Option(metavar="PORT", help="udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")],
+    target: Annotated[int, typer.Option(min=0, max=250, help="System id; 0 for all.")] = 0,
+    delay: Annotated[float, typer.Option("--in", min=0.0, max=60.0, help="Delay of a start, s.")] = 3.0,
+    point: Annotated[
+        str | None, typer.Option(metavar="LAT,LON,ALT", help="Where to go, for goto; ALT above sea level, m.")
+    ] = None,
+    confirm: Annotated[bool, typer.Option("--confirm", help="Second step of a kill, within 5 s of the first.")] = False,
+) -> None:
+    """Send an order, signed with the operator's key beside the card. It is sent five times; each drone obeys it once.
+
+    Example: airflock fly order mission.json start --radio 'udp:0.0.0.0:14601>192.168.1.255:14600'
+    """
+    from airflock.drones import PacketSigner, check_port, orders, read_card, read_key
+
+    asked = ErrorCollector()
+    what = orders.OrderKind.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
+    if what is None or do == "confirm_kill":
+        asked.note(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
+    if (do == "goto") != (point is not None):
+        asked.note("--point LAT,LON,ALT belongs to goto, and goto needs it")
+    where = asked.read(options.parse_position, "--point", point) if point else (0.0, 0.0, 0.0)
+    card = asked.read(read_card, card_file)
+    asked.read(_check_target, card, target)
+    if point:
+        asked.read(_check_inside_fence, card, where, point)
+    key = asked.read(read_key, card_file.with_suffix(".key"))
+    private = asked.read(read_key, card_file.with_suffix(".operator"))
+    asked.read(check_port, radio)
+    asked.raise_errors()
+    assert what is not None
+    utc = time.time_ns() // 1000
+    place = (round(where[0] * 1e7), round(where[1] * 1e7), round(where[2] * 1e3))
+    command = orders.OperatorOrder(what, target, card.mission, utc, utc + round(delay * 1e6), place)
+    _send(radio, orders.order_message(command, private), PacketSigner(key, orders.OPERATOR_SYSTEM))
+    effect = KILL_NOTE if what is orders.OrderKind.KILL else ""
+    terminal.print_message(f"sent {what.name} to {f'drone {target}' if target else 'all'}{effect}")
+
+
+def _send(radio: str, message: Any, sign: Any) -> None:
+    """Send an order five times; raises CardError where the port cannot."""
+    from airflock.drones import open_port
+
+    port = open_port(radio)
+    try:
+        for _ in range(5):
+            if not port.write(sign(message, time.time_ns() // 1000)):
+                raise CardError([f"{radio}: cannot send; does the port say where to send (>HOST:PORT)?"])
+            time.sleep(0.1)
+    finally:
+        port.close()
+
+
+def _check_target(card: Any, target: int) -> None:
+    """Refuse a drone that is no member of the mission."""
+    if target and target not in card.members:
+        raise CardError([f"--target {target}: the card's members are {', '.join(map(str, card.members))}"])
+
+
+def _check_inside_fence(card: Any, option: tuple[float, float, float], point: str) -> None:
+    """Refuse what no drone would obey: a point outside the card's fence, which they refuse, each by itself."""
+    x, y, z = card.site.local(*option)
+    if not card.low <= z <= card.high:
+        line = (
+            f"--point {point}: lies {z:.4g} m above the site; the fence reaches from {card.low:g} to {card.high:g} m "
+            f"(ALT is above sea level, the site's is {option[2] - z:g} m)"
+        )
+        raise CardError([line])
+    far = card.fence.outside(x, y)
+    if far > 0.0:
+        raise CardError([f"--point {point}: lies {far:.4g} m outside of the fence"])
+
+
+# ---- fly
+
+
+class FlyGroup(TyperGroup):
+    """Subcommands; anything else is a flight card, which is flown."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """A subcommand by its name; `run_node` for the name of a file."""
+        if args and args[0] not in self.commands and (Path(args[0]).suffix or is_file(args[0])):
+            args = ["card", *args]
+        return super().resolve_command(ctx, args)
+
+
+fly_app = typer.Typer(
+    cls=FlyGroup, no_args_is_help=True, rich_markup_mode="rich",
+    help="""Fly the same law on real drones: one card for all, a node beside each autopilot, orders from one operator.
+
+    Example: airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10,
+    then on each drone airflock fly mission.json --member 3 --autopilot udp:127.0.0.1:14540 --radio ...
+    """,
+)  # fmt: skip
+
+
+@fly_app.command(
+    "card", context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+)
+def run_node(ctx: typer.Context) -> None:
+    """Run a node, as python -m airflock.drones.onboard CARD ... does; `airflock fly card --help` lists its options."""
+    from airflock.drones import main
+
+    raise typer.Exit(main(ctx.args))
+
+
+fly_app.command("prepare", cls=VerbCommand)(prepare)
+fly_app.command("order", cls=VerbCommand)(order)
+
+
+@fly_app.command("replay", cls=VerbCommand)
+def replay(
+    card_file: Annotated[Path, typer.Argument(metavar="CARD", help="The flight card.", show_default=False)],
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of a node.", show_default=False)],
+    as_json: options.Json = False,
+) -> None:
+    """Fly the log of a node again: the same inputs must give the same outputs, to the bit.
+
+    Example: airflock fly replay mission.json mission-3-20270115T101500Z.log
+    """
+    from airflock.drones import read_card, read_key, replay_log_file
+
+    card, key = read_card(card_file), read_key(card_file.with_suffix(".key"))
+    ticks, different, notes = 0, [], []
+    for tick in replay_log_file(log, card, key):
+        ticks += 1
+        notes += [(tick.time, note) for note in tick.out.notes]
+        if not tick.same:
+            different.append(tick.time)
+    if as_json:
+        terminal.print_json({"ticks": ticks, "different": different, "notes": notes})
+    else:
+        for at, note in notes:
+            terminal.print_message(f"{at:10.2f} s  {note}")
+        terminal.print_message(f"{ticks} ticks, {len(different)} with another output than was logged")
+    if different:
+        raise ScenarioError(
+            [f"{log}: {len(different)} of {ticks} ticks differ when flown again, first at {different[0]:g} s"]
+        )

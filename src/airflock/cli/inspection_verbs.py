@@ -1,0 +1,207 @@
+"""Verbs presets, validate and doctor: what there is, whether it is right, and whether this machine can run it."""
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from airflock.cli import options, terminal
+from airflock.support import AirflockError, as_error, collect_errors, is_file, read_text
+
+if TYPE_CHECKING:
+    from airflock.scenarios import Key
+
+# ---- presets, validate and doctor
+
+
+def presets(
+    name: Annotated[
+        str | None, typer.Argument(metavar="PRESET", help="Show one preset in full.", show_default=False)
+    ] = None,
+    for_speed: Annotated[
+        float | None, typer.Option(min=0.1, max=100.0, help="Print a starting set for this speed, m/s.")
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """List the presets, show one as TOML, or derive a starting set for a speed (--for-speed 12 > mine.toml).
+
+    Example: airflock presets vasarhelyi_2018/4ms
+    """
+    from airflock.scenarios import files
+
+    known = files.presets()
+    if for_speed is not None:
+        from airflock.scenarios import starting_set
+
+        _show(starting_set(for_speed), as_json)
+        return
+    if name is not None:
+        if name not in known and not is_file(name):
+            files.load(name)  # complains about a wrong name
+        with as_error(name):
+            text = read_text(known.get(name) or name)
+        _show(text, as_json and bool(files.load(name)))  # a file that is none is refused as any other
+        return
+    titles = {key: str(files.load(key).document.get("title", "")) for key in known}
+    if as_json:
+        terminal.print_json(titles)
+        return
+    width = max(len(key) for key in titles)
+    for key, title in titles.items():
+        typer.echo(f"{key:<{width}}  {title}")
+
+
+def _show(text: str, as_json: bool) -> None:
+    """Print a scenario as it is written, or as one JSON object."""
+    if as_json:
+        terminal.print_json(tomllib.loads(text))
+    else:
+        typer.echo(text, nl=False)
+
+
+def validate(
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE...", help="Scenario files, presets, studies or recordings.")
+    ],
+    changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
+    as_json: options.Json = False,
+) -> None:
+    """Check scenario and study files (every fault at once), or fly a recording again and compare the bits.
+
+    With --json, each file has a verdict (null if it is wrong), its faults and its notes. Exit status 2 if any is wrong.
+
+    Example: airflock validate mine.toml
+    """
+    changed = options.parse_settings(changes)
+    checked = []
+    for name in files:
+        entry = _checked(name, changed, law, trust)
+        checked.append(entry)
+        if not as_json and entry["verdict"] is not None:
+            for note in entry["notes"]:
+                terminal.print_message(f"note: {name}: {note}")
+            typer.echo(f"{name}: {entry['verdict']}")
+    faults = [fault for entry in checked for fault in entry["faults"]]
+    if not as_json:
+        options.raise_errors(faults)
+        return
+    terminal.print_json({"files": checked})
+    if faults:
+        raise typer.Exit(2)
+
+
+def _checked(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> dict[str, Any]:
+    """Verdict, notes and faults of one file; each fault begins with its name."""
+    from airflock.search import ValidationReport, validate
+
+    found: list[str] = []
+    valid: ValidationReport | None = None
+    with collect_errors(found):
+        valid = validate(name, changed, law, trust=trust)
+    faults = [fault if name in fault else f"{name}: {fault}" for fault in found]
+    return {
+        "file": name,
+        "verdict": valid.verdict if valid else None,
+        "notes": list(valid.notes) if valid else [],
+        "faults": faults,
+    }
+
+
+def doctor(
+    clear: Annotated[bool, typer.Option("--clear-cache", help="Only remove all compiled drivers.")] = False,
+    as_json: options.Json = False,
+) -> None:
+    """Show versions, cores, extras, GPUs and cache, and fly a ten-second self-check on each device.
+
+    Example: airflock doctor
+    """
+    if clear:
+        from airflock.support import clear_cache, default_cache_folder
+
+        count, size = clear_cache()
+        if as_json:
+            terminal.print_json(
+                {"cache": str(default_cache_folder()), "removed": count, "freed_mb": round(size / 1e6, 1)}
+            )
+        else:
+            typer.echo(f"{default_cache_folder()}: {count} drivers removed, {size / 1e6:.1f} MB")
+        return
+    from airflock.recordings import doctor as examine
+
+    found = examine()
+    if as_json:
+        terminal.print_json(found)
+    else:
+        for key, text in found.items():
+            typer.echo(f"{key:<16} {text}")
+    failed = [text for key, text in found.items() if key.endswith("self_check") and text != "passed"]
+    if failed:
+        raise AirflockError(f"self-check {'; '.join(failed)}")
+
+
+# ---- keys
+
+
+def keys(
+    section: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="SECTION|KIND|KEY",
+            help="For instance radio, couzin_2002, faults, motor, top, or delay.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """List the sections of a scenario file, or every key of one: meaning, unit, range, default and source.
+
+    Example: airflock keys radio
+    """
+    from airflock.scenarios import keys as known
+
+    listed_keys = known.keys(section)
+    if as_json:
+        terminal.print_json([{**key._asdict(), "options": list(key.options)} for key in listed_keys])
+        return
+    if section is None:
+        width = max(map(len, known.sections()))
+        for name, listed in known.sections().items():
+            count = len(listed.keys)
+            typer.echo(f"{name:<{width}}  {count:>2} key{'s' if count != 1 else ' '}  {listed.about}")
+        return
+    _print_keys(listed_keys)
+
+
+def _print_keys(listed_keys: "list[Key]") -> None:
+    from rich.console import Console
+    from rich.padding import Padding
+    from rich.text import Text
+
+    console = Console()
+    width = max(len(key.name) for key in listed_keys)
+    for key in listed_keys:
+        owner = f"   ({key.of})" if len({key.of for key in listed_keys}) > 1 and key.of else ""
+        line = Text.assemble((f"{key.name:<{width}}", "bold"), f"   {key.standard}   [{key.allowed}]", (owner, "cyan"))
+        source = f" ({key.source})" if key.source else ""
+        console.print(line)
+        console.print(Padding(Text.assemble(key.meaning, (source, "dim")), (0, 0, 0, 4)))
+
+
+# ---- types
+
+
+def types(
+    files: Annotated[list[str] | None, typer.Argument(metavar="FILE.py...", help="Not read.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Not written.")] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Removed: use mypy, and airflock.check_model in Python.
+
+    Example: airflock types mine.py
+    """
+    from airflock.check import check_types
+
+    check_types(files or (), out=out)

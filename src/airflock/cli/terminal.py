@@ -1,0 +1,289 @@
+"""Tables for a terminal, and JSON for machines."""
+
+import itertools
+import json
+import math
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from threading import Lock
+from typing import Any, Protocol
+
+# ---- Tables and JSON
+
+
+def column_statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Mean, standard deviation and median of each column; of a column of lists, those of each place.
+
+    A value that is nan (a time of what never happened) is left out; where all are, the statistics are nan.
+    """
+    summary: dict[str, dict[str, Any]] = {"mean": {}, "std": {}, "median": {}}
+    for key, first in rows[0].items():
+        if isinstance(first, (list, tuple)):
+            places = [_moments([row[key][c] for row in rows]) for c in range(len(first))]
+            moments: Any = [list(column) for column in zip(*places, strict=True)] or [[], [], []]
+        else:
+            moments = _moments([row[key] for row in rows])
+        for name, value in zip(summary, moments, strict=True):
+            summary[name][key] = value
+    return summary
+
+
+def _moments(numbers: Sequence[Any]) -> tuple[float, float, float]:
+    values = sorted(v for v in map(float, numbers) if not math.isnan(v))
+    n = len(values)
+    if not n:
+        return math.nan, math.nan, math.nan
+    mean = math.fsum(values) / n
+    spread = math.sqrt(math.fsum((v - mean) ** 2 for v in values) / (n - 1)) if n > 1 else 0.0
+    return mean, spread, 0.5 * (values[(n - 1) // 2] + values[n // 2])
+
+
+def format_number(x: Any, missing: str = "never") -> str:
+    """A number with four significant digits, `missing` where it is nan (a time's `never`); a list side by side."""
+    if isinstance(x, (list, tuple)):
+        return ", ".join(f"{v:.3g}" if v == v else missing for v in x)
+    return f"{x:.4g}" if x == x else missing
+
+
+def print_score_table(
+    title: str,
+    rows: Sequence[Mapping[str, Any]],
+    published: Mapping[str, tuple[float, float | None]],
+    units_and_meanings: Mapping[str, tuple[str, str]],
+) -> None:
+    """Print order parameters beside what a paper reports; about: unit and meaning by name.
+
+    What no flight has (a clearance where nothing stands) is named in one line below, not told as a number.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    summary = column_statistics(rows)
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    table.add_column("order parameter", style="bold")
+    table.add_column("mean ± sd" if len(rows) > 1 else "value", justify="right")
+    if len(rows) > 1:
+        table.add_column("median", justify="right")
+    if published:
+        table.add_column("published", justify="right", style="cyan")
+    table.add_column("unit")
+    table.add_column("meaning", style="dim")
+    untold = [key for key, mean in summary["mean"].items() if _is_unmeasured(key, mean) and key not in published]
+    for key in [key for key in summary["mean"] if key not in untold]:
+        unit, meaning = units_and_meanings.get(key, ("", ""))
+        missing = "never" if key.startswith("time_to_") else "nan"  # only an event can never happen
+        mean = format_number(summary["mean"][key], missing)
+        spread = summary["std"][key]
+        single = len(rows) == 1 or isinstance(spread, list) or spread != spread
+        cells = [key, mean if single else f"{mean} ± {spread:.2g}"]
+        cells += [format_number(summary["median"][key], missing)] if len(rows) > 1 else []
+        if published:
+            entry = published.get(key)
+            spread = "" if entry is None or entry[1] is None else f" ± {entry[1]:.2g}"
+            cells += ["" if entry is None else f"{format_number(entry[0])}{spread}"]
+        table.add_row(*cells, unit, meaning)
+    Console().print(table)
+    if untold:
+        Console().print(
+            f"not shown, because there is nothing to measure: {', '.join(untold)}", style="dim", soft_wrap=True
+        )
+
+
+def _is_unmeasured(key: str, mean: Any) -> bool:
+    """Whether no flight has such a number; an event that never happened is told as `never`."""
+    values = mean if isinstance(mean, (list, tuple)) else [mean]
+    return not key.startswith("time_to_") and bool(values) and all(math.isnan(value) for value in values)
+
+
+def print_json(value: Any) -> None:
+    """Print JSON on one line; numbers that are no JSON (never expected) become null."""
+    sys.stdout.write(json.dumps(to_json_value(value), ensure_ascii=False) + "\n")
+
+
+def to_json_value(value: Any) -> Any:
+    """Plain Python values with finite numbers."""
+    if isinstance(value, Mapping):
+        return {str(key): to_json_value(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [to_json_value(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value.item() if hasattr(value, "item") else value
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """What is read otherwise than it is written or hardly meant, once each; before anything is flown or written."""
+    for text in dict.fromkeys(notes):
+        print_message(f"note: {text}")
+
+
+def print_message(text: str) -> None:
+    """A line for a person, on the error stream so that it never mixes with output."""
+    sys.stderr.write(f"{text}\n")
+
+
+# ---- Progress
+
+FIRST_LINE_AFTER, LINE_INTERVAL = 10.0, 30.0  # s: before the first line of a log, and at least between two
+INTERVAL_SHARE = 0.1  # of the time so far that passes at least between two lines: a day gives some seventy
+
+
+class ProgressLine(Protocol):
+    """What is under way, told again whenever it changes."""
+
+    def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
+        """What is under way, how much of it is done, and how much there is (None: nobody knows)."""
+
+    def say(self, text: str) -> None:
+        """Print a line that stays."""
+
+
+@contextmanager
+def progress_line(quiet: bool = False) -> Iterator[ProgressLine]:
+    """The line for where standard error goes: none if quiet, a bar on a terminal, or lines for a log."""
+    if quiet:
+        yield SilentProgress()
+    elif sys.stderr.isatty():
+        with _progress_bar() as bar:
+            yield bar
+    else:
+        yield LogProgress()
+
+
+class SilentProgress:
+    """Nothing is told of progress, nor what would stay above it."""
+
+    def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
+        """Tell nothing."""
+
+    def say(self, text: str) -> None:
+        """Print nothing."""
+
+
+class LogProgress:
+    """Plain lines for a file or the log of a cluster, each with what is done, how fast, and how long it will take."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        self._clock, self._lock = clock, Lock()
+        self._began = clock()
+        self._next_line_at = self._began + FIRST_LINE_AFTER
+        self._time_left = TimeLeft(clock)
+
+    def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
+        """Print a line if the last one is long enough ago."""
+        with self._lock:
+            self._time_left.update(done, total)
+            now = self._clock()
+            if now < self._next_line_at:
+                return
+            self._next_line_at = now + max(LINE_INTERVAL, INTERVAL_SHARE * (now - self._began))
+            amount = f": {done:,.0f}" if done else ""
+            amount = f": {done:,.0f} of {total:,.0f} ({done / total:.0%})" if total else amount
+            left = self._time_left.left
+            ends = "" if left is None else f", {format_duration(left)} left"
+            self.say(f"{text}{amount}{ends}")
+
+    def say(self, text: str) -> None:
+        """Print a line that stays."""
+        print_message(text)
+
+
+class TimeLeft:
+    """How fast work goes: `left` is the time (s) that it will still take, None where nobody knows.
+
+    What was done before it was first looked at, by a run that was cut off, took no time. Less done than before
+    means that other work begins.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        self._clock = clock
+        self._first, self._last, self._since = 0.0, math.inf, clock()
+        self.left: float | None = None
+
+    def update(self, done: float, total: float | None) -> None:
+        """Take what is done, of how much."""
+        now = self._clock()
+        if done < self._last:
+            self._first, self._since = done, now
+        self._last = done
+        gained = done - self._first
+        self.left = None if not total or gained <= 0.0 else (total - done) * (now - self._since) / gained
+
+
+def format_duration(seconds: float) -> str:
+    """A time as one says it: 40 s, 12 min, 3.5 h."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
+
+
+@contextmanager
+def _progress_bar() -> Iterator[ProgressLine]:
+    """A line that moves: what is under way, a bar, its share, and the time that is left."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    shape = (
+        TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TaskProgressColumn(),
+        TextColumn("{task.fields[left]}"), TimeElapsedColumn(),
+    )  # fmt: skip
+    pace = TimeLeft()
+    with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as drawn:
+        task: Any = None
+
+        class Bar:
+            def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
+                nonlocal task
+                pace.update(done, total)
+                left = "" if pace.left is None else f"{format_duration(pace.left)} left"
+                if task is None:
+                    task = drawn.add_task(text, total=total, left=left)
+                drawn.update(task, description=text, completed=done, total=total, left=left)
+
+            def say(self, text: str) -> None:
+                drawn.console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+        yield Bar()
+
+
+@contextmanager
+def counting_parts(label: str, total: int | None = None, quiet: bool = False) -> Iterator[Callable[[], None]]:
+    """Progress of so many equal parts (None: nobody knows); yields a function to call after each."""
+    with progress_line(quiet) as told:
+        lock, done = Lock(), 0
+
+        def one() -> None:
+            nonlocal done
+            with lock:
+                done += 1
+                told.update(label, done, total)
+
+        told.update(label, 0, total)
+        yield one
+
+
+@contextmanager
+def search_progress(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[bool], None]]]:
+    """Progress of a search: generation, best, mean, flights per second; then of the finalists."""
+    from airflock.search import RACE_ROUNDS
+
+    finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
+    finals += round(sum(share * seeds for share, seeds in RACE_ROUNDS) * study.whole("pool"))
+    began, flown = time.perf_counter(), itertools.count(1)
+    with progress_line(quiet) as told:
+
+        def watch(p: Any) -> None:
+            rate = p.fresh / max(time.perf_counter() - began, 1e-9)
+            found = "" if p.best is None else f", best {p.best:.4f}"
+            found += "" if p.mean is None else f", mean {p.mean:.4f}"
+            where = f"run {p.run + 1}, " if study.whole("restarts") else ""
+            text = f"{where}generation {p.generation + 1}/{study.whole('generations')}{found}, {rate:.1f} flights/s"
+            told.update(text, p.done, p.total)
+
+        def note(_: bool) -> None:
+            told.update("finalists on fresh seeds", min(next(flown), finals), finals)
+
+        yield watch, note

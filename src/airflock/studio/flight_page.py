@@ -1,0 +1,130 @@
+"""Page: the player's flights on a view, frame by frame. Its rooms hold the controls and say what is seen."""
+
+import html
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.studio.browser_view import BrowserView
+from airflock.studio.measurement_panel import ComparisonPanel, MeasurementPanel
+from airflock.studio.page_panels import ActionPanel, OpeningPanel, PagePanel, PlaybackPanel, status_html
+from airflock.studio.page_scene import PageScene
+from airflock.studio.player import Player
+from airflock.studio.selection_panel import SelectionPanel
+from airflock.studio.tuning_panel import TuningPanel
+
+FRAMES_PER_SECOND = 30  # per second of real time
+CHARTS_PER_SECOND = 5  # per second
+
+
+class FlightPage:
+    """One page: call `run` to fly until `stop` or Ctrl-C."""
+
+    def __init__(self, player: Player, view: BrowserView):
+        self.player, self.view = player, view
+        self._is_running = True
+        self.scene = PageScene(player, view)
+        panel = view.panel
+        self.title, self.warning_text = panel.text(), panel.text()
+        self.rescue_button = panel.add_button("Go back one moment", lambda: player.ask(self._rescued))
+        self.rescue_button.visible = False
+        play, tune, measure, compare = panel.add_tabs("Play", "Tune", "Measure", "Compare")
+        with play:
+            self.playback, self.selection, self.actions = PlaybackPanel(self), SelectionPanel(self), ActionPanel(self)
+            self.open_panel = OpeningPanel(self)
+        with tune:
+            self.tuning = TuningPanel(self, tune)
+        self.measurement = MeasurementPanel(self, measure)
+        with compare:
+            self.comparison = ComparisonPanel(self, compare)
+        self.panels: list[PagePanel] = [
+            self.playback,
+            self.selection,
+            self.actions,
+            self.open_panel,
+            self.tuning,
+            self.measurement,
+            self.comparison,
+        ]
+        for room in self.panels:
+            room.rebuild()
+        self.frame(True)
+        view.on_click(lambda origin, way: player.ask(lambda: self._clicked(origin, way)))
+
+    def stop(self) -> None:
+        """End `run` after the frame at hand; from any thread."""
+        self._is_running = False
+
+    def run(self) -> None:
+        """Fly and draw in real time until the page is stopped."""
+        now = drawn = refreshed = time.perf_counter()
+        acted = False
+        while self._is_running:
+            last, now = now, time.perf_counter()
+            moved = self.player.tick(now - last)
+            refresh = now - refreshed >= 1.0 / CHARTS_PER_SECOND
+            if moved or acted or refresh:
+                self.frame(refresh)
+            refreshed = now if refresh else refreshed
+            drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
+            acted = self._run_actions_until(drawn)
+
+    def _run_actions_until(self, end: float) -> bool:
+        """Do at once what a hand asks for, until the next frame is due. Whether anything was done."""
+        acted = self.player.run_actions_within(0.001)  # the threads of the page's server come first
+        while self._is_running and (left := end - time.perf_counter()) > 0.0:
+            acted = self.player.run_actions_within(left) or acted
+        return acted
+
+    def rebuild(self) -> None:
+        """Draw and list everything again, for other flights than before."""
+        self.scene.rebuild()
+        for room in self.panels:
+            room.rebuild()
+        self.frame(True)
+
+    def on_time_changed(self) -> None:
+        """Forget trails, charts, and collisions that lie ahead: the flights are at another time."""
+        self.scene.forget()
+        if len(self.player.sides) != len(self.scene.flocks):
+            self.rebuild()
+        self.measurement.clear()
+        self.tuning.show_values()
+
+    def frame(self, refresh: bool) -> None:
+        """Draw the present moment, with charts, tables and words if `refresh`."""
+        chosen = self.selection.chosen
+        with self.view.atomic():
+            if refresh:
+                self.scene.rebuild_if_changed()
+            self.scene.frame(chosen)
+            if refresh:
+                for room in self.panels:
+                    room.refresh()
+                self._show_status()
+
+    def _clicked(self, origin: NDArray[Any], direction: NDArray[Any]) -> None:
+        if self.actions.is_aiming:
+            self.actions.at(np.asarray(origin), np.asarray(direction))
+        else:
+            self.selection.at(np.asarray(origin), np.asarray(direction))
+
+    def _rescued(self) -> None:
+        """Go back to the last moment that was kept before the flight failed."""
+        self.playback.go_back(self.player.time)
+
+    def _show_status(self) -> None:
+        """Say where the flight is, what is wrong, and what has happened."""
+        player = self.player
+        state = "paused" if player.is_paused else "stopped" if player.failure_message or player.over else "flying"
+        counts = [side.flight.agents for side in player.sides]
+        agents = f"{' and '.join(map(str, counts))} agent{'s' * (counts != [1])}"
+        done = " and ".join(str(len(side.flight.events)) for side in player.sides)
+        self.title.content = (
+            f"<div style='padding:0 0.75em;font-variant-numeric:tabular-nums'><b>{html.escape(player.where)}</b><br>"
+            f"<small>t = {player.time:.1f} s · {agents} · seed {player.seed} · {state} · events: {done}</small></div>"
+        )
+        self.rescue_button.visible = bool(player.failure_message)
+        self.warning_text.content = status_html(player.status, is_error=bool(player.failure_message))

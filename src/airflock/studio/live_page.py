@@ -1,0 +1,169 @@
+"""Watch: a page in the browser that shows a flight and lets it be played, tuned and measured; or a fleet that flies."""
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from airflock.drones import FlightCard, FrameStream, Port, SerialPort, open_port, read_card, read_key
+from airflock.fleets import DEFAULT_WATCH_ADDRESS, FleetObserver
+from airflock.studio.player import FlightRequest, Player
+from airflock.support import CardError, StudioError, collect_errors, expand_path
+
+# ---- Flights
+
+
+def watch(
+    scenario: str | os.PathLike[str],
+    settings: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    *,
+    law: Any = None,
+    trust: bool = False,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    against: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    radios: Sequence[str] = (),
+    key: str | os.PathLike[str] | None = None,
+    say: Callable[[str], None] = print,
+) -> None:
+    """Open a page that flies a scenario live, until Ctrl-C: play it, turn its sliders, save what is found.
+
+    Of a flight card (.json) it shows the fleet that carries it instead, by the packets that its radios hear: where the
+    drones are, their phases, links and faults. It listens only, and can do nothing to them.
+
+    scenario : name of a preset, of a scenario file, or of a recording (.nc), which is flown again; or of a flight card
+    settings : keys like "model.p_rep" with the values that replace the file's
+    seed     : seed of the flight
+    law      : a law of your own that flies instead of the file's, as for `airflock.load`
+    trust    : whether code that the file names, such as a law in a Python file, may run
+    host     : address to listen at; 0.0.0.0 lets other machines in
+    port     : port to listen at; 0 takes any free one
+    against  : what flies beside it on the same clock, with the same seed and noise: another preset or file, or keys
+               with values, such as {"model.p_rep": 0.2}
+    radios   : of a fleet: where its packets are heard, such as "udp:0.0.0.0:14600" or "serial:/dev/ttyUSB0:57600";
+               by default where a fleet in software is heard, udp:127.0.0.1:14600
+    key      : of a fleet: file of the mission's key; by default beside the card
+    say      : called with each line: notes, the address of the page, faults
+
+    Raises ScenarioError for a scenario that cannot be flown, CardError for card, key and radios of a fleet, and
+    StudioError for a port in use, one line each.
+
+    Returns
+    -------
+    Nothing, when the page is ended with Ctrl-C; what was found is saved from the page.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.watch("vasarhelyi_2018/4ms", {"agents": 30})  # doctest: +SKIP
+    >>> airflock.watch("mission.json", radios=["udp:0.0.0.0:14600"])  # doctest: +SKIP
+    """
+    if str(scenario).lower().endswith(".json"):
+        idle = {"settings": settings, "seed": seed, "law": law, "trust": trust, "against": against}
+        _check_unused(f"{scenario}: is a flight card; its fleet is shown as it flies", idle, "a scenario")
+
+        watch_fleet(scenario, key, radios, host, port, say)
+        return
+    _check_unused(f"{scenario}: is flown here", {"radios": radios, "key": key}, "the flight card of a fleet (.json)")
+    rival = against if against is None or isinstance(against, Mapping) else str(against)
+    request = FlightRequest(str(scenario), dict(settings or {}), seed, law, trust, rival, interpret_first=True)
+    player = Player(request)
+    for note in dict.fromkeys(note for side in player.sides for note in side.scenario.notes):
+        say(f"note: {note}")
+    from airflock.studio.browser_view import BrowserView
+    from airflock.studio.flight_page import FlightPage
+
+    player.fault = say
+    if player.is_compiling:
+        say("compiling ... (flying interpreted meanwhile)")
+    player.start()
+    view = BrowserView(host, port, player.where)
+    try:
+        page = FlightPage(player, view)
+        try:
+            say(f"watch at {view.address}  (Ctrl-C ends)")
+            page.run()
+        except KeyboardInterrupt:
+            say(f"ended at t = {player.time:.1f} s")
+    finally:
+        view.stop()
+
+
+def _check_unused(subject: str, options: Mapping[str, Any], needed: str) -> None:
+    """Raise StudioError for what was given and would do nothing."""
+    given = [name for name, value in options.items() if value]
+    if given:
+        raise StudioError(f"{subject}; {' and '.join(given)} need{'s' * (len(given) == 1)} {needed}")
+
+
+# ---- Fleets
+
+DEFAULT_RADIOS = (f"udp:{DEFAULT_WATCH_ADDRESS[0]}:{DEFAULT_WATCH_ADDRESS[1]}",)  # where fleets in software are heard
+
+
+class ListeningRadios:
+    """Open radios that are only listened to: pieces of a serial line are put together to frames."""
+
+    def __init__(self, ports: Sequence[Port]):
+        self._ports_and_streams = [(port, FrameStream() if isinstance(port, SerialPort) else None) for port in ports]
+
+    def __call__(self) -> Iterator[bytes]:
+        """Datagrams that have arrived."""
+        for port, line in self._ports_and_streams:
+            for data in port.read():
+                yield from [data] if line is None else line.whole_frames(data)
+
+    def close(self) -> None:
+        """Close all."""
+        for port, _ in self._ports_and_streams:
+            port.close()
+
+
+def open_card_and_radios(
+    card: Path, key: Path | None, radios: Sequence[str]
+) -> tuple[FlightCard, bytes, ListeningRadios]:
+    """Card, key and open radios. Raises CardError with all faults at once, and leaves nothing open."""
+    faults: list[str] = []
+    found, secret, ports = None, b"", []
+    with collect_errors(faults):
+        found = read_card(card)
+    with collect_errors(faults):
+        secret = read_key(key or card.with_suffix(".key"))
+    for text in radios or DEFAULT_RADIOS:
+        with collect_errors(faults):
+            ports.append(open_port(text))
+    if faults or found is None:
+        ListeningRadios(ports).close()
+        raise CardError(faults)
+    return found, secret, ListeningRadios(ports)
+
+
+def watch_fleet(
+    card: str | os.PathLike[str], key: str | os.PathLike[str] | None, radios: Sequence[str], host: str, port: int,
+    notify: Callable[[str], None],
+) -> None:  # fmt: skip
+    """Open a page that shows the fleet of a flight card by what its radios hear, until Ctrl-C. It sends nothing.
+
+    Raises CardError for card, key and radios, all faults at once, and StudioError for a port in use.
+    """
+    found, secret, heard = open_card_and_radios(expand_path(card), expand_path(key) if key else None, radios)
+    try:
+        if time.time() >= found.expires:
+            notify(f"note: {card} has expired; its drones no longer start")
+        from airflock.studio.browser_view import BrowserView
+        from airflock.studio.fleet_page import FleetPage
+
+        observer = FleetObserver(found, secret, now=time.monotonic(), utc=time.time_ns() // 1000)
+        view = BrowserView(host, port, found.name)
+        try:
+            page = FleetPage(observer, view, heard)
+            notify(f"listening at {', '.join(radios or DEFAULT_RADIOS)}; watch at {view.address}  (Ctrl-C ends)")
+            page.run()
+        except KeyboardInterrupt:
+            notify(f"ended; {observer.accepted_count} packets were heard")
+        finally:
+            view.stop()
+    finally:
+        heard.close()

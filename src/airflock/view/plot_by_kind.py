@@ -1,0 +1,155 @@
+"""One door to the pictures of a scenario or a recording, by the name of the kind."""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from airflock.recordings import load_recording, scenario_of_recording, simulate
+from airflock.scenarios import Scenario, scenario_variant
+from airflock.support import AirflockError, RecordingError, suggest
+from airflock.view.flight_paths import scenario_or_none
+from airflock.view.order_parameter_plots import flocked, series, transfer
+from airflock.view.result_plots import received
+from airflock.view.rules_plot import rules
+from airflock.view.trajectory_plots import rays, through, trajectories
+from airflock.view.wash_plot import wash
+
+KINDS = (
+    "trajectories", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash", "reception",
+)  # fmt: skip
+SCENARIO_KINDS = ("rules", "transfer")  # pictures that take no flight
+PlotSource = Scenario | xr.Dataset | str | os.PathLike[str]
+
+
+def plot(
+    what: PlotSource,
+    kind: str = "trajectories",
+    *,
+    seed: int = 0,
+    start: float | None = None,
+    stop: float | None = None,
+    settings: Mapping[str, Any] | None = None,
+    law: Any = None,
+    trust: bool = False,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw a flight, a recording, or the rules of a model.
+
+    Parameters
+    ----------
+    what : Scenario, xarray.Dataset, str or path
+        A scenario or the name of one, which is flown; or a recording (time, space, keypoint, individual), or a
+        file (.nc) of one.
+    kind : str
+        trajectories, series, flocked; scene, space, rays where something stands in the world; wash of a
+        formation of wings; reception, the time since the last packet by distance; rules of a model;
+        transfer, the partial fitnesses.
+    seed : int
+        Seed of the flight, if a scenario is flown.
+    start, stop : float, optional
+        Window of time, s; which one is shown otherwise stands in the picture's title.
+    settings : mapping, optional
+        Keys of the scenario to change, such as {"radio.delay": 0.5}; a recording takes none.
+    law : optional
+        A flocking law of your own, or one by its name or file, that flies instead of the file's, as in `airflock.load`.
+    trust : bool
+        Whether code that the scenario file names may run.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw into, instead of a new figure. A picture of several panels divides their place, which must be one
+        of a grid (`figure.subplots`). Trajectories in space need axes with projection="3d".
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure, also that of `ax`; `airflock.plots.save_figure(figure, "flight.png")` writes it.
+
+    Raises
+    ------
+    AirflockError
+        If there is no such kind, or the kind does not fit what is drawn.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> figure = airflock.plot("vasarhelyi_2018/4ms", "rules")
+    >>> len(figure.axes) > 0
+    True
+    """
+    if kind not in KINDS:
+        raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}{suggest(kind, KINDS, lead='; ')}")
+    if kind in SCENARIO_KINDS:
+        _refuse_tracks(what, kind)
+        scenario = _scenario(what, settings, law, trust)
+        return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)
+    keep = ("heard",) if kind == "reception" else ()
+    recording = recording_or_flight(what, seed, settings, law, trust=trust, keep=keep)
+    with naming_file(what):
+        return _of_recording(recording, kind, start, stop, ax)
+
+
+def _refuse_tracks(source: PlotSource, kind: str) -> None:
+    """Raise RecordingError for tracks where a law or a fitness is drawn: they have none."""
+    recording = load_recording(source) if _is_recording_file(source) else source  # type: ignore[arg-type]
+    if isinstance(recording, xr.Dataset) and scenario_or_none(recording) is None:
+        raise RecordingError(f"{_source_name(source)}: tracks were flown by no scenario, which the kind {kind} draws")
+
+
+def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None, ax: Axes | None) -> Figure:
+    if kind in ("scene", "space"):
+        return through(recording, start=start, stop=stop, space=kind == "space", ax=ax)
+    if kind == "rays":
+        return rays(recording, start=start, ax=ax)
+    if kind == "wash":
+        return wash(recording, start=start, ax=ax)
+    if kind == "reception":
+        return received(recording, ax=ax)
+    if kind == "flocked":
+        return flocked(recording, start=start, stop=stop, ax=ax)
+    if kind == "series":
+        return series(recording, start=start, stop=stop, ax=ax)
+    return trajectories(recording, start=start, stop=stop, ax=ax)
+
+
+def _is_recording_file(source: Any) -> bool:
+    return isinstance(source, (str, os.PathLike)) and str(source).lower().endswith(".nc")
+
+
+def _scenario(source: PlotSource, settings: Mapping[str, Any] | None, law: Any, trust: bool) -> Scenario:
+    if isinstance(source, xr.Dataset) or _is_recording_file(source):
+        return scenario_of_recording(source if isinstance(source, xr.Dataset) else load_recording(source), settings)  # type: ignore[arg-type]
+    return scenario_variant(source, settings, law, trust=trust)
+
+
+def recording_or_flight(
+    source: PlotSource, seed: int, settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False,
+    keep: Sequence[str] = (),
+) -> xr.Dataset:  # fmt: skip
+    """The recording that is given or named, or a flight of the scenario that is."""
+    if isinstance(source, xr.Dataset) or _is_recording_file(source):
+        if settings or law is not None:
+            raise AirflockError(
+                f"{_source_name(source)}: is a recording; --set, --agents, --duration and --law need a scenario to fly"
+            )
+        return source if isinstance(source, xr.Dataset) else load_recording(source)  # type: ignore[arg-type]
+    return simulate(_scenario(source, settings, law, trust), seed, keep=keep)
+
+
+@contextmanager
+def naming_file(source: Any) -> Iterator[None]:
+    """Faults of a recording that are told inside begin with the name of its file, where it is one."""
+    try:
+        yield
+    except RecordingError as fault:
+        before, colon, said = str(fault).partition(": ")
+        if before != "recording" or not colon or not _is_recording_file(source):
+            raise
+        raise RecordingError(f"{source}: {said}") from fault
+
+
+def _source_name(source: Any) -> str:
+    return "recording" if isinstance(source, xr.Dataset) else str(source)

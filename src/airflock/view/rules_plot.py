@@ -1,0 +1,249 @@
+"""A model's own rules drawn against distance (Vásárhelyi et al. 2018, Fig. 6), in the words of the law.
+
+A law whose neighbours act through several terms (TERMS, or several vectors among its Sums) gets a panel for each.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from airflock.core import COMMANDS, Model, argument_names
+from airflock.scenarios import Scenario
+from airflock.support import RuleError
+from airflock.view import style
+from airflock.view.flight_paths import short_name
+from airflock.view.law_vectors import term_name_and_unit, vector_fields
+from airflock.view.style import check_positive
+
+# ---- Responses of a law
+
+Array = NDArray[Any]
+MAX_DIFFERENCE = 1e3  # m/s; a larger allowed difference is drawn as none
+
+
+class RuleResponse(NamedTuple):
+    """Answer of a pair rule along one axis: to each vector among its sums."""
+
+    name: str
+    values: Array
+
+
+def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
+    """What `neighbour` returns for a neighbour r (m) ahead of an agent at rest that moves sideways at dv (m/s)."""
+    side = 1.0 if dv > 0.0 else 0.0
+    given = {
+        "dx": r, "dy": 0.0, "dz": 0.0, "r": r, "r2": r * r, "dvx": 0.0, "dvy": dv, "dvz": 0.0, "dv": dv,
+        "vx": 0.0, "vy": 0.0, "vz": 0.0, "hx": 0.0, "hy": 0.0, "hz": 0.0,
+        "nhx": 0.0, "nhy": side, "nhz": 0.0, "age": 0.0, "lower": 0.0, "kin": 1.0, "group": -1.0, "p": p,
+    }  # fmt: skip
+    if model.neighbour is None:
+        raise RuleError(f"model {model.name} has no rule neighbour")
+    names = argument_names(model.neighbour, "neighbour", model.name)
+    if "dv" in names and dv == 0.0:
+        given["dv"] = 1e-6  # as a driver guards it: the length of nothing divides safely
+    return model.neighbour(*(given[name] for name in names))
+
+
+def repulsion_curve(model: Model, p: Any, r: Array) -> list[RuleResponse]:
+    """Push away from a neighbour at rest at distances r (m), positive outwards; one Response per vector."""
+    sums = [pair_sums(model, p, float(d)) for d in r]
+    return [
+        RuleResponse(name, np.array([-getattr(s, x) for s in sums], dtype=float))
+        for name, (x, _) in vector_fields(model.Sums).items()
+    ]
+
+
+def alignment_curve(model: Model, p: Any, r: Array, dv: float) -> list[RuleResponse]:
+    """Response along a velocity difference dv (m/s) at distances r (m), beyond what a neighbour at rest causes."""
+    rest = [pair_sums(model, p, float(d)) for d in r]
+    moved = [pair_sums(model, p, float(d), dv) for d in r]
+    return [
+        RuleResponse(
+            name, np.array([getattr(b, y) - getattr(a, y) for a, b in zip(rest, moved, strict=True)], dtype=float)
+        )
+        for name, (_, y) in vector_fields(model.Sums).items()
+    ]
+
+
+def allowed_difference_curve(model: Model, p: Any, r: Array) -> Array:
+    """Largest velocity difference (m/s) at distances r (m) that causes no alignment; nan where none does.
+
+    Found by halving an interval, from the rule alone: any difference above it must cause some.
+    """
+    return np.array([_largest_allowed_difference(model, p, float(d)) for d in r])
+
+
+def _largest_allowed_difference(model: Model, p: Any, r: float) -> float:
+    fields = [y for _, y in vector_fields(model.Sums).values()]
+    rest = pair_sums(model, p, r)
+
+    def aligns(dv: float) -> bool:
+        moved = pair_sums(model, p, r, dv)
+        return any(abs(getattr(moved, y) - getattr(rest, y)) > 1e-12 * dv for y in fields)
+
+    low, high = 0.0, MAX_DIFFERENCE
+    if not aligns(high):
+        return float("nan")
+    if aligns(1e-6):
+        return 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if aligns(middle) else (middle, high)
+    return high
+
+
+def wall_curve(model: Model, p: Any, distance: Array, v: float) -> list[RuleResponse]:
+    """What one wall adds to the command of an agent that flies straight at it at v (m/s), positive inwards."""
+    if model.boundary is None:
+        raise RuleError(f"model {model.name} has no rule boundary")
+    names = argument_names(model.boundary, "boundary", model.name)
+    given = {"nx": 1.0, "ny": 0.0, "nz": 0.0, "vx": -v, "vy": 0.0, "vz": 0.0, "p": p}
+    answers = [model.boundary(*({**given, "distance": float(d)}[name] for name in names)) for d in distance]
+    return [
+        RuleResponse(name, np.array([getattr(a, x) for a in answers], dtype=float))
+        for name, (x, _) in vector_fields(model.Walls).items()
+    ]
+
+
+# ---- Plot of the rules
+
+CURVE_POINTS = 400
+DIFFERENCE_SHARES = (0.5, 1.0, 2.0)  # of the velocity difference, in the panel of alignment
+
+
+def rules(
+    scenario: Scenario, *, difference: float | None = None, speed: float | None = None, farthest: float | None = None,
+    ax: Axes | None = None,
+) -> Figure:  # fmt: skip
+    """Repulsion, largest allowed velocity difference and alignment, or each term of the law by its own word; walls.
+
+    scenario   : whose law is drawn, with its numbers
+    difference : velocity difference of the pair, m/s; by default the model's preferred speed
+    speed      : at which an agent flies towards a wall, m/s; by default the same
+    farthest   : largest distance drawn, m; by default a quarter beyond the interaction range
+    ax         : axes of a grid, whose place the panels take, instead of a new figure
+    The picture is that of Vásárhelyi et al. 2018, Fig. 6.
+
+    Raises RuleError for a law without a rule of distance, and AirflockError for an `ax` that is none of a grid.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> len(airflock.plots.rules(airflock.load("vasarhelyi_2018/4ms")).axes)
+    3
+    """
+    model, p = scenario.model, scenario.parameters
+    if model.neighbour is None and model.boundary is None:
+        raise RuleError(f"model {model.name} has neither neighbour nor boundary; there is no rule of distance to draw")
+    preferred = model.preferred_speed(p) if model.preferred_speed else 1.0
+    dv = float(preferred if difference is None else difference)
+    v = float(preferred if speed is None else speed)
+    reach = float(farthest if farthest is not None else _largest_distance(scenario))
+    check_positive(difference=dv, speed=v, farthest=reach)
+    r = np.linspace(reach / CURVE_POINTS, reach, CURVE_POINTS)
+    unit = COMMANDS[model.command].replace("^2", "²")
+    draws: list[tuple[str, Callable[[Axes], None]]] = []
+    if model.neighbour is not None and (model.terms or len(vector_fields(model.Sums)) > 1):
+        for stem in vector_fields(model.Sums):
+            draws.append(
+                (term_name_and_unit(model, stem)[0], partial(_term_panel, model=model, p=p, r=r, dv=dv, stem=stem))
+            )
+    elif model.neighbour is not None:
+        draws.append(("one neighbour", partial(_pair_panel, model=model, p=p, r=r, dv=dv, unit=unit)))
+        draws.append(("alignment", partial(_alignment_panel, model=model, p=p, r=r, dv=dv, unit=unit)))
+    if model.boundary is not None:
+        draws.append(("one wall", partial(_wall_panel, model=model, p=p, r=r, v=v, unit=unit)))
+    figure, panels = style.figure_and_panels(ax, 1, len(draws), 3.4 * len(draws) + 0.4, 3.1)
+    for axes, (title, draw), name in zip(panels[0], draws, "ABCDEFGH", strict=False):
+        draw(axes)
+        style.set_panel_letter(axes, f"{name}  {title}")
+    style.set_figure_title(figure, short_name(scenario), f"rules of {model.name} against distance")
+    return style.root_figure(figure)
+
+
+def _largest_distance(scenario: Scenario) -> float:
+    known = scenario.model.interaction_range or scenario.model.reach
+    span = float(known(scenario.parameters)) if known else scenario.radio.range
+    return 1.25 * (span if span < 1e4 else min(scenario.radio.range, 100.0))
+
+
+def _term_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, stem: str) -> None:
+    """One term of a law: what a neighbour at rest adds to it, and what its motion adds, up to the law's own reach."""
+    word, unit = term_name_and_unit(model, stem)
+    assert model.neighbour is not None
+    by_velocity = bool({"dvx", "dvy", "dv"} & set(argument_names(model.neighbour, "neighbour", model.name)))
+    inside = r < float(model.reach(p)) if model.reach else np.full(len(r), True)
+    place = list(vector_fields(model.Sums)).index(stem)
+    away = np.where(inside, repulsion_curve(model, p, r)[place].values, 0.0)
+    if away.any():
+        towards = away.max() <= 0.0
+        label = "towards it" if towards else "away from it"
+        axes.plot(r, -away if towards else away, color=style.BLUE, linewidth=1.8, label=label)
+    for share, color in zip(
+        DIFFERENCE_SHARES if by_velocity else (1.0,), (style.ORANGE, style.RED, style.PURPLE), strict=False
+    ):
+        along = np.where(inside, alignment_curve(model, p, r, share * dv)[place].values, 0.0)
+        if along.any():
+            label = f"$\\Delta v$ = {share * dv:.3g} m/s" if by_velocity else "along its heading"
+            axes.plot(r, along, color=color, linewidth=1.8, label=label)
+    axes.axhline(0.0, color=style.GREY, linewidth=0.6, zorder=0)
+    style.style_axes(axes, "distance (m)", f"{word} ({unit})" if unit else word)
+    axes.set_xlim(0.0, float(r[-1]))
+    style.add_legend(axes)
+
+
+def _pair_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
+    """Fig. 6 itself: repulsion, largest allowed difference, and the difference at hand."""
+    pushes = repulsion_curve(model, p, r)
+    allowed = allowed_difference_curve(model, p, r)
+    shared = unit == "m/s"  # one axis serves both
+    for line, push in zip((style.BLUE, style.SKY, style.PURPLE), pushes, strict=False):
+        axes.plot(r, push.values, color=line, linewidth=1.8, label=_curve_label("repulsion", push.name))
+    other = axes if shared else style.add_right_axis(axes, "velocity difference (m/s)", style.GREEN)
+    other.plot(r, allowed, color=style.GREEN, linewidth=1.8, label="largest allowed\nvelocity difference")
+    other.axhline(dv, color=style.RED, linewidth=1.2, linestyle=(0, (5, 3)), label="actual difference")
+    beyond = np.nan_to_num(allowed, nan=MAX_DIFFERENCE) < dv
+    other.fill_between(r, allowed, dv, where=beyond.tolist(), color=style.RED, alpha=0.08, linewidth=0.0)
+    style.style_axes(axes, "distance (m)", f"speed ({unit})" if shared else f"repulsion ({unit})")
+    lines = axes.get_legend_handles_labels()[0] + ([] if shared else other.get_legend_handles_labels()[0])
+    highest = max([2.0 * dv] + ([float(push.values.max()) for push in pushes] if shared else []))
+    other.set_ylim(min(0.0, axes.get_ylim()[0] if shared else 0.0), 1.25 * highest)
+    axes.set_xlim(0.0, float(r[-1]))
+    style.add_legend(axes, lines)
+
+
+def _alignment_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
+    for share, color in zip(DIFFERENCE_SHARES, (style.ORANGE, style.RED, style.PURPLE), strict=True):
+        for number, term in enumerate(alignment_curve(model, p, r, share * dv)):
+            dashes = ("-", "--", ":")[number % 3]
+            label = _curve_label(f"$\\Delta v$ = {share * dv:.3g} m/s", term.name)
+            axes.plot(r, term.values, color=color, linewidth=1.8, linestyle=dashes, label=label)
+    style.style_axes(axes, "distance (m)", f"alignment term ({unit})")
+    axes.set_xlim(0.0, float(r[-1]))
+    low, high = axes.get_ylim()
+    axes.set_ylim(min(0.0, low), 1.4 * high)  # room for the legend
+    style.add_legend(axes)
+
+
+def _wall_panel(axes: Axes, *, model: Model, p: Any, r: Array, v: float, unit: str) -> None:
+    reach = float(r[-1])
+    distance = np.linspace(-0.1 * reach, reach, CURVE_POINTS)
+    colors = (style.ORANGE, style.RED, style.PURPLE)
+    for share, color in zip(DIFFERENCE_SHARES, colors, strict=True):
+        for number, term in enumerate(wall_curve(model, p, distance, share * v)):
+            dashes = ("-", "--", ":")[number % 3]
+            label = _curve_label(f"{share * v:.3g} m/s towards it", term.name)
+            axes.plot(distance, term.values, color=color, linewidth=1.8, linestyle=dashes, label=label)
+    axes.axvspan(float(distance[0]), 0.0, color=style.PALE_GREY, alpha=0.6, linewidth=0.0)
+    style.style_axes(axes, "distance to the wall (m)", f"wall term ({unit})")
+    axes.set_xlim(float(distance[0]), reach)
+    style.add_legend(axes)
+
+
+def _curve_label(label: str, name: str) -> str:
+    return f"{label}, {name}" if name else label
