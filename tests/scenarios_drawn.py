@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.contract import Model
+from airflock.core.model import Model
 from airflock.core.parameters import Choice, Parameters, Quantity, choices, declarations, quantity
 from airflock.core.topology import topology as topology_of_ones_own
 from airflock.parts.bodies.registry import BODIES as KNOWN_BODIES

@@ -8,12 +8,10 @@ from .check.sensors import check_sensor as check_sensor
 from .check.topologies import check_topology as check_topology
 from .check.types import check_types as check_types
 from .cli.papers import paper as paper
-from .core.contract import (
-    body as body,
-    metric as metric,
-    model as model,
-)
+from .core.body import body as body
 from .core.fault import fault as fault
+from .core.metric import metric as metric
+from .core.model import model as model
 from .core.parameters import (
     Parameters as Parameters,
     choice as choice,

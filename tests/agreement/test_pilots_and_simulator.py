@@ -12,13 +12,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import airflock
-from airflock.core.agent import State
-from airflock.core.contract import model
-from airflock.core.hearing import PacketPolicy
+from airflock.core.contract import State, call_rule
+from airflock.core.model import model
 from airflock.core.parameters import choices
-from airflock.core.pilot import Pilot
+from airflock.core.pilot import PacketPolicy, Pilot
 from airflock.core.silence import Parameters as Silence, could_be_near, counts, for_standing_neighbour, with_defaults
-from airflock.core.vocabulary import call_rule
 from airflock.drones.onboard.fields import to_tuples
 from airflock.fleets.prepare import to_json_table
 from airflock.parts.bodies.registry import BODIES

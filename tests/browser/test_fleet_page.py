@@ -8,7 +8,7 @@ import pytest
 from pixels import chart, coloured, places, shot
 from test_watch import until
 
-from airflock.core.agent import State
+from airflock.core.contract import State
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.fleets.faults import InjectedFault
 from airflock.fleets.lockstep import START_TIME

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.core.hearing import EARLY
+from airflock.core.pilot import EARLY
 from airflock.drones.onboard.card import card_hash, parse_card
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.fleets import compare, live as live_, realtime, starting

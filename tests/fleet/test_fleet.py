@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from airflock.core import random
-from airflock.core.agent import State
+from airflock.core.contract import State
 from airflock.core.radio import lost
 from airflock.drones.mavlink import dialect
 from airflock.drones.mavlink.autopilots import AUTOPILOTS, AutopilotCommands

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from airflock.core.agent import State
+from airflock.core.contract import State
 from airflock.drones.mavlink import dialect, orders, status
 from airflock.drones.mavlink.frames import FramePacker, frames_in
 from airflock.drones.mavlink.orders import OperatorOrder, OrderKind, new_operator_keys

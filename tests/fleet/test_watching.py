@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import airflock
 from airflock.cli.main import app
-from airflock.core.agent import State
+from airflock.core.contract import State
 from airflock.drones.mavlink import witness
 from airflock.drones.mavlink.keys import write_key
 from airflock.drones.mavlink.orders import OrderKind

@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 from hypothesis import given, strategies as st
 
-from airflock.core.radio import packets
-from airflock.core.reception import PacketReception, arrival_probability
+from airflock.core.radio import PacketReception, arrival_probability, packets
 from airflock.estimate.identification.packets import table_entries
 from airflock.parts.radios import bursts, congestion, jitter, links, shadow, table
 from airflock.parts.radios.registry import RADIOS

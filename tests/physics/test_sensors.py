@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.core.agent import State
-from airflock.core.sensing import SensorState
+from airflock.core.contract import State
+from airflock.core.sensor import SensorState
 from airflock.parts.sensors.registry import SENSORS
 
 PERIOD = 0.2

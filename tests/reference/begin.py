@@ -6,7 +6,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from airflock.core import random
-from airflock.core.agent import State
+from airflock.core.contract import State
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.surroundings import FlightWorld
 from airflock.scenarios.wings import FORMATIONS

@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 
 from airflock.check.flock import flock_solver
 from airflock.core import radio, random
-from airflock.core.agent import State
-from airflock.core.contract import Metric
-from airflock.core.hearing import PacketPolicy
+from airflock.core.contract import State, call_rule
 from airflock.core.maths import norm
+from airflock.core.metric import Metric
 from airflock.core.parameters import choices
-from airflock.core.pilot import Pilot
-from airflock.core.vocabulary import call_rule
+from airflock.core.pilot import PacketPolicy, Pilot
 from airflock.parts.bodies import dryden, wind
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.surroundings import FlightWorld, GoalCourse, wall_range

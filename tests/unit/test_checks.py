@@ -15,7 +15,9 @@ from airflock.check.report import CheckError
 from airflock.check.sensors import check_sensor
 from airflock.check.topologies import check_topology
 from airflock.check.units import UnitScale, unit_factor
-from airflock.core.contract import body, metric, model
+from airflock.core.body import body
+from airflock.core.metric import metric
+from airflock.core.model import model
 from airflock.core.radio import radio
 from airflock.core.sensor import sensor
 from airflock.core.topology import topology

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.core.agent import State
+from airflock.core.contract import State
 from airflock.drones.onboard.log import LoggingNode
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.node import Node, NodeMemory

@@ -19,7 +19,7 @@ HOMES = {
     "evolve": "airflock.search.run", "certify": "airflock.certificates.run", "display": "airflock.displays.displays",
     "tune": "airflock.search.tune.run", "identify": "airflock.estimate.identification.run",
     "infer": "airflock.estimate.inference.run",
-    "body": "airflock.core.contract", "fleet": "airflock.fleets.flying",
+    "body": "airflock.core.body", "fleet": "airflock.fleets.flying",
 }  # fmt: skip
 UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "s", "body_length": "m"}
 FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__"} - CLASSES)  # their examples: test_api_page

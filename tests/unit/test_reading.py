@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from airflock.core.rules.reading import fields_read
+from airflock.core.rule_syntax import fields_read
 from airflock.core.vocabulary import Mean
 from airflock.parts.metrics.registry import METRICS
 
