@@ -24,7 +24,7 @@ from .engine import Flight as Flight
 from .estimate.identification.run import identify as identify
 from .estimate.inference.run import infer as infer
 from .fleets.flying import fleet as fleet
-from .parts.metrics.registry import metric_set as metric_set
+from .parts.metrics.metric_sets import metric_set as metric_set
 from .recordings import measures as measures
 from .recordings.exports.export import export as export
 from .recordings.files import (

@@ -16,7 +16,7 @@ from airflock.fleets import compare, live as live_, realtime, starting
 from airflock.fleets.ailing import FaultyNode
 from airflock.fleets.befalling import DroneFaults
 from airflock.fleets.lockstep import LockstepFleet
-from airflock.parts.faults.registry import KINDS
+from airflock.parts.faults.fault_kinds import KINDS
 from airflock.recordings.flights import simulate
 from airflock.support.errors import CardError
 from fleets import card, document, scenario

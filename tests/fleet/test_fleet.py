@@ -35,7 +35,7 @@ from airflock.fleets.individuals import agent_sensors
 from airflock.fleets.lockstep import SOFTWARE_KEY
 from airflock.fleets.vehicle import SoftwareVehicle
 from airflock.parts.radios import jitter, links
-from airflock.parts.radios.registry import RADIOS
+from airflock.parts.radios.radio_kinds import RADIOS
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import measure_recording
 from airflock.support.coordinates import FlightSite

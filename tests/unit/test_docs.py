@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from airflock.parts.metrics import registry
+from airflock.parts.metrics import metric_sets as registry
 from airflock.scenarios.laws import MODELS
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -10,7 +10,7 @@ import pytest
 
 import airflock
 import toys
-from airflock.parts.metrics import registry
+from airflock.parts.metrics import metric_sets as registry
 from airflock.recordings.measures import milling
 from airflock.runs.executors.in_process import ThreadExecutor
 from airflock.runs.store import FlightStore

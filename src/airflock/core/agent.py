@@ -215,7 +215,7 @@ STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class WorldMap(Protocol):
-    """What a pilot asks of the world: `world.place.Place` answers from a map."""
+    """What a pilot asks of the world: `airflock.world.WorldMap` answers from a map."""
 
     def beside(self, own: State, other: State, /) -> State:
         """State of another agent at its image nearest to own: itself wherever space is not periodic."""
