@@ -112,7 +112,7 @@ def _reproduced(name: str) -> str:
 
 def order_parameters(drawn: bool) -> None:
     """Definition, unit, range, reference and a picture of low and high of every order parameter."""
-    from airflock.parts.metrics import fitness_dimock, fitness_kidger, fitness_vasarhelyi, registry
+    from airflock.parts.metrics import fitness_dimock, fitness_kidger, fitness_vasarhelyi, metric_sets as registry
 
     known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
     homes: dict[str, Any] = {}
@@ -130,7 +130,7 @@ def order_parameters(drawn: bool) -> None:
         homes |= dict.fromkeys(module.REPORTS, module.fitness)
     wrong = sorted(set(units) ^ set(known))
     if wrong:
-        raise ExtensionError(f"order_parameters.toml and parts/metrics/registry.py differ in {', '.join(wrong)}")
+        raise ExtensionError(f"order_parameters.toml and parts/metrics/metric_sets.py differ in {', '.join(wrong)}")
     import sys
 
     pairs = pictures.pairs()
@@ -180,9 +180,9 @@ def robots() -> None:
 
     from airflock.core import radio as radios, silence
     from airflock.parts.bodies import wind
-    from airflock.parts.bodies.registry import BODIES
-    from airflock.parts.radios.registry import RADIOS
-    from airflock.parts.sensors.registry import SENSORS
+    from airflock.parts.bodies.body_kinds import BODIES
+    from airflock.parts.radios.radio_kinds import RADIOS
+    from airflock.parts.sensors.sensor_kinds import SENSORS
     from airflock.scenarios.keys import keys as keys_of
 
     pieces = [

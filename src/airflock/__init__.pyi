@@ -8,12 +8,10 @@ from .check.sensors import check_sensor as check_sensor
 from .check.topologies import check_topology as check_topology
 from .check.types import check_types as check_types
 from .cli.papers import paper as paper
-from .core.contract import (
-    body as body,
-    metric as metric,
-    model as model,
-)
+from .core.body import body as body
 from .core.fault import fault as fault
+from .core.metric import metric as metric
+from .core.model import model as model
 from .core.parameters import (
     Parameters as Parameters,
     choice as choice,
@@ -26,7 +24,7 @@ from .engine import Flight as Flight
 from .estimate.identification.vehicle_identification import identify as identify
 from .estimate.inference.law_inference import infer as infer
 from .fleets.flying import fleet as fleet
-from .parts.metrics.registry import metric_set as metric_set
+from .parts.metrics.metric_sets import metric_set as metric_set
 from .recordings import measures as measures
 from .recordings.exports import export as export
 from .recordings.health import doctor as doctor

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airflock.world import bvh
-from airflock.world.scenes.tree import box_rows, cylinder_rows, make_scene, triangle_rows
+from airflock.world.scenes.scene_builder import box_rows, cylinder_rows, make_scene, triangle_rows
 from kernels import compiled
 from needed import needed
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.core.composition import add_laws
-from airflock.core.contract import model
+from airflock.core.model import add_laws, model
 from airflock.core.parameters import Parameters as Record
 from airflock.engine import fly_world
 from airflock.parts.aero import descent

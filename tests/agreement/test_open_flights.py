@@ -319,7 +319,7 @@ def test_what_makes_no_sense_is_one_line(scenario, call, said):
     [("vasarhelyi_2018/4ms", "cpu"), ("vasarhelyi_2018/real_gnss", "python")],  # its sensor, compiled: covering.PLANS
 )
 def test_what_an_agent_perceives_makes_up_its_command(name, device):
-    from airflock.core.vocabulary import call_rule
+    from airflock.core.contract import call_rule
 
     scenario = load(name, {"agents": 12, "duration": 20.0, "radio.range": 200.0})
     flight = airflock.open(scenario, 3, precision=64, device=device).advance(5.0)

@@ -12,22 +12,23 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import airflock
-from airflock.core.agent import State
-from airflock.core.contract import model
-from airflock.core.hearing import PacketPolicy
+from airflock.core.contract import State, call_rule
+from airflock.core.model import model
 from airflock.core.parameters import choices
-from airflock.core.pilot import Pilot
+from airflock.core.pilot import PacketPolicy, Pilot
 from airflock.core.silence import Parameters as Silence, could_be_near, counts, for_standing_neighbour, with_defaults
 from airflock.core.vocabulary import call_rule
 from airflock.drones.onboard.card import to_tuples
 from airflock.fleets.card_document import to_json_table
 from airflock.parts.bodies.registry import BODIES
+from airflock.drones.onboard.fields import to_tuples
+from airflock.fleets.prepare import to_json_table
+from airflock.parts.bodies.body_kinds import BODIES
 from airflock.parts.laws import dimock_2003, vasarhelyi_2018, vicsek_1995
-from airflock.parts.radios.registry import RADIOS
+from airflock.parts.radios.radio_kinds import RADIOS
 from airflock.support.errors import RuleError
 from airflock.world import arena
-from airflock.world.corners import counter_clockwise, polygon_error
-from airflock.world.place import Shapes, WorldMap
+from airflock.world.world_map import Shapes, WorldMap, counter_clockwise, polygon_error
 from flocks import ISLANDS, PENTAGON
 
 QUIET = {"sensors.noise": 0.0, "body.noise": 0.0, "duration": 10.0, "metrics.period": 0.2}

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from airflock.core.contract import model
+from airflock.core.model import model
 from airflock.core.parameters import Parameters, quantity
 from airflock.scenarios.files import load
 from airflock.scenarios.part_kinds import CallerParts

@@ -9,7 +9,7 @@ import pytest
 
 import airflock
 from against_reference import interpreted_flight
-from airflock.core.contract import model
+from airflock.core.model import model
 from airflock.core.parameters import Parameters
 from airflock.drones.onboard.card import card_hash, parse_card
 from airflock.engine import plan_of

@@ -8,7 +8,7 @@ import pytest
 from pixels import chart, coloured, places, shot
 from test_watch import until
 
-from airflock.core.agent import State
+from airflock.core.contract import State
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.fleets.drone_faults import InjectedFault
 from airflock.fleets.fleet_observer import FleetObserver, TelemetryBroadcast

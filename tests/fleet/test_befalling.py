@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.core.hearing import EARLY
+from airflock.core.pilot import EARLY
 from airflock.drones.onboard.card import card_hash, parse_card
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.fleets import compare, realtime
@@ -19,6 +19,12 @@ from airflock.fleets.radio_channel import FaultyNode
 from airflock.fleets.realtime import fly_in_realtime, lockstep_only_errors
 from airflock.parts.faults.registry import KINDS
 from airflock.recordings.simulation import simulate
+from airflock.fleets import compare, live as live_, realtime, starting
+from airflock.fleets.ailing import FaultyNode
+from airflock.fleets.befalling import DroneFaults
+from airflock.fleets.lockstep import LockstepFleet
+from airflock.parts.faults.fault_kinds import KINDS
+from airflock.recordings.flights import simulate
 from airflock.support.errors import CardError
 from fleets import card, document, scenario
 from flocks import ISLANDS

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from airflock.core import random
-from airflock.core.agent import State
+from airflock.core.contract import State
 from airflock.core.radio import lost
 from airflock.drones.mavlink.autopilots import AUTOPILOTS, AutopilotCommands
 from airflock.drones.mavlink.frames import common_dialect, frames_in
@@ -32,6 +32,8 @@ from airflock.fleets.radio_channel import SOFTWARE_KEY, PacketNumbers, RadioChan
 from airflock.fleets.vehicle import POSITION_GAIN, STANDING_SPEED, SoftwareVehicle
 from airflock.parts.radios import jitter, links
 from airflock.parts.radios.registry import RADIOS
+from airflock.parts.radios.radio_kinds import RADIOS
+from airflock.recordings.flights import simulate
 from airflock.recordings.scores import measure_recording
 from airflock.recordings.simulation import simulate
 from airflock.support.coordinates import FlightSite

@@ -13,6 +13,9 @@ import airflock
 from airflock.cli.main import app
 from airflock.core.agent import State
 from airflock.drones.mavlink.messages import CHANNEL_SYSTEM, HEARS_REPORT, parse_report, report_message
+from airflock.core.contract import State
+from airflock.drones.mavlink import witness
+from airflock.drones.mavlink.keys import write_key
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.mavlink.signing import PacketSigner, write_key
 from airflock.drones.onboard.card import read_card

@@ -9,8 +9,14 @@ from hypothesis import given, settings, strategies as st
 from airflock.core.maths import FAR
 from airflock.world import bvh, casts, shapes
 from airflock.world.scenery import Parameters
-from airflock.world.scenes.build import scene_of
-from airflock.world.scenes.tree import box_rows, cylinder_rows, make_scene, segment_rows, triangle_rows
+from airflock.world.scenes.scene_builder import (
+    box_rows,
+    cylinder_rows,
+    make_scene,
+    scene_of,
+    segment_rows,
+    triangle_rows,
+)
 from kernels import compiled
 
 coordinate = st.floats(-20.0, 20.0, allow_subnormal=False)

@@ -6,9 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from airflock.core.agent import HeardNeighbour, State, decide, sum_neighbours
-from airflock.core.contract import model
+from airflock.core.agent import HeardNeighbour, decide, sum_neighbours
+from airflock.core.contract import State
 from airflock.core.maths import bell, braking_curve, braking_distance, excess, peak, rising
+from airflock.core.model import model
 from airflock.parts.laws import vasarhelyi_2018, viragh_2014
 
 MODELS = [model(vasarhelyi_2018), model(viragh_2014)]

@@ -12,8 +12,8 @@ from airflock.scenarios.flight_world import FlightWorld as Seen
 from airflock.support.errors import ScenarioError
 from airflock.view.scene_solids import prism_solid as drawn_prism
 from airflock.world import arena, polygon
-from airflock.world.place import WorldMap, edge_rows
 from airflock.world.shapes import from_triangle
+from airflock.world.world_map import WorldMap, edge_rows
 from flocks import from_start, ideal, interpreted, scenario
 
 L = [[-60.0, 0.0], [0.0, 0.0], [0.0, -60.0], [30.0, -60.0], [30.0, 30.0], [-60.0, 30.0]]  # its notch is at the origin

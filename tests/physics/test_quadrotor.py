@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 import airflock
-from airflock.core.vocabulary import call_rule
+from airflock.core.contract import call_rule
 from airflock.parts.bodies import quadrotor
 from airflock.parts.bodies.battery import hovering, left
 from airflock.parts.bodies.quadrotor import Memory, Parameters, move

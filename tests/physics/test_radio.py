@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from airflock.core.radio import FEW_PACKETS, either, lost, packets
-from airflock.core.reception import loss_probability
+from airflock.core.radio import FEW_PACKETS, either, loss_probability, lost, packets
 from airflock.parts.radios.links import Parameters, missed, missed_few, power, received, thrice
-from airflock.parts.radios.registry import RADIOS
+from airflock.parts.radios.radio_kinds import RADIOS
 
 K = Parameters(loss=0.3)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.core.agent import State
-from airflock.core.sensing import SensorState
-from airflock.parts.sensors.registry import SENSORS
+from airflock.core.contract import State
+from airflock.core.sensor import SensorState
+from airflock.parts.sensors.sensor_kinds import SENSORS
 
 PERIOD = 0.2
 REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.spatial import Delaunay, Voronoi, cKDTree
 
-from airflock.core.agent import HeardNeighbour, State
-from airflock.core.topology import met_neighbours
+from airflock.core.agent import HeardNeighbour, met_neighbours
+from airflock.core.contract import State
 from airflock.parts.topologies.parameters import Parameters
 from airflock.parts.topologies.ranking import HEARD_LIMIT, kth_least
-from airflock.parts.topologies.registry import TOPOLOGIES
 from airflock.parts.topologies.strongest import loss
+from airflock.parts.topologies.topology_kinds import TOPOLOGIES
 
 HERE = State(0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 SEEDS = st.integers(0, 2**32 - 1)
@@ -172,7 +172,7 @@ def test_a_way_that_touches_a_body_is_free():
 class Wall:
     """Something between an agent and all that is east of x = 3 m."""
 
-    def blocked(self, x, y, z, to_x, to_y, to_z):
+    def is_blocked(self, x, y, z, to_x, to_y, to_z):
         return to_x > 3.0
 
 

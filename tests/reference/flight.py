@@ -12,15 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.flock import flock_solver
+from airflock.check.truths import flock_solver
 from airflock.core import radio, random
-from airflock.core.agent import State
-from airflock.core.contract import Metric
-from airflock.core.hearing import PacketPolicy
+from airflock.core.contract import State, call_rule
 from airflock.core.maths import norm
+from airflock.core.metric import Metric
 from airflock.core.parameters import choices
-from airflock.core.pilot import Pilot
-from airflock.core.vocabulary import call_rule
+from airflock.core.pilot import PacketPolicy, Pilot
 from airflock.parts.bodies import dryden, wind
 from airflock.scenarios.cost import step_counts
 from airflock.scenarios.flight_world import FlightWorld, GoalCourse, wall_range

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from airflock.core import random
-from airflock.core.agent import State
+from airflock.core.contract import State, call_rule
 from airflock.core.parameters import Quantity, declarations
-from airflock.core.vocabulary import call_rule
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.units import RelativeSpread
 

@@ -3,11 +3,12 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from airflock.check.flock import FlockSolver, rule_solver
-from airflock.core.agent import START, State, reduce_records, reduce_values
-from airflock.core.contract import Metric
+from airflock.check.truths import FlockSolver, rule_solver
+from airflock.core.agent import START, reduce_records, reduce_values
+from airflock.core.contract import State, call_rule
 from airflock.core.maths import TINY, norm
-from airflock.core.vocabulary import Mean, call_rule
+from airflock.core.metric import Metric
+from airflock.core.vocabulary import Mean
 from airflock.engine.text.probe import scratch_shapes
 from airflock.scenarios.flight_world import FlightWorld
 

@@ -258,7 +258,7 @@ def _check_certificate(path):
 
 
 def _ground(path):
-    from airflock.world.scenes.outlines import load_field
+    from airflock.world.scenes.field_outlines import load_field
 
     load_field(path, simplify=1.0, space=True)
 

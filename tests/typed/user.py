@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import airflock
-from airflock.core.contract import Model
+from airflock.core.model import Model
 from airflock.scenarios.keys import Key
 
 

@@ -11,21 +11,26 @@ from airflock.check.bodies import check_body
 from airflock.check.metrics import check_metric
 from airflock.check.models import check_model
 from airflock.check.radios import check_radio
-from airflock.check.report import CheckError
 from airflock.check.sensors import check_sensor
 from airflock.check.topologies import check_topology
-from airflock.check.units import UnitScale, unit_factor
-from airflock.core.contract import body, metric, model
+from airflock.check.truths import CheckError, UnitScale, unit_factor
+from airflock.core.body import body
+from airflock.core.metric import metric
+from airflock.core.model import model
 from airflock.core.radio import radio
 from airflock.core.sensor import sensor
 from airflock.core.topology import topology
-from airflock.parts.bodies.registry import BODIES
+from airflock.parts.bodies.body_kinds import BODIES
 from airflock.parts.laws import vasarhelyi_2018, viragh_2014
 from airflock.parts.laws.vasarhelyi_2018 import Sums
 from airflock.parts.metrics.registry import METRICS, SETS
 from airflock.parts.radios.registry import RADIOS
 from airflock.parts.sensors.registry import SENSORS
 from airflock.scenarios.named_code import MODELS, find_law
+from airflock.parts.metrics.metric_sets import METRICS, SETS
+from airflock.parts.radios.radio_kinds import RADIOS
+from airflock.parts.sensors.sensor_kinds import SENSORS
+from airflock.scenarios.laws import MODELS, find_law
 from airflock.support.errors import RuleError, ScenarioError
 
 

@@ -18,7 +18,7 @@ from airflock.scenarios.scenario_builder import build_scenario
 from airflock.support.coordinates import FlightSite
 from airflock.support.errors import ScenarioError
 from airflock.support.untrusted import TextError, parse_xml
-from airflock.world.scenes.outlines import load_field
+from airflock.world.scenes.field_outlines import load_field
 
 FIELDS = Path(__file__).parents[1] / "fields"
 FEW = {"agents": 4, "start.separation": 4.0, "duration": 1.0}

@@ -12,16 +12,19 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from airflock.core import maths
-from airflock.core.contract import model
-from airflock.core.rules import law
-from airflock.core.vocabulary import VOCABULARY, argument_names
-from airflock.core.vocabulary.metrics import METRIC
+from airflock.core import law, maths
+from airflock.core.contract import argument_names
+from airflock.core.metric import METRIC
+from airflock.core.model import model
+from airflock.core.vocabulary import VOCABULARY
 from airflock.engine.text.generate import DriverSource
 from airflock.engine.text.probe import probe_model
 from airflock.parts.bodies.registry import BODIES
 from airflock.parts.metrics.registry import METRICS
 from airflock.scenarios.named_code import MODELS
+from airflock.parts.bodies.body_kinds import BODIES
+from airflock.parts.metrics.metric_sets import METRICS
+from airflock.scenarios.laws import MODELS
 from airflock.support.errors import RuleError
 
 RULES = ("reach", "sight", "neighbour", "boundary", "decide", "preferred_speed", "interaction_range")

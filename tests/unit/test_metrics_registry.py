@@ -1,6 +1,6 @@
 """What an order parameter means is told by the set that a flight is scored with."""
 
-from airflock.parts.metrics.registry import METRICS, SETS, reported_values
+from airflock.parts.metrics.metric_sets import METRICS, SETS, reported_values
 
 
 def test_each_kind_tells_of_its_own_fitness():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, strategies as st
 
-from airflock.core.agent import State
+from airflock.core.contract import State
 from airflock.core.maths import braking_curve
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.onboard.card import SafetyLimits

@@ -10,7 +10,7 @@ import pytest
 
 import airflock
 import toys
-from airflock.parts.metrics import registry
+from airflock.parts.metrics import metric_sets as registry
 from airflock.recordings.measures import milling
 from airflock.runs.executors import ThreadExecutor
 from airflock.runs.flight_store import FlightStore

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import pytest
 
-from airflock.core.contract import metric
+from airflock.core.metric import metric
 from airflock.engine import plan_of
 from airflock.scenarios.files import load, presets
 from needed import needed

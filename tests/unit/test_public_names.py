@@ -23,7 +23,7 @@ HOMES = {
     "display": "airflock.displays.displays",
     "tune": "airflock.search.tuning_run", "identify": "airflock.estimate.identification.run",
     "infer": "airflock.estimate.inference.run",
-    "body": "airflock.core.contract", "fleet": "airflock.fleets.flying",
+    "body": "airflock.core.body", "fleet": "airflock.fleets.flying",
 }  # fmt: skip
 UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "s", "body_length": "m"}
 FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__"} - CLASSES)  # their examples: test_api_page

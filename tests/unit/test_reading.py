@@ -5,9 +5,9 @@ import math
 
 import pytest
 
-from airflock.core.rules.reading import fields_read
+from airflock.core.rule_syntax import fields_read
 from airflock.core.vocabulary import Mean
-from airflock.parts.metrics.registry import METRICS
+from airflock.parts.metrics.metric_sets import METRICS
 
 RECORDS = {"pair", "shared", "memory", "wing", "q", "agents", "clusters", "members"}
 RULES = [

@@ -11,7 +11,7 @@ from airflock.displays import fly_show, shape_points, show_control as assignment
 from airflock.support.errors import AirflockError, FlightError, ScenarioError
 from airflock.world.scenery import Parameters
 from airflock.world.scenes import meshes
-from airflock.world.scenes.build import in_mesh, scene_of
+from airflock.world.scenes.scene_builder import in_mesh, scene_of
 from needed import needed
 
 trimesh = needed("trimesh")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from airflock.core import random
-from airflock.core.contract.declared import CLOCKS
+from airflock.core.contract import CLOCKS
 from airflock.engine import plan_of
 from flocks import ISLANDS, NOTCHED, scenario
 from inside import (

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 import airflock
-from airflock.core.contract import model
+from airflock.core.model import model
 from airflock.core.parameters import Quantity, declarations, quantity
 from airflock.engine import Flight
 from airflock.parts.laws import vasarhelyi_2018

@@ -6,11 +6,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.given import parameters_with_values
-from airflock.check.report import Report, TruthTable, require_part, run_truths
-from airflock.check.scenes import MIRROR, rotation_about_vertical
-from airflock.check.single import run_in_single_precision
-from airflock.check.units import UNIT_SCALES, rescaled, unit_factor
+from airflock.check.truths import (
+    MIRROR,
+    UNIT_SCALES,
+    Report,
+    TruthTable,
+    parameters_with_values,
+    require_part,
+    rescaled,
+    rotation_about_vertical,
+    run_in_single_precision,
+    run_truths,
+    unit_factor,
+)
 from airflock.core import COMMANDS, Body, argument_names, call_rule, choices, law
 from airflock.parts.aero import Parameters as Wing
 from airflock.scenarios import BODY_KIND, check_seed

@@ -8,9 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.report import Report, TruthTable, require_part, run_truths
-from airflock.check.scenes import MIRROR, rotation_about_vertical
-from airflock.check.units import UNIT_SCALES, UnitScale, rescaled, rescaled_scenario, unit_factor
+from airflock.check.truths import (
+    MIRROR,
+    UNIT_SCALES,
+    Report,
+    TruthTable,
+    UnitScale,
+    require_part,
+    rescaled,
+    rescaled_scenario,
+    rotation_about_vertical,
+    run_truths,
+    unit_factor,
+)
 from airflock.core import Metric, MetricSet, law
 from airflock.engine import measure_frames
 from airflock.scenarios import METRIC_SET_KIND, CallerParts, Scenario, build_scenario, check_seed

@@ -8,22 +8,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.report import Report, TruthTable, run_truths
-from airflock.check.scenes import (
+from airflock.check.truths import (
     AGENT_COUNT,
     MIRROR,
+    UNIT_SCALES,
+    Report,
     Rotation,
     Scene,
     TestedLaw,
+    TruthTable,
     in_units,
     random_directions,
+    rescaled_scenario,
     rotated,
     rotation_about_vertical,
+    run_in_single_precision,
+    run_truths,
     tested_law,
     translated,
+    unit_factor,
 )
-from airflock.check.single import run_in_single_precision
-from airflock.check.units import UNIT_SCALES, rescaled_scenario, unit_factor
 from airflock.core import (
     COMMANDS,
     HeardNeighbour,

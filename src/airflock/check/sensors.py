@@ -6,10 +6,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.given import parameters_with_values
-from airflock.check.report import Report, TruthTable, require_part, run_truths
-from airflock.check.single import run_in_single_precision
-from airflock.check.units import UNIT_SCALES, UnitScale, rescaled
+from airflock.check.truths import (
+    UNIT_SCALES,
+    Report,
+    TruthTable,
+    UnitScale,
+    parameters_with_values,
+    require_part,
+    rescaled,
+    run_in_single_precision,
+    run_truths,
+)
 from airflock.core import (
     COMPONENTS,
     Quantity,

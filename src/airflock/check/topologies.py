@@ -7,9 +7,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.check.given import parameters_with_values
-from airflock.check.report import Report, TruthTable, require_part, run_truths
-from airflock.check.units import UNIT_SCALES, rescaled
+from airflock.check.truths import (
+    UNIT_SCALES,
+    Report,
+    TruthTable,
+    parameters_with_values,
+    require_part,
+    rescaled,
+    run_truths,
+)
 from airflock.core import FAR, TINY, Topology, call_rule, law
 from airflock.parts.topologies import Parameters as Usual
 from airflock.scenarios import TOPOLOGY_KIND, check_seed

@@ -1,48 +1,32 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from . import (
-    agent as agent,
-    random as random,
-    silence as silence,
-)
+from . import agent as agent, law as law, radio as radio, random as random, silence as silence
 from .agent import (
+    AgentView as AgentView,
+    BoundPercept as BoundPercept,
     HeardNeighbour as HeardNeighbour,
-    State as State,
     decide as decide,
     initial_memory as initial_memory,
+    met_neighbours as met_neighbours,
     pair_arguments as pair_arguments,
     sum_neighbours as sum_neighbours,
     sum_surfaces as sum_surfaces,
 )
-from .composition import (
-    add_laws as add_laws,
-    composition_errors as composition_errors,
-)
+from .body import Body as Body, body as body
 from .contract import (
-    Body as Body,
-    Metric as Metric,
-    MetricSet as MetricSet,
-    Model as Model,
-    body as body,
-    metric as metric,
-    model as model,
-    namespace_names as namespace_names,
-)
-from .contract.declared import (
     CLOCKS as CLOCKS,
     COMMANDS as COMMANDS,
+    State as State,
+    argument_names as argument_names,
+    call_rule as call_rule,
+    initial_values as initial_values,
+    namespace_names as namespace_names,
 )
-from .contract.own_records import initial_values as initial_values
 from .fault import (
     DISTURBED_STATES as DISTURBED_STATES,
     ENTRY_KEYS as ENTRY_KEYS,
     FAULT_RULES as FAULT_RULES,
     Fault as Fault,
     fault as fault,
-)
-from .hearing import (
-    PacketPolicy as PacketPolicy,
-    extrapolated_state as extrapolated_state,
-    packet_counts as packet_counts,
 )
 from .maths import (
     FAR as FAR,
@@ -60,6 +44,15 @@ from .maths import (
     shorten as shorten,
     unit as unit,
 )
+from .metric import Metric as Metric, MetricSet as MetricSet, metric as metric
+from .model import (
+    PAIR as PAIR,
+    SURFACE as SURFACE,
+    Model as Model,
+    add_laws as add_laws,
+    composition_errors as composition_errors,
+    model as model,
+)
 from .parameters import (
     Choice as Choice,
     Declaration as Declaration,
@@ -70,7 +63,9 @@ from .parameters import (
     choice as choice,
     choice_error as choice_error,
     choices as choices,
+    component_names as component_names,
     declarations as declarations,
+    expand_vectors as expand_vectors,
     format_with_unit as format_with_unit,
     number_names as number_names,
     points as points,
@@ -78,68 +73,51 @@ from .parameters import (
     quantity as quantity,
     quantity_error as quantity_error,
     text as text,
+    vector_properties as vector_properties,
+    vector_sizes as vector_sizes,
+    without_replaced as without_replaced,
 )
-from .pilot import Pilot as Pilot
+from .pilot import (
+    PacketPolicy as PacketPolicy,
+    Pilot as Pilot,
+    extrapolated_state as extrapolated_state,
+    packet_counts as packet_counts,
+)
 from .radio import (
     FEW_PACKETS as FEW_PACKETS,
+    RULES as RULES,
     PacketParameters as PacketParameters,
-    Radio as Radio,
-    forward as forward,
-)
-from .reception import (
     PacketReception as PacketReception,
+    Radio as Radio,
     arrival_probability as arrival_probability,
+    forward as forward,
     loss_probability as loss_probability,
 )
-from .rules import law as law
-from .rules.integers import (
+from .rule_syntax import (
+    fields_read as fields_read,
     resolve_global as resolve_global,
     tree_of as tree_of,
-)
-from .rules.nodes import walk_tree as walk_tree
-from .rules.reading import fields_read as fields_read
-from .senses import BoundPercept as BoundPercept
-from .sensing import (
-    SensorState as SensorState,
-    add_errors as add_errors,
-    call_measure as call_measure,
+    walk_tree as walk_tree,
 )
 from .sensor import (
     COMPONENTS as COMPONENTS,
     FIRST_DRAW as FIRST_DRAW,
     Sensor as Sensor,
     SensorParameters as SensorParameters,
+    SensorState as SensorState,
+    add_errors as add_errors,
+    call_measure as call_measure,
     sensor as sensor,
 )
 from .silence import (
     SilenceParameters as SilenceParameters,
     with_defaults as with_defaults,
 )
-from .topology import (
-    Topology as Topology,
-    met_neighbours as met_neighbours,
-    topology as topology,
-)
-from .vectors import (
-    component_names as component_names,
-    expand_vectors as expand_vectors,
-    vector_properties as vector_properties,
-    vector_sizes as vector_sizes,
-    without_replaced as without_replaced,
-)
-from .view import AgentView as AgentView
+from .topology import Topology as Topology, topology as topology
 from .vocabulary import (
     PERCEPT_METHODS as PERCEPT_METHODS,
     VOCABULARY as VOCABULARY,
     Mean as Mean,
     Own as Own,
     Percept as Percept,
-    argument_names as argument_names,
-    call_rule as call_rule,
-    radios as radios,
 )
-from .vocabulary.laws import (
-    PAIR as PAIR,
-    SURFACE as SURFACE,
-)
-from .vocabulary.radios import RULES as RULES

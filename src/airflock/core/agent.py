@@ -5,24 +5,17 @@ the order of the drivers: all neighbours, all surfaces, then the decision. In a 
 """
 
 from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol, Self
 
-from airflock.core.contract import Model
+from airflock.core import random
+from airflock.core.contract import State, call_rule
 from airflock.core.maths import FAR, TINY, norm
-from airflock.core.vocabulary import Own, Percept, call_rule
+from airflock.core.model import Model
+from airflock.core.topology import Topology
+from airflock.core.vocabulary import Own, Percept
 
 START = {"sum": 0.0, "min": FAR, "max": -FAR}  # what a reduction gives where nothing is reduced
-
-
-class State(NamedTuple):
-    """Position (m) and velocity (m/s), as whoever holds the record knows them; local east-north-up."""
-
-    x: float
-    y: float
-    z: float
-    vx: float
-    vy: float
-    vz: float
 
 
 class HeardNeighbour(NamedTuple):
@@ -174,3 +167,143 @@ def reduce_values(how: str, total: float, value: float) -> float:
 
 def _zeros(record: type[Any]) -> Any:
     return record(*([0.0] * len(record._fields)))
+
+
+class SightProtocol(Protocol):
+    """A world that hides agents from each other."""
+
+    def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
+        """Whether something stands between two places, m."""
+
+
+def met_neighbours(
+    topology: Topology | None,
+    t: Any,
+    own: State,
+    heard: Iterable[HeardNeighbour],
+    place: SightProtocol | None = None,
+) -> list[HeardNeighbour]:
+    """Those among the heard whom an agent meets, in their order.
+
+    topology, t : kind and its parameters; None: all
+    own         : own state as measured
+    heard       : everybody whom it hears, at the image that it is met at
+    place       : the world, asked whether something stands in between; None: nothing stands anywhere
+    """
+    found = list(heard)
+    if topology is None or not found:
+        return found
+    x, y, z = own.x, own.y, own.z
+    offsets = [(h.state.x - x, h.state.y - y, h.state.z - z) for h in found]
+    count = len(found)
+    squares = [dx * dx + dy * dy + dz * dz + TINY for dx, dy, dz in offsets]
+    hidden = [0.0] * count
+    if place is not None and topology.asks_for("hidden"):
+        hidden = [1.0 if place.is_blocked(x, y, z, h.state.x, h.state.y, h.state.z) else 0.0 for h in found]
+    met = [0.0] * count
+    given = {
+        "n": count, "r2": squares, "hidden": hidden, "fade": [h.fade for h in found], "met": met, "t": t,
+        "dx": [d[0] for d in offsets], "dy": [d[1] for d in offsets], "dz": [d[2] for d in offsets],
+        "heap": [FAR] * count, "weak": [FAR] * count,
+    }  # fmt: skip
+    call_rule(topology.meet, "meet", given, topology.name)
+    return [h for h, taken in zip(found, met, strict=True) if taken > 0.5]
+
+
+Vector = tuple[float, float, float]
+STILL: Vector = (0.0, 0.0, 0.0)
+
+
+class WorldMap(Protocol):
+    """What a pilot asks of the world: `airflock.world.WorldMap` answers from a map."""
+
+    def beside(self, own: State, other: State, /) -> State:
+        """State of another agent at its image nearest to own: itself wherever space is not periodic."""
+
+    def surfaces(self, x: float, y: float, z: float, /) -> Iterable[tuple[float, float, float, float]]:
+        """Distance (m) and unit normal of every wall and obstacle."""
+
+    def ray(self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, /) -> float:
+        """Free distance of a thin ray, m."""
+
+    def cast(
+        self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, radius: float, /
+    ) -> float:  # fmt: skip
+        """Free distance of a sphere, m."""
+
+    def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
+        """Whether an obstacle or the scene stands between two places, m."""
+
+
+class BoundPercept(Percept):
+    """What one agent perceives at one decision, bound to a map of the world and to its own random numbers."""
+
+    place: WorldMap
+    at: State
+    random_key: tuple[int, int, int]
+    rays: int
+
+    @classmethod
+    def of(
+        cls,
+        place: WorldMap,
+        own: State,
+        time: float,
+        goal: Vector | None = None,
+        asker: tuple[int, int, int] = (0, 0, 0),
+    ) -> Self:
+        """Percept at a position; goal: where it is (m), if there is one; asker: seed, number of decision and agent."""
+        offset = STILL if goal is None else (goal[0] - own.x, goal[1] - own.y, goal[2] - own.z)
+        found = cls(time, -own.x, -own.y, -own.z, *offset)
+        found.place, found.at, found.random_key, found.rays = place, own, asker, 0
+        return found
+
+    def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
+        """Free distance along the unit vector u, at most length, m."""
+        return self.place.ray(*self.at[:3], ux, uy, uz, length)
+
+    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
+        """Free distance of a sphere of this radius along the unit vector u, at most length, m; counted in `rays`."""
+        self.rays += 1
+        return self.place.cast(*self.at[:3], ux, uy, uz, length, radius)
+
+    def normal(self, draw: int) -> float:
+        """Normal random number of this agent and decision."""
+        words = random.random_words(self.random_key[0], random.MODEL, 0, *self.random_key[1:], draw)
+        return float(random.normal_pair(words[0], words[1])[0])
+
+    def uniform(self, draw: int) -> float:
+        """Uniform random number of this agent and decision."""
+        words = random.random_words(self.random_key[0], random.MODEL, 0, *self.random_key[1:], draw)
+        return float(random.uniform(words[0]))
+
+
+@dataclass(frozen=True)
+class AgentView:
+    """What one agent perceived at a decision, and what came of it.
+
+    agent, time : its number; time of the decision, s
+    true, own   : its state, and its state as it measured it: position (m) and velocity (m/s)
+    heard       : neighbours in range whose packets it has: who, state as heard (m, m/s), age (s)
+    met         : of each of them, in the same order, whether the topology lets it meet that one
+    terms       : of each of them what the neighbour rule made of it; 0 of whom it does not meet or beyond its reach
+    alike       : of each of them what the rule would have made of it, had it flown as the agent does
+    sums, walls : what the law was given of all neighbours, and of all surfaces
+    memory      : the law's memory after the decision
+    command     : in the unit of the law's command
+    body        : what the body remembers, such as its thrust or the energy that it used; None if nothing
+    """
+
+    agent: int
+    time: float
+    true: State
+    own: State
+    heard: tuple[HeardNeighbour, ...]
+    met: tuple[bool, ...]
+    terms: tuple[Any, ...]
+    alike: tuple[Any, ...]
+    sums: Any
+    walls: Any
+    memory: Any
+    command: tuple[float, ...]
+    body: Any = None

@@ -12,10 +12,34 @@ from functools import cached_property
 from math import inf
 from typing import Any
 
-from airflock.core.contract import namespace_names
+from airflock.core.body import COMMAND, MOTION, STATE
+from airflock.core.contract import argument_names, call_rule, namespace_names
 from airflock.core.parameters import Parameters, choices, number_names
-from airflock.core.vocabulary import argument_names, call_rule
 from airflock.support import RuleError
+
+ONSET = {
+    "since": "time since the fault began, s",
+    **{f"at_{name}": f"true {text}, when the fault began" for name, text in STATE.items()},
+    **{f"at_{name}": f"{text}, when the fault began" for name, text in COMMAND.items()},
+}
+LAST = {f"at_{name}": f"{text}, as it was last before the fault began" for name, text in STATE.items()}
+RULES = {
+    "sense": {**STATE, **ONSET, **LAST, "f": "the fault's parameters"},
+    "tell": {**STATE, **ONSET, **LAST, "f": "the fault's parameters"},
+    "radio": {"reach": "radio.range, m", "since": ONSET["since"], "f": "the fault's parameters"},
+    "clock": {"since": ONSET["since"], "f": "the fault's parameters"},
+    "overrule": {**COMMAND, **ONSET, "f": "the fault's parameters"},
+    "motion": {
+        **{name: MOTION[name] for name in ("vx", "vy", "vz", "cx", "cy", "cz", "dt")},
+        "nx": "velocity after the step as the body flew it, east, m/s",
+        "ny": "velocity after the step as the body flew it, north, m/s",
+        "nz": "velocity after the step as the body flew it, up, m/s",
+        **ONSET,
+        "f": "the fault's parameters",
+    },
+    "leaves": {"f": "the fault's parameters"},
+}
+
 
 # rule → how many numbers it returns, and what they are
 FAULT_RULES: Mapping[str, tuple[int, str]] = {
@@ -27,7 +51,7 @@ FAULT_RULES: Mapping[str, tuple[int, str]] = {
     "motion": (3, "its velocity after the step, m/s"),
     "leaves": (1, "time from the fault's beginning until it is absent, s"),
 }
-STATE = tuple(f"at_{letter}{axis}" for letter in ("", "v") for axis in "xyz")  # "at_x" to "at_vz"
+AT_NAMES = tuple(f"at_{letter}{axis}" for letter in ("", "v") for axis in "xyz")  # "at_x" to "at_vz"
 # who asks `sense` or `tell`, and for which state: the one believed, the one sent of it, and that which is told instead
 DISTURBED_STATES: Mapping[str, str] = {"believed": "sense", "sent": "sense", "told": "tell"}
 ENTRY_KEYS = ("kind", "at", "until", "lasts", "per_hour", "agents", "group", "number")  # of an entry of [[faults]]
@@ -85,7 +109,7 @@ class Fault:
     def onset_names(self) -> tuple[str, ...]:
         """What of the agent's true state and command its rules want to know as it was when the fault began."""
         asked = {(kind, name) for kind, rule in self.rules.items() for name in argument_names(rule, kind, self.name)}
-        asked -= {(kind, name) for kind in DISTURBED_STATES.values() for name in STATE}
+        asked -= {(kind, name) for kind in DISTURBED_STATES.values() for name in AT_NAMES}
         return tuple(sorted({name for _, name in asked if name.startswith("at_")}))
 
     def time_to_absence(self, numbers: Any) -> float:
@@ -102,7 +126,7 @@ class Fault:
         """
         rule = self.rules.get(DISTURBED_STATES[state])
         names = () if rule is None else argument_names(rule, DISTURBED_STATES[state], self.name)
-        return tuple(name for name in STATE if name in names)
+        return tuple(name for name in AT_NAMES if name in names)
 
 
 def fault(namespace: Any, name: str = "") -> Fault:

@@ -1,27 +1,33 @@
 """The contract of a topology, and its use on board: which of those whom an agent hears it meets."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
-from airflock.core.agent import HeardNeighbour, State
-from airflock.core.contract import namespace_names
-from airflock.core.maths import FAR, TINY
+from airflock.core.contract import argument_names, namespace_names
 from airflock.core.parameters import Choice, Parameters, declarations
-from airflock.core.vocabulary import argument_names, call_rule
 from airflock.support import RuleError
+
+RULES = {
+    "meet": {
+        "n": "number of others",
+        "dx": "offsets to the others as believed, east, m; dx[j] is that to number j",
+        "dy": "offsets to the others as believed, north, m; dy[j] is that to number j",
+        "dz": "offsets to the others as believed, up, m; dz[j] is that to number j",
+        "r2": "squares of their lengths, m²; 1e30 of whom is not heard",
+        "hidden": "1.0 of whom something hides that stands in the world, else 0.0",
+        "fade": "normal random numbers of the signals",
+        "met": "to fill: 1.0 for whom the agent meets, else 0.0",
+        "heap": "scratch of n numbers",
+        "weak": "scratch of n further numbers",
+        "t": "the topology's parameters",
+    },
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class NoParameters(Parameters):
     """No number."""
-
-
-class SightProtocol(Protocol):
-    """A world that hides agents from each other."""
-
-    def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
-        """Whether something stands between two places, m."""
 
 
 @dataclass(frozen=True)
@@ -71,37 +77,3 @@ def topology(namespace: Any, name: str = "") -> Topology:
         raise RuleError(f"topology {name}: Parameters.{words[0]} is a choice; a topology has numbers only")
     near, flat = bool(found.get("NEAR", False)), bool(found.get("FLAT", False))
     return Topology(name, rule, flat, near, record, dict(found.get("VIOLATES", {})))
-
-
-def met_neighbours(
-    topology: Topology | None,
-    t: Any,
-    own: State,
-    heard: Iterable[HeardNeighbour],
-    place: SightProtocol | None = None,
-) -> list[HeardNeighbour]:
-    """Those among the heard whom an agent meets, in their order.
-
-    topology, t : kind and its parameters; None: all
-    own         : own state as measured
-    heard       : everybody whom it hears, at the image that it is met at
-    place       : the world, asked whether something stands in between; None: nothing stands anywhere
-    """
-    found = list(heard)
-    if topology is None or not found:
-        return found
-    x, y, z = own.x, own.y, own.z
-    offsets = [(h.state.x - x, h.state.y - y, h.state.z - z) for h in found]
-    count = len(found)
-    squares = [dx * dx + dy * dy + dz * dz + TINY for dx, dy, dz in offsets]
-    hidden = [0.0] * count
-    if place is not None and topology.asks_for("hidden"):
-        hidden = [1.0 if place.is_blocked(x, y, z, h.state.x, h.state.y, h.state.z) else 0.0 for h in found]
-    met = [0.0] * count
-    given = {
-        "n": count, "r2": squares, "hidden": hidden, "fade": [h.fade for h in found], "met": met, "t": t,
-        "dx": [d[0] for d in offsets], "dy": [d[1] for d in offsets], "dz": [d[2] for d in offsets],
-        "heap": [FAR] * count, "weak": [FAR] * count,
-    }  # fmt: skip
-    call_rule(topology.meet, "meet", given, topology.name)
-    return [h for h, taken in zip(found, met, strict=True) if taken > 0.5]

@@ -12,6 +12,7 @@ from airflock.core import (
     COMPONENTS,
     FAULT_RULES,
     PAIR,
+    RULES,
     SURFACE,
     VOCABULARY,
     Body,
@@ -24,7 +25,6 @@ from airflock.core import (
     Topology,
     argument_names,
     law,
-    radios,
 )
 from airflock.parts.aero import descent, wing as wings
 from airflock.support import RuleError, describe_error
@@ -110,7 +110,7 @@ def probe_body(body: Body, chosen: tuple[tuple[str, str], ...]) -> None:
 @cache
 def probe_radio(radio: Radio) -> None:
     """The same for the rules of a radio."""
-    for kind in radios.RULES:
+    for kind in RULES:
         rule = getattr(radio, kind)
         if rule is None:
             continue

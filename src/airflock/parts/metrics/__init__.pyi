@@ -5,8 +5,7 @@ from . import (
     nearest as nearest,
     parameters as parameters,
 )
-from .parameters import Parameters as Parameters
-from .registry import (
+from .metric_sets import (
     DEFAULT_SET as DEFAULT_SET,
     METRICS as METRICS,
     POWER_SETTINGS as POWER_SETTINGS,
@@ -16,3 +15,4 @@ from .registry import (
     scalar_names as scalar_names,
     to_metric_set as to_metric_set,
 )
+from .parameters import Parameters as Parameters

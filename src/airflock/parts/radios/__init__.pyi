@@ -3,8 +3,5 @@ from . import (
     links as links,
     table as table,
 )
-from .registry import (
-    DEFAULT_RADIO as DEFAULT_RADIO,
-    RADIOS as RADIOS,
-)
+from .radio_kinds import DEFAULT_RADIO as DEFAULT_RADIO, RADIOS as RADIOS
 from .table import ENTRIES as ENTRIES

@@ -1,27 +1,22 @@
-"""The vocabularies of the rule contract: what each kind of rule may ask for, by name; each owner's in a file.
+"""The vocabulary of the rule contract: what each kind of rule may request by the names of its arguments.
 
-All quantities are in SI; a difference is always neighbour minus own. Own, Percept and Mean are
-the records behind some of the names.
+All quantities are in SI units; a difference is always neighbour minus own. The chapter of each kind describes its
+part. Own, Percept and Mean are the records behind some of the names.
 """
 
-import inspect
-from collections.abc import Callable, Mapping
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from airflock.core.vocabulary import bodies, faults, laws, metrics, radios, sensors, topologies
-from airflock.support import RuleError, suggest
+from airflock.core.body import RULES as BODY
+from airflock.core.fault import RULES as FAULT
+from airflock.core.metric import METRIC, METRIC_SET
+from airflock.core.model import RULES as MODEL
+from airflock.core.radio import RULES as RADIO
+from airflock.core.sensor import RULES as SENSOR
+from airflock.core.topology import RULES as TOPOLOGY
 
 VOCABULARY: dict[str, dict[str, str]] = {
-    **laws.RULES,
-    **bodies.RULES,
-    **sensors.RULES,
-    **radios.RULES,
-    **topologies.RULES,
-    **faults.RULES,
-    **metrics.METRIC,
-    **metrics.METRIC_SET,
-}
+    **MODEL, **BODY, **SENSOR, **RADIO, **TOPOLOGY, **FAULT, **METRIC, **METRIC_SET,
+}  # fmt: skip
 
 
 class Own(NamedTuple):
@@ -87,31 +82,3 @@ class Mean(NamedTuple):
     hy: float
     hz: float
     n: float
-
-
-@cache
-def argument_names(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...]:
-    """Names that a rule asks for, checked against the vocabulary of its kind."""
-    asked = inspect.signature(rule).parameters
-    names = tuple(asked)
-    known = VOCABULARY[kind]
-    for name in names:
-        if name not in known:
-            hint = suggest(name, known, ".", lead="; ", cutoff=0.6)
-            if asked[name].default is not inspect.Parameter.empty:
-                hint = f"; a number of the rule's own is declared in Parameters, and read as p.{name}."
-            elif name == "self":
-                hint = "; a rule is a plain function."
-            where = f"{owner}.{kind}" if owner else kind
-            raise RuleError(f"{where}({', '.join(names)}) asks for {name!r}{hint} Known: {', '.join(known)}")
-    return names
-
-
-def call_rule(rule: Callable[..., Any], kind: str, arguments: Mapping[str, Any], owner: str = "") -> Any:
-    """Call a rule with what it asks for by name."""
-    names = argument_names(rule, kind, owner)
-    values = [arguments.get(name) for name in names]
-    for place, value in enumerate(values):
-        if value is None:
-            raise RuleError(f"{owner}.{kind} asks for {names[place]}, which {owner} does not provide".lstrip("."))
-    return rule(*values)

@@ -1,8 +1,4 @@
-"""Which names of a rule are integers, judged by how they are used, whatever they are called.
-
-An integer counts a loop over a range, is an index, is given to `range`, to a shift or to a function that takes an
-integer there, is divided by a whole number with `//`, or is made of such. All other numbers of a rule are floats.
-"""
+"""Rules as text: their syntax trees, the integers in them, and the fields of a record that they read."""
 
 import ast
 import inspect
@@ -12,8 +8,35 @@ from collections.abc import Callable, Iterator
 from functools import cache, lru_cache
 from typing import Any
 
-from airflock.core.rules.nodes import walk_tree
 from airflock.support import RuleError
+
+LEAVES = ast.Name, ast.Constant, ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop
+WORDS = {"ctx", "op", "ops", "id", "attr", "name", "asname", "module", "level", "names", "kind", "type_comment"}
+
+
+def walk_tree(tree: ast.AST) -> list[ast.AST]:
+    """All nodes of a tree in the order of `ast.walk`, without contexts (`Load`), operators and what is imported."""
+    found = [tree]
+    for node in found:  # which grows
+        for name in _FIELDS[type(node)]:
+            below = getattr(node, name, None)
+            if isinstance(below, list):
+                found += [item for item in below if isinstance(item, ast.AST)]
+            elif isinstance(below, ast.AST):
+                found.append(below)
+    return found
+
+
+class _Fields(dict[type[ast.AST], tuple[str, ...]]):
+    """Fields of a kind of node in which others may stand."""
+
+    def __missing__(self, kind: type[ast.AST]) -> tuple[str, ...]:
+        below = () if issubclass(kind, LEAVES) else tuple(name for name in kind._fields if name not in WORDS)
+        return self.setdefault(kind, below)
+
+
+_FIELDS = _Fields()
+
 
 BITWISE = (ast.LShift, ast.RShift, ast.BitAnd, ast.BitOr, ast.BitXor)
 KEEPING = {"min", "max", "abs"}  # integers of integers
@@ -148,3 +171,37 @@ def _gives_integer(rule: Callable[..., Any] | None) -> bool:
     node = tree_of(rule)
     returned = [item.value for item in walk_tree(node) if isinstance(item, ast.Return) and item.value is not None]
     return bool(returned) and all(is_integer(value, integer_names(rule), rule) for value in returned)
+
+
+@cache
+def fields_read(rule: Callable[..., Any], record: str) -> frozenset[str] | None:
+    """Fields that a rule may read of the record that it calls by this name; None where its text does not tell."""
+    nodes = walk_tree(tree_of(rule))
+    found: set[str] = set()
+    told = 0
+    for item in nodes:
+        if isinstance(item, ast.Attribute) and _is(item.value, record):
+            found.add(item.attr)
+            told += 1
+        elif isinstance(item, ast.Call):
+            for place, given in enumerate(item.args):
+                if _is(given, record):
+                    below = _read_below(item, place, rule)
+                    if below is None:
+                        return None
+                    found |= below
+                    told += 1
+    return frozenset(found) if told == sum(_is(item, record) for item in nodes) else None
+
+
+def _is(node: ast.AST, name: str) -> bool:
+    return isinstance(node, ast.Name) and node.id == name
+
+
+def _read_below(call: ast.Call, place: int, rule: Callable[..., Any]) -> frozenset[str] | None:
+    """What a function reads of the record that a rule hands it at this place."""
+    called = resolve_function(call.func.id, rule) if isinstance(call.func, ast.Name) else None
+    if called is None or any(isinstance(given, ast.Starred) for given in call.args):
+        return None
+    names = list(inspect.signature(called).parameters)
+    return fields_read(called, names[place]) if place < len(names) else None

@@ -1,15 +1,82 @@
-"""The contract of a model: a published flocking law, gathered from a module or any namespace."""
+"""The contract of a flocking law: its vocabulary, its rules gathered from a namespace, and the sum of two laws."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from inspect import signature
 from typing import Any
 
-from airflock.core.contract.declared import COMMANDS, REDUCTIONS
-from airflock.core.contract.namespaces import namespace_names
+from airflock.core.contract import COMMANDS, REDUCTIONS, argument_names, namespace_names
 from airflock.core.parameters import declarations
-from airflock.core.vocabulary import argument_names
-from airflock.core.vocabulary.laws import RULES
 from airflock.support import RuleError
+
+PAIR = {
+    "dx": "offset to the neighbour as heard, east, m",
+    "dy": "offset to the neighbour as heard, north, m",
+    "dz": "offset to the neighbour as heard, up, m",
+    "r": "length of the offset, m",
+    "r2": "its square, m²; cheaper than r",
+    "dvx": "velocity of the neighbour minus own, east, m/s",
+    "dvy": "velocity of the neighbour minus own, north, m/s",
+    "dvz": "velocity of the neighbour minus own, up, m/s",
+    "dv": "length of the velocity difference, m/s",
+    "vx": "own velocity as measured, east, m/s",
+    "vy": "own velocity as measured, north, m/s",
+    "vz": "own velocity as measured, up, m/s",
+    "hx": "own heading (unit vector), east",
+    "hy": "own heading (unit vector), north",
+    "hz": "own heading (unit vector), up",
+    "nhx": "heading of the neighbour as heard, east",
+    "nhy": "heading of the neighbour as heard, north",
+    "nhz": "heading of the neighbour as heard, up",
+    "age": "age of the neighbour's data, s",
+    "lower": "1.0 if the neighbour has the lower index, else 0.0",
+    "kin": "1.0 if the neighbour is of the own group, else 0.0",
+    "group": "number of the neighbour's group in [[groups]], the first being 0.0; -1.0 if it is in none",
+}
+SURFACE = {
+    "distance": "distance to the surface, m; negative on its far side",
+    "nx": "unit normal of the surface, pointing to where flying is allowed, east",
+    "ny": "unit normal of the surface, pointing to where flying is allowed, north",
+    "nz": "unit normal of the surface, pointing to where flying is allowed, up",
+    "vx": "own velocity as measured, east, m/s",
+    "vy": "own velocity as measured, north, m/s",
+    "vz": "own velocity as measured, up, m/s",
+}
+FLOCK = {
+    "n": "number of agents",
+    "x": "true positions of all agents, east, m; x[i] is that of agent i",
+    "y": "true positions of all agents, north, m; y[i] is that of agent i",
+    "z": "true positions of all agents, up, m; z[i] is that of agent i",
+    "vx": "their velocities, east, m/s",
+    "vy": "their velocities, north, m/s",
+    "vz": "their velocities, up, m/s",
+    "wing": "parameters of the wing (aero.wing)",
+    "aero": "parameters of the drag descent (aero.descent)",
+    "work": "scratch arrays in the shapes that `workspace` gives, kept from call to call; work.name[row][column]",
+    "shared": "columns of Shared to fill: shared.name[i] for every agent i",
+}
+AGENT = {
+    "own": "Own: velocity vx vy vz (m/s) and heading hx hy hz as measured",
+    "sums": "what `neighbour` summed up over all neighbours",
+    "walls": "what `boundary` summed up over all surfaces",
+    "memory": "the model's Memory of this agent",
+    "percept": "Percept: time (s), the offsets centre_x centre_y centre_z to the arena's centre "
+    "and goal_x goal_y goal_z to the goal (m), rays and noise",
+    "period": "time between two decisions, s",
+    "shared": "what `flock` found for this agent",
+    "wing": "parameters of the wing (aero.wing)",
+    "aero": "parameters of the drag descent (aero.descent)",
+}
+RULES = {
+    "reach": {"p": "parameters"},
+    "sight": {"p": "parameters"},
+    "wall_reach": {"p": "parameters"},
+    "neighbour": {**PAIR, "p": "the model's parameters"},
+    "boundary": {**SURFACE, "p": "the model's parameters"},
+    "flock": {**FLOCK, "p": "the model's parameters"},
+    "decide": {**AGENT, "p": "the model's parameters"},
+}
+
 
 NEEDED = {  # what each law brings, and what it is
     "Parameters": "a record of its numbers, derived from airflock.Parameters",
@@ -39,7 +106,7 @@ class Model:
     workspace    : `workspace` of any of n, p, wing, aero → NamedTuple of (rows, columns), the scratch of `flock`
     wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away say nothing; without it all are asked
     decide       : → command x, y, z and a Memory if the model declares one
-    added        : a law whose command is added to that of `decide` (`core.composition`)
+    added        : a law whose command is added to that of `decide` (`add_laws`)
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
     violates : truths of `airflock.check_model` that do not hold for it, and why (VIOLATES)
@@ -179,3 +246,43 @@ def _terms(given: Any, sums: Any, name: str) -> dict[str, tuple[str, str]]:
         if not (isinstance(words, tuple) and len(words) == 2 and all(isinstance(word, str) for word in words)):
             raise RuleError(f"model {name}: TERMS[{stem!r}] = {words!r}; give a word and a unit")
     return dict(given)
+
+
+FIRST_ONLY_ARGUMENTS = ("p", "sums", "walls", "memory")  # what only the first law can have: there is one record of each
+FIRST_ONLY_RULES = ("neighbour", "boundary", "Memory", "reach", "sight", "wall_reach")
+
+
+def add_laws(base: Model, extra: Model) -> Model:
+    """The law `base` with the command of `extra` added to its own.
+
+    `extra` may have a rule of the whole flock where `base` has none; its `decide` takes no parameters `p` of the model,
+    only records that a scenario has once. Raises RuleError where the two do not fit. Equal arguments give the same
+    rules, and so the same driver.
+    """
+    for fault in composition_errors(base, extra):
+        raise RuleError(fault)
+    return replace(
+        base,
+        name=f"{base.name}_and_{extra.name}",
+        added=extra,
+        flock=extra.flock or base.flock,
+        Shared=extra.Shared or base.Shared,
+        workspace=extra.workspace or base.workspace,
+        doc=f"{base.doc}\n\n{extra.doc}",
+    )
+
+
+def composition_errors(base: Model, extra: Model) -> list[str]:
+    """Why two laws cannot be added, one line each."""
+    found = []
+    if base.command != extra.command:
+        found.append(f"model {base.name} commands {base.command}, and {extra.name} {extra.command}: no sum of the two")
+    if base.flock is not None and extra.flock is not None:
+        found.append(f"model {base.name} solves for the whole flock itself; {extra.name} cannot do so beside it")
+    if base.added is not None or extra.added is not None:
+        found.append(f"model {base.name} or {extra.name} is a sum already")
+    more = [name for name in FIRST_ONLY_RULES if getattr(extra, name) is not None]
+    more += [name for name in signature(extra.decide).parameters if name in FIRST_ONLY_ARGUMENTS]
+    if more:
+        found.append(f"{extra.name} is added to another model and can have no {', '.join(more)} of its own")
+    return found

@@ -1,14 +1,87 @@
-"""The contract of an order parameter: rules that measure a flock at one instant, and how instants combine."""
+"""The contracts of an order parameter and of a set of them: vocabulary, rules and records.
+
+The rules of an order parameter measure a flock at one instant; `OVER_TIME` says how instants combine. A set holds order
+parameters that are measured together, and the fitness by which a flight is judged.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from airflock.core.contract.declared import CLOCKS, OVER_TIME, REDUCTIONS
-from airflock.core.contract.namespaces import namespace_names
-from airflock.core.vocabulary import argument_names
-from airflock.core.vocabulary.metrics import METRIC
+from airflock.core.body import STATE
+from airflock.core.contract import CLOCKS, OVER_TIME, REDUCTIONS, argument_names, call_rule, namespace_names
+from airflock.core.model import FLOCK, PAIR
 from airflock.support import RuleError
+
+MEASURED = {
+    **STATE,
+    "speed": "length of the velocity, m/s",
+    "hx": "heading (unit vector; zero at rest), east",
+    "hy": "heading (unit vector; zero at rest), north",
+    "hz": "heading (unit vector; zero at rest), up",
+    "excursion": "distance outside the arena or inside an obstacle, m; negative where flying is allowed",
+    "touches": "1.0 if a sphere of radius metrics.r_body met the scene on its last step of motion, else 0.0",
+    "rays": "rays that the agent cast at its last decision; 0.0 in a recording",
+    "pair": "what this metric's `pair` gathered for this agent",
+    "memory": "this metric's Memory of this agent",
+    "mean": "Mean over the flock: x y z (m), vx vy vz (m/s), hx hy hz, and number n",
+    "shared": "what this metric's `survey` found for this agent",
+    "wing": "parameters of the wing (aero.wing)",
+}
+MEMBER = {
+    name: text
+    for name, text in MEASURED.items()
+    if name not in ("excursion", "touches", "rays", "memory", "mean", "shared", "wing")
+} | {
+    "mean": "Mean over the agent's own cluster",
+}
+CLUSTER = {
+    "n": "members of the cluster",
+    "hx": "sum of their headings, east",
+    "hy": "sum of their headings, north",
+    "hz": "sum of their headings, up",
+    "hh": "sum of the squared lengths of their headings: how many of them move",
+    "members": "what `member` summed up over the members",
+    "mean": "Mean over the members",
+}
+SAMPLE = {
+    "n": "number of agents",
+    "mean": "Mean over the flock",
+    "agents": "what `agent` summed up over all agents",
+    "clusters": "what `cluster` summed up over all clusters",
+    "dimensions": "2.0 in a plane, 3.0 in space",
+    "time": "since the start, s",
+}
+METRIC = {
+    "pair": {name: PAIR[name] for name in ("dx", "dy", "dz", "r", "r2", "lower")} | {"q": "metric parameters"},
+    "linked": {"r": "distance of two agents, m", "r2": "its square, m²; cheaper than r", "q": "metric parameters"},
+    "agent": {**MEASURED, "q": "metric parameters"},
+    "member": {**MEMBER, "q": "metric parameters"},
+    "cluster": {**CLUSTER, "q": "metric parameters"},
+    "sample": {**SAMPLE, "q": "metric parameters"},
+    "survey": {**FLOCK, "q": "metric parameters"},
+    "within": {"q": "metric parameters"},
+    "linked_within": {"q": "metric parameters"},
+    "settled": {
+        "pair": "what the rule `pair` adds up to over all who are nearer than `beyond`, and perhaps some others",
+        "beyond": "distance, m",
+        "q": "metric parameters",
+    },
+}
+METRIC_SET = {
+    "fitness": {
+        "values": "order parameters of one flight, by name",
+        "agents": "number of agents",
+        "duration": "time flown, s",
+        "q": "metric parameters",
+    },
+    "faults": {
+        "q": "metric parameters",
+        "largest": "largest extension, m; 0.0 without an arena",
+        "edges": "world.edges",
+    },
+}
+
 
 ABSENCE = {  # by how instants combine, `vocabulary.OVER_TIME`
     "mean": "mean over instants, each as that of a flock of those who are there",
@@ -151,3 +224,58 @@ def metric(namespace: Any, name: str = "") -> Metric:
         clock=clock,
         **{key: found[key] for key in records if key in found},
     )
+
+
+@dataclass(frozen=True)
+class MetricSet:
+    """Order parameters that are measured together, and what a flight is judged by.
+
+    name       : how scenarios refer to it (metrics.kind)
+    Parameters : record behind the section [metrics]
+    chosen     : `chosen(q)` → the metrics, where a parameter decides; else `metrics`
+    fitness    : of any of values, agents, duration (s), q → named numbers, from the order parameters of one flight
+    reports    : of what `fitness` gives: unit and meaning
+    best       : the order parameter that is larger in a better flight; empty if none is
+    violates   : truths of `airflock.check_metric` that its fitness breaks, and why (VIOLATES)
+    faults     : of any of q, largest (extension, m), edges → what is wrong with the parameters, one line each
+    """
+
+    name: str
+    metrics: tuple[Metric, ...]
+    Parameters: type
+    chosen: Callable[[Any], tuple[Metric, ...]] | None = None
+    fitness: Callable[..., Mapping[str, float]] | None = None
+    reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    best: str = ""
+    faults: Callable[..., list[str]] | None = None
+    violates: Mapping[str, str] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.metrics, self.fitness))
+
+    def __post_init__(self) -> None:
+        if self.fitness is not None:
+            argument_names(self.fitness, "fitness", self.name)
+        if self.faults is not None:
+            argument_names(self.faults, "faults", self.name)
+        names = [item.name for item in self.metrics]
+        values = [value for item in self.metrics for value in item.Sample._fields]
+        for which, found in (("metric", names), ("value", values)):
+            twice = sorted({name for name in found if found.count(name) > 1})
+            if twice:
+                raise RuleError(f"metric set {self.name}: the {which} {', '.join(twice)} comes twice")
+
+    def of(self, q: Any) -> tuple[Metric, ...]:
+        """Metrics for these parameters."""
+        return self.metrics if self.chosen is None else self.chosen(q)
+
+    def judged(self, values: Mapping[str, Any], agents: int, duration: float, q: Any) -> dict[str, Any]:
+        """The order parameters of one flight with its fitness; q: parameters with everything filled in."""
+        if self.fitness is None:
+            return dict(values)
+        given = {"values": values, "agents": agents, "duration": duration, "q": q}
+        return {**values, **call_rule(self.fitness, "fitness", given, self.name)}
+
+    def numbers(self, q: Any) -> tuple[str, ...]:
+        """Names of the order parameters that are one number, fitness last."""
+        return tuple(dict.fromkeys([*(name for each in self.of(q) for name in each.reports), *self.reports]))

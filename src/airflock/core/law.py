@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any
 
-from airflock.core.rules.integers import BITWISE, integer_names, is_integer, tree_of
-from airflock.core.rules.nodes import walk_tree
+from airflock.core.rule_syntax import BITWISE, integer_names, is_integer, tree_of, walk_tree
 from airflock.support import RuleError
 
 ALLOWED_CALLS = {"min", "max", "abs", "float", "int", "range", "len"}

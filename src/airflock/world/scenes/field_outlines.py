@@ -5,16 +5,174 @@ A file is untrusted: it is read through `untrusted`, and everything that is wron
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from shapely.geometry import LineString, Point, Polygon
 from shapely.validation import explain_validity
 
-from airflock.support import FlightSite, ScenarioError, as_error, read_text, shortened
-from airflock.world.scenes import geojson, kml
-from airflock.world.scenes.rings import Outline, Ring
+from airflock.support import (
+    Element,
+    FlightSite,
+    FormatError,
+    ScenarioError,
+    as_error,
+    parse_json_object,
+    parse_xml,
+    read_text,
+    shortened,
+)
+
+NO_AREA = {"Point", "MultiPoint", "LineString", "MultiLineString", "LinearRing", "Track", "MultiTrack", "Model"}
+Ring = list[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Outline:
+    """One shape of a file: its name, its rings in degrees (longitude, latitude), and heights (m) that it tells.
+
+    shape : of one that is no polygon, and so is left out: what it is
+    """
+
+    name: str
+    shell: Ring
+    holes: list[Ring] = field(default_factory=list)
+    heights: Mapping[str, float] = field(default_factory=dict)
+    shape: str = ""
+
+
+def open_ring(ring: Ring) -> Ring:
+    """A ring without its last point, where that is the first again, and without points that are given twice."""
+    return [point for point, after in zip(ring, [*ring[1:], ring[0]], strict=True) if point != after] if ring else []
+
+
+def heights_of(properties: Mapping[str, Any]) -> dict[str, float]:
+    """The properties floor and ceiling, m."""
+    found = {key: properties[key] for key in ("floor", "ceiling") if properties.get(key) is not None}
+    for key, value in found.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise FormatError(f"the property {key} = {shortened(repr(value), 40)} is not a height in m")
+    return {key: float(value) for key, value in found.items()}
+
+
+MOST_CORNERS = 100_000  # of all polygons of a file
+
+
+def parse_geojson(text: str) -> list[Outline]:
+    """Shapes of a GeoJSON text (RFC 7946), in its order."""
+    document = parse_json_object(text)
+    crs = str(document.get("crs", "")).upper()
+    if crs and "CRS84" not in crs and "4326" not in crs:
+        raise FormatError("is in other coordinates than longitude and latitude (key crs); export it as WGS 84")
+    found = list(_features(document, ""))
+    if sum(len(ring) for one in found for ring in (one.shell, *one.holes)) > MOST_CORNERS:
+        raise FormatError(f"has more than {MOST_CORNERS} corners")
+    return found
+
+
+def _features(value: Any, name: str, properties: Mapping[str, Any] | None = None) -> Iterator[Outline]:
+    """Shapes of a GeoJSON object and of all that it holds."""
+    if not isinstance(value, Mapping):
+        return
+    kind = value.get("type")
+    if kind == "FeatureCollection":
+        for number, one in enumerate(_list(value.get("features"), "features")):
+            yield from _features(one, f"feature {number + 1}")
+    elif kind == "Feature":
+        given = value.get("properties")
+        given = given if isinstance(given, Mapping) else {}
+        yield from _features(value.get("geometry"), shortened(str(given.get("name") or name), 60), given)
+    elif kind == "GeometryCollection":
+        for one in _list(value.get("geometries"), "geometries"):
+            yield from _features(one, name, properties)
+    elif kind in ("Polygon", "MultiPolygon"):
+        polygons = _list(value.get("coordinates"), "coordinates")
+        for rings in [polygons] if kind == "Polygon" else polygons:
+            shell, *holes = [_ring(ring) for ring in _list(rings, "coordinates")] or [[]]
+            yield Outline(name or "polygon", shell, holes, heights_of(properties or {}))
+    elif kind in NO_AREA:
+        yield Outline(name or "a shape", [], shape=str(kind))
+
+
+def _list(value: Any, key: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise FormatError(f"{key} is not a list")
+    return value
+
+
+def _ring(points: Any) -> Ring:
+    found = []
+    for point in _list(points, "a ring of coordinates"):
+        numbers = point if isinstance(point, list) else []
+        if len(numbers) < 2 or any(isinstance(n, bool) or not isinstance(n, (int, float)) for n in numbers[:2]):
+            raise FormatError(f"{shortened(repr(point), 40)} is not a point [longitude, latitude]")
+        found.append((float(numbers[0]), float(numbers[1])))
+    return open_ring(found)
+
+
+def parse_kml(text: str) -> list[Outline]:
+    """Shapes of a KML text, in its order; heights are those of its extended data, not of its coordinates."""
+    return list(_placed(parse_xml(text), "", {}))
+
+
+def _placed(element: Element, name: str, told: Mapping[str, str]) -> Iterator[Outline]:
+    """Shapes within an element, with the name of the nearest thing around them that has one, and what is told of it."""
+    name = next((shortened(one.text, 60) for one in element.children if one.tag == "name" and one.text), name)
+    if element.tag == "Placemark":
+        told = {key: value for one in element.children if one.tag == "ExtendedData" for key, value in _data(one)}
+    if element.tag == "Polygon":
+        shells, holes = (
+            [ring for one in element.children if one.tag == tag for ring in _rings(one)]
+            for tag in ("outerBoundaryIs", "innerBoundaryIs")
+        )
+        yield Outline(name or "polygon", shells[0] if shells else [], holes, heights_of(_numbers(told)))
+        return
+    if element.tag in NO_AREA:
+        yield Outline(name or "a shape", [], shape=element.tag)
+    for one in element.children:
+        yield from _placed(one, name, told)
+
+
+def _data(extended: Element) -> Iterator[tuple[str, str]]:
+    """Names and values of an element ExtendedData: of Data (Google Earth) and of SimpleData (QGIS, GDAL)."""
+    for one in extended.children:
+        if one.tag == "SimpleData":
+            yield one.name, one.text
+        elif one.tag == "Data":
+            yield from ((one.name, two.text) for two in one.children if two.tag == "value")
+        elif one.tag == "SchemaData":
+            yield from _data(one)
+
+
+def _numbers(told: Mapping[str, str]) -> dict[str, Any]:
+    """Texts of a KML as numbers where they are some; without those that are empty."""
+    found: dict[str, Any] = {}
+    for key, value in told.items():
+        try:
+            found[key] = float(value) if value else None
+        except ValueError:
+            found[key] = value
+    return found
+
+
+def _rings(boundary: Element) -> list[Ring]:
+    """Rings of a boundary: Google Earth writes several holes into one innerBoundaryIs."""
+    texts = [two.text for one in boundary.children if one.tag == "LinearRing" for two in one.children
+             if two.tag == "coordinates"]  # fmt: skip
+    return [_coordinates(text) for text in texts] or [[]]
+
+
+def _coordinates(text: str) -> Ring:
+    found = []
+    for point in text.split():
+        try:
+            longitude, latitude, *_ = (float(number) for number in point.split(","))
+        except ValueError:
+            raise FormatError(f"{shortened(repr(point), 40)} is not a point longitude,latitude") from None
+        found.append((longitude, latitude))
+    return open_ring(found)
+
 
 MOST_KEPT = 500  # of one polygon that is flown in: each decision looks along lines of sight past all of them
 ENDLESS = 1e5  # m; heights of an obstacle that has none, where others have
@@ -45,7 +203,7 @@ def load_field(path: Path, *, simplify: float = 0.0, space: bool = False) -> Fie
     """
     where = f"world.file = {shortened(str(path), 120)}"
     kinds: dict[str, Callable[[str], list[Outline]]] = {
-        ".geojson": geojson.parse_outlines, ".json": geojson.parse_outlines, ".kml": kml.parse_outlines,
+        ".geojson": parse_geojson, ".json": parse_geojson, ".kml": parse_kml,
     }  # fmt: skip
     if path.suffix.lower() not in kinds:
         hint = "; unzip it first" if path.suffix.lower() == ".kmz" else ""

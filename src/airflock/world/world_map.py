@@ -1,6 +1,7 @@
-"""Place: walls, obstacles and what stands in the world, asked from one position; plain Python, as a drone carries it.
+"""The map of a world: its outlines, walls, obstacles and shapes, queried at one position.
 
-Made from the record of an arena and, where a scene stands in it, from rows of shapes behind their tree.
+Plain Python, as a drone carries it. A map is made from the record of an arena and, where a scene stands in it, from
+rows of shapes behind their tree.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -11,7 +12,77 @@ from typing import Any, Self
 from airflock.core import FAR, State, norm
 from airflock.world import arena, bvh, edges, excursion, polygon, rays
 from airflock.world.arena import Surface
-from airflock.world.corners import Corners, counter_clockwise, is_convex, without_straight_corners
+
+Corners = Sequence[Sequence[float]]
+STRAIGHT = 1e-9  # rad; by how much an outline at least turns at a corner
+
+
+def signed_area(corners: Corners) -> float:
+    """Signed area of a polygon, m²: positive if its corners run counter-clockwise."""
+    pairs = zip(corners, [*corners[1:], corners[0]], strict=True)
+    return 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in pairs)
+
+
+def counter_clockwise(corners: Corners) -> list[Sequence[float]]:
+    """The corners in counter-clockwise order."""
+    return list(corners) if signed_area(corners) > 0.0 else list(corners)[::-1]
+
+
+def polygon_error(corners: Corners) -> str:
+    """Why a list of corners is no simple polygon; empty if it is one."""
+    if len(corners) < 3:
+        return f"has {len(corners)} corners; a polygon needs at least 3"
+    n = len(corners)
+    for k in range(n):
+        if tuple(corners[k][:2]) == tuple(corners[(k + 1) % n][:2]):
+            return f"gives corner [{corners[k][0]:g}, {corners[k][1]:g}] twice in succession"
+    edges = [(corners[k], corners[(k + 1) % n]) for k in range(n)]
+    for k in range(n):
+        if _folds(*edges[k], edges[(k + 1) % n][1]):
+            return f"turns back on itself at [{edges[k][1][0]:g}, {edges[k][1][1]:g}]"
+        for m in range(k + 2, n if k else n - 1):  # neighbours share a corner
+            if _meet(*edges[k], *edges[m]):
+                return f"crosses or touches itself near [{edges[m][0][0]:g}, {edges[m][0][1]:g}]"
+    return "" if signed_area(corners) != 0.0 else "has no area"
+
+
+def is_convex(corners: Corners) -> bool:
+    """Whether a simple polygon turns one way only."""
+    ring = counter_clockwise(corners)
+    n = len(ring)
+    return all(_turn(ring[k], ring[(k + 1) % n], ring[(k + 2) % n]) >= -1e-9 * abs(signed_area(ring)) for k in range(n))
+
+
+def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
+    """Twice the signed area of a triangle, m²: positive for a turn to the left at b."""
+    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+
+
+def without_straight_corners(corners: Corners) -> list[Sequence[float]]:
+    """Corners of a simple polygon at which it turns, in order: a straight side is one side, however it is divided."""
+    n = len(corners)
+    return [b for k, b in enumerate(corners) if _turns(corners[k - 1], b, corners[(k + 1) % n])]
+
+
+def _turns(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> bool:
+    """Whether the way a b c does not go straight on at b."""
+    across = abs(_turn(a, b, c))
+    along = (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1])
+    return along <= 0.0 or across > STRAIGHT * along
+
+
+def _folds(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> bool:
+    """Whether the way a b c goes back over itself."""
+    return _turn(a, b, c) == 0.0 and (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0.0
+
+
+def _meet(a: Sequence[float], b: Sequence[float], c: Sequence[float], d: Sequence[float]) -> bool:
+    """Whether the segments a b and c d have a point in common."""
+    for k in (0, 1):
+        if max(a[k], b[k]) < min(c[k], d[k]) or max(c[k], d[k]) < min(a[k], b[k]):
+            return False
+    return _turn(a, b, c) * _turn(a, b, d) <= 0.0 and _turn(c, d, a) * _turn(c, d, b) <= 0.0
+
 
 FAR_HEIGHT = 1e9  # m; half height of an arena that is flown in a plane
 AWAY = 1e8  # m; nothing is looked for beyond
@@ -246,3 +317,50 @@ class WorldMap:
             rule = rays.to_box if self._flat else self._clear
             free = min(free, rule(x, y, z - self._middle, ux, uy, uz, *sides, up, self._edges, 0))
         return float(bvh.cast(x, y, z, ux, uy, uz, free, radius, *self._scene)) if self._casts else float(free)
+
+
+RAYS = {"square": rays.to_box, "polygon": rays.to_polygon, "circle": rays.to_cylinder, "none": rays.to_nothing}
+EDGE_RULES = {"open": None, "bounce": edges.bounce, "periodic": edges.wrap}
+
+
+def arena_surfaces(world: arena.Parameters) -> tuple[tuple[Callable[..., Any], ...], Callable[..., float]]:
+    """Families of surfaces of an arena, and its excursion function; a periodic one has no walls to feel or to leave."""
+    if world.edges == "periodic":
+        return (), excursion.beyond_nothing
+    three = world.dimensions == "3"
+    caps = (arena.plane,) if three else ()
+    ground = {"square": (arena.plane,), "polygon": caps, "circle": (arena.cylinder,), "none": ()}[world.arena]
+    if world.arena == "square" and world.walls == "nearest_per_axis":
+        return (arena.slab,), excursion.beyond_box
+    beyond = {
+        "square": excursion.beyond_box,
+        "polygon": excursion.beyond_polygon,
+        "circle": excursion.beyond_cylinder,
+        "none": excursion.beyond_nothing,
+    }[world.arena]
+    if three and world.arena == "circle":
+        return (arena.cylinder, arena.plane), beyond
+    return ground, beyond
+
+
+def arena_ray(world: arena.Parameters) -> Callable[..., float]:
+    """Free distance along a direction to the arena's walls."""
+    return rays.to_nothing if world.edges == "periodic" else RAYS[world.arena]
+
+
+def face_rows(world: arena.Parameters) -> tuple[list[list[float]], list[int]]:
+    """Rows of the surface functions of `arena_surfaces`, and how many belong to each family."""
+    three = world.dimensions == "3"
+    h, z = 0.5 * world.side, 0.5 * world.height
+    low, high = arena.heights_of(world)
+    caps = [[0.0, 0.0, 1.0, -low], [0.0, 0.0, -1.0, high]] if three else []
+    if world.arena == "none" or world.edges == "periodic":
+        return [], []
+    if world.arena == "circle":
+        return [[0.0, 0.0, 0.0, world.radius], *caps], [1, len(caps)]
+    if world.arena == "square" and world.walls == "nearest_per_axis":
+        rows = [[1.0, 0.0, 0.0, h], [0.0, 1.0, 0.0, h]] + ([[0.0, 0.0, 1.0, z]] if three else [])
+        return rows, [len(rows)]
+    corners = ((-h, -h), (h, -h), (h, h), (-h, h)) if world.arena == "square" else ()  # a polygon's edges are no planes
+    rows = [list(inward_plane(a, b)) for a, b in zip(corners, (*corners[1:], *corners[:1]), strict=True)]
+    return rows + caps, [len(rows) + len(caps)]

@@ -1,0 +1,109 @@
+"""The contract that all kinds of rule share: where rules are gathered from, and how they are called.
+
+A rule is a plain function of floats. The names of its arguments are its declaration: a driver computes and passes only
+what the rule requests, in any order. `core.vocabulary` lists the names. A file of rules may bring records of its own
+(Parameters, and a Memory that a rule keeps from call to call); they are checked when the file is gathered.
+"""
+
+import inspect
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import make_dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+from airflock.core.parameters import Parameters, number_names
+from airflock.support import RuleError, shortened, suggest
+
+COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": "1"}  # and their units
+REDUCTIONS = ("sum", "min", "max")
+OVER_TIME = ("mean", *REDUCTIONS)  # how the samples of a flight combine
+CLOCKS = ("sample", "collision")  # metrics.period and metrics.collision_period
+
+
+class State(NamedTuple):
+    """Position (m) and velocity (m/s), as whoever holds the record knows them; local east-north-up."""
+
+    x: float
+    y: float
+    z: float
+    vx: float
+    vy: float
+    vz: float
+
+
+def namespace_names(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:
+    """What a module, a class or a mapping of names holds, and what it is called: `name`, its NAME, or its module's.
+
+    A static method is the function inside, so that the check of rules can name it and its decorator.
+    """
+    if not isinstance(namespace, Mapping) and not hasattr(namespace, "__dict__"):
+        told = shortened(repr(namespace), 80)
+        raise RuleError(f"{told} holds no rules; give a module, a class, or names such as globals()")
+    found = dict(namespace) if isinstance(namespace, Mapping) else dict(vars(namespace))
+    found = {key: value.__func__ if isinstance(value, staticmethod) else value for key, value in found.items()}
+    return found, name or str(found.get("NAME") or found.get("__name__", "own")).rpartition(".")[2].strip("_")
+
+
+def merge_parameters(common: type, record: Any, owner: str) -> type:
+    """Parameters of a file's own together with the numbers that all of its kind have.
+
+    common : record of those numbers; record : the file's, None where it has none; owner : such as "radio mine"
+    """
+    if record is None:
+        return common
+    if not (isinstance(record, type) and issubclass(record, Parameters)):
+        raise RuleError(f"{owner}: Parameters is not a frozen dataclass derived from airflock.Parameters")
+    if set(number_names(common)) <= set(number_names(record)):
+        return record
+    made = make_dataclass("Parameters", [], bases=(record, common), frozen=True, kw_only=True)
+    made.__doc__, made.__module__ = record.__doc__, record.__module__
+    return made
+
+
+def check_memory_record(
+    owner: str, rule: str, argument_names: Collection[str], record: Any, name: str = "Memory"
+) -> None:
+    """Refuse what a rule keeps from call to call, where it is no NamedTuple with the values of the start, or not asked.
+
+    asked : names that the rule asks for; record : what the file holds under `name`, if anything
+    """
+    word = name.lower()
+    if (word in argument_names) is (record is None):
+        raise RuleError(f"{owner}: a rule {rule} that asks for {word} and a NamedTuple {name} come together")
+    if record is not None and set(getattr(record, "_field_defaults", {})) != set(getattr(record, "_fields", "-")):
+        raise RuleError(f"{owner}: {name} is a NamedTuple whose fields all have a value for the start")
+
+
+def initial_values(record: type | None) -> tuple[float, ...]:
+    """What each field of such a record is at the start of a flight; nothing without one."""
+    return tuple(getattr(record, "_field_defaults", {}).values())
+
+
+@cache
+def argument_names(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...]:
+    """Names that a rule asks for, checked against the vocabulary of its kind."""
+    asked = inspect.signature(rule).parameters
+    names = tuple(asked)
+    from airflock.core.vocabulary import VOCABULARY  # here, because the chapters of the kinds import this one
+
+    known = VOCABULARY[kind]
+    for name in names:
+        if name not in known:
+            hint = suggest(name, known, ".", lead="; ", cutoff=0.6)
+            if asked[name].default is not inspect.Parameter.empty:
+                hint = f"; a number of the rule's own is declared in Parameters, and read as p.{name}."
+            elif name == "self":
+                hint = "; a rule is a plain function."
+            where = f"{owner}.{kind}" if owner else kind
+            raise RuleError(f"{where}({', '.join(names)}) asks for {name!r}{hint} Known: {', '.join(known)}")
+    return names
+
+
+def call_rule(rule: Callable[..., Any], kind: str, arguments: Mapping[str, Any], owner: str = "") -> Any:
+    """Call a rule with what it asks for by name."""
+    names = argument_names(rule, kind, owner)
+    values = [arguments.get(name) for name in names]
+    for place, value in enumerate(values):
+        if value is None:
+            raise RuleError(f"{owner}.{kind} asks for {names[place]}, which {owner} does not provide".lstrip("."))
+    return rule(*values)

@@ -1,0 +1,325 @@
+"""The scene of a scenario, and the goals in it: made once, kept as arrays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.support import SceneError
+from airflock.world import bvh, goals, scenery
+from airflock.world.inside import inside
+from airflock.world.shapes import APPEARS, BOX, CLOSED, COLUMNS, CYLINDER, GROUND, SEGMENT, TRIANGLE
+
+FAR_AWAY = 1e9  # m; where the bounds of a shape lie that is not there yet
+LEAF = 4  # shapes of a leaf
+TALL_HEIGHT = 1e6  # m; half height of what has no end in height
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What stands in a world.
+
+    shapes : (shape, 18) rows as in `world.shapes`, in the order of the tree's leaves
+    nodes  : (node, 6) bounds, m; links : (node, 3) skip, first, last as in `world.bvh`
+    notes  : what was adjusted while it was made, for a person to read
+    """
+
+    shapes: NDArray[np.float64]
+    nodes: NDArray[np.float64]
+    links: NDArray[np.int64]
+    notes: tuple[str, ...] = field(default=())
+
+    @cached_property
+    def as_lists(self) -> tuple[list[list[float]], list[list[float]], list[list[int]]]:
+        """Shapes, nodes and links as plain lists, for plain Python."""
+        return self.shapes.tolist(), self.nodes.tolist(), self.links.tolist()
+
+    @cached_property
+    def has_closed_surface(self) -> bool:
+        """Whether any surface closes around a position."""
+        return bool((self.shapes[:, CLOSED] > 0.0).any())
+
+    @property
+    def later(self) -> NDArray[np.int64]:
+        """Numbers of the shapes that appear while flying."""
+        return np.flatnonzero(self.shapes[:, APPEARS] > 0.0)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lowest and highest corner (2, 3), m; zeros if empty."""
+        if not len(self.shapes):
+            return np.zeros((2, 3))
+        return np.array([self.shapes[:, :3].min(axis=0), self.shapes[:, 3:6].max(axis=0)])
+
+
+def box_rows(corners: Any) -> NDArray[np.float64]:
+    """Rows of boxes from (box, 6) lowest and highest corners, m."""
+    given = np.asarray(corners, float).reshape(-1, 6)
+    return _rows(BOX, given, given[:, :0])
+
+
+def ground_row(corners: Any) -> NDArray[np.float64]:
+    """Row of the ground from its (6,) lowest and highest corner, m."""
+    given = np.asarray(corners, float).reshape(-1, 6)
+    return _rows(GROUND, given, given[:, :0])
+
+
+def cylinder_rows(values: Any) -> NDArray[np.float64]:
+    """Rows of upright cylinders from (cylinder, 5) x y radius z0 z1, m."""
+    x, y, r, low, high = np.asarray(values, float).reshape(-1, 5).T
+    bounds = np.stack([x - r, y - r, low, x + r, y + r, high], axis=1)
+    return _rows(CYLINDER, bounds, np.stack([x, y, r], axis=1))
+
+
+def triangle_rows(corners: Any) -> NDArray[np.float64]:
+    """Rows of triangles from (triangle, 3, 3) corners, m."""
+    given = np.asarray(corners, float).reshape(-1, 3, 3)
+    bounds = np.concatenate([given.min(axis=1), given.max(axis=1)], axis=1)
+    return _rows(TRIANGLE, bounds, given.reshape(-1, 9))
+
+
+def segment_rows(ends: Any) -> NDArray[np.float64]:
+    """Rows of upright walls without end in height from (segment, 4) ax ay bx by, m."""
+    given = np.asarray(ends, float).reshape(-1, 4)
+    tall = np.full(len(given), TALL_HEIGHT)
+    low = np.minimum(given[:, :2], given[:, 2:])
+    high = np.maximum(given[:, :2], given[:, 2:])
+    bounds = np.column_stack([low, -tall, high, tall])
+    return _rows(SEGMENT, bounds, given)
+
+
+def make_scene(rows: Sequence[NDArray[np.float64]], notes: tuple[str, ...] = ()) -> Scene:
+    """Scene of these rows of shapes."""
+    shapes = np.concatenate([np.zeros((0, COLUMNS)), *rows])
+    order, nodes, links = _tree(shapes)
+    return Scene(shapes[order], nodes, links, notes)
+
+
+def _rows(kind: float, bounds: NDArray[np.float64], numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    rows = np.zeros((len(bounds), COLUMNS))
+    rows[:, :6], rows[:, 6], rows[:, 7 : 7 + numbers.shape[1]] = bounds, kind, numbers
+    return rows
+
+
+def _tree(shapes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Order of the shapes, nodes and links: split at the median of the longest axis until leaves are small."""
+    if not len(shapes):
+        return np.zeros(0, np.int64), np.zeros((0, 6)), np.zeros((0, 3), np.int64)
+    low, high = shapes[:, :3], shapes[:, 3:6]
+    middle = np.clip(0.5 * (low + high), -TALL_HEIGHT, TALL_HEIGHT)
+    order: list[int] = []
+    nodes: list[Any] = []
+    links: list[list[int]] = []
+    pending = [(np.arange(len(shapes)), -1)]  # members, or the node whose walk ends here
+    while pending:
+        members, closes = pending.pop()
+        if closes >= 0:
+            links[closes][0] = len(nodes)
+            continue
+        number = len(nodes)
+        nodes.append(np.concatenate([low[members].min(axis=0), high[members].max(axis=0)]))
+        links.append([0, len(order), len(order)])
+        pending.append((members[:0], number))
+        if len(members) <= LEAF:
+            order.extend(members.tolist())
+            links[number][2] = len(order)
+            continue
+        axis = int(np.ptp(middle[members], axis=0).argmax())
+        half = len(members) // 2
+        sides = np.argpartition(middle[members, axis], half)
+        pending.append((members[sides[half:]], -1))
+        pending.append((members[sides[:half]], -1))
+    return np.array(order), np.array(nodes), np.array(links, np.int64)
+
+
+def without_appearing(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Shapes as they stand at the start, and what appears later: its bounds (m), time (s) and number."""
+    if not len(scene.later):
+        return scene.shapes, np.zeros((0, 8))
+    shapes, k = scene.shapes.copy(), scene.later
+    later = np.column_stack([shapes[k, :6], shapes[k, APPEARS], k])
+    shapes[k, :6] = FAR_AWAY
+    return shapes, later
+
+
+def buildings(p: scenery.Parameters) -> NDArray[np.float64]:
+    """Rows of boxes. Blocks are numbered from the south-west; a lower density leaves some of them empty."""
+    rng = np.random.default_rng(int(p.seed))
+    n, pitch = int(p.blocks), p.block + p.street
+    west = (np.arange(n) - 0.5 * n) * pitch + 0.5 * p.street
+    x, y = (axis.ravel() for axis in np.meshgrid(west, west, indexing="ij"))
+    height = rng.uniform(min(p.low, p.high), max(p.low, p.high), n * n)
+    stands = rng.uniform(0.0, 1.0, n * n) < p.density
+    flat = np.zeros(n * n)
+    return box_rows(np.stack([x, y, flat, x + p.block, y + p.block, height], axis=1)[stands])
+
+
+def extent(p: scenery.Parameters) -> float:
+    """Half side of the city with the street around it, m."""
+    return 0.5 * int(p.blocks) * (p.block + p.street)
+
+
+def forest_extent(p: scenery.Parameters) -> float:
+    """Half side of the forest, m."""
+    return 0.5 * p.side
+
+
+def half_side(p: scenery.Parameters, shapes: Any) -> float:
+    """Half side (m) of the square that a scene stands on."""
+    if p.kind == "city":
+        return extent(p)
+    if p.kind == "forest":
+        return forest_extent(p)
+    return float(np.abs(shapes[:, [0, 1, 3, 4]]).max()) if len(shapes) else 0.0
+
+
+# Our choice: a stand of grown broad-leaved trees; the thesis's scene is not available
+MOST = 200_000  # trees, of two shapes each: their tree of boxes takes some 10 s to build
+HEIGHT = (8.0, 20.0)  # m, tree
+TRUNK = (0.15, 0.40)  # m, radius
+CROWN = (1.0, 2.5)  # m, radius
+CLEAR = (0.35, 0.55)  # share of the height below the crown
+
+
+def trees(p: scenery.Parameters) -> NDArray[np.float64]:
+    """Rows of cylinders: trunks, then crowns."""
+    rng = np.random.default_rng(int(p.seed))
+    n = round(p.trees * p.density)
+    if n > MOST:
+        raise SceneError(
+            f"scene.trees = {p.trees:g} at scene.density = {p.density:g} are {n} trees; at most {MOST} fit, "
+            f"for instance scene.trees = {int(MOST / p.density)}"
+        )
+    x, y = rng.uniform(-0.5 * p.side, 0.5 * p.side, (2, n))
+    height, trunk, crown, clear = (rng.uniform(*span, n) for span in (HEIGHT, TRUNK, CROWN, CLEAR))
+    ground = np.zeros(n)
+    stems = np.stack([x, y, trunk, ground, clear * height], axis=1)
+    crowns = np.stack([x, y, crown, clear * height, height], axis=1)
+    return cylinder_rows(np.concatenate([stems, crowns]))
+
+
+__all__ = ["Scene", "clearance", "in_mesh", "scene_of", "waypoints"]
+
+Polygons = tuple[tuple[tuple[float, ...], ...], ...]
+MARGIN = 100.0  # m; the ground reaches beyond the scene, so that no flock slips under it
+DEPTH = 1000.0  # m; thickness of the ground: nothing starts below it
+MANY = 50_000  # shapes; of more no lists are made, which would take longer than they save
+ATTEMPTS = 100_000  # draws of all free points
+IN_VAIN = 10_000  # of them without finding one: hardly any of the scene is free
+
+
+@lru_cache(maxsize=32)
+def scene_of(
+    p: scenery.Parameters, dimensions: int, polygons: Polygons = (), heights: tuple[tuple[float, ...], ...] = ()
+) -> Scene:
+    """Scene as arrays; in a plane every building and tree is its ground plan.
+
+    polygons : walls besides, m; heights: lowest and highest of the last of them, if they have ends in height, m
+    """
+    tall = len(polygons) - len(heights)
+    walls = [
+        segment_rows([[*a, *b] for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]) for ring in polygons[:tall]
+    ]
+    walls += [triangle_rows(_faces(ring, *ends)) for ring, ends in zip(polygons[tall:], heights, strict=True)]
+    if p.kind == "none":
+        return make_scene(walls)
+    notes: tuple[str, ...] = ()
+    if p.kind == "mesh":
+        from airflock.world.scenes.meshes import load_mesh
+
+        rows, notes = load_mesh(p, dimensions)
+    elif p.kind == "boxes":
+        given = np.array(p.boxes, float).reshape(-1, 7)
+        rows = box_rows(given[:, :6])
+        rows[:, APPEARS] = given[:, 6]
+    else:
+        rows = buildings(p) if p.kind == "city" else trees(p)
+        rows[:, APPEARS] = appearance_times(p, len(rows))
+    if dimensions == 2:
+        flat = (rows[:, 6] == BOX) | (rows[:, 6] == CYLINDER)
+        rows[flat, 2], rows[flat, 5] = -TALL_HEIGHT, TALL_HEIGHT
+        return make_scene([rows, *walls], notes)
+    half = half_side(p, rows) + MARGIN
+    below = [ground_row([-half, -half, -DEPTH, half, half, 0.0])] if p.ground == "yes" else []
+    return make_scene([*below, rows, *walls], notes)
+
+
+def _faces(ring: tuple[tuple[float, ...], ...], low: float, high: float) -> list[list[tuple[float, ...]]]:
+    """Triangles (3 corners each, m) of an upright prism over a simple polygon."""
+    pairs = list(zip(ring, ring[1:] + ring[:1], strict=True))
+    found = [[(*a, low), (*b, low), (*b, high)] for a, b in pairs]
+    found += [[(*a, low), (*b, high), (*a, high)] for a, b in pairs]
+    from shapely import constrained_delaunay_triangles  # here, because most worlds have no polygon to triangulate
+    from shapely.geometry import Polygon
+
+    flat = [part.exterior.coords[:3] for part in constrained_delaunay_triangles(Polygon(ring)).geoms]
+    return found + [[(*corner, z) for corner in part] for part in flat for z in (low, high)]
+
+
+def appearance_times(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
+    """When each of so many shapes appears, s; 0: it stands from the start. A tree's trunk and crown come together."""
+    parts = 2 if p.kind == "forest" else 1
+    rng = np.random.default_rng([int(p.seed), 2])
+    late, when = rng.uniform(0.0, 1.0, (2, count // parts))
+    return np.tile(np.where(late < p.later, np.maximum(when * p.later_until, 1e-6), 0.0), parts)
+
+
+def clearance(scene: Scene, position: Any, within: float = 1e6) -> float:
+    """Distance (m) to what stands in a scene; negative inside a solid, 1e30 if nothing is within (m)."""
+    x, y, z = (float(c) for c in position)
+    return float(bvh.nearest(x, y, z, within, *_tables(scene)).distance)
+
+
+def in_mesh(scene: Scene, position: Any) -> bool:
+    """Whether a position lies inside a closed mesh, in a plane inside its cut at height 0."""
+    x, y, z = (float(c) for c in position)
+    return scene.has_closed_surface and bool(inside(x, y, z, *_tables(scene)) > 0.5)
+
+
+def _tables(found: Scene) -> Any:
+    """Shapes, nodes and links for plain Python: lists, or the arrays where there are too many."""
+    return found.as_lists if len(found.shapes) < MANY else (found.shapes, found.nodes, found.links)
+
+
+@lru_cache(maxsize=32)
+def waypoints(g: goals.Parameters, p: scenery.Parameters, dimensions: int) -> NDArray[np.float64]:
+    """Goals in their order (goal, 3), m.
+
+    Free points are drawn by the scene's seed: within the scene, between the two heights, clear of everything, and at
+    least goals.apart from the one before.
+    """
+    if g.kind == "none":
+        return np.zeros((0, 3))
+    if g.kind in ("points", "own"):
+        found = np.array(g.points, float).reshape(-1, 3)
+        return found * (1.0, 1.0, 0.0) if dimensions == 2 else found
+    place = scene_of(p, dimensions)
+    half = (
+        half_side(p, place.shapes)
+        if p.kind in ("city", "forest")
+        else 0.5 * float(np.ptp(place.bounds, axis=0)[:2].min())
+    )
+    rng = np.random.default_rng([int(p.seed), 1])
+    chosen: list[NDArray[np.float64]] = []
+    last = np.zeros(3)
+    vain = 0
+    for _ in range(ATTEMPTS):
+        if vain == IN_VAIN:
+            break
+        vain += 1
+        spot = np.array(
+            [*rng.uniform(-half, half, 2), rng.uniform(g.low, max(g.high, g.low)) if dimensions == 3 else 0.0]
+        )
+        free = np.linalg.norm(spot - last) >= g.apart and clearance(place, spot, g.clearance) >= g.clearance
+        if free and not in_mesh(place, spot):
+            chosen.append(spot)
+            last, vain = spot, 0
+            if len(chosen) == int(g.count):
+                return np.array(chosen)
+    raise SceneError(
+        f"goals.kind = 'scene': no free point at {g.clearance:g} m from everything and {g.apart:g} m from the last; "
+        "lower goals.clearance, goals.apart or scene.density"
+    )
