@@ -15,6 +15,8 @@ from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, call_r
 
 def has_fault(i: int, kind: Fault, time: Any, flock: FlockRows, numbers: Any) -> Any:
     """Whether agent i suffers from a kind of fault at a time (s); half a step is as good as none."""
+    # The driver only compares times. Which agent has a fault, and when, is decided between two steps, so a fault
+    # needs no memory of its own, a snapshot holds it, and any cuts give the same bits.
     return (time - flock.fault(kind.name, "onset")[i] > -HALF * numbers.c.dt) & (
         time - flock.fault(kind.name, "onset")[i] < flock.fault(kind.name, "lasts")[i] - HALF * numbers.c.dt
     )
@@ -30,11 +32,14 @@ def struck(
 
     kept : whether velocities are kept for a step's faults until this is asked again; else each step copies its own
     """
+    # Velocities before a step are copied at decisions, not at each step: a copy a step became two calls of memcpy, a
+    # hundredth of a flight.
     for a in range(plan.dimensions) if kept else ():
         for i in lanes:
             flock.before_step[a][i] = flock.velocity[a][i]
     lowest = LIMIT
     highest = ZERO
+    # Lanes are found as reals, by masks: a minimum of integers behind a branch would not become vectors.
     for i in lanes:
         until = ZERO
         for kind in plan.suffers("motion"):
@@ -74,6 +79,8 @@ def apply_state_faults(
     """
     for i in lanes:
         on = has_fault(i, kind, time, flock, numbers)
+        # A frozen receiver repeats the last position that it reported, errors included, not the true one, which it
+        # never knew. So each decision keeps what the rule last returned for a state without this fault.
         for rows, at in ((position, "at_"), (velocity, "at_v")):
             for a in [a for a in range(plan.dimensions) if at + "xyz"[a] in kind.kept(state)]:
                 flock.kept(kind.name, state, at + "xyz"[a])[i] = choose(
@@ -107,11 +114,14 @@ def tune(lanes: Iterable[int], decision: int, flock: FlockRows, numbers: Any, wh
         for i in lanes:
             out = reach
             into = reach
+            # Of several faults of the radio the worst one counts, in each direction by itself.
             for kind in plan.suffers("radio"):
                 on = has_fault(i, kind, time, flock, numbers)
                 t = call_rule(kind.radio, reach=reach, **fault_arguments(i, kind, time, flock, plan=plan))
                 out = least(out, choose(on, t[0], reach))
                 into = least(into, choose(on, t[1], reach))
+            # Squares, because the pair loop compares squares; negative stands for "not at all", which no square can
+            # be.
             flock.reach_out[i] = choose(out < ZERO, -ONE, out * out)
             flock.reach_in[i] = choose(into < ZERO, -ONE, into * into)
     if plan.suffers("clock"):
@@ -123,6 +133,7 @@ def tune(lanes: Iterable[int], decision: int, flock: FlockRows, numbers: Any, wh
 
 def set_clocks(lanes: Iterable[int], clock: Any, time: Any, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
     """Fill a row with how far the clocks of agents are ahead at a time (s), by their faults."""
+    # Several kinds of clock faults add up, since each is an offset of the same clock.
     for i in lanes:
         ahead = ZERO
         for kind in plan.suffers("clock"):
@@ -135,6 +146,7 @@ def set_clocks(lanes: Iterable[int], clock: Any, time: Any, flock: FlockRows, nu
 def overrule(agents: Iterable[int], flock: FlockRows, numbers: Any, time: float, *, plan: Plan) -> None:
     """Disturb the commands that laws have just given."""
     c = flock.command
+    # After the law and before the body: a fault of command must be seen by the body and its limits.
     for i in agents:
         for kind in plan.suffers("overrule"):
             t = call_rule(

@@ -26,6 +26,7 @@ def free_distance(
     """How far (m) obstacles and the scene leave a ray free on its first r metres."""
     free = r
     if plan.obstacles:
+        # Each cast is cut at the free way so far, so that later ones end sooner.
         for o in range(whole.obstacles):
             free = least(free, ray_to_obstacle(x, y, z, ux, uy, uz, around.edges, around.spans, o, plan=plan))
     if plan.scene:
@@ -38,6 +39,8 @@ def fill_hidden(
 ) -> None:
     """Whom obstacles or the scene hide from agent i, as it believes both to be placed: row `hidden`."""
     x = flock.measured_position
+    # A cast through the tree of shapes branches and cannot be a vector, so it has a loop of its own, and only agents
+    # in range are cast at.
     for j in others:
         flock.hidden[j] = ZERO
         if flock.square[j] < HALF * FAR:
@@ -56,6 +59,7 @@ def fill_fade(
     for j in others:
         first = pair_number(i, j, n, flock, whole, plan=plan)
         second = pair_number(j, i, n, flock, whole, plan=plan)
+        # The pair is numbered by the lower number first, so that the signal is the same both ways.
         pair = first if flock.number[i] < flock.number[j] else second
         w0, w1, w2, w3 = random.draw(pair, decision, FADE, whole.world, whole.seed_low, whole.seed_high)
         one, two = random.normal_pair(w0, w1)
@@ -76,6 +80,8 @@ def meet(
 
 def call_topology(n: int, others: CandidateRows, numbers: Any, *, plan: Plan) -> None:
     """Ask the topology whom of these n an agent meets: row `met`."""
+    # The k-th least distance is a limit, and an agent exactly on it is met, too: no number of an agent decides, and a
+    # flock that is its own mirror image stays so.
     call_rule(
         plan.meets, n=n, dx=others.away[X], dy=others.away[Y], dz=others.away[Z], r2=others.square,
         hidden=others.hidden, fade=others.fade, met=others.met, heap=others.heap, weak=others.weak, t=numbers.topology,

@@ -27,6 +27,8 @@ from airflock.engine.stages.words import (
 
 def measured_velocity(i: int, a: int, flock: FlockRows, *, plan: Plan) -> Any:
     """Own velocity as agent i measures it along one axis, m/s."""
+    # The controller feels the true velocity plus the error of the last measurement, so the body flies on between two
+    # decisions. It keeps the inertial velocity when satellite navigation fails: a frozen one would be a runaway.
     return (
         flock.velocity[a][i] + flock.own_drift[a][i]
         if plan.has_sensor_error and a < plan.dimensions
@@ -45,7 +47,10 @@ def apply_body_and_faults(
     for i in () if kept else hurt:
         for a in range(plan.dimensions):
             flock.before_step[a][i] = v[a][i]
+    # All lanes take the plain loop of the body; rules of faults are called afterwards over the lanes that may suffer.
+    # Two loops of the body (with and without faults) gave other last bits and cost more than this second pass.
     apply_body(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
+    # Faults are applied one after another, each to what the one before left of the motion.
     for i in hurt:
         t = (v[X][i], v[Y][i], v[Z][i])
         for kind in faults:
@@ -109,6 +114,7 @@ def move(
     g = aliases()
     if rule_asks(plan.body.move, "gx", "gy", "gz"):
         noise()
+        # One Philox call gives four normal numbers; in a plane two steps share it.
         for a in range(plan.dimensions):
             g[a] = flock.outer[a] if plan.dimensions == 3 or step % 2 == 0 else flock.outer[a + 2]
     time = real(step) * numbers.c.dt
@@ -120,7 +126,9 @@ def move(
     if plan.integration != "old":
         apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
     fastest = ZERO
-    for i in lanes if watched else ():  # whole vectors, of which some lanes have no agent
+    # Over whole vectors, with absent lanes counted as standing: the remainder of a loop costs three times as much per
+    # agent as its vector part.
+    for i in lanes if watched else ():
         if drifts:
             speed2 = sum(
                 velocity_beside_drift(i, a, held, flock) * velocity_beside_drift(i, a, held, flock)
@@ -129,11 +137,15 @@ def move(
         else:
             speed2 = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
         fastest = most(fastest, choose(integer(i) < integer(n), speed2, ZERO))
+    # Positions move by the velocity before the step (the authors' program, integration "old") or after it; `fastest` is
+    # that of the velocity that moves them, so the bound on collisions is exact.
     for a in range(plan.dimensions):
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
     if plan.integration == "old":
         apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
+    # Edges come last, when the step is done: a periodic box takes the agent to its other side, a mirror turns its
+    # velocity.
     if plan.edge_rule:
         for i in agents:
             for a in range(plan.dimensions):
