@@ -44,7 +44,7 @@ def start_drift(held: Any, flock: FlockRows, n: int, *, plan: Plan) -> None:
 
 
 def approach_bound(held: Any, fastest: Any, dt: Any) -> Any:
-    """How much nearer two agents may have come in a step, m.
+    """Bound how much nearer two agents may have come in a step, m.
 
     fastest : largest squared speed beside the drift, m²/s²
     """

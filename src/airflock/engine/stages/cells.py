@@ -152,7 +152,7 @@ def sort_by_cells(
 
 
 def line_position(line: int, count: Any) -> Any:
-    """Where a line of cells lies along y and z; lines come strip by strip."""
+    """Return the position of a line of cells along y and z; lines come strip by strip."""
     wide = STRIP * count[Z]
     strip = line // wide
     high = min(STRIP, count[Y] - strip * STRIP)
@@ -177,7 +177,7 @@ def first_cell_of_row(cy: Any, cz: Any, count: Any, *, plan: Plan) -> Any:
 
 
 def agents_around(oy: int, oz: int, starts: Any, count: Any, *, plan: Plan) -> Any:
-    """How many agents lie in and around a line of cells."""
+    """Count the agents in and around a line of cells."""
     room = 0
     for qz in cells_beside(oz, count[Z], plan=plan) if plan.dimensions == 3 else (0,):
         cz = wrap_cell(qz, count[Z], plan=plan)
@@ -191,7 +191,7 @@ def agents_around(oy: int, oz: int, starts: Any, count: Any, *, plan: Plan) -> A
 
 
 def image_shift(q: Any, c: Any, count: Any, width: Any) -> Any:
-    """How far the image q of cell c of a periodic box of this width (m) is shifted along an axis, m."""
+    """Return the shift (m) along an axis of the image q of cell c, in a periodic box of this width (m)."""
     # Agents are copied at the image where they are met, so that the pair loop knows no periodic box.
     return real((q - c) // count) * width
 

@@ -1,8 +1,8 @@
-"""Clusters: who is linked to whom, one agent after another, and the rules of an order parameter over each cluster.
+"""Clusters: linked agents, found one after another, and the rules of an order parameter over each cluster.
 
-A cluster grows from its first agent, which is expanded, then the next of its members, until all are. `state` is 0 of an
-agent that nobody has reached, 1 of one in the cluster that grows, 2 of one in an earlier cluster; `expanded` is 1 of
-those whose links have been looked at.
+A cluster grows from its first agent, which is expanded, then the next of its members, until all are. The array
+`state` is 0 for an agent in no cluster yet, 1 for a member of the growing cluster, 2 for a member of an earlier one;
+`expanded` is 1 for agents with all links checked.
 """
 
 import math
@@ -38,7 +38,7 @@ from airflock.engine.stages.words import (
 def expand_agent(
     e: int, state: Any, expanded: Any, flock: FlockRows, numbers: Any, n: int, *, plan: Plan, metric: Metric
 ) -> Any:
-    """Take whoever is linked to agent e, and in no cluster yet, into the cluster that grows; returns how many."""
+    """Add the agents that are linked to agent e, and in no cluster yet, to the growing cluster; return their number."""
     own = vector()
     for a in range(plan.dimensions):
         own[a] = flock.position[a][e]
@@ -92,7 +92,7 @@ def grow_cluster(
 
 
 def call_member(i: int, mean: Any, flock: FlockRows, numbers: Any, *, metric: Metric) -> Any:
-    """What the member rule of a metric says of agent i; mean : over its cluster."""
+    """Call the member rule of a metric for agent i; mean : over its cluster."""
     pair = shared_record(metric.Pair, flock.pair, i, metric) if rule_asks(metric.member, "pair") else None
     return call_rule(metric.member, **agent_arguments(i, flock), pair=pair, mean=mean, q=numbers.q)
 

@@ -16,7 +16,7 @@ MAX_GATHERED = 64  # shapes gathered at most; where more are in sight, each cast
 
 
 def law_asks(model: Model, name: str) -> bool:
-    """Whether a rule that decides asks for something by this name."""
+    """Return True if a deciding rule of the law takes an argument of this name."""
     return any(rule_asks(rule, name) for rule in model.decide_rules)
 
 
@@ -26,12 +26,12 @@ def summed_record(i: int, record: Any, rows: Columns, live: Iterable[int]) -> An
 
 
 def shared_record(i: int, flock: FlockRows, *, model: Model) -> Any:
-    """What the rule of the whole flock found for agent i."""
+    """Return the record Shared of agent i, which the rule of the whole flock has filled."""
     return model.Shared(*[flock.shared("model", name)[i] for name in model.Shared._fields])  # type: ignore[misc, union-attr]
 
 
 def goal_of(i: int, a: int, flock: FlockRows, scene: Any, *, plan: Plan) -> Any:
-    """Where the goal of agent i is along one axis, m: its own, or that of the flock."""
+    """Return the goal of agent i along one axis, m: its own, or that of the flock."""
     return flock.goal[a][i] if plan.own else scene.aim[a]
 
 

@@ -1,4 +1,4 @@
-"""Flight: the order of a step, and of a recording that is measured; what a step is made of are the other stages."""
+"""Flight: the order of the stages in a step of a flight, and in a recording that is measured."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -30,13 +30,13 @@ def add_up(sums: Any, values: Any, sampled: Sampled, count: int) -> None:
 
 
 def metric_range(metrics: tuple[Metric, ...], q: Any) -> Any:
-    """Distance beyond which no metric has anything to say of a pair, m."""
+    """Return the distance beyond which pairs contribute to no metric, m."""
     # The widest radius of all metrics on this clock: one loop serves all of them, so the least eager one decides.
     return most(metric_range(metrics[:-1], q), call_rule(metrics[-1].within, q=q)) if metrics else ZERO
 
 
 def reset_metric_memory(metrics: tuple[MeasuredMetric, ...], memory: Any, n: int) -> None:
-    """Put what metrics remember back to its start."""
+    """Reset the memory of metrics to its start values."""
     # Metrics and fields are written out; the loop over agents is the one that remains in the driver.
     for one in metrics:
         for c, start in enumerate(getattr(one.metric.Memory, "_field_defaults", {}).values()):
@@ -57,8 +57,8 @@ def keep(frame: int, flock: FlockRows, frames: Any, n: int, *, plan: Plan, slots
 def keep_frame(step: int, first: int, frames: Any, whole: Any, *, stages: Stages) -> None:
     """Keep a frame, where there are any.
 
-    The first frame is that of the first sample at or after the step `first`. Whether a flight is recorded is asked of
-    its frames, not of its plan: the same driver then flies it with and without a recording.
+    The first frame is that of the first sample at or after the step `first`. The size of the
+    array decides whether a flight is recorded, not the plan: one driver flies with and without a recording.
     """
     # A driver with and one without frames would be two compilations for `run --save`; one comparison a sample is
     # cheaper.
@@ -85,7 +85,7 @@ def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
 def sample_stage(
     name: str, time: Any, values: Any, sums: Any, *, stages: Stages, sampled: Mapping[str, tuple[Sampled, int]]
 ) -> None:
-    """Let a stage measure, and add up what it found."""
+    """Call a stage that measures, and add its values to the sums."""
     call_rule(stages[name], time=time)
     add_up(sums, values, *sampled[name])
 
@@ -93,7 +93,7 @@ def sample_stage(
 def prepare(
     held: Any, flock: FlockRows, whole: Any, m: int, past: Any, *, stages: Stages, order: Order, slots: bool
 ) -> None:
-    """Once agents have their places: who lies in which slot, and what was sent before the first step."""
+    """Number the slots and fill the ring of sent states, once the agents have their places."""
     if slots:
         for i in range(m):
             flock.number[i] = i
@@ -108,7 +108,7 @@ def prepare(
 def sense(
     step: int, time: Any, late: Any, numbers: Any, whole: Any, past: Any, *, plan: Plan, stages: Stages, order: Order
 ) -> None:
-    """What comes before anybody moves: what is sent, what changes in the world and, unless in turn, decisions."""
+    """Do the first half of a step: send, change the world and, unless agents take turns, decide."""
     # The ring holds what is under way: slot k of the ring is heard at decision k, `delay` steps after it was sent.
     for name in order["send"]:
         if (step + whole.delay) % whole.decide_every == 0:

@@ -1,8 +1,8 @@
-"""Links by cells: who is linked to whom in a large flock, and the rules of an order parameter over each cluster.
+"""Links by cells: linked agents of a large flock, and the rules of an order parameter over each cluster.
 
 A cluster grows from its first agent: each member in turn looks at the cells around its own, which are as wide as links
-reach. Of a cell `left` are those in no cluster yet, in its first places; whoever is reached leaves them, so that nobody
-is looked at once more. What is found is that of `clusters` but for the order of sums.
+reach. The first `left` places of a cell hold its agents in no cluster yet; an agent that joins leaves them, so that
+none is visited twice. Results are those of `clusters` except for the order of sums.
 """
 
 import math
@@ -29,7 +29,7 @@ def join_cell(
     plan: Plan,
     metric: Metric,
 ) -> Any:
-    """Take whoever is left in a cell and linked to a place into the cluster; returns how many have been reached."""
+    """Add the linked agents of one cell to the growing cluster; return the new length of `reached`."""
     k = cells.starts[here]
     end = k + grown.left[here]
     while k < end:
@@ -62,7 +62,7 @@ def expand_member(
     plan: Plan,
     metric: Metric,
 ) -> Any:
-    """The same of all cells around that of the agent at place f."""
+    """Add the linked agents of all cells around the agent at place f; return the new length of `reached`."""
     own, at, low, high, count = vector(), vector(), vector(), vector(), cells.count
     for a in range(plan.dimensions):
         own[a] = cells.flat[a, f]

@@ -99,7 +99,7 @@ def field_names(record: Any) -> tuple[str, ...]:
 
 
 def reductions(record: Any, metric: Metric) -> list[str]:
-    """How each field of a record of a metric adds up: sum, min or max."""
+    """Return the reduction of each field of a record of a metric: sum, min or max."""
     return [metric.reduce.get(name, "sum") for name in field_names(record)]
 
 
@@ -142,10 +142,9 @@ def sum_pairs(
 ) -> Any:  # fmt: skip
     """Sum the pair rules of all metrics over the others of each agent; returns the least squared distance, m².
 
-    nearest : whether the least distance is asked for. Only then: two minima of the same squares in one loop are not
+    nearest : whether the least distance is needed; only then, as two minima of the same squares in one loop are not
               vectorised (7 times slower)
-    abreast : whether two agents go through the others together, where it is not. One reading of the others serves
-              both; and LLVM, which repeats a short loop of minima four times for vectors of 64 agents, does so twice
+    abreast : whether two agents go through the others together, where the least distance is not needed
     """
     least2 = FAR
     if any(one.metric.pair is not None for one in metrics):
@@ -170,7 +169,7 @@ def sum_pairs_of(
     agents: tuple[int, ...], flock: FlockRows, numbers: Any, n: int, m: int,
     *, plan: Plan, metrics: tuple[MeasuredMetric, ...], nearest: bool,
 ) -> Any:  # fmt: skip
-    """The same of these agents, one or two."""
+    """Sum the pair rules for these agents, one or two; return the least squared distance, m²."""
     axes, x = range(plan.dimensions), flock.position
     paired = [one for one in metrics if one.metric.pair is not None]
     own, other, sums, others = vector(), vector(), totals(), totals()
@@ -221,7 +220,7 @@ def agent_arguments(i: int, flock: FlockRows) -> Any:
 def call_agent_rule(
     i: int, pair: Any, shared: Any, kept: Any, mean: Any, flock: FlockRows, numbers: Any, *, metric: Metric
 ) -> Any:  # fmt: skip
-    """What the agent rule of a metric says of agent i; and, where it remembers, what it is to remember."""
+    """Call the agent rule of a metric for agent i; returns its terms and, where it has a memory, the new memory."""
     return call_rule(
         metric.agent,
         **agent_arguments(i, flock),
@@ -293,9 +292,9 @@ def measure(
     excursion      : the stage of this name
     survey         : runs the rule of the whole flock of a metric, by its name, where it has one
     clustered      : finds its clusters
-    nearest        : whether the least distance is asked for
+    nearest        : whether the least distance is needed
     abreast        : whether two agents may go through the others of a pair rule together
-    headed         : whether speeds, headings or means of the flock are asked for
+    headed         : whether rules need speeds, headings or means of the flock
     summed         : of what the flock's mean is taken: position x, velocity v, heading h
     over           : what goes through pairs by cells; None: all pairs
     """

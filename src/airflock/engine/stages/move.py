@@ -26,7 +26,7 @@ from airflock.engine.stages.words import (
 
 
 def measured_velocity(i: int, a: int, flock: FlockRows, *, plan: Plan) -> Any:
-    """Own velocity as agent i measures it along one axis, m/s."""
+    """Return the own velocity as agent i measures it along one axis, m/s."""
     # The controller feels the true velocity plus the error of the last measurement, so the body flies on between two
     # decisions. It keeps the inertial velocity when satellite navigation fails: a frozen one would be a runaway.
     return (
@@ -40,7 +40,7 @@ def apply_body_and_faults(
     lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
     hurt_first: int, hurt_end: int, *, plan: Plan, kept: bool,
 ) -> None:  # fmt: skip
-    """Velocities by the rule of the body and then, among those of whom anybody suffers from any, by its faults."""
+    """Advance velocities by the rule of the body, then apply faults of motion on the affected lanes."""
     v = flock.velocity
     faults = plan.suffers("motion")
     hurt = () if not faults else lanes if plan.sequential else lanes_between(lanes, hurt_first, hurt_end)
@@ -66,7 +66,7 @@ def apply_body_and_faults(
 def apply_body(
     lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
 ) -> None:
-    """Velocities by the rule of the body."""
+    """Advance velocities by the rule of the body."""
     v, command = flock.velocity, flock.command
     for i in lanes:
         t = call_rule(
@@ -102,12 +102,12 @@ def move(
     noise: Callable[[], None], gusts: Callable[[], Any], held: Any, hurt_first: int, hurt_end: int,
     *, plan: Plan, watched: bool, drifts: bool, kept: bool,
 ) -> Any:  # fmt: skip
-    """Velocities by the body, positions by the velocity before or after; returns the largest squared speed.
+    """Advance velocities by the body and positions by the velocity before or after; return the largest squared speed.
 
     noise, gusts         : the stages of these names, for this step
-    watched              : whether somebody wants to know that speed; else it is 0
+    watched              : whether that speed is needed; else it is 0
     drifts, held         : whether it is that beside the drift of the flock (`stages.approach`)
-    hurt_first, hurt_end : lanes of those among whom somebody suffers from a fault of motion (`stages.faults.struck`)
+    hurt_first, hurt_end : lanes that hold all agents with a fault of motion (`stages.faults.struck`)
     kept                 : whether their velocities are kept from step to step, so that no step copies them
     """
     x, v = flock.position, flock.velocity

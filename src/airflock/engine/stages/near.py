@@ -118,7 +118,7 @@ def in_ring(
     paired: list[MeasuredMetric],
     nearest: bool,
 ) -> Any:
-    """The same of all cells of a ring around the cell of the agent, of the first ring with what is inside of it.
+    """Add the pairs with all agents in one ring of cells around the own cell; the first ring includes its inside.
 
     Cells side by side along x are one run of places; a run that goes over the ends of a periodic box is cut there.
     """
@@ -148,7 +148,7 @@ def in_ring(
 
 
 def unsettled(beyond: Any, near2: Any, sums: Any, numbers: Any, *, paired: list[MeasuredMetric], nearest: bool) -> Any:
-    """Whether somebody farther than `beyond` could still change what is summed, 1 or 0."""
+    """Return 1 if an agent farther than `beyond` (m) could still change the sums, else 0."""
     open_ = 0
     # All metrics of the clock share one search, so the slowest of them decides how far it goes.
     for metric, _, _, first in paired:
@@ -197,7 +197,7 @@ def pairs_by_cells(
     flock: FlockRows, numbers: Any, cells: SortedCells, sides: Any,
     *, plan: Plan, metrics: tuple[MeasuredMetric, ...], nearest: bool,
 ) -> Any:  # fmt: skip
-    """What `pairs` finds, for metrics that say when their pairs are `settled`.
+    """Sum the pair rules by cells, as `sum_pairs` does, for metrics that say when their pairs are `settled`.
 
     sides : size of a cell along each axis, m
     """

@@ -32,7 +32,7 @@ SMALLEST = 1e-3  # m; width of the cells of a law that nobody flies by
 
 
 def own_state(i: int, own: Any, v: Any, h: Any, true: Any, flock: FlockRows, *, plan: Plan) -> None:
-    """Where agent i believes that it is (own), how it moves (v) and heads (h), and where it is (true)."""
+    """Load the state of agent i into vectors: believed place (own), velocity (v), heading (h) and true place."""
     axes = range(plan.dimensions)
     for a in axes:
         own[a] = flock.measured_position[a][i]
@@ -104,11 +104,11 @@ def neighbours(
 ) -> None:
     """Sum the neighbour rule over all others in range of each agent, or over those that its topology lets it meet.
 
-    late   : how old is what is heard on arrival, s
+    late   : age of data on arrival, s
     draw   : where packets are lost, fills the rows of `words` for agent i and the others of its four
-    drawn  : instead of it, draws the random word of what agent j sends agent i; each pair is then looked at by itself,
-             also for what stands between the two
-    meet   : finds whom of those whom agent i hears it meets, where that is not all of them
+    drawn  : draws the random word of a packet from agent j to agent i instead; each pair then also finds by itself what
+             stands between the two
+    meet   : fills the row `met` of agent i, where it does not meet all that it hears
     sums   : each field of Sums that is summed, and how it is reduced
     images : whether offsets go to the nearest image (candidates that come by cells are at theirs)
     """

@@ -12,10 +12,10 @@ OUTER = random.OUTER
 
 
 class DrawFunctions(NamedTuple):
-    """`draw` and `normal` as functions of the driver, each once, whoever asks.
+    """`draw` and `normal` as functions of the driver, each once for all callers.
 
     words     : draws for agents that lie at their own numbers, or for all by their numbers where they are sorted
-    by_number : draws by their numbers where some may have left, of whom the others keep the order; None where none may
+    by_number : draws by their numbers, where some may have left and the others keep their order; None where none may
     """
 
     words: Callable[..., Any]
@@ -23,14 +23,14 @@ class DrawFunctions(NamedTuple):
     normal: Callable[..., Any]
 
 
-Draw = DrawFunctions | None  # None: their loops stand where they are asked for
+Draw = DrawFunctions | None  # None: their loops stand in place of the calls
 
 
 def draw(
     m: int, order: Row, step: Any, stream: int, world: Any, seed_low: Any, seed_high: Any, u0: Row, u1: Row, u2: Row,
     u3: Row,
 ) -> None:  # fmt: skip
-    """Four random words of a stream per agent, in four rows; order: numbers of the agents."""
+    """Draw four random words of a stream per agent, into four rows; order: numbers of the agents."""
     # Philox is inlined here before LLVM sees it. Compiled alone, LLVM vectorises across its four words, and the loop
     # over agents stays scalar: 2.8 µs instead of 0.65 µs for 112 agents.
     for i in range(m):
@@ -38,7 +38,7 @@ def draw(
 
 
 def fill_words(u: Columns, flock: FlockRows, whole: Any, step: Any, stream: int, m: int, drawn: Draw) -> None:
-    """The same of this world.
+    """Draw four random words of a stream for all agents of this world.
 
     Until somebody leaves each agent lies at its own number, and a loop that counts takes a tenth less than one that
     looks the number up. The two are functions of their own: beside the other, either is compiled to a slower one.

@@ -1,4 +1,4 @@
-"""Pair: what an agent hears of another one, and what its law makes of it."""
+"""Pair: an agent hears another one, and its law turns that into terms of its sums."""
 
 import math
 from typing import Any
@@ -54,7 +54,7 @@ HEAR_AND_ADD, HEAR, ADD = "both", "hear", "add"
 
 
 def heard_age(me: PairLoopAgent, j: int, at: Decision, flock: FlockRows, *, plan: Plan) -> Any:
-    """How old the data of agent j are on arrival, as the clocks of both tell, s."""
+    """Return the age of the data of agent j on arrival, by the clocks of both, s."""
     return at.late + flock.clock[me.i] - sending_clock(j, flock, plan=plan) if plan.suffers("clock") else at.late
 
 
@@ -64,13 +64,13 @@ def group_of(j: int, others: CandidateRows, *, plan: Plan) -> Any:
 
 
 def same_group(i: int, j: int, flock: FlockRows, others: CandidateRows, *, plan: Plan) -> Any:
-    """Whether two agents are of one group, 1 or 0; all are where nobody asks for groups."""
+    """Return 1 if two agents are of one group, else 0; always 1 where no rule uses groups."""
     # A rule sees of groups only two words, `kin` and `group`: what a group means is the business of the law.
     return (ONE if others.group[j] == flock.own("", "group")[i] else ZERO) if plan.uses_groups else ONE
 
 
 def true_offset(me: PairLoopAgent, j: int, o: Any, flock: FlockRows, w: Any, *, plan: Plan) -> Any:
-    """True offset o of agent j, m, and the square of its length, m²."""
+    """Fill the true offset o of agent j, m, and return its squared length, m²."""
     axes = range(plan.dimensions)
     # Two loops over the axes, one after the other: they are written out, and the second stands only in a periodic
     # box.
@@ -115,7 +115,7 @@ def as_heard(
 
 
 def is_other(me: PairLoopAgent, q: int) -> Any:
-    """Whether the one at place q among the others is there, and another agent."""
+    """Return True if place q among the others holds an agent, and not the agent itself."""
     return integer(q) != me.ii if me.end is None else (integer(q) != me.ii) & (integer(q) < me.end)
 
 
@@ -135,7 +135,7 @@ def pair_counts(
     plan: Plan,
     model: Model,
 ) -> Any:
-    """Whether an agent hears agent j, or meets it, as far as distances say: in range, and within the law's reach."""
+    """Return True if agent j counts by distance: in radio range (or met), and within the law's reach."""
     # Range of the radio (true distance) first, the law's own reach (believed distance) last; exactly on the edge
     # counts.
     if part == ADD:
@@ -152,7 +152,7 @@ def pair_counts(
 
 
 def true_offset_if_asked(me: PairLoopAgent, j: int, part: str, o: Any, flock: FlockRows, w: Any, *, plan: Plan) -> Any:
-    """True offset o of agent j, m, and the square of its length, m², where either is asked for; else 0."""
+    """Fill the true offset o of agent j, m, and return its squared length, m², where rules need it; else return 0."""
     # Without delay, sensor errors or packets the believed offset is the true one; a second subtraction would cost
     # every pair.
     if (plan.perturbed or plan.packets) and part != ADD:  # noqa: SIM108 - a helper of several lines stands alone
@@ -174,7 +174,7 @@ def is_clear_between(
     *,
     plan: Plan,
 ) -> Any:
-    """Whether nothing stands between two agents, 1 or 0, where it shades the radio."""
+    """Return 1 if nothing that shades the radio stands between two agents, else 0."""
     if plan.shades and at.drawn is not None:
         # A GPU has no row per agent for this: a table of all pairs would not fit, so each pair is cast inside the
         # loop.
@@ -216,7 +216,7 @@ def receive_packet(
 def packet_arrives(
     me: PairLoopAgent, j: int, ok: Any, part: str, apart2: Any, r: Any, at: Decision, k: Any, *, plan: Plan
 ) -> Any:
-    """Whether what counts is not lost on the way, where radio.loss says that some is."""
+    """Return True if a pair that counts also receives its packet, by the loss of the radio."""
     if plan.lossy and not plan.packets and part != ADD:
         # One uniform number against one probability decides loss and both links: three draws a pair, real powers and
         # rows written and read again made two lossy links ten times as dear as an ideal radio; this way 1.7 times.

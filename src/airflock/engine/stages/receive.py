@@ -29,11 +29,11 @@ from airflock.engine.stages.words import (
 PACKET = random.PACKET
 AIR = random.AIR
 MORE = random.AIR + 256  # a second draw of the same pair
-UNIFORM, NORMAL = ("u0", "u1", "u2", "u3"), ("g0", "g1", "g2", "g3")  # random numbers that a rule may ask for
+UNIFORM, NORMAL = ("u0", "u1", "u2", "u3"), ("g0", "g1", "g2", "g3")  # random numbers that a rule may take
 
 
 def first_of_four(i: int, flock: FlockRows) -> Any:
-    """Whether agent i is the first at hand of the four receivers that share random words."""
+    """Return True if agent i is the first present one of the four receivers that share random words."""
     # Where agents have left, numbers have gaps: a new group of four begins where the quotient by four changes.
     return (i == 0) | (flock.number[i] >> 2 != flock.number[i - 1] >> 2)
 
@@ -68,17 +68,17 @@ def drawn_pair_word(me: PairLoopAgent, j: int, at: Decision) -> Any:
 
 
 def clock_time(time: Any, i: int, flock: FlockRows, *, plan: Plan) -> Any:
-    """A time (s) as the clock of agent i tells it."""
+    """Return a time (s) by the clock of agent i."""
     return time + flock.clock[i] if plan.suffers("clock") else time
 
 
 def sending_clock(j: int, flock: FlockRows, *, plan: Plan) -> Any:
-    """How far the clock of agent j was ahead when it sent what comes in now, s."""
+    """Return how far the clock of agent j was ahead when it sent the data that arrive now, s."""
     return flock.sent_clock[j] if plan.late else flock.clock[j]
 
 
 def sent_time(j: int, at: Decision, flock: FlockRows, *, plan: Plan) -> Any:
-    """When what comes in at a decision was sent by agent j, by its own clock, s."""
+    """Return when agent j sent the data that arrive at a decision, by its own clock, s."""
     return at.time - at.late + sending_clock(j, flock, plan=plan) if plan.suffers("clock") else at.time - at.late
 
 
@@ -90,7 +90,7 @@ def packet_count(decision: int, rate: Any, numbers: Any) -> Any:
 def loss_probability(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
     """Probability that nothing of what one agent sends another arrives, in range.
 
-    about : what a rule may ask for of the two and of the decision
+    about : arguments of the rules of the radio for this pair and decision
     """
     # Two independent causes of loss are one probability, so that one draw decides both.
     return (
@@ -103,7 +103,7 @@ def loss_probability(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
 def pair_numbers(
     me: PairLoopAgent, j: int, flock: FlockRows, whole: Any, at: Decision, *, plan: Plan
 ) -> dict[str, Any]:
-    """Random numbers of one pair and decision that rules of the radio may ask for, by name."""
+    """Draw the random numbers that rules of the radio take for one pair and decision, by name."""
     pair = pair_number(me.i, j, at.agents, flock, whole, plan=plan)
     u, g = totals(), totals()
     # Only the numbers that a rule of this radio takes are drawn: each Philox call is a cost for every pair.
@@ -133,10 +133,10 @@ def update_packet(
     *,
     plan: Plan,
 ) -> None:
-    """Where packets are kept: `packet` is then the newest that an agent has of agent j.
+    """Receive what agent j sends, and put the newest packet of it into `packet`, where packets are kept.
 
-    apart2, carried2 : squares of how far the two are apart, and of how far packets carry, m²
-    about            : what rules of the radio may ask for of the two and of the decision
+    apart2, carried2 : squared distance of the two, and squared range of packets, m²
+    about            : arguments of the rules of the radio for this pair and decision
     """
     dims = plan.dimensions
     got = apart2 <= carried2
@@ -168,7 +168,7 @@ def glimpse(
     i: int, j: int, got: Any, rolled: dict[str, Any], at: Decision, packet: Any, flock: FlockRows, numbers: Any,
     *, plan: Plan,
 ) -> None:  # fmt: skip
-    """`packet` is then where agent i believes agent j by the newest picture that shows it.
+    """Put the place of agent j into `packet`, by the newest picture that shows it to agent i.
 
     Places are those that agent i believes in, so the error of its own position is in all of them alike.
     """
@@ -199,7 +199,7 @@ def glimpse(
 def call_receive(
     i: int, j: int, near: Any, about: dict[str, Any], at: Decision, flock: FlockRows, numbers: Any, *, plan: Plan
 ) -> Any:
-    """Whether a packet arrives by the radio's own rule; its Packet is then the new one, where packets carry so far."""
+    """Return True if a packet arrives by the radio's own rule; keeps its new Packet where the pair is in range."""
     age = clock_time(at.time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
     if plan.radio.Packet is not None:
         # What the rule remembers of a pair changes only where the two are in range, as if it had not been called
@@ -216,7 +216,7 @@ def call_receive(
 def queue_packet(
     i: int, j: int, got: Any, about: dict[str, Any], at: Decision, flock: FlockRows, numbers: Any, *, plan: Plan
 ) -> None:
-    """What agent j sends agent i and is not lost goes under way, unless another packet of this pair is."""
+    """Put a packet that is not lost on its way, unless another packet of this pair is on its way already."""
     dims, first, due = plan.dimensions, plan.waiting, 2 * plan.waiting
     goes = got & (flock.packet[due][i, j] < HALF * GONE)
     wait = call_rule(plan.radio.late, **about, k=numbers.k)
@@ -234,7 +234,7 @@ def queue_packet(
 
 
 def deliver_due(i: int, j: int, at: Decision, packet: Any, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
-    """What is due by now has come; half a step is as good as none."""
+    """Deliver the packet on its way if it is due by now, within half a step."""
     first, due = plan.waiting, 2 * plan.waiting
     # Half a motion step of tolerance: float32 times of send and delay do not add up exactly to a step.
     come = (flock.packet[due][i, j] > HALF * GONE) & (flock.packet[due][i, j] <= at.time + HALF * numbers.c.dt)
@@ -244,16 +244,16 @@ def deliver_due(i: int, j: int, at: Decision, packet: Any, flock: FlockRows, num
 
 
 def extrapolated(a: int, age: Any, packet: Any, *, plan: Plan) -> Any:
-    """Where the sender of a packet is believed to be along one axis, m: where it was, or carried forward.
+    """Return the believed place of the sender of a packet along one axis, m: as sent, or carried forward.
 
-    Written out what `core.radio.forward` says: as a call, compilers add up in another order, and flights differ by it.
+    Writes `core.radio.forward` out: as a call, compilers add in another order, and flights change in their last bits.
     """
     # Written out although `core.radio.forward` says the same; see the docstring.
     return packet[a] + packet[a + plan.dimensions] * age if plan.radio.carry is radio.forward else packet[a]
 
 
 def carried_by_rule(age: Any, packet: Any, k: Any, *, plan: Plan) -> Any:
-    """The same by any other rule of the radio, of all axes at once."""
+    """Return the believed place of the sender of a packet by a rule of the radio, all axes at once, m."""
     return call_rule(
         plan.radio.carry, x=packet[X], y=packet[Y], z=packet[Z] if plan.dimensions == 3 else ZERO,
         vx=packet[plan.dimensions + X], vy=packet[plan.dimensions + Y],
@@ -262,7 +262,7 @@ def carried_by_rule(age: Any, packet: Any, k: Any, *, plan: Plan) -> Any:
 
 
 def packet_is_valid(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
-    """Whether the newest packet that an agent has of another one, of this age (s), says something.
+    """Return True if the newest packet of another agent, of this age (s), still counts.
 
     Over a radio that keeps it, it does until the next one comes; where lost neighbours stop an agent, until they count
     as lost.
@@ -279,6 +279,6 @@ def packet_is_valid(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
 
 
 def load_packet(i: int, j: int, packet: Any, flock: FlockRows, *, plan: Plan) -> None:
-    """Where packets are kept: `packet` is then the newest that agent i has of agent j."""
+    """Load the newest packet that agent i has of agent j into `packet`."""
     for c in range(2 * plan.dimensions + 1):
         packet[c] = flock.packet[c][i, j]

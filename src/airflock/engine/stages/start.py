@@ -1,4 +1,4 @@
-"""Start: where agents are when a flight begins, and how far a place is outside."""
+"""Start: the places of agents when a flight begins, and the distance of a place outside the arena."""
 
 from collections.abc import Callable
 from typing import Any
@@ -21,7 +21,7 @@ EXTENTS = ("extent_x", "extent_y", "extent_z")
 def excursion(
     x: Any, y: Any, z: Any, w: Any, edges: Any, spans: Any, corners: int, obstacles: int, scene: Any, *, plan: Plan
 ) -> Any:
-    """How far a position is outside the arena, or inside of what stands in it, m; negative elsewhere."""
+    """Return how far a position is outside the arena, or inside an obstacle, m; negative elsewhere."""
     e = plan.excursion(
         x, y, height_above_middle(z, edges, corners, plan=plan), w.half_x, w.half_y, w.half_z, edges, corners
     )
@@ -53,7 +53,7 @@ def try_place(
 
 
 def is_free(free: Any, s: Any, w: Any, scene: Any, *, plan: Plan) -> Any:
-    """Whether a place that is free so far is at `start.clearance` from the scene, and no mesh closes around it."""
+    """Return True if a place that is free so far keeps `start.clearance` from the scene and is inside no mesh."""
     if plan.scene:
         if free:
             free = bvh.nearest(s[X], s[Y], s[Z], w.clearance, *scene_tree(scene)).distance >= w.clearance

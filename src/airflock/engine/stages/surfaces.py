@@ -12,7 +12,7 @@ from airflock.world import bvh, polygon
 
 
 def add_surface(i: int, surface: Any, flock: FlockRows, numbers: Any, *, plan: Plan, model: Model) -> None:
-    """Add what agent i feels of one surface."""
+    """Add the terms of one surface to the sums of agent i."""
     v = vector()
     for a in range(plan.dimensions):
         v[a] = flock.measured_velocity[a][i]
@@ -26,7 +26,7 @@ def add_surface(i: int, surface: Any, flock: FlockRows, numbers: Any, *, plan: P
 
 
 def wall_reach_of(i: int, look: Any, flock: FlockRows, numbers: Any, *, plan: Plan, model: Model) -> Any:
-    """How far agent i feels surfaces, m: as far as all, or by its own numbers."""
+    """Return the distance within which agent i feels surfaces, m: that of the flock, or by its own numbers."""
     return (
         least(call_rule(model.wall_reach, p=agent_numbers(i, "p", flock, numbers, plan=plan)), LIMIT)
         if plan.varies("p") and model.wall_reach is not None

@@ -62,7 +62,7 @@ def integer(value: Any) -> Any:
 
 
 def row_index(value: Any) -> Any:
-    """A whole number that is a place in a row: a driver need not ask whether it counts from the row's end."""
+    """A whole number that is a place in a row: a driver need not test whether it counts from the row's end."""
     # Numba tests for every signed index whether it counts from the row's end; leaving the test out took 1 % off a
     # flight.
     return int(value)
@@ -123,13 +123,13 @@ def aliases() -> Any:
 
 
 def call_rule(rule: Callable[..., Any] | None, **offered: Any) -> Any:
-    """Call a rule with what it asks for by name. A driver computes only that."""
+    """Call a rule with the arguments that it takes, by name. A driver computes only those."""
     assert rule is not None
     return rule(*(offered[name] for name in inspect.signature(rule).parameters))
 
 
 def rule_asks(rule: Callable[..., Any] | None, *names: str) -> bool:
-    """Whether a rule asks for any of these names."""
+    """Return True if a rule takes an argument of any of these names."""
     return rule is not None and bool(set(names) & set(inspect.signature(rule).parameters))
 
 
