@@ -28,8 +28,8 @@ from c_reference import SCORES
 
 from airflock.engine import cpu, plan_of, score_flights
 from airflock.engine.cuda import launch
-from airflock.engine.cuda.kernel import ARGUMENTS
-from airflock.engine.cuda.memory import layout_of
+from airflock.engine.cuda.flight_kernel import ARGUMENTS
+from airflock.engine.cuda.launch import layout_of
 from airflock.engine.tables import world_tables
 from airflock.scenarios.files import load
 from airflock.support import gpu as device
@@ -209,7 +209,7 @@ def rehearsing() -> bool:
 
 def big_flock(sizes: Sizes) -> dict[str, Any]:
     """Steps per second of one flock by cells, beside the same boids in JAX, in turn, each time from its start."""
-    from airflock.engine.cuda.crowd import LargeFlock
+    from airflock.engine.cuda.large_flock import LargeFlock
 
     scenario = load("zapotecatl_2016/literal", crowd_settings(sizes.boids))
     crowd = LargeFlock(scenario, plan_of(scenario), seed=1)

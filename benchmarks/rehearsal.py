@@ -37,22 +37,22 @@ def begin(sizes: Callable[..., Any] = SimpleNamespace) -> Any:
     import cuda_c
     from numba.cuda.simulator.kernel import FakeCUDAKernel
 
-    from airflock.engine.cuda import crowd, launch, memory
+    from airflock.engine.cuda import launch
     from airflock.support import gpu as device
 
     device.unavailable_reason = lambda: None
     device.describe_gpus = lambda: [{"name": "rehearsal"}]
-    for module in (device, launch, crowd):
+    for module in (device, launch, large_flock):
         module.required = lambda simulated=False: None
         module.free_memory = lambda: 10**9
         module.multiprocessors = lambda: 2
-    plain = memory.layout_of
+    plain = launch.layout_of
 
     def layout_of(plan: Any, agents: int, flocks: int, processors: int = 2) -> Any:
         shape = plain(plan, agents, flocks, processors)
         return replace(shape, threads=agents * shape.per_agent, simulated=True)
 
-    launch.layout_of = memory.layout_of = layout_of
+    launch.layout_of = layout_of
     for module in list(sys.modules.values()):
         if getattr(module, "layout_of", None) is plain:
             module.layout_of = layout_of

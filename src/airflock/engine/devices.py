@@ -103,14 +103,14 @@ def _slower(plan: Plan) -> float:
 
 def flies_by_cells(scenario: Scenario, plan: Plan, given_start: bool = False) -> bool:
     """Whether a GPU flies a flock by cells, step by step, and not as one block; given: from given places."""
-    from airflock.engine.cuda.crowd import cell_plan_error
+    from airflock.engine.cuda.large_flock import cell_plan_error
 
     return cell_plan_error(plan, scenario.agents) is None and (given_start or not scenario.separation())
 
 
 def gpu_memory_error(scenario: Scenario, plan: Plan) -> str | None:
     """Why a flock does not fit into the GPU's free memory; None if it does."""
-    from airflock.engine.cuda import crowd, launch
+    from airflock.engine.cuda import large_flock as crowd, launch
 
     if flies_by_cells(scenario, plan, plan.given_start):
         return crowd.memory_error(scenario, plan)
@@ -122,7 +122,7 @@ def cuda_plan_error(plan: Plan, agents: int) -> str | None:
     """Why a GPU cannot fly a plan with this many agents; None if it can."""
     if agents <= MOST_TOGETHER:
         return None
-    from airflock.engine.cuda.crowd import cell_plan_error
+    from airflock.engine.cuda.large_flock import cell_plan_error
 
     fault = cell_plan_error(plan, agents)
     return None if fault is None else f"{agents} agents are more than one block flies ({MOST_TOGETHER}), and {fault}"
@@ -145,7 +145,7 @@ def fly_on_gpu(
     on_done: Callable[[], None] | None = None,
 ) -> list[DriverResult]:
     """Fly worlds on the GPU, flight i with plans[i] and seeds[i]; those of one plan together in one launch."""
-    from airflock.engine.cuda.crowd import fly_large_flock
+    from airflock.engine.cuda.large_flock import fly_large_flock
     from airflock.engine.cuda.launch import fly_many
 
     groups: dict[Plan, list[int]] = {}

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from airflock.engine.fault_columns import fault_memory_rows
 from airflock.engine.initial_rows import law_memories, metric_memory_rows
 from airflock.engine.passes.flock import scratch_arrays
-from airflock.engine.passes.slots import sorts_by_cells
+from airflock.engine.passes.grid import sorts_by_cells
 from airflock.engine.plan import Plan
 from airflock.engine.stages.approach import BEGUN
 from airflock.engine.stages.state import fault_row

@@ -7,7 +7,7 @@ every so-manieth. `stages.flight` is the same as a function; kernels and cells t
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from airflock.engine.passes.slots import sorts_by_cells
+from airflock.engine.passes.grid import sorts_by_cells
 from airflock.engine.plan import Plan
 from airflock.engine.text.rewrite import law_suffix
 

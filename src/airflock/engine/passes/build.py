@@ -9,7 +9,7 @@ from typing import Any
 from airflock.core import Metric, argument_names
 from airflock.engine.plan import INTEGER_NAMES, Plan
 from airflock.engine.replace import ReplacementError, checked_replace
-from airflock.engine.specialise.values import StageFunction
+from airflock.engine.specialise.known_values import StageFunction
 from airflock.engine.stages.state import FAULT_PREFIX, NUMBER_PREFIX, SCENE_ARRAYS
 from airflock.engine.text.generate import DriverSource
 from airflock.engine.text.rewrite import law_suffix

@@ -5,14 +5,28 @@ from functools import partial
 
 from airflock.core import CLOCKS
 from airflock.engine import vectors
-from airflock.engine.passes import approach, decide, flock, measure, move, perceive, slots
+from airflock.engine.passes import flock, grid
 from airflock.engine.passes.build import Builder, sampled_columns
-from airflock.engine.passes.plain import add_plain_stage
+from airflock.engine.passes.stage_functions import (
+    add_begin,
+    add_decide,
+    add_measure,
+    add_meet,
+    add_move,
+    add_nearest,
+    add_neighbours,
+    add_plain_stage,
+    add_receive,
+    add_snapshot,
+    skippable_metrics,
+    uses_drift,
+    uses_nearest_pair,
+)
 from airflock.engine.plan import Plan
 from airflock.engine.primitives import DECLARED, random_primitives
 from airflock.engine.replace import checked_replace
 from airflock.engine.schedule import STAGES_PER_LAW, sequential_stages, stages_of_events
-from airflock.engine.specialise.stage import specialise
+from airflock.engine.specialise.specialiser import specialise
 from airflock.engine.stages import flight as flight_
 from airflock.engine.stages.words import BLOCK
 
@@ -41,24 +55,24 @@ HEAD += DECLARED + "\n{primitives}\n"
 STAGE_MAKERS: dict[
     str, Callable[[Builder], None]
 ] = {  # what makes the function of each stage; rows are numbered in this order
-    "snapshot": perceive.add_snapshot,
+    "snapshot": add_snapshot,
     "perceive": partial(add_plain_stage, name="perceive"),
     "tune": partial(add_plain_stage, name="tune"),
-    "receive": perceive.add_receive,
-    "meet": perceive.add_meet,
-    "neighbours": decide.add_neighbours,
+    "receive": add_receive,
+    "meet": add_meet,
+    "neighbours": add_neighbours,
     "boundaries": partial(add_plain_stage, name="boundaries"),
     "flock": flock.add_flock,
-    "decide": decide.add_decide,
+    "decide": add_decide,
     "stop": partial(add_plain_stage, name="stop"),
     "overrule": partial(add_plain_stage, name="overrule"),
-    "move": move.add_move,
-    "measure_sample": partial(measure.add_measure, clock="sample"),
-    "measure_collision": partial(measure.add_measure, clock="collision"),
+    "move": add_move,
+    "measure_sample": partial(add_measure, clock="sample"),
+    "measure_collision": partial(add_measure, clock="collision"),
     "aim_": partial(add_plain_stage, name="aim_"),
     "glide_": partial(add_plain_stage, name="glide_"),
     "appear_": partial(add_plain_stage, name="appear_"),
-    "rearrange": slots.add_rearrange,
+    "rearrange": grid.add_rearrange,
 }
 CALLED = ("snapshot", "receive", "meet")  # made whatever is due: others call them, or a kernel holds them
 
@@ -89,13 +103,13 @@ def flight_stages(plan: Plan, lenient: bool = False) -> Builder:
     """
     build = Builder(plan)
     build.source.allow_builtins = lenient
-    build.slots = slots.uses_slots(plan)
+    build.slots = grid.uses_slots(plan)
     events = stages_of_events(plan)
     make_stages(build)
-    move.add_begin(build)
+    add_begin(build)
     if plan.sequential:
         _turns(build)
-    approach.add_nearest(build)
+    add_nearest(build)
     _keep(build)
     names = [name for name, _, _ in sampled_columns(plan.metrics)]
     made = specialise(
@@ -105,9 +119,9 @@ def flight_stages(plan: Plan, lenient: bool = False) -> Builder:
         order=events,
         sampled=_sampled(plan),
         slots=build.slots,
-        watched=approach.skippable_metrics(plan),
-        drifts=approach.uses_drift(build),
-        foretold=approach.uses_nearest_pair(build),
+        watched=skippable_metrics(plan),
+        drifts=uses_drift(build),
+        foretold=uses_nearest_pair(build),
         collided=names.index("n_coll") if plan.stop else 0,
     )
     arguments = "row, whole, faces, edges, spans, scene, start, work, words, past, store, gust, mem, memory, labels"

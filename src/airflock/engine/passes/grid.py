@@ -13,15 +13,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.passes.build import Builder
+from airflock.engine.passes.build import Builder, loop_lines
+from airflock.engine.passes.flock import flock_rules
 from airflock.engine.plan import Plan
-from airflock.engine.specialise.stage import specialise
-from airflock.engine.specialise.values import StageCall, StageFunction, driver_argument
+from airflock.engine.specialise.known_values import StageCall, StageFunction, driver_argument
+from airflock.engine.specialise.specialiser import specialise
 from airflock.engine.stages import cells
 from airflock.engine.stages.cells import CHUNKS, MAX_CELLS_PER_AGENT, SPARE
 from airflock.engine.stages.neighbours import widest_reach
 from airflock.engine.stages.neighbours_by_cells import neighbours_by_cells
 from airflock.engine.stages.words import BLOCK
+
+# ----------------------------------------------------------------------------------------------------------- cells
+
 
 SORT = StageFunction("sort", ("n", "near", "most_cells", "row", "work", "cells"))
 KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
@@ -89,3 +93,34 @@ def sort_lines(build: Builder, min_width: str, max_cells: str) -> list[str]:
     """Lines that sort agents into about `most` cells no smaller than `near` (m)."""
     add_sort(build)
     return [*bind_lines(build), f"sides, count = sort(n, {min_width}, {max_cells}, row, work, cells)"]
+
+
+# ----------------------------------------------------------------------------------------------------------- slots
+
+
+def uses_slots(plan: Plan) -> bool:
+    """Whether agents have slots: where they are sorted, and where some may be absent, who lie behind the others."""
+    return plan.absence or sorts_by_cells(plan)
+
+
+def sorts_by_cells(plan: Plan) -> bool:
+    """Whether agents are put beside those they meet: not where rules of the whole flock know them by number."""
+    return plan.grid and not plan.sequential and not flock_rules(plan)
+
+
+def add_rearrange(build: Builder) -> None:
+    """Function rearrange: moves all agents to where they were just sorted to; sums lend their memory meanwhile."""
+    rows = ["lane = table[c]", *_spread("kept[i] = lane[whose[i]]"), *_spread("lane[i] = kept[i]")]
+    build.function(
+        "put(n, table, kept, whose)", loop_lines("c in range(table.shape[0])", rows), "return 0", parallel=True
+    )
+    each = [f"put(n, {table}, kept, whose)" for table in ("work", "mem", "memory")]  # one function, compiled once
+    build.function(
+        "rearrange(n, work, mem, memory, cells)", [*bind_lines(build), "kept = totals_[:n]", *each], "return 0"
+    )
+
+
+def _spread(line: str) -> list[str]:
+    """A loop over all slots, in parts side by side."""
+    part = loop_lines(f"i in range(n * part // {CHUNKS}, n * (part + 1) // {CHUNKS})", [line])
+    return loop_lines(f"part in prange({CHUNKS})", part)

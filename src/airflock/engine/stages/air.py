@@ -29,8 +29,10 @@ def apart(there: Any, here: Any, a: int, w: Any, *, plan: Plan) -> Any:
 
 
 def talkers_in_range(i: int, others: Iterable[int], range2: Any, flock: FlockRows, w: Any, *, plan: Plan) -> Any:
-    """How many others are truly within the range of the radio of agent i."""
+    """Count the other agents that are truly within the range of the radio of agent i."""
     talkers = ZERO
+    # Counted over true places and before the pair loop, as a radio that shares its channel needs the number for every
+    # pair.
     for j in others:
         o = vector()
         for a in range(plan.dimensions):
@@ -43,7 +45,8 @@ def talkers_in_range(i: int, others: Iterable[int], range2: Any, flock: FlockRow
 def fill_clear(
     i: int, others: Iterable[int], range2: Any, flock: FlockRows, w: Any, whole: Any, around: WorldArrays, *, plan: Plan
 ) -> None:
-    """Between agent i and whom obstacles or the scene stand, as both truly are: row `clear`."""
+    """Fill the row `clear`: 1 where nothing stands between the true places of agent i and another one."""
+    # A cast branches; its answers go to a row first, so that the pair loop itself stays one of vectors.
     for j in others:
         open_way = is_clear(i, j, range2, flock, w, whole, around, plan=plan)
         flock.clear[j] = open_way
@@ -52,7 +55,7 @@ def fill_clear(
 def is_clear(
     i: int, j: int, range2: Any, flock: FlockRows, w: Any, whole: Any, around: WorldArrays, *, plan: Plan
 ) -> Any:
-    """Whether nothing stands between two agents in range of each other, as both truly are, 1 or 0."""
+    """Return 1 if nothing stands between the true places of two agents in range of each other, else 0."""
     x = flock.position
     open_way = ONE
     o = vector()

@@ -1,8 +1,8 @@
-"""Clusters: who is linked to whom, one agent after another, and the rules of an order parameter over each cluster.
+"""Clusters: linked agents, found one after another, and the rules of an order parameter over each cluster.
 
-A cluster grows from its first agent, which is expanded, then the next of its members, until all are. `state` is 0 of an
-agent that nobody has reached, 1 of one in the cluster that grows, 2 of one in an earlier cluster; `expanded` is 1 of
-those whose links have been looked at.
+A cluster grows from its first agent, which is expanded, then the next of its members, until all are. The array
+`state` is 0 for an agent in no cluster yet, 1 for a member of the growing cluster, 2 for a member of an earlier one;
+`expanded` is 1 for agents with all links checked.
 """
 
 import math
@@ -38,7 +38,7 @@ from airflock.engine.stages.words import (
 def expand_agent(
     e: int, state: Any, expanded: Any, flock: FlockRows, numbers: Any, n: int, *, plan: Plan, metric: Metric
 ) -> Any:
-    """Take whoever is linked to agent e, and in no cluster yet, into the cluster that grows; returns how many."""
+    """Add the agents that are linked to agent e, and in no cluster yet, to the growing cluster; return their number."""
     own = vector()
     for a in range(plan.dimensions):
         own[a] = flock.position[a][e]
@@ -48,6 +48,7 @@ def expand_agent(
         d = vector()
         r2 = offset(d, own, flock.position, j, numbers.w, plan=plan)
         r = math.sqrt(r2)
+        # No branch: `state` and `fresh` are updated by masks, so that the loop over all agents stays a vector loop.
         joins = integer(call_rule(metric.linked, r=r, r2=r2, q=numbers.q) & (state[j] == 0))
         state[j] |= joins
         fresh += joins
@@ -83,6 +84,7 @@ def grow_cluster(
     while e >= 0:
         fresh = expand_agent(e, state, expanded, flock, numbers, n, plan=plan, metric=metric)
         size += fresh
+        # Mostly one cluster holds everybody; then the rest need not be expanded.
         if done + size == n:
             break
         e = first_unexpanded(state, expanded, n)
@@ -90,7 +92,7 @@ def grow_cluster(
 
 
 def call_member(i: int, mean: Any, flock: FlockRows, numbers: Any, *, metric: Metric) -> Any:
-    """What the member rule of a metric says of agent i; mean : over its cluster."""
+    """Call the member rule of a metric for agent i; mean : over its cluster."""
     pair = shared_record(metric.Pair, flock.pair, i, metric) if rule_asks(metric.member, "pair") else None
     return call_rule(metric.member, **agent_arguments(i, flock), pair=pair, mean=mean, q=numbers.q)
 
@@ -116,6 +118,7 @@ def cluster_mean(size: int, mean: Any, state: Any, flock: FlockRows, n: int, *, 
         for total in (cx, cv, ch):
             for a in range(plan.dimensions):
                 total[a] = ZERO
+        # A second pass over the flock, which only metrics with a rule for members pay for.
         for j in range(n):
             if state[j] == 1:
                 for total, row in ((cx, flock.position), (cv, flock.velocity), (ch, flock.heading)):
@@ -154,7 +157,11 @@ def sum_clusters(
             expanded[i] = 0
         done = 0
         first = 0
+        # Clusters are found one after another, from the lowest agent in none yet: their order, and so that of all
+        # sums, does not depend on who is linked.
         while done < n:
+            # `first` never goes back: all before it are in clusters, so looking for starts costs one pass over the
+            # flock in all.
             while state[first] != 0:
                 first += 1
             size = grow_cluster(first, done, state, expanded, flock, numbers, n, plan=plan, metric=metric)
@@ -162,11 +169,13 @@ def sum_clusters(
             for a in axes:
                 s[a] = ZERO
             hh = ZERO
+            # A mask, not a branch: agents outside the cluster add zero, and the loop over all stays one of vectors.
             for j in range(n):
                 inside = ONE if state[j] == 1 else ZERO
                 for a in axes:
                     s[a] = s[a] + inside * h[a][j]
                 hh += inside * sum(h[a][j] * h[a][j] for a in axes)
+                # Members are marked as done in this pass, unless their own rule still has to find them by state 1.
                 if metric.member is None:
                     state[j] = integer(2) if state[j] != 0 else integer(0)
             own_mean = cluster_mean(size, mean, state, flock, n, plan=plan, metric=metric)

@@ -14,7 +14,9 @@ from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, call_r
 
 
 def has_fault(i: int, kind: Fault, time: Any, flock: FlockRows, numbers: Any) -> Any:
-    """Whether agent i suffers from a kind of fault at a time (s); half a step is as good as none."""
+    """Return True if agent i has a kind of fault at a time (s), within half a step."""
+    # The driver only compares times. Which agent has a fault, and when, is decided between two steps, so a fault
+    # needs no memory of its own, a snapshot holds it, and any cuts give the same bits.
     return (time - flock.fault(kind.name, "onset")[i] > -HALF * numbers.c.dt) & (
         time - flock.fault(kind.name, "onset")[i] < flock.fault(kind.name, "lasts")[i] - HALF * numbers.c.dt
     )
@@ -23,18 +25,20 @@ def has_fault(i: int, kind: Fault, time: Any, flock: FlockRows, numbers: Any) ->
 def struck(
     lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, *, plan: Plan, kept: bool
 ) -> tuple[int, int]:
-    """Lanes among which all lie who suffer from a fault of motion at a time (s) or later: the first, and the end.
+    """Find the first and the end of the lanes that hold all agents with a fault of motion at a time (s) or later.
 
-    There may be more of them than need be: who suffers no longer by a step, whatever the rounding, or lies between two
-    who do.
+    The span may be too wide: it includes a fault that ended within the last step, and lanes between affected ones.
 
-    kept : whether velocities are kept for a step's faults until this is asked again; else each step copies its own
+    kept : whether velocities before a step are kept until the next call; else each step copies its own
     """
+    # Velocities before a step are copied at decisions, not at each step: a copy a step became two calls of memcpy, a
+    # hundredth of a flight.
     for a in range(plan.dimensions) if kept else ():
         for i in lanes:
             flock.before_step[a][i] = flock.velocity[a][i]
     lowest = LIMIT
     highest = ZERO
+    # Lanes are found as reals, by masks: a minimum of integers behind a branch would not become vectors.
     for i in lanes:
         until = ZERO
         for kind in plan.suffers("motion"):
@@ -51,7 +55,7 @@ def struck(
 
 
 def fault_arguments(i: int, kind: Fault, time: Any, flock: FlockRows, *, plan: Plan) -> Any:
-    """What every rule of a fault may ask for: `since`, its numbers `f`, and what was so when it began."""
+    """Return the arguments of every rule of a fault: `since`, its numbers `f`, and the state when it began."""
     return {
         "since": most(time - flock.fault(kind.name, "onset")[i], ZERO),
         "f": kind.record(*[flock.fault(kind.name, name)[i] for name in kind.fields]),
@@ -69,11 +73,13 @@ def apply_state_faults(
 ) -> None:  # fmt: skip
     """Disturb states by the rule `sense` or `tell` of a kind of fault; before it begins, keep what it may repeat.
 
-    asked : as which of `core.fault.ASKED`
-    time  : at which these states were taken, s
+    state : kind of state, as in `core.DISTURBED_STATES`
+    time  : when these states were taken, s
     """
     for i in lanes:
         on = has_fault(i, kind, time, flock, numbers)
+        # A frozen receiver repeats the last position that it reported, errors included, not the true one, which it
+        # never knew. So each decision keeps what the rule last returned for a state without this fault.
         for rows, at in ((position, "at_"), (velocity, "at_v")):
             for a in [a for a in range(plan.dimensions) if at + "xyz"[a] in kind.kept(state)]:
                 flock.kept(kind.name, state, at + "xyz"[a])[i] = choose(
@@ -100,18 +106,21 @@ def apply_state_faults(
 
 
 def tune(lanes: Iterable[int], decision: int, flock: FlockRows, numbers: Any, whole: Any, *, plan: Plan) -> None:
-    """Find how far each agent is heard and hears at a decision, and how far its clock is ahead, or was as it sent."""
+    """Find the radio range of each agent out and in at a decision, and the lead of its clock now and when it sent."""
     time = real(decision) * numbers.c.period
     if plan.suffers("radio"):
         reach = least(numbers.k.range, LIMIT)
         for i in lanes:
             out = reach
             into = reach
+            # Of several faults of the radio the worst one counts, in each direction by itself.
             for kind in plan.suffers("radio"):
                 on = has_fault(i, kind, time, flock, numbers)
                 t = call_rule(kind.radio, reach=reach, **fault_arguments(i, kind, time, flock, plan=plan))
                 out = least(out, choose(on, t[0], reach))
                 into = least(into, choose(on, t[1], reach))
+            # Squares, because the pair loop compares squares; negative stands for "not at all", which no square can
+            # be.
             flock.reach_out[i] = choose(out < ZERO, -ONE, out * out)
             flock.reach_in[i] = choose(into < ZERO, -ONE, into * into)
     if plan.suffers("clock"):
@@ -123,6 +132,7 @@ def tune(lanes: Iterable[int], decision: int, flock: FlockRows, numbers: Any, wh
 
 def set_clocks(lanes: Iterable[int], clock: Any, time: Any, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
     """Fill a row with how far the clocks of agents are ahead at a time (s), by their faults."""
+    # Several kinds of clock faults add up, since each is an offset of the same clock.
     for i in lanes:
         ahead = ZERO
         for kind in plan.suffers("clock"):
@@ -133,8 +143,9 @@ def set_clocks(lanes: Iterable[int], clock: Any, time: Any, flock: FlockRows, nu
 
 
 def overrule(agents: Iterable[int], flock: FlockRows, numbers: Any, time: float, *, plan: Plan) -> None:
-    """Disturb the commands that laws have just given."""
+    """Disturb the commands of this decision."""
     c = flock.command
+    # After the law and before the body: a fault of command must be seen by the body and its limits.
     for i in agents:
         for kind in plan.suffers("overrule"):
             t = call_rule(
@@ -148,7 +159,7 @@ def overrule(agents: Iterable[int], flock: FlockRows, numbers: Any, time: float,
 def apply_motion_fault(
     i: int, moved: Any, kind: Fault, time: Any, flock: FlockRows, numbers: Any, *, plan: Plan
 ) -> Any:
-    """What the rule `motion` of a kind of fault makes of a motion step, m/s."""
+    """Return the velocity after a motion step as the rule `motion` of a kind of fault changes it, m/s."""
     before = flock.before_step
     return call_rule(
         kind.motion, vx=before[X][i], vy=before[Y][i], vz=before[Z][i],

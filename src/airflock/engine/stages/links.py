@@ -1,8 +1,8 @@
-"""Links by cells: who is linked to whom in a large flock, and the rules of an order parameter over each cluster.
+"""Links by cells: linked agents of a large flock, and the rules of an order parameter over each cluster.
 
 A cluster grows from its first agent: each member in turn looks at the cells around its own, which are as wide as links
-reach. Of a cell `left` are those in no cluster yet, in its first places; whoever is reached leaves them, so that nobody
-is looked at once more. What is found is that of `clusters` but for the order of sums.
+reach. The first `left` places of a cell hold its agents in no cluster yet; an agent that joins leaves them, so that
+none is visited twice. Results are those of `clusters` except for the order of sums.
 """
 
 import math
@@ -29,7 +29,7 @@ def join_cell(
     plan: Plan,
     metric: Metric,
 ) -> Any:
-    """Take whoever is left in a cell and linked to a place into the cluster; returns how many have been reached."""
+    """Add the linked agents of one cell to the growing cluster; return the new length of `reached`."""
     k = cells.starts[here]
     end = k + grown.left[here]
     while k < end:
@@ -38,6 +38,8 @@ def join_cell(
         r2 = apart(d, own, cells.flat, f, numbers.w, plan=plan)
         r = math.sqrt(r2)
         if call_rule(metric.linked, r=r, r2=r2, q=numbers.q):
+            # An agent that joins is swapped behind those left in the cell, so no agent is visited twice, however
+            # dense the flock.
             end -= 1
             grown.places[k] = grown.places[end]
             grown.reached[tail] = f
@@ -60,17 +62,19 @@ def expand_member(
     plan: Plan,
     metric: Metric,
 ) -> Any:
-    """The same of all cells around that of the agent at place f."""
+    """Add the linked agents of all cells around the agent at place f; return the new length of `reached`."""
     own, at, low, high, count = vector(), vector(), vector(), vector(), cells.count
     for a in range(plan.dimensions):
         own[a] = cells.flat[a, f]
     cell_position(at, own_cell, count)
+    # Outside a periodic box the range of cells ends at its border; inside one it wraps around.
     for a in range(plan.dimensions):
         low[a] = at[a] - 1 if plan.periodic else max(at[a] - 1, 0)
         high[a] = at[a] + 2 if plan.periodic else min(at[a] + 2, count[a])
     if plan.dimensions == 2:
         low[Z] = 0
         high[Z] = 1
+    # Links are no longer than a cell is wide, so the 9 cells of a plane, or 27 in space, hold all partners.
     for qz in range(low[Z], high[Z]):
         for qy in range(low[Y], high[Y]):
             row = wrap_cell(qz, count[Z], plan=plan) * count[Y] + wrap_cell(qy, count[Y], plan=plan)
@@ -101,6 +105,7 @@ def cluster_sums(
             for a in range(plan.dimensions):
                 total[a] = ZERO
     hh = ZERO
+    # Only headings are always summed; positions and velocities are read where a rule for members needs their means.
     for e in range(done, tail):
         j = whose[reached[e]]
         for a in range(plan.dimensions):
@@ -155,6 +160,8 @@ def clusters_by_cells(
     for e in range(n):
         ident[e] = e
     done = 0
+    # One core: growing is sequential by nature. Sums over a cluster come in the order in which members are reached,
+    # so they differ from all pairs in the last bits; counts do not.
     for here in range(count[X] * count[Y] * count[Z]):
         while tally[here] > 0:
             tally[here] -= 1
@@ -162,6 +169,7 @@ def clusters_by_cells(
             cell[done] = here
             tail = done + 1
             e = done
+            # `reached` is the queue of the search, and its finished part the list of members: e follows, tail leads.
             while e < tail:
                 tail = expand_member(reached[e], cell[e], tail, numbers, cells, grown, plan=plan, metric=metric)
                 e += 1

@@ -26,7 +26,9 @@ from airflock.engine.stages.words import (
 
 
 def measured_velocity(i: int, a: int, flock: FlockRows, *, plan: Plan) -> Any:
-    """Own velocity as agent i measures it along one axis, m/s."""
+    """Return the own velocity as agent i measures it along one axis, m/s."""
+    # The controller feels the true velocity plus the error of the last measurement, so the body flies on between two
+    # decisions. It keeps the inertial velocity when satellite navigation fails: a frozen one would be a runaway.
     return (
         flock.velocity[a][i] + flock.own_drift[a][i]
         if plan.has_sensor_error and a < plan.dimensions
@@ -38,14 +40,17 @@ def apply_body_and_faults(
     lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
     hurt_first: int, hurt_end: int, *, plan: Plan, kept: bool,
 ) -> None:  # fmt: skip
-    """Velocities by the rule of the body and then, among those of whom anybody suffers from any, by its faults."""
+    """Advance velocities by the rule of the body, then apply faults of motion on the affected lanes."""
     v = flock.velocity
     faults = plan.suffers("motion")
     hurt = () if not faults else lanes if plan.sequential else lanes_between(lanes, hurt_first, hurt_end)
     for i in () if kept else hurt:
         for a in range(plan.dimensions):
             flock.before_step[a][i] = v[a][i]
+    # All lanes take the plain loop of the body; rules of faults are called afterwards over the lanes that may suffer.
+    # Two loops of the body (with and without faults) gave other last bits and cost more than this second pass.
     apply_body(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
+    # Faults are applied one after another, each to what the one before left of the motion.
     for i in hurt:
         t = (v[X][i], v[Y][i], v[Z][i])
         for kind in faults:
@@ -61,7 +66,7 @@ def apply_body_and_faults(
 def apply_body(
     lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
 ) -> None:
-    """Velocities by the rule of the body."""
+    """Advance velocities by the rule of the body."""
     v, command = flock.velocity, flock.command
     for i in lanes:
         t = call_rule(
@@ -97,18 +102,19 @@ def move(
     noise: Callable[[], None], gusts: Callable[[], Any], held: Any, hurt_first: int, hurt_end: int,
     *, plan: Plan, watched: bool, drifts: bool, kept: bool,
 ) -> Any:  # fmt: skip
-    """Velocities by the body, positions by the velocity before or after; returns the largest squared speed.
+    """Advance velocities by the body and positions by the velocity before or after; return the largest squared speed.
 
     noise, gusts         : the stages of these names, for this step
-    watched              : whether somebody wants to know that speed; else it is 0
+    watched              : whether that speed is needed; else it is 0
     drifts, held         : whether it is that beside the drift of the flock (`stages.approach`)
-    hurt_first, hurt_end : lanes of those among whom somebody suffers from a fault of motion (`stages.faults.struck`)
+    hurt_first, hurt_end : lanes that hold all agents with a fault of motion (`stages.faults.struck`)
     kept                 : whether their velocities are kept from step to step, so that no step copies them
     """
     x, v = flock.position, flock.velocity
     g = aliases()
     if rule_asks(plan.body.move, "gx", "gy", "gz"):
         noise()
+        # One Philox call gives four normal numbers; in a plane two steps share it.
         for a in range(plan.dimensions):
             g[a] = flock.outer[a] if plan.dimensions == 3 or step % 2 == 0 else flock.outer[a + 2]
     time = real(step) * numbers.c.dt
@@ -120,7 +126,9 @@ def move(
     if plan.integration != "old":
         apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
     fastest = ZERO
-    for i in lanes if watched else ():  # whole vectors, of which some lanes have no agent
+    # Over whole vectors, with absent lanes counted as standing: the remainder of a loop costs three times as much per
+    # agent as its vector part.
+    for i in lanes if watched else ():
         if drifts:
             speed2 = sum(
                 velocity_beside_drift(i, a, held, flock) * velocity_beside_drift(i, a, held, flock)
@@ -129,11 +137,15 @@ def move(
         else:
             speed2 = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
         fastest = most(fastest, choose(integer(i) < integer(n), speed2, ZERO))
+    # Positions move by the velocity before the step (the authors' program, integration "old") or after it; `fastest` is
+    # that of the velocity that moves them, so the bound on collisions is exact.
     for a in range(plan.dimensions):
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
     if plan.integration == "old":
         apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
+    # Edges come last, when the step is done: a periodic box takes the agent to its other side, a mirror turns its
+    # velocity.
     if plan.edge_rule:
         for i in agents:
             for a in range(plan.dimensions):

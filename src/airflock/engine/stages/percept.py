@@ -51,6 +51,7 @@ def ray(percept: Any, ux: float, uy: float, uz: float, length: float, *, plan: P
         for o in range(percept.obstacles):
             free = ray_to_obstacle(x, y, z, ux, uy, uz, percept.edges, percept.spans, o, plan=plan)
             t = least(t, free)
+    # The tree comes last: its search ends at the free distance that walls and obstacles have left.
     if plan.scene:
         t = least(t, bvh.cast(x, y, z, ux, uy, uz, t, ZERO, percept.shapes, percept.nodes, percept.links))
     return t
@@ -60,6 +61,7 @@ def cast(
     percept: Any, ux: float, uy: float, uz: float, length: float, radius: float, *, plan: Plan, model: Model
 ) -> Any:
     """Free distance (m) for a sphere of this radius (m) along the unit vector u, at most `length` (m)."""
+    # Rays are counted: metrics report what a law spends on seeing.
     percept.counts[0] += 1
     x = -percept.centre_x
     y = -percept.centre_y
@@ -77,6 +79,7 @@ def cast(
             ),
         )  # fmt: skip
     if plan.scene and model.sight is not None:
+        # Few shapes in sight lie in the list of this decision; where they did not fit (-1), the cast walks the tree.
         if percept.gathered >= 0:
             t = bvh.cast_near(x, y, z, ux, uy, uz, t, radius, percept.shapes, percept.near, percept.gathered)
         else:

@@ -29,11 +29,12 @@ from airflock.engine.stages.words import (
 PACKET = random.PACKET
 AIR = random.AIR
 MORE = random.AIR + 256  # a second draw of the same pair
-UNIFORM, NORMAL = ("u0", "u1", "u2", "u3"), ("g0", "g1", "g2", "g3")  # random numbers that a rule may ask for
+UNIFORM, NORMAL = ("u0", "u1", "u2", "u3"), ("g0", "g1", "g2", "g3")  # random numbers that a rule may take
 
 
 def first_of_four(i: int, flock: FlockRows) -> Any:
-    """Whether agent i is the first at hand of the four receivers that share random words."""
+    """Return True if agent i is the first present one of the four receivers that share random words."""
+    # Where agents have left, numbers have gaps: a new group of four begins where the quotient by four changes.
     return (i == 0) | (flock.number[i] >> 2 != flock.number[i - 1] >> 2)
 
 
@@ -42,6 +43,8 @@ def draw(
 ) -> None:  # fmt: skip
     """Random words of all that is sent to agent i and to the others of its four, in four rows, one for each of them."""
     u = flock.words
+    # The counter holds (receiver >> 2) * agents + sender, so that the number depends on neither memory layout nor
+    # vector width: pilots, `look` and a thread of a GPU draw the same number alone.
     for j in others:
         u[0][j], u[1][j], u[2][j], u[3][j] = random.philox(
             random.pair_number(flock.number[i], flock.number[j], whole.born if plan.absence else n), decision, PACKET,
@@ -51,6 +54,8 @@ def draw(
 
 def word(i: int, j: int, decision: int, n: int, whole: Any) -> Any:
     """Random word of what agent j sends agent i, where it draws alone."""
+    # The four words of one Philox call belong to four receivers; the last two bits of the receiver pick its own
+    # without a branch.
     w0, w1, w2, w3 = random.draw(
         random.pair_number(i, j, n), decision, PACKET, whole.world, whole.seed_low, whole.seed_high
     )
@@ -63,17 +68,17 @@ def drawn_pair_word(me: PairLoopAgent, j: int, at: Decision) -> Any:
 
 
 def clock_time(time: Any, i: int, flock: FlockRows, *, plan: Plan) -> Any:
-    """A time (s) as the clock of agent i tells it."""
+    """Return a time (s) by the clock of agent i."""
     return time + flock.clock[i] if plan.suffers("clock") else time
 
 
 def sending_clock(j: int, flock: FlockRows, *, plan: Plan) -> Any:
-    """How far the clock of agent j was ahead when it sent what comes in now, s."""
+    """Return how far the clock of agent j was ahead when it sent the data that arrive now, s."""
     return flock.sent_clock[j] if plan.late else flock.clock[j]
 
 
 def sent_time(j: int, at: Decision, flock: FlockRows, *, plan: Plan) -> Any:
-    """When what comes in at a decision was sent by agent j, by its own clock, s."""
+    """Return when agent j sent the data that arrive at a decision, by its own clock, s."""
     return at.time - at.late + sending_clock(j, flock, plan=plan) if plan.suffers("clock") else at.time - at.late
 
 
@@ -85,8 +90,9 @@ def packet_count(decision: int, rate: Any, numbers: Any) -> Any:
 def loss_probability(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
     """Probability that nothing of what one agent sends another arrives, in range.
 
-    about : what a rule may ask for of the two and of the decision
+    about : arguments of the rules of the radio for this pair and decision
     """
+    # Two independent causes of loss are one probability, so that one draw decides both.
     return (
         radio.either(radio.lost(about["distance"], k), call_rule(plan.missed, **about, k=k))
         if plan.lossy and plan.missed is not None
@@ -97,9 +103,10 @@ def loss_probability(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
 def pair_numbers(
     me: PairLoopAgent, j: int, flock: FlockRows, whole: Any, at: Decision, *, plan: Plan
 ) -> dict[str, Any]:
-    """Random numbers of one pair and decision that rules of the radio may ask for, by name."""
+    """Draw the random numbers that rules of the radio take for one pair and decision, by name."""
     pair = pair_number(me.i, j, at.agents, flock, whole, plan=plan)
     u, g = totals(), totals()
+    # Only the numbers that a rule of this radio takes are drawn: each Philox call is a cost for every pair.
     if plan.rolls(UNIFORM):
         u[0], u[1], u[2], u[3] = random.draw(pair, at.step, AIR, whole.world, whole.seed_low, whole.seed_high)
     if plan.rolls(NORMAL):
@@ -126,10 +133,10 @@ def update_packet(
     *,
     plan: Plan,
 ) -> None:
-    """Where packets are kept: `packet` is then the newest that an agent has of agent j.
+    """Receive what agent j sends, and put the newest packet of it into `packet`, where packets are kept.
 
-    apart2, carried2 : squares of how far the two are apart, and of how far packets carry, m²
-    about            : what rules of the radio may ask for of the two and of the decision
+    apart2, carried2 : squared distance of the two, and squared range of packets, m²
+    about            : arguments of the rules of the radio for this pair and decision
     """
     dims = plan.dimensions
     got = apart2 <= carried2
@@ -141,6 +148,8 @@ def update_packet(
         got = got & passed
     if plan.draws:
         got = got & (random.uniform(drawn_pair_word(me, j, at)) >= miss)
+    # One packet of a pair is under way at a time, those behind it are dropped, as on a link that repeats until it is
+    # acknowledged. A queue would need rows for each place in it.
     if plan.radio.late is not None:
         queue_packet(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
         deliver_due(me.i, j, at, packet, flock, numbers, plan=plan)
@@ -159,13 +168,15 @@ def glimpse(
     i: int, j: int, got: Any, rolled: dict[str, Any], at: Decision, packet: Any, flock: FlockRows, numbers: Any,
     *, plan: Plan,
 ) -> None:  # fmt: skip
-    """`packet` is then where agent i believes agent j by the newest picture that shows it.
+    """Put the place of agent j into `packet`, by the newest picture that shows it to agent i.
 
     Places are those that agent i believes in, so the error of its own position is in all of them alike.
     """
     dims, w = plan.dimensions, numbers.w
     then, off, expected, v, ev = vector(), vector(), vector(), vector(), vector()
     since = sent_time(i, at, flock, plan=plan) - flock.packet[2 * dims][i, j]
+    # What is kept is a place in the observer's own frame at the moment of the picture, so that the error of the own
+    # position is in both terms and drops out where the law takes the difference.
     for a in range(dims):
         moved = apart(flock.position[a][i], flock.heard_position[a][i], a, w, plan=plan)
         then[a] = flock.measured_position[a][i] - moved
@@ -179,6 +190,7 @@ def glimpse(
         k=numbers.k,
     )  # fmt: skip
     for a in range(dims):
+        # Nothing branches: a picture that does not show the other one leaves the old packet in place.
         packet[a] = choose(got, then[a] + t[a], flock.packet[a][i, j])
         packet[a + dims] = choose(got, t[a + 3], flock.packet[a + dims][i, j])
     packet[2 * dims] = choose(got, sent_time(i, at, flock, plan=plan), flock.packet[2 * dims][i, j])
@@ -187,9 +199,11 @@ def glimpse(
 def call_receive(
     i: int, j: int, near: Any, about: dict[str, Any], at: Decision, flock: FlockRows, numbers: Any, *, plan: Plan
 ) -> Any:
-    """Whether a packet arrives by the radio's own rule; its Packet is then the new one, where packets carry so far."""
+    """Return True if a packet arrives by the radio's own rule; keeps its new Packet where the pair is in range."""
     age = clock_time(at.time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
     if plan.radio.Packet is not None:
+        # What the rule remembers of a pair changes only where the two are in range, as if it had not been called
+        # elsewhere.
         kept = plan.radio.Packet(*[flock.packet[plan.pocket + c][i, j] for c in field_indices(plan.radio.Packet)])
         hit = call_rule(plan.radio.receive, **about, age=age, packet=kept, k=numbers.k)
         for c in field_indices(plan.radio.Packet):
@@ -202,10 +216,12 @@ def call_receive(
 def queue_packet(
     i: int, j: int, got: Any, about: dict[str, Any], at: Decision, flock: FlockRows, numbers: Any, *, plan: Plan
 ) -> None:
-    """What agent j sends agent i and is not lost goes under way, unless another packet of this pair is."""
+    """Put a packet that is not lost on its way, unless another packet of this pair is on its way already."""
     dims, first, due = plan.dimensions, plan.waiting, 2 * plan.waiting
     goes = got & (flock.packet[due][i, j] < HALF * GONE)
     wait = call_rule(plan.radio.late, **about, k=numbers.k)
+    # The waiting packet lies in rows of its own behind the newest one; both are tables [i, j] that the pair loop
+    # passes in vectors.
     for a in range(dims):
         flock.packet[first + a][i, j] = choose(goes, flock.heard_position[a][j], flock.packet[first + a][i, j])
         flock.packet[first + a + dims][i, j] = choose(
@@ -218,8 +234,9 @@ def queue_packet(
 
 
 def deliver_due(i: int, j: int, at: Decision, packet: Any, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
-    """What is due by now has come; half a step is as good as none."""
+    """Deliver the packet on its way if it is due by now, within half a step."""
     first, due = plan.waiting, 2 * plan.waiting
+    # Half a motion step of tolerance: float32 times of send and delay do not add up exactly to a step.
     come = (flock.packet[due][i, j] > HALF * GONE) & (flock.packet[due][i, j] <= at.time + HALF * numbers.c.dt)
     for c in range(plan.waiting):
         packet[c] = choose(come, flock.packet[first + c][i, j], flock.packet[c][i, j])
@@ -227,15 +244,16 @@ def deliver_due(i: int, j: int, at: Decision, packet: Any, flock: FlockRows, num
 
 
 def extrapolated(a: int, age: Any, packet: Any, *, plan: Plan) -> Any:
-    """Where the sender of a packet is believed to be along one axis, m: where it was, or carried forward.
+    """Return the believed place of the sender of a packet along one axis, m: as sent, or carried forward.
 
-    Written out what `core.radio.forward` says: as a call, compilers add up in another order, and flights differ by it.
+    Writes `core.radio.forward` out: as a call, compilers add in another order, and flights change in their last bits.
     """
+    # Written out although `core.radio.forward` says the same; see the docstring.
     return packet[a] + packet[a + plan.dimensions] * age if plan.radio.carry is radio.forward else packet[a]
 
 
 def carried_by_rule(age: Any, packet: Any, k: Any, *, plan: Plan) -> Any:
-    """The same by any other rule of the radio, of all axes at once."""
+    """Return the believed place of the sender of a packet by a rule of the radio, all axes at once, m."""
     return call_rule(
         plan.radio.carry, x=packet[X], y=packet[Y], z=packet[Z] if plan.dimensions == 3 else ZERO,
         vx=packet[plan.dimensions + X], vy=packet[plan.dimensions + Y],
@@ -244,11 +262,13 @@ def carried_by_rule(age: Any, packet: Any, k: Any, *, plan: Plan) -> Any:
 
 
 def packet_is_valid(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
-    """Whether the newest packet that an agent has of another one, of this age (s), says something.
+    """Return True if the newest packet of another agent, of this age (s), still counts.
 
     Over a radio that keeps it, it does until the next one comes; where lost neighbours stop an agent, until they count
     as lost.
     """
+    # At 60 % loss, counting only the packets of this decision left an agent deaf to more than half of its neighbours:
+    # smallest distance 0.3 m in ten seeds; with data believed for `patience`, 2.9 m.
     return (
         (packet[2 * plan.dimensions] > -1e8) & (call_rule(plan.radio.lasts, age=age, k=numbers.k) > HALF)
         if plan.radio.lasts is not None
@@ -259,6 +279,6 @@ def packet_is_valid(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
 
 
 def load_packet(i: int, j: int, packet: Any, flock: FlockRows, *, plan: Plan) -> None:
-    """Where packets are kept: `packet` is then the newest that agent i has of agent j."""
+    """Load the newest packet that agent i has of agent j into `packet`."""
     for c in range(2 * plan.dimensions + 1):
         packet[c] = flock.packet[c][i, j]

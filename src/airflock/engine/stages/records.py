@@ -7,7 +7,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class WorldArrays:
-    """What stands in the world: ends of all walls, which of them are of each obstacle, and the scene."""
+    """The world as arrays: ends of all walls, the span of them that each obstacle has, and the scene."""
 
     edges: Any
     spans: Any
@@ -62,7 +62,7 @@ class PairLoopAgent:
 
 @dataclass(frozen=True)
 class CandidateRows:
-    """Rows of those whom an agent goes through: all of a flock, or the candidates around a line of cells.
+    """Rows of the agents that a pair loop visits: all of a flock, or the candidates around a line of cells.
 
     number, group : of each, and what it is heard to do
     square, away  : what the agent makes of each, from here on by its place among the others (`stages.state.Flock`)
@@ -83,7 +83,7 @@ class CandidateRows:
 
 @dataclass(frozen=True)
 class SquaredRanges:
-    """How far an agent hears and heeds others, m².
+    """Squared ranges of an agent: of its radio and of its law, m².
 
     radio, radio_ : square of the radio's range, and as squares that carry the guard TINY are compared with it
     law           : square of the law's reach
@@ -96,7 +96,7 @@ class SquaredRanges:
 
 @dataclass(frozen=True)
 class NeighbourEstimate:
-    """What an agent makes of another one: offset (m) and relative velocity (m/s) with their lengths, heading, age (s).
+    """An estimate of another agent: offset (m) and relative velocity (m/s) with their lengths, heading, age (s).
 
     r2 : square of the offset's length, m²
     """

@@ -37,6 +37,7 @@ def move_goal(flock: FlockRows, numbers: Any, time: float, elapsed: float, n: in
         stray = GONE
         for a in (X, Y, Z):
             f[a] = c[a]
+        # A shepherd drives the agent that has strayed farthest; of several as far, the first one.
         for i in range(n):
             if apart(i, c, flock, plan=plan) > stray:
                 stray = apart(i, c, flock, plan=plan)
@@ -74,6 +75,9 @@ def move_own_goals(flock: FlockRows, numbers: Any, time: float, n: int, scene: A
             for a in axes:
                 flock.departed[a][i] = x[a][i]
             far = most(far, sum((scene.goals[who[i], a] - x[a][i]) * (scene.goals[who[i], a] - x[a][i]) for a in axes))
+        # All goals are under way for the same time on straight ways. With least squared ways no two come nearer than
+        # the spacing over the root of 2 (Turpin, Michael & Kumar 2014), so flocking only mends what noise and wind
+        # disturb.
         at[3] = 1.5 * math.sqrt(far) / w.goal_speed if w.goal_speed > ZERO else ZERO
     for i in range(n):
         for a in axes:
@@ -90,12 +94,15 @@ def let_appear(flock: FlockRows, numbers: Any, time: float, n: int, scene: Any) 
     for r in range(len(later)):
         if (later[r, 6] >= ZERO) and (later[r, 6] <= time):
             free = True
+            # Every agent is looked at: shapes appear a few times in a flight, so the search need not be quick.
             for i in range(n):
                 if bvh.beside(x[X][i], x[Y][i], x[Z][i], later, r) <= w.clearance * w.clearance:
                     free = False
             if free:
                 shape = int(later[r, 7])
                 later[r, 6] = GONE
+                # A shape that is not due yet has its bounds at 1e9 m: all loops test bounds first, so no cast tests a
+                # time.
                 for c in repeat(6):
                     scene.shapes[shape, c] = later[r, c]
     return 0
@@ -105,11 +112,14 @@ def find_contacts(flock: FlockRows, numbers: Any, n: int, scene: Any, *, plan: P
     """Find which agents have touched the scene since the positions were last looked at."""
     x, before, axes = flock.position, flock.before, range(plan.dimensions)
     if plan.scene:
+        # At the first look there is no way yet: the agent is taken to have stood where it is.
         if scene.counts[1] == 0:
             for i in range(n):
                 for a in axes:
                     before[a][i] = x[a][i]
         scene.counts[1] = 1
+    # A contact is tested along the way since the last look, so that a fast agent cannot pass through a thin wall
+    # between two.
     for i in range(n):
         if plan.scene:
             flock.touches[i] = bvh.touches(

@@ -1,4 +1,4 @@
-"""Start: where agents are when a flight begins, and how far a place is outside."""
+"""Start: the places of agents when a flight begins, and the distance of a place outside the arena."""
 
 from collections.abc import Callable
 from typing import Any
@@ -21,7 +21,7 @@ EXTENTS = ("extent_x", "extent_y", "extent_z")
 def excursion(
     x: Any, y: Any, z: Any, w: Any, edges: Any, spans: Any, corners: int, obstacles: int, scene: Any, *, plan: Plan
 ) -> Any:
-    """How far a position is outside the arena, or inside of what stands in it, m; negative elsewhere."""
+    """Return how far a position is outside the arena, or inside an obstacle, m; negative elsewhere."""
     e = plan.excursion(
         x, y, height_above_middle(z, edges, corners, plan=plan), w.half_x, w.half_y, w.half_z, edges, corners
     )
@@ -40,6 +40,7 @@ def try_place(
     w0, w1, w2, w3 = random.draw(i, attempt, START, whole.world, whole.seed_low, whole.seed_high)
     for a, word in zip(range(plan.dimensions), (w0, w1, w2), strict=False):
         s[a] = places.spread(random.uniform(word), -getattr(w, EXTENTS[a]), getattr(w, EXTENTS[a]))
+    # In a world without walls the test always holds, but compilers cannot see it: 26 instructions of a GPU kernel.
     free = (
         excursion(s[X], s[Y], s[Z], w, around.edges, around.spans, whole.corners, whole.obstacles, around.scene)
         <= -w.wall_clearance
@@ -52,10 +53,13 @@ def try_place(
 
 
 def is_free(free: Any, s: Any, w: Any, scene: Any, *, plan: Plan) -> Any:
-    """Whether a place that is free so far is at `start.clearance` from the scene, and no mesh closes around it."""
+    """Return True if a place that is free so far keeps `start.clearance` from the scene and is inside no mesh."""
     if plan.scene:
         if free:
             free = bvh.nearest(s[X], s[Y], s[Z], w.clearance, *scene_tree(scene)).distance >= w.clearance
+        # Parity of crossings is wrong where buildings of a city model overlap (inside both it is even); a winding
+        # number over the closed parts is not. Three lines must agree, as one may pass through an edge of two
+        # triangles.
         if plan.has_mesh and free:
             free = inside(s[X], s[Y], s[Z], *scene_tree(scene)) < HALF
     return free
@@ -90,6 +94,7 @@ def begin(  # noqa: C901 - tests of the plan leave one way through
     excursion : the stage of this name
     """
     axes, x, v, w = range(plan.dimensions), flock.position, flock.velocity, numbers.w
+    # Lanes without an agent must be far away from the start: at the origin they would be met by vector loops.
     for i in range(m):
         for a in axes:
             x[a][i] = AWAY
@@ -101,6 +106,7 @@ def begin(  # noqa: C901 - tests of the plan leave one way through
             for a in axes:
                 v[a][i] = start[a + plan.dimensions, i]
         return 0
+    # Formations need no search: their places are apart by construction, and all fly along x.
     if plan.start in FORMATIONS:
         for i in range(n):
             s = vector()
@@ -111,11 +117,14 @@ def begin(  # noqa: C901 - tests of the plan leave one way through
         return 0
     for i in range(n):
         placed = False
+        # Rejection sampling, agent by agent: a place depends only on the seed and on agents with lower numbers, so
+        # the same start comes out on every device.
         for attempt in repeat(ATTEMPTS):
             s = vector()
             free = try_place(i, attempt, s, w, whole, around, excursion, plan=plan)
             for j in range(i if w.separation > ZERO else 0):
                 free = free & (sum((s[a] - x[a][j]) * (s[a] - x[a][j]) for a in axes) >= w.separation * w.separation)
+            # The dear test, through the tree of shapes, comes last and only for places that are free so far.
             free = is_free(free, s, w, around.scene, plan=plan)
             if free:
                 for a in axes:

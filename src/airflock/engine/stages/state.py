@@ -68,7 +68,7 @@ class FlockRows:
 
     position: Axes = axes_attribute("")  # true state, m
     velocity: Axes = axes_attribute("v")  # m/s
-    command: Axes = axes_attribute("c")  # what was asked of the body
+    command: Axes = axes_attribute("c")  # command to the body
     measured_position: Axes = axes_attribute("m")  # own state as the agent believes it, m
     measured_velocity: Axes = axes_attribute("mv")  # m/s
     heard_position: Axes = axes_attribute("h")  # its state as others hear it, m
@@ -120,7 +120,7 @@ class FlockRows:
 
     @cached_property
     def as_sent(self) -> "FlockRows":
-        """The same flock with the faults that it had when what is heard now was sent."""
+        """This flock with the faults of the moment when the data heard now were sent."""
         return FlockRows(self.take, self.dimensions, self.number, then=True)
 
     def fault(self, kind: str, column: str) -> Row:
@@ -136,7 +136,7 @@ class FlockRows:
         return self.take(f"shared_{owner}_{name}")
 
     def pair(self, metric: str, name: str) -> Row:
-        """What the pair rule of a metric found, one field of it."""
+        """Row of one field that the pair rule of a metric has filled."""
         return self.take(f"{metric}_{name}")
 
     def own(self, letter: str, name: str) -> Row:
@@ -155,7 +155,7 @@ def fault_row(kind: str, column: str) -> str:
 
 
 def fault_memory_row(kind: str, state: str, component: str) -> str:
-    """Name of the row with what a rule of a kind of fault was last given, `asked` as one of `core.fault.ASKED`."""
+    """Name of the row with the last undisturbed value for a kind of fault; state as in `core.DISTURBED_STATES`."""
     return fault_row(kind, f"{state}_{component}")
 
 

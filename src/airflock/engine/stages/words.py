@@ -62,12 +62,16 @@ def integer(value: Any) -> Any:
 
 
 def row_index(value: Any) -> Any:
-    """A whole number that is a place in a row: a driver need not ask whether it counts from the row's end."""
+    """A whole number that is a place in a row: a driver need not test whether it counts from the row's end."""
+    # Numba tests for every signed index whether it counts from the row's end; leaving the test out took 1 % off a
+    # flight.
     return int(value)
 
 
 def least(a: Any, b: Any) -> Any:
     """The lesser of two numbers; of a number and nan the number."""
+    # Compiled to llvm.minnum and maxnum: Numba's own min of floats is a comparison without fast-math flags, and a
+    # reduction over it stays scalar (25 µs instead of 10.5 µs for the nearest neighbours of 100).
     return b if a != a or b < a else a
 
 
@@ -78,6 +82,8 @@ def most(a: Any, b: Any) -> Any:
 
 def choose(test: Any, a: Any, b: Any) -> Any:
     """`a` where the test holds, else `b`; both are computed, there is no branch."""
+    # Of two conditional expressions on one test LLVM makes two ways through the loop, which is then not vectorised;
+    # the select instruction keeps it: 1.9 ns a pair before, 0.22 after.
     return a if test else b
 
 
@@ -117,13 +123,13 @@ def aliases() -> Any:
 
 
 def call_rule(rule: Callable[..., Any] | None, **offered: Any) -> Any:
-    """Call a rule with what it asks for by name. A driver computes only that."""
+    """Call a rule with the arguments that it takes, by name. A driver computes only those."""
     assert rule is not None
     return rule(*(offered[name] for name in inspect.signature(rule).parameters))
 
 
 def rule_asks(rule: Callable[..., Any] | None, *names: str) -> bool:
-    """Whether a rule asks for any of these names."""
+    """Return True if a rule takes an argument of any of these names."""
     return rule is not None and bool(set(names) & set(inspect.signature(rule).parameters))
 
 

@@ -178,7 +178,7 @@ def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str
         frames = [
             frame
             for frame in traceback.extract_tb(fault.__traceback__)
-            if "airflock/rules/probe" not in frame.filename and frame.filename != "<string>"  # text of a dataclass
+            if frame.filename not in (__file__, "<string>")  # text of a dataclass
         ]
         spot = f"{frames[-1].filename}:{frames[-1].lineno}" if frames else _place(rule)
         raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {describe_error(fault)}") from fault

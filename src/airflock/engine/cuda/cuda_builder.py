@@ -8,12 +8,18 @@ from dataclasses import dataclass
 from textwrap import indent
 
 from airflock.core import Metric
-from airflock.engine.cuda.clusters import cluster_lines
-from airflock.engine.cuda.lower import lower_statements, used_names
-from airflock.engine.cuda.primitives import primitives_text
-from airflock.engine.cuda.reciprocals import SecondForms, reciprocal_name, with_reciprocals
-from airflock.engine.cuda.rows import LoweringContext, parse_lines
-from airflock.engine.cuda.shape import BlockLayout
+from airflock.engine.cuda.block_layout import BlockLayout
+from airflock.engine.cuda.cuda_clusters import cluster_lines
+from airflock.engine.cuda.cuda_primitives import primitives_text
+from airflock.engine.cuda.lowering import (
+    LoweringContext,
+    SecondForms,
+    lower_statements,
+    parse_lines,
+    reciprocal_name,
+    used_names,
+    with_reciprocals,
+)
 from airflock.engine.passes.build import JIT_DECORATOR, Builder, branch_lines, inline_lines
 from airflock.engine.plan import Plan
 from airflock.engine.replace import checked_replace

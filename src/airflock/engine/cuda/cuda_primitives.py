@@ -4,7 +4,7 @@ Integers are those of every other engine, bit by bit. Logarithm, sine and cosine
 and agree to rounding. The simulator's forms of the sums go through shared memory: it has no shuffles.
 """
 
-from airflock.engine.cuda.shape import BlockLayout
+from airflock.engine.cuda.block_layout import BlockLayout
 from airflock.engine.primitives import DECLARED, NARROW
 
 HEAD = (

@@ -9,8 +9,8 @@ from typing import Any
 from airflock.core import Metric
 from airflock.engine.passes.build import Builder, branch_lines, loop_lines
 from airflock.engine.plan import Plan
-from airflock.engine.specialise.stage import specialise
-from airflock.engine.specialise.values import LocalVector, driver_argument
+from airflock.engine.specialise.known_values import LocalVector, driver_argument
+from airflock.engine.specialise.specialiser import specialise
 from airflock.engine.stages.clusters import call_member, mean_from_sums
 from airflock.engine.stages.measure import add_terms, clear_totals, record_of_totals, reductions
 from airflock.engine.stages.state import FlockRows
