@@ -2,6 +2,8 @@
 
 from types import SimpleNamespace
 
+from airflock.support import gpu
+
 
 def runtime(free=0, available=True, fault=None, device=None):
     """Stands for numba-cuda's runtime interface on a machine with a GPU with so many free bytes, or with none."""
@@ -18,3 +20,17 @@ def runtime(free=0, available=True, fault=None, device=None):
         get_current_device=current,
         current_context=lambda: SimpleNamespace(get_memory_info=lambda: memory),
     )
+
+
+def replace_gpu(monkeypatch, **properties):
+    """Put such a machine in the place of this one; call `forget_gpu` when the test ends.
+
+    The loader of numba-cuda is replaced, not `gpu.cuda_runtime`: other modules hold that function by its name.
+    """
+    monkeypatch.setattr(gpu, "import_module", lambda name: runtime(**properties))
+    forget_gpu()
+
+
+def forget_gpu():
+    """Forget what was found out about the GPU, so that the next test looks again."""
+    gpu.unavailable_reason.cache_clear()

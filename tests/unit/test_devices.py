@@ -13,7 +13,7 @@ from airflock.scenarios.files import load
 from airflock.support import gpu as gpu
 from airflock.support.errors import DeviceError, FlightError, ScenarioError
 from flocks import scenario
-from gpus import runtime
+from gpus import forget_gpu, replace_gpu
 from inside import MOST_THREADS, Flown, Shape, shape_of, simulate
 
 SMALL = scenario(agents=3, duration=0.2, world__side=60.0, world__walls="nearest_per_axis")  # others have its driver
@@ -21,13 +21,16 @@ SMALL = scenario(agents=3, duration=0.2, world__side=60.0, world__walls="nearest
 
 @pytest.fixture
 def present(monkeypatch):
-    monkeypatch.setattr(gpu, "unavailable_reason", lambda: None)
-    monkeypatch.setattr(gpu, "cuda_runtime", lambda: runtime(free=140e9))
+    replace_gpu(monkeypatch, free=140e9)
+    yield
+    forget_gpu()
 
 
 @pytest.fixture
 def absent(monkeypatch):
-    monkeypatch.setattr(gpu, "unavailable_reason", lambda: "no driver")
+    replace_gpu(monkeypatch, available=False, fault="no driver")
+    yield
+    forget_gpu()
 
 
 def test_unknown_devices_are_refused():
@@ -36,15 +39,15 @@ def test_unknown_devices_are_refused():
 
 
 def test_a_missing_gpu_is_an_error_where_it_is_named_and_a_note_where_not(absent):
-    with pytest.raises(DeviceError, match="device = cuda: no driver; choose device = cpu or auto"):
+    with pytest.raises(DeviceError, match="device = cuda: no GPU can be used: no driver; choose device = cpu or auto"):
         score_flights([SMALL], [0], device="cuda")
     said = []
     assert pick_device([SMALL], "auto", notify=said.append) == "cpu"
-    assert said == ["device auto: cpu, no driver"]
+    assert said == ["device auto: cpu, no GPU can be used: no driver"]
 
 
 def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypatch):
-    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 2)
+    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 2)
     said = []
     assert pick_device([SMALL], "auto", notify=said.append) == "cpu"
     many = scenario(agents=100, duration=600.0)
@@ -55,15 +58,15 @@ def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypat
 
 def test_auto_leaves_to_many_cores_what_one_thread_of_a_gpu_would_solve(present, monkeypatch):
     many, said = [load("dimock_2003/physical")] * 10_000, []
-    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 16)
+    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 16)
     assert pick_device(many, "auto", notify=said.append) == "cpu"
     assert said == ["device auto: cpu, about 19 s of work on 16 cores, where the GPU would take 1.1e+02 s"]
-    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 1)
+    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 1)
     assert pick_device(many, "auto") == "cuda"
 
 
 def test_one_long_flight_is_no_work_for_a_gpu(present, monkeypatch):
-    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 1)
+    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 1)
     long = load("zapotecatl_2016/best", {"duration": 2e4})
     assert cost.estimated_seconds(long) > 50.0
     assert pick_device([long], "auto") == "cpu"
@@ -71,7 +74,7 @@ def test_one_long_flight_is_no_work_for_a_gpu(present, monkeypatch):
 
 
 def test_a_big_flock_has_all_of_a_gpu_to_itself(present, monkeypatch):
-    monkeypatch.setattr("airflock.engine.devices.cores", lambda: 16)
+    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 16)
     keys = {"agents": 100_000, "world.edges": "periodic", "world.arena": "square", "world.side": 46.0,
             "world.height": 46.0, "start.separation": 0.0, "metrics.kind": "order", "dt": 0.02}  # fmt: skip
     assert pick_device([load("zapotecatl_2016/literal", {**keys, "duration": 400.0})], "auto") == "cuda"
@@ -84,7 +87,7 @@ def test_work_grows_with_flights_agents_and_time():
 
 
 def test_the_cpu_is_never_asked_about_a_gpu(monkeypatch):
-    monkeypatch.setattr(gpu, "unavailable_reason", lambda: pytest.fail("asked"))
+    monkeypatch.setattr(gpu, "import_module", lambda name: pytest.fail("asked"))
     assert pick_device([SMALL], "cpu") == "cpu"
 
 
@@ -146,7 +149,7 @@ def test_the_step_at_which_a_closed_flight_left_the_finite_numbers_is_found(wron
 
 def test_the_command_ends_with_one_line_and_status_2_without_a_gpu():
     code = "import sys; sys.argv = ['airflock', 'run', 'vasarhelyi_2018/4ms', '--device', 'cuda']\n"
-    code += "from airflock import gpu as device\ndevice.trouble = lambda: 'no driver'\n"
+    code += "from airflock.support import gpu\ngpu.unavailable_reason = lambda: 'no driver'\n"
     code += "from airflock.cli import main\nmain()\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2

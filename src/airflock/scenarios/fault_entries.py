@@ -113,10 +113,10 @@ def _entry(
         rest = {key: value for key, value in table.items() if key not in ENTRY_KEYS}
         numbers, number_notes, wrong = _record(where, rest, kind.Parameters, ENTRY_KEYS)
         notes, errors = notes + number_notes, errors + wrong
-    who, wrong = _who(where, table, agents, groups)
+    who, wrong = _read_agents(where, table, agents, groups)
     errors += wrong
     if when is not None:
-        errors += _when_faults(where, when, agents if who is None else len(who))
+        errors += _time_errors(where, when, agents if who is None else len(who))
     if kind is None:
         return None, notes, errors
     if sequential and PERCEPTION & set(kind.rules):
@@ -126,7 +126,7 @@ def _entry(
         )
     if when is None or numbers is None or who is None:
         return None, notes, errors
-    errors += _end_faults(where, when, kind, numbers)
+    errors += _end_errors(where, when, kind, numbers)
     count = 1 if when.number is None and when.per_hour is not None else when.number
     entry = FaultEntry(
         kind, numbers, who, None if count is None else int(count), when.at, when.per_hour or 0.0,
@@ -159,7 +159,7 @@ def _kind(
     return None, [f"{where}.kind = {name!r}: unknown kind of fault; {hint}"]
 
 
-def _who(
+def _read_agents(
     where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group]
 ) -> tuple[tuple[int, ...] | None, list[str]]:
     """Return the agents that an entry may affect, or None, with the errors."""
@@ -176,7 +176,7 @@ def _who(
     return None, [f"{where}.group = {table['group']!r}: unknown group; {known}"]
 
 
-def _when_faults(where: str, when: FaultTiming, may: int) -> list[str]:
+def _time_errors(where: str, when: FaultTiming, may: int) -> list[str]:
     """Return the errors of times that are valid one by one; may : how many agents may be affected."""
     errors = []
     if (when.at is None) == (when.per_hour is None):
@@ -190,7 +190,7 @@ def _when_faults(where: str, when: FaultTiming, may: int) -> list[str]:
     return errors
 
 
-def _end_faults(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> list[str]:
+def _end_errors(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> list[str]:
     """Return why a fault cannot end."""
     errors = []
     ends = when.lasts is not None or (when.at is not None and when.until is not None)
@@ -244,10 +244,12 @@ def merge_onsets(
 
     lasting : numbers of the entries before that stay as they are
     """
-    named = {_which(onset): onset for onset in after}
-    begun = [named.get(_which(o), o) for o in before if o.begin < now and (_which(o) in named or o.entry in lasting)]
-    kept = {_which(onset)[:3] for onset in begun}
-    gone = [o for o in after if o.begin < now <= o.step and _which(o)[:3] in kept and o not in begun]
+    named = {_identity(onset): onset for onset in after}
+    begun = [
+        named.get(_identity(o), o) for o in before if o.begin < now and (_identity(o) in named or o.entry in lasting)
+    ]
+    kept = {_identity(onset)[:3] for onset in begun}
+    gone = [o for o in after if o.begin < now <= o.step and _identity(o)[:3] in kept and o not in begun]
     return _in_order([*begun, *gone, *(o for o in after if o.begin >= now)])
 
 
@@ -265,7 +267,7 @@ def _in_order(found: Sequence[FaultOnset]) -> tuple[FaultOnset, ...]:
     return tuple(kept)
 
 
-def _which(onset: FaultOnset) -> tuple[str, int, int, bool]:
+def _identity(onset: FaultOnset) -> tuple[str, int, int, bool]:
     """Return the identity of a fault, whatever its numbers: kind, agent, step of its begin, and if the agent leaves."""
     return onset.kind, onset.agent, onset.begin, onset.leaves
 
@@ -283,7 +285,7 @@ def _onsets_of_entry(
             continue
         step = round(at / dt)
         gone = kind.time_to_absence(entry.numbers)
-        for agent in _hit(entry, number, occurrence, seed, world):
+        for agent in _affected_agents(entry, number, occurrence, seed, world):
             yield FaultOnset(step, kind.name, agent, lasts, numbers, entry=number, begin=step)
             if gone < lasts:
                 yield FaultOnset(step + round(gone / dt), kind.name, agent, lasts, numbers, True, number, step)
@@ -305,7 +307,7 @@ def _occurrence_times(scenario: "Scenario", entry: FaultEntry, number: int, seed
         yield time
 
 
-def _hit(entry: FaultEntry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
+def _affected_agents(entry: FaultEntry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
     """Return the agents that an occurrence affects: all that may be, or so many of them, drawn without replacement."""
     may = entry.agents
     if entry.number is None or entry.number >= len(may):

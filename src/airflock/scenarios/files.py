@@ -92,7 +92,7 @@ def load(
     radio : optional
         A radio of your own by which agents hear each other: a `Radio`, a namespace, or a name or file.
     topology : optional
-        A topology of your own, which says whom of those that they hear agents meet: a namespace, or a name or file.
+        A topology of your own, which selects whom agents meet among those that they hear: a namespace, or a name or file.
     faults : optional
         Kinds of fault of your own, which entries of [[faults]] may name: a namespace such as a module, what
         `airflock.fault` gives, or a list of these.
@@ -158,9 +158,9 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     known = presets()
     path = known.get(name) or (expand_path(name) if folder is None else folder / expand_path(name))
     if not is_file(path):
-        # the name of a file is meant as a preset only where the two are much alike
-        word, alike = (name, 0.4) if path.suffix != ".toml" else (name.removesuffix(".toml"), 0.7)
-        hint = suggest(word, known, "; airflock presets lists the presets", lead="; ", cutoff=alike)
+        # a file name is a misspelt preset only where the two are very similar
+        word, cutoff = (name, 0.4) if path.suffix != ".toml" else (name.removesuffix(".toml"), 0.7)
+        hint = suggest(word, known, "; airflock presets lists the presets", lead="; ", cutoff=cutoff)
         raise ScenarioError([f"{name}: no such file or preset{hint}"])
     if path.suffix.lower() in NO_SCENARIO:
         raise ScenarioError([f"{name}: is {NO_SCENARIO[path.suffix.lower()]}"])
@@ -332,7 +332,7 @@ def _kind_with_path(entry: Any, folder: Path) -> Any:
 
 
 FROM_FILE = ("world.file", "world.simplify")
-GIVEN = ("corners", "obstacles", "heights")  # what the file says, and the scenario cannot say as well
+GIVEN = ("corners", "obstacles", "heights")  # keys that come from the map file, so the scenario may not have them
 INSTEAD = {"arena": "square", "side": 1e6}  # of a file that cannot be read, so that all else is judged in wide room
 
 

@@ -92,7 +92,7 @@ class GroupLawReader:
     def named(self, where: str, table: Any) -> tuple[tuple[Model, Any] | None, list[str]]:
         """Return the law of a group, None for that of the flock, and the errors, one line each."""
         if not isinstance(table, Mapping):
-            return None, []  # said where its numbers are read
+            return None, []  # reported where its numbers are read
         kind = table.get("kind", self.kind)
         try:
             law = self._found(where, kind)
@@ -154,7 +154,7 @@ def group_errors(
 ) -> list[str]:
     """Return why groups cannot fly with their own numbers or law, one line each."""
     errors: list[str] = []
-    of_all = {*body_errors(body, parts, model), *sensor_errors(sensor, parts)}  # told already
+    of_all = {*body_errors(body, parts, model), *sensor_errors(sensor, parts)}  # reported already
     for number, group in enumerate(groups):
         law, base = group.law or (model, parts["parameters"])
         own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in "pbs"}
@@ -327,7 +327,7 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             absolute = {"value": value["spread"], **unit} if unit else value["spread"]
             spreads[key] = absolute if share is None else share
             rest = {name: entry for name, entry in value.items() if name != "spread"}
-            inner = rest.get("value")  # set anew beside a spread that has a unit, it may be a table of its own
+            inner = rest.get("value")  # a setting beside a spread with a unit may be a table
             values |= {key: inner if isinstance(inner, Mapping) else rest} if "value" in rest else {}
         else:
             values[key] = value

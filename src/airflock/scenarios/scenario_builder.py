@@ -90,22 +90,22 @@ def build_scenario(
     flown, whole, more = collect_parts(whole, caller_parts, folder, trust=trust)
     errors = [*known_errors, *unknown, *errors, *more]
     records = ({"model": flown.law.Parameters} if flown.law else {}) | flown.records
-    whole, key_notes, more = _written_out(whole, settings, short, records)
+    whole, key_notes, more = _in_si_units(whole, settings, short, records)
     errors += more
     parts, more = _parts(whole, flown)
-    errors += more + _faults_between(parts, flown, started)
-    individuals, individual_notes, more = _individuals(whole, parts, flown, caller_parts, folder, trust)
+    errors += more + _errors_between(parts, flown, started)
+    individuals, individual_notes, more = _read_groups_and_faults(whole, parts, flown, caller_parts, folder, trust)
     published, wrong = _published(whole.get("published", {}))
     errors += more + wrong
     if errors or flown.law is None:
         raise ScenarioError([f"{where}: {error}" for error in errors])
-    parts["scene"] = _beside(parts["scene"], folder)
+    parts["scene"] = _find_mesh(parts["scene"], folder)
     scenario = Scenario(
         name=where, model=flown.law, vehicle=flown.vehicle, sensor=flown.sensor, transceiver=flown.transceiver,
         measures=flown.measures, own_topology=flown.own_topology, published=published,
         document=whole, **parts, **individuals,
     )  # fmt: skip
-    if errors := _derived_faults(scenario) or scene_errors(scenario, started):
+    if errors := _derived_errors(scenario) or scene_errors(scenario, started):
         raise ScenarioError([f"{where}: {error}" for error in errors])
     notes = (
         *notes,
@@ -119,7 +119,7 @@ def build_scenario(
     return replace(scenario, notes=notes)
 
 
-def _written_out(
+def _in_si_units(
     document: dict[str, Any], settings: Mapping[str, Any], short: Mapping[str, Any], records: Mapping[str, type]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
     """Expand last words to whole keys and vectors to components, convert to SI units; return notes and errors, too."""
@@ -131,7 +131,7 @@ def _written_out(
     return document, [*notes, *converted], errors + more
 
 
-def _derived_faults(scenario: Scenario) -> list[str]:
+def _derived_errors(scenario: Scenario) -> list[str]:
     """Return errors of numbers that follow from the scenario and lie outside their ranges."""
     try:
         scenario.resolved_metrics()
@@ -141,7 +141,7 @@ def _derived_faults(scenario: Scenario) -> list[str]:
     return []
 
 
-def _individuals(
+def _read_groups_and_faults(
     document: Mapping[str, Any],
     parts: Mapping[str, Any],
     flown: ScenarioParts,
@@ -173,7 +173,7 @@ def _individuals(
     return {"groups": flocks, "faults": entries}, notes + fault_notes, errors + more
 
 
-def _beside(scene: Any, folder: Path | None) -> Any:
+def _find_mesh(scene: Any, folder: Path | None) -> Any:
     """Return the scene; a mesh file that is not where its name says is looked for beside the scenario file."""
     if scene.kind != "mesh" or folder is None or is_file(scene.file) or not is_file(folder / scene.file):
         return scene
@@ -202,7 +202,7 @@ def _parts(document: Mapping[str, Any], flown: ScenarioParts) -> tuple[dict[str,
     return parts, errors
 
 
-def _faults_between(parts: Mapping[str, Any], flown: ScenarioParts, started: bool) -> list[str]:
+def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: bool) -> list[str]:
     """Return the errors of sections that are valid alone but do not fit each other."""
     errors: list[str] = []
     flight, law, world = parts["flight"], flown.law, parts["world"]

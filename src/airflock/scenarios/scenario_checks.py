@@ -186,7 +186,7 @@ def _overlapping(parts: Mapping[str, Any]) -> list[str]:
 
 
 MOST_JITTER = 5.8  # standard deviations; no normal number of `core.random` is larger
-ROUNDED = 2e-3  # m; by how much an obstacle at an edge may reach outside: corners of files are told to the millimetre
+ROUNDED = 2e-3  # m; by how much an obstacle at an edge may reach outside: files round corners to the millimetre
 JAMMED = 0.5  # covered share at which random sequential placement of discs comes to a halt (it jams at 0.547)
 
 
@@ -283,7 +283,7 @@ def formation_errors(world: arena.Parameters, start_record: start.Parameters, ag
     return []
 
 
-def _edge_faults(world: arena.Parameters) -> list[str]:
+def _edge_errors(world: arena.Parameters) -> list[str]:
     """Return the errors of edges that the arena cannot have."""
     errors = []
     if world.edges != "open" and world.arena != "square":
@@ -368,7 +368,7 @@ def world_errors(
     region, height = (None, 1.0) if errors else _region(world, start_record)
     if not errors:
         errors += (
-            _edge_faults(world) if started else start_region_errors(world, start_record, agents) + _edge_faults(world)
+            _edge_errors(world) if started else start_region_errors(world, start_record, agents) + _edge_errors(world)
         )
     solid: list[Polygon] = []
     within = None if plan is None or not world.obstacles else plan.buffer(ROUNDED, join_style="mitre")

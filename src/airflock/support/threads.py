@@ -8,7 +8,7 @@ from queue import SimpleQueue
 from threading import Event, Thread, local
 from typing import Any
 
-_thread = local()  # of each worker: the event that tells it to give up its flight
+_thread = local()  # of each worker: the event that makes it abandon its flight
 
 
 class Interrupted(Exception):
@@ -53,11 +53,11 @@ def run_in_threads(
             while number not in kept:
                 latest = ended.get()
                 kept[latest.number] = latest
-                if on_done and latest.fault is None:
+                if on_done and latest.error is None:
                     on_done()
             mine = kept.pop(number)
-            if mine.fault is not None:
-                raise mine.fault
+            if mine.error is not None:
+                raise mine.error
             yield mine.result
     finally:
         interrupted.set()
@@ -69,7 +69,7 @@ def run_in_threads(
 class _Ended:
     number: int
     result: Any = None
-    fault: BaseException | None = None
+    error: BaseException | None = None
 
 
 def _work(
@@ -82,8 +82,8 @@ def _work(
             return
         try:
             ended.put(_Ended(number, jobs[number]()))
-        except BaseException as error:  # raised again where the result is asked for
-            ended.put(_Ended(number, fault=error))
+        except BaseException as error:  # raised again where the result is read
+            ended.put(_Ended(number, error=error))
 
 
 def run_in_background(work: Callable[[], Any]) -> Future[Any]:
@@ -99,7 +99,7 @@ def run_in_background(work: Callable[[], Any]) -> Future[Any]:
         released.wait()
         try:
             future.set_result(work())
-        except Exception as error:  # raised again where the result is asked for
+        except Exception as error:  # raised again where the result is read
             future.set_exception(error)
 
     Thread(target=run, daemon=True).start()
