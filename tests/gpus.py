@@ -1,5 +1,6 @@
 """Machines with a GPU of some size, or with none, where there is neither."""
 
+import sys
 from types import SimpleNamespace
 
 from airflock.support import gpu
@@ -27,7 +28,13 @@ def replace_gpu(monkeypatch, **properties):
 
     The loader of numba-cuda is replaced, not `gpu.cuda_runtime`: other modules hold that function by its name.
     """
-    monkeypatch.setattr(gpu, "import_module", lambda name: runtime(**properties))
+
+    def load(name):
+        if sys.modules.get(name, name) is None:  # a test says that it is not installed
+            raise ModuleNotFoundError(f"import of {name} halted", name=name)
+        return runtime(**properties)
+
+    monkeypatch.setattr(gpu, "import_module", load)
     forget_gpu()
 
 

@@ -51,7 +51,7 @@ class Key(NamedTuple):
 
     @property
     def standard(self) -> str:
-        """The default, for a person to read; a dash where it comes from the rest of the scenario."""
+        """The default, for a person to read; a dash where it follows from the scenario."""
         if self.default is None or self.default in ((), ""):
             return "–"
         return format_with_unit(f"{self.default:g}", self.unit) if self.kind == "number" else str(self.default)
@@ -198,7 +198,7 @@ OWN = "FILE.py"
 
 
 class UndeclaredKey(NamedTuple):
-    """A key without a declaration: kind ("text", "choice", "list", "table"), meaning, options of a choice."""
+    """A key without a declaration: kind ("text", "choice", "list", "table"), meaning, options."""
 
     kind: str
     meaning: str

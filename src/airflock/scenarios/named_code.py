@@ -71,7 +71,7 @@ T = TypeVar("T")
 
 
 def load_user_module(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
-    """Import a Python file that a key names, beside the scenario file or else in the current folder.
+    """Import a Python file that a key names, beside the scenario file or in the current folder.
 
     Raises what `import_user_file` raises.
     """
@@ -112,7 +112,7 @@ def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
 
 
 def _beside(path: Path, fault: BaseException) -> str:
-    """Return a hint for a missing module that lies beside the file which imports it; "" for any other error."""
+    """Return a hint for a missing module that lies beside the importing file; "" for any other error."""
     wanted = str(fault.name).partition(".")[0] if isinstance(fault, ModuleNotFoundError) else ""
     if not wanted or not is_file(path.with_name(f"{wanted}.py")):
         return ""
@@ -162,14 +162,12 @@ def law_hash(law: Model) -> str:
     texts: dict[str, str] = {}
     left = [value for value in (*vars(law).values(), *law.decide_rules) if isinstance(value, FunctionType)]
     # Follow the calls inside the module: a changed helper changes the law, though the text of its
-    # rules is the same. Imported functions are left out, as their versions are recorded elsewhere.
+    # rules stays the same. Functions of other modules are left out.
     while left:
         rule = left.pop()
         if rule.__qualname__ in texts:
             continue
         try:
-            # The text without its common indentation: a law in a class hashes like the same law in
-            # a module.
             texts[rule.__qualname__] = inspect.cleandoc(inspect.getsource(rule))
         except (OSError, TypeError):  # typed at a prompt: there is only its code
             texts[rule.__qualname__] = rule.__code__.co_code.hex()

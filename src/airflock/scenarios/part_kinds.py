@@ -68,7 +68,7 @@ class PartKind(Generic[T]):
 
     @property
     def records(self) -> dict[str, type]:
-        """Records of parameters, by name, of those parts of the package that have one of their own."""
+        """Records of parameters by name, of those parts of the package that have their own."""
         own = {name: getattr(one, "Parameters", None) for name, one in self.shipped.items()}
         return {name: record for name, record in own.items() if record is not None}
 
@@ -95,7 +95,7 @@ class PartKind(Generic[T]):
         return part if isinstance(part, self.member) else self.gather(part, ""), []
 
     def kind(self, document: Mapping[str, Any], default: str = "") -> Any:
-        """Return the kind that a document names, which may be written as a table with value and source."""
+        """Return the kind that a document names, also if it is a table with value and source."""
         table = document.get(self.section, {})
         default = default or self.default
         return value_of(table.get("kind", default)) if isinstance(table, Mapping) else default
@@ -214,7 +214,7 @@ def collect_parts(
     """
 
     def one(family: PartKind[T], mine: T | None, usual: str) -> tuple[T, list[str]]:
-        """Return the caller's part or the document's; the default one, with errors, where that is missing."""
+        """Return the caller's part or the document's; the default one, with errors, if it is missing."""
         if mine is not None:
             return mine, []
         parts, errors = family.named(family.kind(document, usual), folder, trust=trust)
@@ -266,7 +266,7 @@ def collect_parts(
 def _law(
     document: Mapping[str, Any], given: CallerParts, folder: Path | None, trust: bool
 ) -> tuple[Model | None, list[str]]:
-    """Find the law, and add drag descent where the document has a section [aero]; return it with the errors."""
+    """Find the law, and add drag descent for a section [aero]; return it with the errors."""
     table, errors = model_table(document)
     law = given.law
     if law is None and not errors:

@@ -76,7 +76,8 @@ def read_section(
         return None, [f"{section} = {table!r} is not a table of keys"]
     values, errors = plain_values(section, table, record)
     known = {name: declared for name, declared, _ in declarations(record)}
-    # All values are checked before a record is made: its constructor would stop at the first error.
+    # Checked here and not by the constructor of the record, whose lines know neither section nor
+    # file.
     values = {key: _python(value, known.get(key)) for key, value in values.items()}
     for name, declared in known.items():
         if name in values and _is_wrong(values[name], declared):

@@ -113,7 +113,7 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
             return given, "", ""  # no number at all: the check of the section reports it with the allowed range
         if not match[2]:
             return None, "", f"{name} = {value!r} {_missing_unit(match[1], declared)}"
-        # "0,5 s" would otherwise be read as 0 with the unit ",5 s".
+        # The pattern reads "0,5 s" as 0 with the unit ",5 s"; name the comma and not the unit.
         if DECIMAL_COMMA.match(match[2]):
             return None, "", f"{name} = {value}: has a decimal comma; write {match[1]}.{match[2][1:]}"
         value, unit = float(match[1]), match[2]
@@ -155,8 +155,8 @@ def _scaled(value: Any, times: float) -> Any:
     if isinstance(value, bool):
         return None
     if isinstance(value, (int, float)):
-        # Twelve digits drop the rounding of the product: 400 ms is 0.4 s and not 0.4000000000000001
-        # s.
+        # Twelve digits drop the rounding of the product, so that a note and a file read as a person
+        # would write them.
         return float(f"{value * times:.12g}") if times != 1.0 else value
     if isinstance(value, (list, tuple)):
         scaled = [_scaled(entry, times) for entry in value]
@@ -178,7 +178,7 @@ class RelativeSpread(float):
     def __eq__(self, other: object) -> bool:
         return isinstance(other, RelativeSpread) and float(self) == float(other)
 
-    # A class that defines __eq__ loses its hash, and groups are keys of caches.
+    # A class that defines __eq__ loses the hash of float.
     __hash__ = float.__hash__
 
     @classmethod
@@ -188,7 +188,7 @@ class RelativeSpread(float):
         value, unit = (match[1], match[2]) if match else ("", "")
         if isinstance(entry, Mapping):
             value, unit = entry.get("value"), entry.get("unit")
-        # A factor of 1 means a plain number without "%": then the spread is absolute.
+        # A factor of 1 is the unit 1 itself, so the spread is absolute.
         if isinstance(value, bool) or not isinstance(unit, str) or conversion_factor(unit, "1") in (None, 1.0):
             return None
         try:

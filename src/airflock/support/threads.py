@@ -42,6 +42,7 @@ def run_in_threads(
             if on_done:
                 on_done()
         return
+    # A queue whose put and get are single calls of C: an interruption cannot leave it locked.
     ended: SimpleQueue[_Ended] = SimpleQueue()
     interrupted, turns = Event(), iter(range(len(jobs)))
     team = [Thread(target=_work, args=(jobs, turns, ended, interrupted), daemon=True) for _ in range(workers)]
@@ -50,6 +51,8 @@ def run_in_threads(
     kept: dict[int, _Ended] = {}
     try:
         for number in range(len(jobs)):
+            # Results arrive in any order and are handed on in the order of the jobs, so that output
+            # never depends on timing.
             while number not in kept:
                 latest = ended.get()
                 kept[latest.number] = latest
@@ -60,6 +63,8 @@ def run_in_threads(
                 raise mine.error
             yield mine.result
     finally:
+        # Also where the caller stops iterating: the workers abandon their flights at the next
+        # check.
         interrupted.set()
         for thread in team:
             thread.join()
@@ -102,6 +107,7 @@ def run_in_background(work: Callable[[], Any]) -> Future[Any]:
         except Exception as error:  # raised again where the result is read
             future.set_exception(error)
 
+    # A daemon, so that a compilation in the background does not keep the program from ending.
     Thread(target=run, daemon=True).start()
     released.set()
     return future
