@@ -14,7 +14,7 @@ from airflock.scenarios.files import load
 from airflock.support import gpu
 from airflock.support.errors import DeviceError, FlightError, ScenarioError
 from flocks import scenario
-from gpus import runtime
+from gpus import forget_gpu, replace_gpu
 from inside import MOST_THREADS, Flown, Shape, shape_of, simulate
 
 SMALL = scenario(agents=3, duration=0.2, world__side=60.0, world__walls="nearest_per_axis")  # others have its driver
@@ -25,12 +25,18 @@ def present(monkeypatch):
     for home in (gpu, support):  # where it is, and the door through which others reach it
         monkeypatch.setattr(home, "unavailable_reason", lambda: None)
         monkeypatch.setattr(home, "cuda_runtime", lambda: runtime(free=140e9))
+    replace_gpu(monkeypatch, free=140e9)
+    yield
+    forget_gpu()
 
 
 @pytest.fixture
 def absent(monkeypatch):
     for home in (gpu, support):
         monkeypatch.setattr(home, "unavailable_reason", lambda: "no driver")
+    replace_gpu(monkeypatch, available=False, fault="no driver")
+    yield
+    forget_gpu()
 
 
 def test_unknown_devices_are_refused():
@@ -39,11 +45,11 @@ def test_unknown_devices_are_refused():
 
 
 def test_a_missing_gpu_is_an_error_where_it_is_named_and_a_note_where_not(absent):
-    with pytest.raises(DeviceError, match="device = cuda: no driver; choose device = cpu or auto"):
+    with pytest.raises(DeviceError, match="device = cuda: no GPU can be used: no driver; choose device = cpu or auto"):
         score_flights([SMALL], [0], device="cuda")
     said = []
     assert pick_device([SMALL], "auto", notify=said.append) == "cpu"
-    assert said == ["device auto: cpu, no driver"]
+    assert said == ["device auto: cpu, no GPU can be used: no driver"]
 
 
 def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypatch):
@@ -87,7 +93,7 @@ def test_work_grows_with_flights_agents_and_time():
 
 
 def test_the_cpu_is_never_asked_about_a_gpu(monkeypatch):
-    monkeypatch.setattr(gpu, "unavailable_reason", lambda: pytest.fail("asked"))
+    monkeypatch.setattr(gpu, "import_module", lambda name: pytest.fail("asked"))
     assert pick_device([SMALL], "cpu") == "cpu"
 
 
@@ -151,6 +157,8 @@ def test_the_command_ends_with_one_line_and_status_2_without_a_gpu():
     code = "import sys; sys.argv = ['airflock', 'run', 'vasarhelyi_2018/4ms', '--device', 'cuda']\n"
     code += "from airflock.support import gpu as device\ndevice.unavailable_reason = lambda: 'no driver'\n"
     code += "from airflock.cli.main import main\nmain()\n"
+    code += "from airflock.support import gpu\ngpu.unavailable_reason = lambda: 'no driver'\n"
+    code += "from airflock.cli import main\nmain()\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr.strip() == "airflock: device = cuda: no driver; choose device = cpu or auto"

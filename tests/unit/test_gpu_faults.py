@@ -9,10 +9,9 @@ import pytest
 from airflock.cli import main
 from airflock.engine import pick_device, plan_of
 from airflock.scenarios.files import load
-from airflock.support import gpu as gpu
 from airflock.support.errors import DeviceError
 from flocks import scenario
-from gpus import runtime
+from gpus import forget_gpu, replace_gpu
 from inside import no_room
 from needed import needed
 
@@ -25,10 +24,10 @@ def machine(monkeypatch):
 
     def put(**properties):
         monkeypatch.delenv("NUMBA_ENABLE_CUDASIM", raising=False)
-        monkeypatch.setattr(gpu, "cuda_runtime", lambda: runtime(**properties))
-        monkeypatch.setattr(gpu, "unavailable_reason", gpu.unavailable_reason.__wrapped__)
+        replace_gpu(monkeypatch, **properties)
 
-    return put
+    yield put
+    forget_gpu()
 
 
 def ended(monkeypatch, capsys, *arguments):

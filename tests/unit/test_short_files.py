@@ -5,7 +5,7 @@ import re
 import pytest
 
 import airflock
-from airflock.core import fault
+from airflock.core import ENTRY_KEYS
 from airflock.core.parameters import Quantity, declarations
 from airflock.parts.bodies.registry import BODIES
 from airflock.parts.faults.registry import KINDS
@@ -165,7 +165,7 @@ def test_every_name_that_a_file_may_hold_is_among_the_keys():
     every = airflock.keys()
     names = {key.name for key in every}
     assert {name.partition(".")[0] for name in names} == {*TOP_LEVEL_KEYS, "extends"}
-    for of, known in (("faults", fault.ENTRY_KEYS), ("groups", groups.KEYS)):
+    for of, known in (("faults", ENTRY_KEYS), ("groups", groups.KEYS)):
         assert {key.name for key in keys.sections()[of].keys} == {f"{of}.{name}" for name in known}
     records = {**BODIES, **SENSORS, **KINDS} | {name: find_law(name) for name in MODELS}
     for name, found in records.items():
@@ -178,7 +178,7 @@ def test_every_name_that_a_file_may_hold_is_among_the_keys():
 def test_the_keys_of_a_kind_of_fault_are_its_numbers_and_those_of_every_entry():
     names = [key.name for key in keys.keys("motor")]
     assert names[0] == "faults.share" and {"faults.at", "faults.per_hour", "faults.agents", "body.motor"} <= set(names)
-    assert {key.name for key in keys.keys("gnss_frozen")} == {f"faults.{name}" for name in fault.ENTRY_KEYS}
+    assert {key.name for key in keys.keys("gnss_frozen")} == {f"faults.{name}" for name in ENTRY_KEYS}
 
 
 def test_an_unknown_section_of_keys_is_told_with_the_nearest():

@@ -1,4 +1,4 @@
-"""The cost of a flight: its steps, its use of cells, and its run time, estimated before anything is compiled."""
+"""The cost of a flight: its steps, its use of cells, and its run time, estimated before a compilation."""
 
 import math
 from collections import Counter
@@ -35,10 +35,12 @@ NEAR_FROM, NEAR_FROM_IN_A_BOX = 6000, 2000
 
 
 def uses_all_cores(scenario: Scenario) -> bool:
-    """Return True if one flight uses all cores by itself, so that several side by side gain nothing.
+    """Return True if one flight uses all cores, so that several side by side gain nothing.
 
     Its neighbours are found by cells: many agents, laws of finite reach, exact perception.
     """
+    # Cells hold true states: errors, delays and losses belong to a pair and would need a memory for
+    # each.
     perfect = not scenario.has_sensor_error and step_counts(scenario)["delay"] == 0 and scenario.radio.loss == 0.0
     return (
         scenario.agents >= GRID_FROM
@@ -69,7 +71,7 @@ def cell_notes(scenario: Scenario) -> list[str]:
 
 
 def uses_cells(scenario: Scenario) -> bool:
-    """Return True if cells as wide as a law's reach contain every agent that an agent of the law may meet."""
+    """Return True if cells as wide as a law's reach contain every agent that an agent may meet."""
     if not any(law.model.neighbour for law in scenario.laws) or not all(map(_within_reach, scenario.laws)):
         return False
     kind = scenario.topology_rule
@@ -83,7 +85,7 @@ def _within_reach(law: FlownLaw) -> bool:
 
 
 def box_fits_cells(scenario: Scenario) -> bool:
-    """Return True if a periodic box is two reaches wide, so that a neighbour is in reach at one image only."""
+    """Return True if a periodic box is two reaches wide, so that only one image is in reach."""
     if scenario.world.edges != "periodic":
         return True
     halves = half_sizes(scenario.world)[: scenario.dimensions]
@@ -97,6 +99,7 @@ def _widest_reach(scenario: Scenario, law: FlownLaw) -> float:
     read = fields_read(law.model.reach, "p")
     reaches = [float(law.model.reach(law.parameters))]
     for group in scenario.groups:
+        # Groups that fly by another law do not widen this one's cells.
         if group.agents and set(group.agents) <= set(law.agents):
             if any(letter == "p" and (read is None or name in read) for letter, name in group.spread):
                 return math.inf
@@ -106,12 +109,14 @@ def _widest_reach(scenario: Scenario, law: FlownLaw) -> float:
 
 
 def metrics_use_cells(scenario: Scenario) -> bool:
-    """Return True if order parameters look at pairs by cells, too, where neighbours are found so."""
+    """Return True if order parameters look at pairs by cells, too."""
     periodic = scenario.world.edges == "periodic"
     return bool(scenario.agents >= (NEAR_FROM_IN_A_BOX if periodic else NEAR_FROM))
 
 
 TIMES = (("days", 86400.0), ("h", 3600.0), ("min", 60.0))
+# Counted and not timed, as an answer is needed before anything is compiled. Shipped presets took
+# 0.2 to 1.6 times the estimate, so 30 days refuse nothing that anybody waits for.
 LONGEST = 30 * 86400.0  # s of a processor that one flight may take; nobody waits longer for one
 # s of one core (2 cores of 2025, single precision). Measured: flights of 31 presets take 0.20 to 1.62 of the estimate.
 PAIR = 7e-10  # for one look at one other agent
@@ -121,10 +126,11 @@ WING = 2e-6  # for what one wing does to another, while all are solved for
 
 
 def check_run_time(scenario: Scenario) -> None:
-    """Refuse a flight that takes too long; raises FlightError with the number of agents or the duration that fits."""
+    """Refuse a flight that takes too long; raises FlightError with the size that fits."""
     flight, n = scenario.flight, float(scenario.agents)
     if flight.duration / flight.dt * n * (2.0 * n * PAIR + STEP + SIGHT + n * WING) <= LONGEST:
         return  # whatever its rates and its law are
+    # Slow rates of decision and cells make a flight cheaper, but take longer to find out.
     took = estimated_seconds(scenario)
     if took <= LONGEST:
         return
@@ -145,6 +151,7 @@ def estimated_seconds(scenario: Scenario) -> float:
     """Estimate the seconds of one core that a flight takes, without its compilation."""
     times, n, model = step_counts(scenario), float(scenario.agents), scenario.model
     decisions = times["steps"] / times["decide_every"]
+    # By cells an agent looks at about sixty others, however large the flock is.
     pairs = min(n, 60.0) if uses_all_cores(scenario) else n
     seconds = (decisions + times["steps"] / times["sample_every"]) * n * pairs * PAIR + times["steps"] * n * STEP
     seconds += decisions * n * SIGHT if model.sight is not None else 0.0
@@ -153,6 +160,8 @@ def estimated_seconds(scenario: Scenario) -> float:
 
 def estimated_total_seconds(scenarios: Sequence[Scenario]) -> float:
     """Estimate the seconds of one core that flights take; scenarios may repeat."""
+    # By identity: a sweep repeats one object for thousands of seeds, and a Scenario holds dicts, so
+    # it has no hash.
     kinds = {id(scenario): scenario for scenario in scenarios}
     return sum(count * estimated_seconds(kinds[kind]) for kind, count in Counter(map(id, scenarios)).items())
 

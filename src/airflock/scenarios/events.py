@@ -35,7 +35,7 @@ KINDS = ("change", "command", "push", "place", "fault", "remove", "add", "branch
 
 
 def to_events(items: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
-    """Make events from events or plain dicts, in the order of their steps. Raises FlightError for anything else."""
+    """Make events from events or plain dicts, in the order of their steps. Raises FlightError."""
     if not isinstance(items, Iterable):
         raise FlightError(f"events = {items!r}: give a list of events, such as those of a flight")
     events = []
@@ -49,11 +49,12 @@ def to_events(items: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
                 f"events[{number}]: kind = {event.kind!r} at step {event.step}; known kinds: {', '.join(KINDS)}"
             )
         events.append(event)
+    # sorted() is stable: events of one step keep their order, which changes the result.
     return sorted(events, key=lambda event: event.step)
 
 
 def to_vectors(name: str, value: Any, count: int, dimensions: int, unit: str) -> list[Any]:
-    """Check one finite vector for all of `count` agents, or a list of one for each. Raises FlightError."""
+    """Check one finite vector for all of `count` agents, or one for each. Raises FlightError."""
     rows = value.tolist() if hasattr(value, "tolist") else value
     each = isinstance(rows, (list, tuple)) and any(hasattr(row, "__len__") for row in rows)
     if not each:
@@ -92,7 +93,7 @@ def are_several(agents: Any) -> bool:
 
 
 def check_agents(number_or_list: Any, agents: int) -> list[int]:
-    """Return the numbers of one agent or of several different ones. Raises FlightError in one line."""
+    """Return the numbers of one agent or of several different ones. Raises FlightError."""
     numbers = [
         check_agent(number, agents) for number in (number_or_list if are_several(number_or_list) else [number_or_list])
     ]
@@ -128,7 +129,7 @@ def check_seed(seed: Any) -> int:
 
 
 def check_seeds(seeds: int | Iterable[int]) -> list[int]:
-    """Return the seeds of several flights: 0, 1, ... up to a number of flights, or those of a list."""
+    """Return the seeds of several flights: 0, 1, ... up to a count, or those of a list."""
     if isinstance(seeds, Iterable):
         checked = [check_seed(seed) for seed in seeds]
     else:

@@ -21,6 +21,8 @@ from airflock.support import AirflockError, suggest
 if TYPE_CHECKING:
     from airflock.scenarios.scenario import Scenario
 
+# Refused where agents update in turn: they see each other as they are, so no message exists that a
+# fault could disturb.
 PERCEPTION = {"sense", "tell", "radio", "clock"}  # rules that disturb what agents know of each other
 MOST = 255  # entries of a file: each draws by a number of its own
 
@@ -92,6 +94,8 @@ def read_fault_entries(
         notes += entry_notes
         errors += wrong
         entries += [entry] if entry and not wrong else []
+        # A kind from a file keeps its name for the entries behind it; another kind of this name is
+        # an error, as drivers tell kinds apart by their names.
         if entry is not None:
             if kinds.get(entry.fault.name, entry.fault) != entry.fault:
                 errors.append(f"faults[{number}].kind: {entry.fault.name} is the name of another kind already")
@@ -113,10 +117,10 @@ def _entry(
         rest = {key: value for key, value in table.items() if key not in ENTRY_KEYS}
         numbers, number_notes, wrong = _record(where, rest, kind.Parameters, ENTRY_KEYS)
         notes, errors = notes + number_notes, errors + wrong
-    who, wrong = _who(where, table, agents, groups)
+    who, wrong = _read_agents(where, table, agents, groups)
     errors += wrong
     if when is not None:
-        errors += _when_faults(where, when, agents if who is None else len(who))
+        errors += _time_errors(where, when, agents if who is None else len(who))
     if kind is None:
         return None, notes, errors
     if sequential and PERCEPTION & set(kind.rules):
@@ -126,7 +130,7 @@ def _entry(
         )
     if when is None or numbers is None or who is None:
         return None, notes, errors
-    errors += _end_faults(where, when, kind, numbers)
+    errors += _end_errors(where, when, kind, numbers)
     count = 1 if when.number is None and when.per_hour is not None else when.number
     entry = FaultEntry(
         kind, numbers, who, None if count is None else int(count), when.at, when.per_hour or 0.0,
@@ -138,7 +142,7 @@ def _entry(
 def _record(
     where: str, table: Mapping[str, Any], record: type, beside: Sequence[str] = ()
 ) -> tuple[Any, list[str], list[str]]:
-    """Make a record from keys of an entry, in SI units; return it, or None, with notes and errors."""
+    """Make a record from keys of an entry, in SI units; return it with notes and errors."""
     document, notes, errors = convert_units({where: table}, {where: record})
     result, wrong = schema.read_section(where, document[where], record, beside)
     return (None if errors else result), notes, errors + wrong
@@ -159,7 +163,7 @@ def _kind(
     return None, [f"{where}.kind = {name!r}: unknown kind of fault; {hint}"]
 
 
-def _who(
+def _read_agents(
     where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group]
 ) -> tuple[tuple[int, ...] | None, list[str]]:
     """Return the agents that an entry may affect, or None, with the errors."""
@@ -176,8 +180,8 @@ def _who(
     return None, [f"{where}.group = {table['group']!r}: unknown group; {known}"]
 
 
-def _when_faults(where: str, when: FaultTiming, may: int) -> list[str]:
-    """Return the errors of times that are valid one by one; may : how many agents may be affected."""
+def _time_errors(where: str, when: FaultTiming, may: int) -> list[str]:
+    """Return the errors of times that are valid alone; may : how many agents may be affected."""
     errors = []
     if (when.at is None) == (when.per_hour is None):
         errors.append(f"{where}: give at, when it begins, or per_hour, how often it comes")
@@ -190,7 +194,7 @@ def _when_faults(where: str, when: FaultTiming, may: int) -> list[str]:
     return errors
 
 
-def _end_faults(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> list[str]:
+def _end_errors(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> list[str]:
     """Return why a fault cannot end."""
     errors = []
     ends = when.lasts is not None or (when.at is not None and when.until is not None)
@@ -201,6 +205,8 @@ def _end_faults(where: str, when: FaultTiming, kind: Fault, numbers: Any) -> lis
     return errors
 
 
+# Rates count for the flock and not for each agent: "a motor fails once an hour" is what people know
+# of a fleet.
 ENDLESS = 1e9  # s; how long a fault lasts that does not end
 HOUR = 3600.0  # s
 
@@ -244,10 +250,14 @@ def merge_onsets(
 
     lasting : numbers of the entries before that stay as they are
     """
-    named = {_which(onset): onset for onset in after}
-    begun = [named.get(_which(o), o) for o in before if o.begin < now and (_which(o) in named or o.entry in lasting)]
-    kept = {_which(onset)[:3] for onset in begun}
-    gone = [o for o in after if o.begin < now <= o.step and _which(o)[:3] in kept and o not in begun]
+    # Numbers are left out of the comparison, so that a slider can change a fault that is already
+    # under way.
+    named = {_identity(onset): onset for onset in after}
+    begun = [
+        named.get(_identity(o), o) for o in before if o.begin < now and (_identity(o) in named or o.entry in lasting)
+    ]
+    kept = {_identity(onset)[:3] for onset in begun}
+    gone = [o for o in after if o.begin < now <= o.step and _identity(o)[:3] in kept and o not in begun]
     return _in_order([*begun, *gone, *(o for o in after if o.begin >= now)])
 
 
@@ -255,6 +265,8 @@ def _in_order(found: Sequence[FaultOnset]) -> tuple[FaultOnset, ...]:
     """Sort onsets by their steps; drop agents that leave by a fault which another of its kind has replaced."""
     kept: list[FaultOnset] = []
     last: dict[tuple[str, int], FaultOnset] = {}
+    # A later fault of the same kind replaces an earlier one in the driver's columns, so the earlier
+    # one must not make its agent leave. Of two in one step the later entry wins.
     for onset in sorted(found, key=lambda onset: onset.step):
         other = last.get((onset.kind, onset.agent), onset)
         if not onset.leaves:
@@ -265,8 +277,8 @@ def _in_order(found: Sequence[FaultOnset]) -> tuple[FaultOnset, ...]:
     return tuple(kept)
 
 
-def _which(onset: FaultOnset) -> tuple[str, int, int, bool]:
-    """Return the identity of a fault, whatever its numbers: kind, agent, step of its begin, and if the agent leaves."""
+def _identity(onset: FaultOnset) -> tuple[str, int, int, bool]:
+    """Return the identity of a fault, whatever its numbers: kind, agent, begin, and if the agent leaves."""
     return onset.kind, onset.agent, onset.begin, onset.leaves
 
 
@@ -278,12 +290,13 @@ def _onsets_of_entry(
     numbers = tuple(float(getattr(entry.numbers, name)) for name in kind.fields)
     for occurrence, at in enumerate(_occurrence_times(scenario, entry, number, seed, world)):
         ends = min(entry.lasts, entry.until - at, ENDLESS)
+        # Rounded to steps, as the driver counts them; an endless fault keeps its mark.
         lasts = ends if ends >= ENDLESS else round(ends / dt) * dt
         if lasts <= 0.0:
             continue
         step = round(at / dt)
         gone = kind.time_to_absence(entry.numbers)
-        for agent in _hit(entry, number, occurrence, seed, world):
+        for agent in _affected_agents(entry, number, occurrence, seed, world):
             yield FaultOnset(step, kind.name, agent, lasts, numbers, entry=number, begin=step)
             if gone < lasts:
                 yield FaultOnset(step + round(gone / dt), kind.name, agent, lasts, numbers, True, number, step)
@@ -297,6 +310,8 @@ def _occurrence_times(scenario: "Scenario", entry: FaultEntry, number: int, seed
         return
     time, occurrence = 0.0, 0
     while entry.per_hour > 0.0:
+        # Waiting times of a Poisson process by inversion; occurrence and entry number select the
+        # random number.
         word = random.random_words(seed, random.FAULT, world, occurrence, number)[0]
         time -= HOUR / entry.per_hour * math.log(random.uniform(word))
         occurrence += 1
@@ -305,11 +320,13 @@ def _occurrence_times(scenario: "Scenario", entry: FaultEntry, number: int, seed
         yield time
 
 
-def _hit(entry: FaultEntry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
-    """Return the agents that an occurrence affects: all that may be, or so many of them, drawn without replacement."""
+def _affected_agents(entry: FaultEntry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
+    """Return the agents of an occurrence: all that may be affected, or some drawn without replacement."""
     may = entry.agents
     if entry.number is None or entry.number >= len(may):
         return list(may)
+    # Sorting by one random number per agent draws without replacement, and independently of the
+    # order of agents.
     draw = {agent: random.random_words(seed, random.FAULT, world, occurrence, agent, 1 + number)[0] for agent in may}
     return sorted(sorted(may, key=lambda agent: (draw[agent], agent))[: entry.number])
 

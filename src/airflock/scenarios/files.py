@@ -92,7 +92,7 @@ def load(
     radio : optional
         A radio of your own by which agents hear each other: a `Radio`, a namespace, or a name or file.
     topology : optional
-        A topology of your own, which says whom of those that they hear agents meet: a namespace, or a name or file.
+        A topology of your own, which selects the neighbours that agents meet: a namespace, or a name or file.
     faults : optional
         Kinds of fault of your own, which entries of [[faults]] may name: a namespace such as a module, what
         `airflock.fault` gives, or a list of these.
@@ -154,13 +154,13 @@ def load(
 
 
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
-    """Read a preset or a file; return its document in the current format, and the folder of the file."""
+    """Read a preset or a file; return its document in the current format, and its folder."""
     known = presets()
     path = known.get(name) or (expand_path(name) if folder is None else folder / expand_path(name))
     if not is_file(path):
-        # the name of a file is meant as a preset only where the two are much alike
-        word, alike = (name, 0.4) if path.suffix != ".toml" else (name.removesuffix(".toml"), 0.7)
-        hint = suggest(word, known, "; airflock presets lists the presets", lead="; ", cutoff=alike)
+        # a file name is a misspelt preset only where the two are very similar
+        word, cutoff = (name, 0.4) if path.suffix != ".toml" else (name.removesuffix(".toml"), 0.7)
+        hint = suggest(word, known, "; airflock presets lists the presets", lead="; ", cutoff=cutoff)
         raise ScenarioError([f"{name}: no such file or preset{hint}"])
     if path.suffix.lower() in NO_SCENARIO:
         raise ScenarioError([f"{name}: is {NO_SCENARIO[path.suffix.lower()]}"])
@@ -169,6 +169,7 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
             document = read_toml(path)
         except FormatError as error:
             raise ScenarioError([f"{name}: is not a scenario file (TOML): {error}"]) from error
+    # A study read as a scenario would give one error per key.
     if tells_of_study(document) and not {"model", "extends"} & set(document):
         raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
     return {**formats.to_current_format(document, name), formats.KEY: formats.FORMAT}, path.parent
@@ -271,6 +272,7 @@ def extend_document(
 def _extended(
     document: Mapping[str, Any], where: str, folder: Path | None, read: ReadDocument, chain: tuple[str, ...]
 ) -> tuple[dict[str, Any], str]:
+    # The keys are copied and the link is gone: a recording must not change when a preset does.
     own = dict(document)
     name = own.pop("extends", None)
     if name is None:
@@ -283,6 +285,7 @@ def _extended(
         base, place = read(name, folder)
     except ScenarioError as error:
         raise ScenarioError([f"{where}: extends = {name!r}: {line}" for line in error.faults]) from error
+    # The base's own files are named relative to the base, so they become absolute before the merge.
     base, _ = _extended(_with_paths(base, place), name, place, read, (*chain, name))
     for key in OF_ITS_OWN:
         base.pop(key, None)
@@ -290,7 +293,8 @@ def _extended(
 
 
 def _merge_section(key: str, base: Any, own: Any) -> Any:
-    """Merge one section: the document's keys over the file's, unless they are of different kinds."""
+    """Merge one section: the document's keys over the file's, unless their kinds differ."""
+    # A value with its unit is a table, too, and is replaced as one.
     if not isinstance(base, Mapping) or not isinstance(own, Mapping) or (set(own) & {"value", "unit"} and key != "set"):
         return own
     kinds = (value_of(own.get("kind", base.get("kind"))), value_of(base.get("kind")))
@@ -332,7 +336,7 @@ def _kind_with_path(entry: Any, folder: Path) -> Any:
 
 
 FROM_FILE = ("world.file", "world.simplify")
-GIVEN = ("corners", "obstacles", "heights")  # what the file says, and the scenario cannot say as well
+GIVEN = ("corners", "obstacles", "heights")  # keys that come from the map file, so the scenario may not have them
 INSTEAD = {"arena": "square", "side": 1e6}  # of a file that cannot be read, so that all else is judged in wide room
 
 
@@ -374,6 +378,8 @@ def with_field(
             errors += str(error).splitlines()
         else:
             return {**document, "world": {**field.keys, **kept}}, rest, (field.note,), ()
+    # A very large square stands in for the unreadable field, so that no further error about the
+    # arena follows.
     kept = {key: value for key, value in kept.items() if key not in GIVEN} | INSTEAD
     rest = {key: value for key, value in rest.items() if key.removeprefix("world.") not in (*GIVEN, *INSTEAD, "walls")}
     return {**document, "world": kept}, rest, (), tuple(errors)

@@ -1,4 +1,4 @@
-"""The world of a flight outside a driver: places checked before an agent is put there, edges, appearing shapes, goals.
+"""The world of a flight outside a driver: valid places, edges, appearing shapes, goals.
 
 The first half checks starts and goals against the scene; `FlightWorld` and `GoalCourse` serve interpreted flights.
 """
@@ -89,7 +89,7 @@ def scene_notes(scenario: Scenario) -> list[str]:
 
 
 def wrap_start(scenario: Scenario, start: NDArray[Any]) -> NDArray[Any]:
-    """Move the places (m) of a start (component, agent) back into a periodic box, where they are the same places."""
+    """Move the places (m) of a start (component, agent) back into a periodic box."""
     if scenario.world.edges != "periodic":
         return start
     put = start.copy()
@@ -116,6 +116,7 @@ def position_error(scenario: Scenario, positions: NDArray[Any], agents: Sequence
                 f"agent {agent} lies {beyond.max():.3g} m outside the arena, from whose faces agents bounce; "
                 "move it in or enlarge world.side"
             )
+    # The scene is checked, walls are not: outside an open arena the law brings an agent back.
     place = scenario.stands()
     columns = np.asarray(positions, float)[:dims].T if len(place.shapes) else ()
     for agent, column in zip(agents, columns, strict=False):
@@ -131,6 +132,7 @@ def _depth(place: Scene, point: NDArray[np.float64]) -> float:
         return 0.0
     gap = clearance(place, point)
     if gap <= 0.0:
+        # At least a nanometre, so that a point on a face counts as inside.
         return max(-gap, 1e-9)
     return gap if in_mesh(place, point) else 0.0
 
@@ -160,7 +162,7 @@ def _blocked_share(scene: scenery.Parameters, begin: start.Parameters, dims: int
 
 
 class FlightWorld(Map):
-    """The world of a flight: the map that a drone carries, with edges that act and shapes that appear."""
+    """The world of a flight: the map of a drone, with edges that act and shapes that appear."""
 
     def __init__(self, scenario: Scenario):
         stands, self.edge, self.dims = scenario.stands(), EDGE_RULES[scenario.world.edges], scenario.dimensions
@@ -196,6 +198,7 @@ class FlightWorld(Map):
         for row in self.later:
             if 0.0 <= row[6] <= time:
                 gaps = [bvh.beside(s.x, s.y, s.z, [row], 0) for s in flock]
+                # A shape waits until its place is free: an agent inside of it could never leave.
                 if min(gaps) > self.clearance**2:
                     self.shapes[int(row[7])][:6] = row[:6]
                     row[6] = -1.0
@@ -216,7 +219,7 @@ def wall_range(model: Model, p: Any) -> float:
 
 
 class GoalCourse:
-    """Goals of a flight: place and number of the current one, and when each was reached (s; nan: never)."""
+    """Goals of a flight: the current one, and when each was reached (s; nan: never)."""
 
     def __init__(self, scenario: Scenario):
         self.given, self.points = scenario.goals, [tuple(map(float, p)) for p in scenario.waypoints()]
@@ -254,6 +257,7 @@ class GoalCourse:
         if time <= 0.0:
             self.starts = [state[:3] for state in flock]
             far = max(math.dist(a, b) for a, b in zip(self.starts, self.points, strict=True))
+            # The path is a cubic from rest to rest, whose largest speed is 1.5 times its mean.
             self.duration = 1.5 * far / self.given.speed if self.given.speed > 0.0 else 0.0
         pairs = zip(self.starts, self.points, strict=True)
         self.own = [[goals.glide(a, b, time, self.duration) for a, b in zip(*pair, strict=True)] for pair in pairs]

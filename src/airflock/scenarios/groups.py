@@ -92,7 +92,7 @@ class GroupLawReader:
     def named(self, where: str, table: Any) -> tuple[tuple[Model, Any] | None, list[str]]:
         """Return the law of a group, None for that of the flock, and the errors, one line each."""
         if not isinstance(table, Mapping):
-            return None, []  # said where its numbers are read
+            return None, []  # reported where its numbers are read
         kind = table.get("kind", self.kind)
         try:
             law = self._found(where, kind)
@@ -119,6 +119,7 @@ class GroupLawReader:
         errors, key, base = [], f"{where}.kind = {kind!r}", self.model
         if found is base:
             return []
+        # One body carries all agents, and a body takes one kind of command.
         if found.command != base.command:
             errors.append(
                 f"{key}: model {found.name} commands {found.command}, and model {base.name} of the flock "
@@ -127,6 +128,7 @@ class GroupLawReader:
         for law in (base, found):
             if law.flock is not None:
                 errors.append(f"{key}: model {law.name} solves for the whole flock, so all fly by it")
+        # A driver keeps polygons either as shapes or as surfaces, never as both.
         if self.walls and (found.sight is None) != (base.sight is None):
             casts, other = (base, found) if found.sight is None else (found, base)
             errors.append(
@@ -142,6 +144,8 @@ class GroupLawReader:
         made, errors = schema.read_section(where, own, found.Parameters)
         if errors or made is None:
             return None, errors
+        # Choices select the text of a driver, so they are part of the law; numbers are columns of
+        # its row and stay apart.
         base = self.parameters if found == self.model else found.Parameters()
         record = replace(base, **{key: getattr(made, key) for key in own})
         if found == self.model and found.flock is not None and choices(record) != choices(base):
@@ -154,7 +158,8 @@ def group_errors(
 ) -> list[str]:
     """Return why groups cannot fly with their own numbers or law, one line each."""
     errors: list[str] = []
-    of_all = {*body_errors(body, parts, model), *sensor_errors(sensor, parts)}  # told already
+    # An error of the whole flock would otherwise be repeated for each group.
+    of_all = {*body_errors(body, parts, model), *sensor_errors(sensor, parts)}  # reported already
     for number, group in enumerate(groups):
         law, base = group.law or (model, parts["parameters"])
         own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in "pbs"}
@@ -172,6 +177,8 @@ def group_errors(
 
 def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: int) -> tuple[FlownLaw, ...]:
     """Return the laws of a flock: that of all agents without their own, then those of groups, one for each text."""
+    # Groups with one law and one set of choices share a text, whatever their numbers: each further
+    # law costs a compilation.
     by_law: dict[Any, list[Group]] = {}
     for group in groups:
         if group.law is not None and group.agents:
@@ -183,6 +190,7 @@ def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: i
     for (law, _), members in by_law.items():
         first = members[0]
         assert first.law is not None
+        # Any agent's numbers would do here: what differs among them is read from columns.
         record = replace(
             first.law[1], **{name: value for (letter, name), value in first.numbers.items() if letter == "p"}
         )
@@ -192,7 +200,7 @@ def flown_laws(model: Model, parameters: Any, groups: Sequence[Group], agents: i
 
 
 def _varied(groups: Sequence[Group], record: Any) -> tuple[tuple[str, str], ...]:
-    """Return the numbers of a law that differ among the agents of groups, as ("p", name), in declared order."""
+    """Return the numbers of a law that differ among groups, as ("p", name), in declared order."""
     names = []
     for name, declared, _ in declarations(record):
         usual, key = float(getattr(record, name) or 0.0) if isinstance(declared, Quantity) else 0.0, ("p", name)
@@ -228,6 +236,7 @@ def count_of_share(value: Any, agents: int) -> Any:
     share = SHARE.fullmatch(value) if isinstance(value, str) else None
     if share is None or not 0.0 < float(share[1]) <= 100.0:
         return value
+    # A share never rounds to an empty group.
     return max(1, round(float(share[1]) / 100.0 * agents))
 
 
@@ -268,10 +277,12 @@ def read_groups(
 
 
 def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple[int, ...]], list[str]]:
-    """Return the members of each group: those that are listed, so many of the next ones, or all that are left."""
+    """Return the members of each group: a list, so many of the next ones, or all that are left."""
     errors: list[str] = []
     members: list[tuple[int, ...]] = [()] * len(given)
     taken: set[int] = set()
+    # Lists are read first, then counts, then the one group that takes the rest: so the order of
+    # groups does not change who is listed.
     for number, table in enumerate(given):
         if isinstance(table.get("agents"), (list, tuple)):
             listed, wrong = read_members(f"groups[{number}].agents", table["agents"], agents)
@@ -327,10 +338,12 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             absolute = {"value": value["spread"], **unit} if unit else value["spread"]
             spreads[key] = absolute if share is None else share
             rest = {name: entry for name, entry in value.items() if name != "spread"}
-            inner = rest.get("value")  # set anew beside a spread that has a unit, it may be a table of its own
+            inner = rest.get("value")  # a setting beside a spread with a unit may be a table
             values |= {key: inner if isinstance(inner, Mapping) else rest} if "value" in rest else {}
         else:
             values[key] = value
+    # Spreads are converted under a section name of their own, so that errors can tell a number from
+    # its spread.
     apart = f"{where}.spread"
     converted, unit_notes, unfit = convert_units({where: values, apart: spreads}, {where: record, apart: record})
     notes = [_as_written(line, where, apart) for line in unit_notes]
@@ -389,15 +402,19 @@ def agent_values(groups: Sequence[Group], agents: int, letter: str, name: str, r
         for agent in group.agents:
             value = own
             if spread > 0.0:
+                # Agent, number and record select the random number: a further group changes no
+                # agent's draw.
                 draw = list(LETTERS.values()).index(letter)
                 w0, w1, _, _ = random.random_words(seed, random.SPREAD, 0, list(known).index(name), agent, draw)
                 value += spread * random.normal_pair(w0, w1)[0]
+            # Clipped, not drawn again: a second draw would depend on how often the first one
+            # failed.
             values[agent] = min(max(value, declared.low), declared.high)
     return values
 
 
 def group_number_errors(groups: Sequence[Group], model: Model | None) -> list[str]:
-    """Return why a law that solves for the whole flock cannot fly the numbers of groups, one line."""
+    """Return why a law of the whole flock cannot fly the numbers of groups, one line."""
     if model is None or model.flock is None or model.workspace is None:
         return []
     if "p" not in {*signature(model.flock).parameters, *signature(model.workspace).parameters}:

@@ -21,7 +21,7 @@ from airflock.support import ScenarioError
 
 TOP = "top"  # the keys before the first section
 FAMILIES = {"model": MODELS, "body": BODIES, "sensors": SENSORS, "faults": KINDS}  # sections with records by kind
-OF_ALL = number_names(PacketParameters)  # keys of every radio, which the section [radio] tells
+OF_ALL = number_names(PacketParameters)  # keys of every radio: the section [radio] lists them
 OTHER_RADIOS = {name: radio for name, radio in RADIOS.items() if radio.Parameters is not SECTIONS["radio"]}
 
 
@@ -51,7 +51,7 @@ class Key(NamedTuple):
 
     @property
     def standard(self) -> str:
-        """The default, for a person to read; a dash where it comes from the rest of the scenario."""
+        """The default, for a person to read; a dash where it follows from the scenario."""
         if self.default is None or self.default in ((), ""):
             return "–"
         return format_with_unit(f"{self.default:g}", self.unit) if self.kind == "number" else str(self.default)
@@ -89,6 +89,7 @@ def sections() -> Mapping[str, Section]:
     for name, record in SECTIONS.items():
         if name not in FAMILIES:
             result[name] = _section(f"[{name}]", name, record)
+    # Keys of all radios are listed once, under [radio].
     for name, radio in OTHER_RADIOS.items():
         found = _section(f'radio.kind = "{name}"', "radio", radio.Parameters, name)
         result[name] = found._replace(keys=tuple(key for key in found.keys if _last(key) not in OF_ALL))
@@ -146,6 +147,8 @@ def keys(section: str | None = None) -> list[Key]:
         return list(known[section].keys)
     found = [key for key in every if section in (key.name, _last(key), key.name.partition(".")[0])]
     if not found:
+        # Suggest among whole keys, last words and sections together, as any of the three may be
+        # misspelt.
         words = {key.name: key.name for key in every} | {_last(key): key.name for key in every}
         words |= {name: name for name in (*known, *FAMILIES)}
         near = get_close_matches(section, words, n=1, cutoff=0.5)
@@ -195,7 +198,7 @@ OWN = "FILE.py"
 
 
 class UndeclaredKey(NamedTuple):
-    """A key without a declaration: kind ("text", "choice", "list", "table"), meaning, options of a choice."""
+    """A key without a declaration: kind ("text", "choice", "list", "table"), meaning, options."""
 
     kind: str
     meaning: str

@@ -71,7 +71,7 @@ T = TypeVar("T")
 
 
 def load_user_module(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
-    """Import a Python file that a key names, beside the scenario file or else in the current folder.
+    """Import a Python file that a key names, beside the scenario file or in the current folder.
 
     Raises what `import_user_file` raises.
     """
@@ -88,6 +88,8 @@ def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
     """
     if not is_file(path):
         raise ScenarioError([f"{where}: no such file"])
+    # `--set model.kind=mine.py` is no consent, as settings often come from elsewhere. Only `law=`,
+    # `--law` and `--trust` are.
     if not trust:
         raise ScenarioError(
             [f"{where}: would run the code in {path.absolute()}; if you trust it, add --trust (in Python: trust=True)"]
@@ -98,7 +100,11 @@ def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
     module = util.module_from_spec(spec)
     try:  # the text as it is now: bytecode kept beside it may be of an earlier text, or of a stranger's
         exec(spec.loader.source_to_code(path.read_bytes(), str(path)), vars(module))
+    # A file may call sys.exit or be interrupted while it is imported; the command must still end
+    # with one line.
     except (Exception, SystemExit, KeyboardInterrupt) as error:  # the user's own file may fail in any way
+        # The last frame in the user's own file is the useful place, not the library function in
+        # which it failed.
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         place = f"{path}:{lines[-1]}" if lines else str(path)
         raise RuleError(f"{place}: {shortened(describe_error(error))}{_beside(path, error)}") from error
@@ -106,7 +112,7 @@ def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
 
 
 def _beside(path: Path, fault: BaseException) -> str:
-    """Return a hint for a missing module that lies beside the file which imports it; "" for any other error."""
+    """Return a hint for a missing module that lies beside the importing file; "" for any other error."""
     wanted = str(fault.name).partition(".")[0] if isinstance(fault, ModuleNotFoundError) else ""
     if not wanted or not is_file(path.with_name(f"{wanted}.py")):
         return ""
@@ -123,6 +129,8 @@ def build_from_file(
     module = load_user_module(key, name, folder, trust=trust)
     try:
         made = make(module, to_identifier(Path(name).stem))
+        # A default outside its own range is found here, and not by the first flight that leaves the
+        # number out.
         if isinstance(record := getattr(module, "Parameters", None), type) and declarations(record):
             record()  # its defaults are checked by their own ranges
         return made
@@ -136,6 +144,8 @@ def user_error_line(error: Exception) -> str:
     """Return the line and place of an exception that the user's own code raised; "" if anything else raised it."""
     last = traceback.extract_tb(error.__traceback__)[-1]
     path = Path(last.filename).resolve()
+    # The error is the user's only if the last frame is neither ours, nor Python's, nor an installed
+    # package's, nor a generated driver's.
     others = (
         Path(__file__).resolve().parents[1],
         Path(sysconfig.get_path("stdlib")).resolve(),
@@ -151,6 +161,8 @@ def law_hash(law: Model) -> str:
     """Return a hash of the text of a law's rules and of the functions of its own that they call."""
     texts: dict[str, str] = {}
     left = [value for value in (*vars(law).values(), *law.decide_rules) if isinstance(value, FunctionType)]
+    # Follow the calls inside the module: a changed helper changes the law, though the text of its
+    # rules stays the same. Functions of other modules are left out.
     while left:
         rule = left.pop()
         if rule.__qualname__ in texts:

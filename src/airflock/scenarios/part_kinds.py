@@ -21,7 +21,7 @@ from airflock.core import (
     Topology,
     add_laws,
     body,
-    composition_errors as misfits,
+    composition_errors,
     declarations,
     model,
     number_names,
@@ -31,10 +31,10 @@ from airflock.core import (
 )
 from airflock.parts.aero import descent
 from airflock.parts.bodies import BODIES, default_body
-from airflock.parts.metrics import DEFAULT_SET as USUAL_SET, SETS, metric_set, to_metric_set
-from airflock.parts.radios import DEFAULT_RADIO as USUAL_RADIO, RADIOS
-from airflock.parts.sensors import DEFAULT_SENSOR as USUAL_SENSOR, SENSORS
-from airflock.parts.topologies import DEFAULT_TOPOLOGY as USUAL_TOPOLOGY, TOPOLOGIES
+from airflock.parts.metrics import DEFAULT_SET, SETS, metric_set, to_metric_set
+from airflock.parts.radios import DEFAULT_RADIO, RADIOS
+from airflock.parts.sensors import DEFAULT_SENSOR, SENSORS
+from airflock.parts.topologies import DEFAULT_TOPOLOGY, TOPOLOGIES
 from airflock.scenarios.named_code import build_from_file, find_law
 from airflock.scenarios.schema import value_of
 from airflock.scenarios.sections import SECTIONS
@@ -68,7 +68,7 @@ class PartKind(Generic[T]):
 
     @property
     def records(self) -> dict[str, type]:
-        """Records of parameters, by name, of those parts of the package that have one of their own."""
+        """Records of parameters by name, of those parts of the package that have their own."""
         own = {name: getattr(one, "Parameters", None) for name, one in self.shipped.items()}
         return {name: record for name, record in own.items() if record is not None}
 
@@ -77,6 +77,7 @@ class PartKind(Generic[T]):
         if isinstance(kind, str) and kind in self.shipped:
             return self.shipped[kind], []
         key = f"{self.section}.kind"
+        # Only the ending makes a name a file: a misspelt name must never run code.
         if isinstance(kind, str) and kind.endswith(".py"):
             try:
                 return build_from_file(self.gather, key, kind, folder, trust=trust), []
@@ -94,7 +95,7 @@ class PartKind(Generic[T]):
         return part if isinstance(part, self.member) else self.gather(part, ""), []
 
     def kind(self, document: Mapping[str, Any], default: str = "") -> Any:
-        """Return the kind that a document names, which may be written as a table with value and source."""
+        """Return the kind that a document names, also if it is a table with value and source."""
         table = document.get(self.section, {})
         default = default or self.default
         return value_of(table.get("kind", default)) if isinstance(table, Mapping) else default
@@ -103,20 +104,22 @@ class PartKind(Generic[T]):
         """Return the keys of a section that stay with another kind: all where both kinds have the same numbers."""
         before = self.kind({self.section: table})
         ours = [self.shipped[kind] for kind in (before, new_kind) if isinstance(kind, str) and kind in self.shipped]
-        alike = len(ours) == 2 and len({getattr(one, "Parameters", None) for one in ours}) == 1
-        every = self.shared is None or alike or new_kind == before
+        same_numbers = len(ours) == 2 and len({getattr(one, "Parameters", None) for one in ours}) == 1
+        # Two kinds with one record (two bodies of the same numbers) keep all keys; else only the
+        # shared ones have a meaning.
+        every = self.shared is None or same_numbers or new_kind == before
         return {key: value for key, value in table.items() if key != "kind" and (every or key in (self.shared or ()))}
 
 
 BODY_KIND = PartKind("body", "vehicle", "body", BODIES, Body, body, "multirotor")
 METRIC_SET_KIND = PartKind(
-    "metrics", "measures", "set of order parameters", SETS, MetricSet, metric_set, USUAL_SET, None, to_metric_set
+    "metrics", "measures", "set of order parameters", SETS, MetricSet, metric_set, DEFAULT_SET, None, to_metric_set
 )
-SENSOR_KIND = PartKind("sensors", "sensor", "sensor", SENSORS, Sensor, sensor, USUAL_SENSOR, ("period",))
+SENSOR_KIND = PartKind("sensors", "sensor", "sensor", SENSORS, Sensor, sensor, DEFAULT_SENSOR, ("period",))
 RADIO_KIND = PartKind(
-    "radio", "transceiver", "radio", RADIOS, Radio, radio.radio, USUAL_RADIO, number_names(PacketParameters)
+    "radio", "transceiver", "radio", RADIOS, Radio, radio.radio, DEFAULT_RADIO, number_names(PacketParameters)
 )
-TOPOLOGY_KIND = PartKind("topology", "own_topology", "topology", TOPOLOGIES, Topology, topology, USUAL_TOPOLOGY)
+TOPOLOGY_KIND = PartKind("topology", "own_topology", "topology", TOPOLOGIES, Topology, topology, DEFAULT_TOPOLOGY)
 PART_KINDS: tuple[PartKind[Any], ...] = (METRIC_SET_KIND, BODY_KIND, SENSOR_KIND, RADIO_KIND, TOPOLOGY_KIND)
 
 
@@ -170,7 +173,7 @@ def drag_descent_errors(model: Model) -> list[str]:
     """Return why drag descent cannot be added to a model, one line."""
     if model.flock is not None:
         return [f"aero: model {model.name} goes down the gradient of the drag by itself; leave the section [aero] out"]
-    return [f"aero: {error}" for error in misfits(model, DESCENT)]
+    return [f"aero: {error}" for error in composition_errors(model, DESCENT)]
 
 
 class ScenarioParts(NamedTuple):
@@ -211,7 +214,7 @@ def collect_parts(
     """
 
     def one(family: PartKind[T], mine: T | None, usual: str) -> tuple[T, list[str]]:
-        """Return the caller's part or the document's; the default one, with errors, where that is missing."""
+        """Return the caller's part or the document's; the default one, with errors, if it is missing."""
         if mine is not None:
             return mine, []
         parts, errors = family.named(family.kind(document, usual), folder, trust=trust)
@@ -220,11 +223,15 @@ def collect_parts(
         return parts, errors
 
     law, errors = _law(document, caller_parts, folder, trust)
+    # A law that commands an acceleration needs another default body than one that commands a
+    # velocity.
     usual = default_body(law.command if law else "velocity")
     vehicle, of_body = one(BODY_KIND, caller_parts.vehicle, usual)
     of_body = of_body or body_law_errors(
         vehicle, law, caller_parts.vehicle.name if caller_parts.vehicle else BODY_KIND.kind(document, usual)
     )
+    # Check the rest of the document with a body that fits, so that one wrong name does not cause
+    # ten more errors.
     if of_body and caller_parts.vehicle is None:
         vehicle = BODIES[usual]
     measures, of_metrics = one(METRIC_SET_KIND, caller_parts.measures, METRIC_SET_KIND.default)
@@ -233,6 +240,8 @@ def collect_parts(
     if of_radio:
         transceiver = Radio(str(RADIO_KIND.kind(document)), PacketParameters)  # the common numbers are judged
     own_topology, of_topology = caller_parts.own_topology, list[str]()
+    # Topologies of the package share one record, in which the kind is a choice; a file brings its
+    # own record.
     if own_topology is None and str(kind := TOPOLOGY_KIND.kind(document)).endswith(".py"):
         own_topology, of_topology = TOPOLOGY_KIND.named(kind, folder, trust=trust)  # ours are judged as a choice
     parts = ScenarioParts(law, vehicle, measures, sensor, transceiver, own_topology)
@@ -243,6 +252,8 @@ def collect_parts(
         "radio": of_radio,
         "topology": of_topology,
     }
+    # A stand-in knows other numbers than the part that is missing, so only the numbers of both are
+    # checked.
     for section, more in errors_of.items():
         errors += more
         if more and section == "topology":
@@ -255,7 +266,7 @@ def collect_parts(
 def _law(
     document: Mapping[str, Any], given: CallerParts, folder: Path | None, trust: bool
 ) -> tuple[Model | None, list[str]]:
-    """Find the law, and add drag descent where the document has a section [aero]; return it with the errors."""
+    """Find the law, and add drag descent for a section [aero]; return it with the errors."""
     table, errors = model_table(document)
     law = given.law
     if law is None and not errors:
@@ -265,6 +276,7 @@ def _law(
             errors += str(error).splitlines()
     if law is None or "aero" not in document:
         return law, errors
+    # The section [aero] alone adds drag descent: no preset needs a second law for it.
     more = drag_descent_errors(law)
     return law if more else with_drag_descent(law), errors + more
 

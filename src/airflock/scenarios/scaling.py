@@ -83,6 +83,8 @@ def _gains(v_flock: float) -> list[str]:
         return v_flock * _between([x / v for x, v in zip(column(key), SPEEDS, strict=True)], v_flock)
 
     r0_rep, v_shill = proportional("r0_rep"), proportional("v_shill")
+    # Table S1 holds the repulsion speed at contact near 3 m/s up to 16 m/s, so the product is
+    # interpolated and p_rep follows from it.
     contact = _between([p * r for p, r in zip(column("p_rep"), column("r0_rep"), strict=True)], v_flock)
     derived = {
         "v_flock": (v_flock, "asked for"),
@@ -106,6 +108,7 @@ def _between(values: list[float], v: float) -> float:
     v = min(max(v, SPEEDS[0]), SPEEDS[-1])
     for low, high, a, b in zip(SPEEDS, SPEEDS[1:], values, values[1:], strict=False):
         if v <= high:
+            # Speeds of the table double, so they are evenly spaced in the logarithm.
             s = math.log(v / low) / math.log(high / low)
             return float(a ** (1.0 - s) * b**s)
     return values[-1]

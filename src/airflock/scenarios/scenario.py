@@ -93,11 +93,14 @@ class Scenario:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields alone: cached properties are derived again after unpickling."""
+        # Cached properties may hold compiled drivers, which no other process can use.
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def engine_cache(self) -> dict[Any, Any]:
         """A cache of the engine for flights of this scenario with other seeds, by keys of its own; empty at first."""
+        # A cached property and no field: two scenarios are equal whatever an engine has prepared
+        # for them.
         return {}
 
     @property
@@ -136,7 +139,7 @@ class Scenario:
 
     @cached_property
     def numbers(self) -> dict[str, tuple[str, ...]]:
-        """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
+        """Letter of each record that drivers read → its numbers: the columns of a driver's row."""
         records = self.records
         columns: dict[str, tuple[str, ...]] = {
             each.letter: each.driver_record._fields if each.driver_record else number_names(records[each.key])
@@ -152,7 +155,7 @@ class Scenario:
 
     @property
     def topology_rule(self) -> Topology | None:
-        """The topology that selects whom an agent meets among those that it hears; None: all of them."""
+        """The topology that selects which of the agents in hearing an agent meets; None: all."""
         return self.own_topology or TOPOLOGIES[self.topology.kind]
 
     @cached_property
@@ -163,7 +166,7 @@ class Scenario:
 
     @cached_property
     def varied(self) -> tuple[tuple[str, str], ...]:
-        """Numbers that differ among agents, as (letter, name); those of other laws of groups: `laws`."""
+        """Numbers that differ among agents, as (letter, name); of other laws of groups: `laws`."""
         return self.laws[0].varied + varied_numbers(self.groups, {"b": self.body, "s": self.sensors})
 
     @cached_property
@@ -214,6 +217,7 @@ class Scenario:
         """
         if self.scene.draw == "once":
             return self
+        # Shifted by one bit: a random word has 32 bits, and scene.seed is at most 2^31.
         own = {"seed": random.random_words(seed, random.SCENE, 0, 0, int(self.scene.seed))[0] >> 1, "draw": "once"}
         document = {**self.document, "scene": {**self.document.get("scene", {}), **own}}
         return replace(self, scene=replace(self.scene, **own), document=document)
@@ -221,6 +225,7 @@ class Scenario:
     @cached_property
     def has_scene(self) -> bool:
         """True if the world has shapes that agents see with rays, feel, or must not touch."""
+        # A scene that each flight draws anew is not built here, as its shapes need a seed.
         return self.scene.draw == "flight" or bool(len(self.stands().shapes))
 
     @property
@@ -257,6 +262,8 @@ class Scenario:
         polygons = self.world.obstacles
         if self.world.arena == "polygon":
             polygons = (self.world.corners, *polygons)
+        # A law that casts rays must see the walls of the field; any other law feels them as
+        # surfaces.
         if all(law.model.sight is None for law in self.laws):
             return scene_of(self.scene, self.dimensions)
         return scene_of(self.scene, self.dimensions, polygons, self.world.heights)
@@ -275,7 +282,7 @@ class Scenario:
         return waypoints(self.goals, self.scene, self.dimensions)
 
     def resolved_metrics(self) -> metric_parameters.Parameters:
-        """Return the metric parameters, with those that the scenario leaves open derived from the rest of it."""
+        """Return the metric parameters, open ones derived from the rest of the scenario."""
         return self._measured
 
     @cached_property
@@ -284,11 +291,11 @@ class Scenario:
         return default_metrics(self)
 
     def judged(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Add the partial fitnesses and the fitness of the metric set to the order parameters of a flight."""
+        """Add the fitness of the metric set and its parts to the order parameters of a flight."""
         return self.measures.judged(values, self.agents, self.flight.duration, self.resolved_metrics())
 
     def resolved_silence(self) -> SilenceParameters:
-        """Return the rule of silence, with numbers that the scenario leaves open derived from the rest of it."""
+        """Return the rule of silence, open numbers derived from the rest of the scenario."""
         return self._silent
 
     @cached_property
@@ -353,7 +360,7 @@ def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def scenario_html(scenario: Scenario) -> str:
-    """Return a table of everything that differs from the defaults, section by section, and the notes."""
+    """Return a table of everything that differs from the defaults, and the notes."""
     records = {"top": scenario.flight, "model": scenario.parameters, "body": scenario.body}
     records |= {name: getattr(scenario, name) for name in SECTIONS if name != "body"}
     rows = [
@@ -376,6 +383,8 @@ def default_metrics(scenario: Scenario) -> MetricParameters:
         numbers["v_tol"] = 0.375 * numbers["v_flock"]
     if numbers["r_comm"] is None:
         numbers["r_comm"] = scenario.radio.range
+    # Two agents are of one cluster if they interact; a law without a finite range leaves the
+    # radio's.
     if numbers["r_cluster"] is None:
         known = model.interaction_range or model.reach
         numbers["r_cluster"] = min(float(known(p)), 1e6) if known else min(scenario.radio.range, 1e6)

@@ -80,32 +80,38 @@ def build_scenario(
     ScenarioError
         With all errors, one line each.
     """
+    # Errors are collected from here to the end of all checks: a person sees all of them at once,
+    # and not one a run.
     settings = settings_dict(settings, where)
     document, settings, errors = with_group_keys(formats.to_current_format(document, where), settings)
     document, settings, wrong = with_fault_keys(document, settings)
     errors += wrong
+    # Last words are expanded only after the parts are known, since the parts decide which sections
+    # have the word.
     short = {key: value for key, value in settings.items() if "." not in key and key not in TOP_LEVEL_KEYS}
     document, left_out = with_kinds(document, settings)
     whole, unknown = apply_settings(document, {key: value for key, value in settings.items() if key not in short})
     flown, whole, more = collect_parts(whole, caller_parts, folder, trust=trust)
     errors = [*known_errors, *unknown, *errors, *more]
     records = ({"model": flown.law.Parameters} if flown.law else {}) | flown.records
-    whole, key_notes, more = _written_out(whole, settings, short, records)
+    whole, key_notes, more = _in_si_units(whole, settings, short, records)
     errors += more
     parts, more = _parts(whole, flown)
-    errors += more + _faults_between(parts, flown, started)
-    individuals, individual_notes, more = _individuals(whole, parts, flown, caller_parts, folder, trust)
+    errors += more + _errors_between(parts, flown, started)
+    individuals, individual_notes, more = _read_groups_and_faults(whole, parts, flown, caller_parts, folder, trust)
     published, wrong = _published(whole.get("published", {}))
     errors += more + wrong
     if errors or flown.law is None:
         raise ScenarioError([f"{where}: {error}" for error in errors])
-    parts["scene"] = _beside(parts["scene"], folder)
+    parts["scene"] = _find_mesh(parts["scene"], folder)
     scenario = Scenario(
         name=where, model=flown.law, vehicle=flown.vehicle, sensor=flown.sensor, transceiver=flown.transceiver,
         measures=flown.measures, own_topology=flown.own_topology, published=published,
         document=whole, **parts, **individuals,
     )  # fmt: skip
-    if errors := _derived_faults(scenario) or scene_errors(scenario, started):
+    # These checks need a whole scenario, so they come second and never beside errors of single
+    # keys.
+    if errors := _derived_errors(scenario) or scene_errors(scenario, started):
         raise ScenarioError([f"{where}: {error}" for error in errors])
     notes = (
         *notes,
@@ -119,7 +125,7 @@ def build_scenario(
     return replace(scenario, notes=notes)
 
 
-def _written_out(
+def _in_si_units(
     document: dict[str, Any], settings: Mapping[str, Any], short: Mapping[str, Any], records: Mapping[str, type]
 ) -> tuple[dict[str, Any], list[str], list[str]]:
     """Expand last words to whole keys and vectors to components, convert to SI units; return notes and errors, too."""
@@ -131,7 +137,7 @@ def _written_out(
     return document, [*notes, *converted], errors + more
 
 
-def _derived_faults(scenario: Scenario) -> list[str]:
+def _derived_errors(scenario: Scenario) -> list[str]:
     """Return errors of numbers that follow from the scenario and lie outside their ranges."""
     try:
         scenario.resolved_metrics()
@@ -141,7 +147,7 @@ def _derived_faults(scenario: Scenario) -> list[str]:
     return []
 
 
-def _individuals(
+def _read_groups_and_faults(
     document: Mapping[str, Any],
     parts: Mapping[str, Any],
     flown: ScenarioParts,
@@ -173,15 +179,15 @@ def _individuals(
     return {"groups": flocks, "faults": entries}, notes + fault_notes, errors + more
 
 
-def _beside(scene: Any, folder: Path | None) -> Any:
-    """Return the scene; a mesh file that is not where its name says is looked for beside the scenario file."""
+def _find_mesh(scene: Any, folder: Path | None) -> Any:
+    """Return the scene; its mesh file may lie beside the scenario file."""
     if scene.kind != "mesh" or folder is None or is_file(scene.file) or not is_file(folder / scene.file):
         return scene
     return replace(scene, file=str(folder / scene.file))
 
 
 def _parts(document: Mapping[str, Any], flown: ScenarioParts) -> tuple[dict[str, Any], list[str]]:
-    """Make the records of a scenario by section, None where one has an error; return them with all errors."""
+    """Make the records of a scenario by section, None where one has an error; and all errors."""
     parts: dict[str, Any] = {}
     errors: list[str] = []
     kinds = {family.section: family.records for family in PART_KINDS if family is not METRIC_SET_KIND}
@@ -202,7 +208,7 @@ def _parts(document: Mapping[str, Any], flown: ScenarioParts) -> tuple[dict[str,
     return parts, errors
 
 
-def _faults_between(parts: Mapping[str, Any], flown: ScenarioParts, started: bool) -> list[str]:
+def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: bool) -> list[str]:
     """Return the errors of sections that are valid alone but do not fit each other."""
     errors: list[str] = []
     flight, law, world = parts["flight"], flown.law, parts["world"]
@@ -229,7 +235,7 @@ def _faults_between(parts: Mapping[str, Any], flown: ScenarioParts, started: boo
 
 
 def _published(table: Any) -> tuple[dict[str, tuple[float, float | None]], list[str]]:
-    """Read a paper's numbers by name: mean, and standard deviation where it is given; return them with errors."""
+    """Read a paper's numbers by name, each a mean with or without standard deviation; and errors."""
     if not isinstance(table, Mapping):
         return {}, [f"published = {table!r} is not a table of order parameters"]
     published: dict[str, tuple[float, float | None]] = {}
@@ -260,10 +266,14 @@ def rebuilt(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = 
     kind is changed. The start is not checked again for a flight that has `started`.
     Raises ScenarioError with one line per error.
     """
+    # Building again from the document runs every check; changing records directly would skip those
+    # between sections.
     document = {**scenario.document}
     if scenario.scene.kind == "mesh":  # which was looked for beside the scenario file
         document["scene"] = {**document.get("scene", {}), "file": scenario.scene.file}
     shipped = document.get("model", {}).get("kind") in MODELS
+    # The law of the scenario already has drag descent in it, and building it again would add it
+    # twice.
     if not shipped and scenario.is_aerodynamic:
         raise ScenarioError(["aero: a law of one's own with drag descent cannot be changed in flight"])
     own = {
@@ -273,6 +283,8 @@ def rebuilt(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = 
         and document.get(each.section, {}).get("kind", "") not in ("", *each.shipped)
     }
     kinds = {entry.fault.name: entry.fault for entry in scenario.faults}
+    # Files of faults were run when the scenario was loaded; here their kinds are passed by name and
+    # no code runs.
     if "faults" not in settings and "faults" in document:
         document["faults"] = named_fault_entries(scenario)
     law = None if shipped or "model.kind" in settings else scenario.model
@@ -294,7 +306,7 @@ def named_fault_entries(scenario: Scenario) -> list[dict[str, Any]]:
 
 
 def with_faults_starting(scenario: Scenario, count: int, at: float) -> Scenario:
-    """Return the scenario with its last `count` faults beginning at a time, s; itself where they do already."""
+    """Return the scenario with its last `count` faults beginning at a time, s."""
     entries = named_fault_entries(scenario)
     last = entries[len(entries) - count :]
     if all(entry["at"] == at for entry in last):

@@ -46,6 +46,7 @@ def update_order_errors(flight: Any, sensor: Sensor, sensors: Any, radio: Radio,
     """Return why agents cannot update in turn: they need ideal perception at every step."""
     if flight.update == "synchronous" or sensors is None or k is None:
         return []
+    # A period of one step is as good as none.
     late = sensors.period if round(sensors.period / flight.dt) > 1 else 0.0
     ideal = {
         "sensors.kind": 0.0 if sensor.is_exact(sensors) else sensor.name,
@@ -81,7 +82,7 @@ def metric_errors(measures: MetricSet, q: Any, world: Any) -> list[str]:
 
 
 def silence_errors(rule: str, flight: Any, model: Model | None) -> list[str]:
-    """Return why a law cannot stop for a lost neighbour: it must hear neighbours, and be able to stop."""
+    """Return why a law cannot stop for a lost neighbour: it hears none, or cannot stop."""
     if rule == "fly_on" or model is None:
         return []
     errors = []
@@ -144,6 +145,7 @@ def wing_errors(parts: Mapping[str, Any], law: Model | None, measures: MetricSet
     lines += stall_errors(wing) if wing.stall == "refused" else []
     lines += [] if started else _overlapping(parts)
     place = "aero" if law is not None and law.flock is descent.flock else "model"
+    # [aero] and a law of the whole flock bring their own key `gradient`; only one of the two flies.
     gradient = getattr(parts["aero"] if place == "aero" else parts.get("parameters"), "gradient", "none")
     if gradient in ("analytic", "frozen") and wing.positions == "grid":
         lines.append(f"{place}.gradient = {gradient!r} is a derivative; it needs wing.positions = 'free', not 'grid'")
@@ -154,10 +156,11 @@ def wing_errors(parts: Mapping[str, Any], law: Model | None, measures: MetricSet
 
 
 def stall_errors(wing: wings.Parameters) -> list[str]:
-    """Return the line about a wing that flies slower than its stall speed; empty where it does not."""
+    """Return the line about a wing below its stall speed; empty where it is faster."""
     lift = wings.lift_coefficient(wing)
     if lift <= wing.cl_max:
         return []
+    # The lift coefficient falls with the square of the speed: at this speed it is wing.cl_max.
     fast = wing.speed * (lift / wing.cl_max) ** 0.5
     return [
         f"wing.speed = {wing.speed:g} m/s: the wing stalls, its lift coefficient of {lift:.3g} is beyond wing.cl_max = "
@@ -186,7 +189,7 @@ def _overlapping(parts: Mapping[str, Any]) -> list[str]:
 
 
 MOST_JITTER = 5.8  # standard deviations; no normal number of `core.random` is larger
-ROUNDED = 2e-3  # m; by how much an obstacle at an edge may reach outside: corners of files are told to the millimetre
+ROUNDED = 2e-3  # m; by how much an obstacle at an edge may reach outside: files round corners to the millimetre
 JAMMED = 0.5  # covered share at which random sequential placement of discs comes to a halt (it jams at 0.547)
 
 
@@ -196,6 +199,7 @@ def ground_plan(world: arena.Parameters) -> Any:
         h = 0.5 * world.side
         return Polygon([(-h, -h), (h, -h), (h, h), (-h, h)])
     if world.arena == "circle":
+        # 64 segments per quarter: the polygon lies within 8e-5 of the radius of the circle.
         return Point(0.0, 0.0).buffer(world.radius, quad_segs=64)
     return Polygon(world.corners) if world.arena == "polygon" and len(world.corners) > 2 else None
 
@@ -204,6 +208,7 @@ def polygon_error(corners: Any) -> str:
     """Return why a list of corners is no simple polygon; empty if it is one."""
     if len(corners) < 3:
         return f"has {len(corners)} corners; a polygon needs at least 3"
+    # Shapely accepts repeated corners, but the surface between them has no direction.
     twice = [a for a, b in zip(corners, (*corners[1:], corners[0]), strict=True) if tuple(a) == tuple(b)]
     if twice:
         return f"gives corner [{twice[0][0]:g}, {twice[0][1]:g}] twice in succession"
@@ -240,6 +245,8 @@ def diameter(points: Sequence[tuple[float, float]]) -> float:
         return 0.0
     ends: list[tuple[float, ...]] = [*hull.exterior.coords][:-1] if isinstance(hull, Polygon) else [*hull.coords]
     count, far, largest = len(ends), 1, 0.0
+    # For each side the farthest corner only moves forward, so all sides together need one turn
+    # around the hull.
     for k, (x, y) in enumerate(ends):
         nx, ny = ends[(k + 1) % count]
 
@@ -250,6 +257,7 @@ def diameter(points: Sequence[tuple[float, float]]) -> float:
         for _ in range(count):
             after = (far + 1) % count
             largest = max(largest, math.dist((x, y), ends[far]), math.dist((nx, ny), ends[far]))
+            # On a tie go on: of two parallel sides both far corners count.
             if beyond(after) < beyond(far) or after == k:
                 break
             far = after
@@ -283,7 +291,7 @@ def formation_errors(world: arena.Parameters, start_record: start.Parameters, ag
     return []
 
 
-def _edge_faults(world: arena.Parameters) -> list[str]:
+def _edge_errors(world: arena.Parameters) -> list[str]:
     """Return the errors of edges that the arena cannot have."""
     errors = []
     if world.edges != "open" and world.arena != "square":
@@ -322,6 +330,7 @@ def _region(world: arena.Parameters, begin: start.Parameters) -> tuple[Any, floa
         return box(*(-0.5 * begin.side,) * 2, *(0.5 * begin.side,) * 2), begin.side
     plan, room = ground_plan(world), begin.wall_clearance
     low, high = arena.heights_of(world)
+    # Agents start this far from walls, so the walls' strip is no room for them.
     return None if plan is None else plan.buffer(-room), max(high - low - 2.0 * room, 0.0)
 
 
@@ -342,6 +351,8 @@ def height_errors(world: arena.Parameters) -> list[str]:
         return errors
     if given and not low < high:
         errors.append(f"world.floor = {low:g} m does not lie below world.ceiling = {high:g} m")
+    # Periodic and bouncing boxes are symmetric about the origin, and so is the wall rule of one
+    # axis.
     if given and (world.edges != "open" or world.walls == "nearest_per_axis"):
         key, value = ("edges", world.edges) if world.edges != "open" else ("walls", world.walls)
         errors.append(f"world.{given[0]}: with world.{key} = {value!r} give world.height instead")
@@ -356,7 +367,7 @@ def height_errors(world: arena.Parameters) -> list[str]:
 def world_errors(
     world: arena.Parameters, agents: int, separation: float, start_record: start.Parameters, *, started: bool = False
 ) -> list[str]:
-    """Return all errors of a world, and of starting in it unless the flight has started; one line each."""
+    """Return all errors of a world, and of starting in it unless the flight has started."""
     errors = height_errors(world)
     if world.arena == "polygon":
         error = polygon_error(world.corners)
@@ -368,7 +379,7 @@ def world_errors(
     region, height = (None, 1.0) if errors else _region(world, start_record)
     if not errors:
         errors += (
-            _edge_faults(world) if started else start_region_errors(world, start_record, agents) + _edge_faults(world)
+            _edge_errors(world) if started else start_region_errors(world, start_record, agents) + _edge_errors(world)
         )
     solid: list[Polygon] = []
     within = None if plan is None or not world.obstacles else plan.buffer(ROUNDED, join_style="mitre")

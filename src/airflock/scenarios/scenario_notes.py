@@ -73,6 +73,8 @@ def _no_walls(scenario: Scenario) -> str:
     """Note an arena with walls that the law does not read."""
     model, world = scenario.model, scenario.world
     code = getattr(model.decide, "__code__", None)
+    # A law may look at walls inside its `decide` as well; a callable without code may do anything
+    # and is given the benefit of the doubt.
     names = set(code.co_names) if code is not None else SEES_WALLS
     if world.arena == "none" or world.edges != "open" or model.boundary or model.sight or names & SEES_WALLS:
         return ""
@@ -160,6 +162,8 @@ def pair_notes(flight: Any, q: Any, metrics: tuple[Metric, ...], cells: bool) ->
     cells : True if neighbours are found by cells. Then order parameters look at pairs by cells if all of a clock are
         `settled`, and at links if they have a largest length of links
     """
+    # Metrics of one clock are summed in one pass over pairs: one that needs all pairs makes the
+    # others as slow.
     near = {
         clock: cells and all(item.settled for item in metrics if item.pair and item.clock == clock) for clock in CLOCKS
     }

@@ -44,6 +44,7 @@ def plain_values(section: str, table: Mapping[str, Any], record: type) -> tuple[
             if unit and units.get(key) is not None and unit != units[key]:
                 errors.append(f"{name} = {value['value']} {unit}: the unit is {units[key] or 'none'}")
             value = value["value"]
+        # TOML has whole numbers, and some choices are digits: model.scheme = 2.
         if isinstance(known.get(key), Choice) and isinstance(value, int) and not isinstance(value, bool):
             value = str(value)  # model.scheme = 2
         values[key] = value
@@ -75,6 +76,8 @@ def read_section(
         return None, [f"{section} = {table!r} is not a table of keys"]
     values, errors = plain_values(section, table, record)
     known = {name: declared for name, declared, _ in declarations(record)}
+    # Checked here and not by the constructor of the record, whose lines know neither section nor
+    # file.
     values = {key: _python(value, known.get(key)) for key, value in values.items()}
     for name, declared in known.items():
         if name in values and _is_wrong(values[name], declared):
@@ -90,12 +93,13 @@ def _python(value: Any, declared: Declaration | None) -> Any:
         try:
             return float(value)
         except OverflowError:
-            return value  # beyond what a float can hold: told with the range
+            return value  # beyond what a float can hold: reported with the range
     return str(value) if isinstance(value, str) else value
 
 
 def _is_wrong(value: Any, declared: Declaration) -> bool:
     """Return True if a value of Python's own types is not what was declared."""
+    # The range check lets inf pass where a bound is inf, but no file may set an infinite number.
     if isinstance(declared, Quantity):
         return bool(quantity_error(value, declared)) or value in (inf, -inf)
     if isinstance(declared, Choice):
@@ -108,6 +112,7 @@ def _unknown(section: str, key: str, may: Sequence[str], kinds: Mapping[str, typ
     of = [kind for kind, other in kinds.items() if key in {name for name, _, _ in declarations(other)}]
     prefix = f"{section}." if section else ""
     hint = suggest(key, may, f"known: {', '.join(may)}", prefix=prefix)
+    # A key of another kind of this section is more helpful than the nearest spelling.
     hint = f"it belongs to {section}.kind = {' or '.join(map(repr, of))}" if of else hint
     return f"{prefix}{key}: unknown key; {hint}"
 

@@ -90,6 +90,8 @@ class Section(NamedTuple):
         return {"model": "parameters", "": "flight"}.get(self.key, self.key)
 
 
+# One tuple feeds file tables, Scenario, search space and driver columns. When five lists were
+# matched by position, two swapped entries would have flown with wrong numbers and no error.
 # The order is that of the columns of a driver's row; everything finds its numbers by letter and name.
 ORDER = (
     Section("model", None, "p"),
@@ -105,6 +107,8 @@ ORDER = (
     Section("", Flight, "c", StepTimes),
     Section("wing", wing.Parameters, "wing"),
     Section("aero", descent.Parameters, "aero"),
+    # The wind stands here twice: its mean and its turbulence are two records of the driver, each
+    # derived from the same section.
     Section("wind", wind.Parameters, "air", dryden.Numbers),
     Section("topology", topology.Parameters, "topology"),
     Section("silence", silence.Parameters, "silence"),

@@ -58,6 +58,8 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, Mapping):
         return {key: _plain(inner) for key, inner in value.items()}
+    # Subclasses of list and tuple (named tuples) are left alone: their constructors take other
+    # arguments.
     return type(value)(map(_plain, value)) if type(value) in (list, tuple) else value
 
 
@@ -133,6 +135,7 @@ def with_group_keys(
     names = [table.get("name", f"group_{number}") for number, table in enumerate(tables)]
     errors = []
     for key, value in group_settings.items():
+        # Names of groups may hold dots, so a key is split from its end.
         group, section, name = split_key(key)
         if section not in LETTERS and _belongs_to_file(key, names):
             errors.append(
@@ -250,6 +253,7 @@ def with_fault_keys(
         number, error = _find_entry(entry, name, tables)
         if number is None:
             errors.append(f"{key}: {error}")
+        # None resets the number to its default, for sliders and sweeps that return to the start.
         elif value is None:  # as it is without
             tables[number].pop(name, None)
         else:
@@ -273,6 +277,7 @@ def fault_declarations(entries: Sequence[Any]) -> Iterator[tuple[str, str, Decla
 
     Keys count the entries: a kind may occur again while a flock flies.
     """
+    # Keys by number and not by kind, since a kind may occur in several entries.
     for number, entry in enumerate(entries):
         for name, declared, _ in declarations(entry.numbers):
             yield f"{FAULT_PREFIX}{number}.{name}", entry.fault.name, declared, getattr(entry.numbers, name)
@@ -300,6 +305,7 @@ def _find_entry(entry: str, name: str, tables: Sequence[Mapping[str, Any]]) -> t
     """Return the number of the entry that a key names by its kind or number; or None, and the error."""
     if not entry or not name:
         return None, f"unknown key; {FAULT_FORM}"
+    # isdecimal alone accepts digits of other scripts, which a file never means.
     if entry.isascii() and entry.isdecimal():
         if int(entry) < len(tables):
             return int(entry), ""

@@ -24,6 +24,8 @@ def keys_by_last_word(records: Mapping[str, type]) -> dict[str, list[str]]:
     for section, record in records.items():
         for name, declared, _ in declarations(record):
             if section:
+                # Optional numbers of metrics default to the scenario's own; without this rule
+                # `v_flock` would be ambiguous in every law that has it.
                 derived = section == "metrics" and isinstance(declared, Quantity) and declared.optional
                 if not (derived and name in keys):
                     keys.setdefault(name, []).append(f"{section}.{name}")

@@ -39,6 +39,8 @@ UNITS: dict[str, dict[str, float]] = {
     "kg/m^3": {"g/cm^3": 1e3, "g/L": 1.0},
     "1": {"%": 1e-2},
 }  # fmt: skip
+# A table of our own and not pint: fifty entries, no registry that depends on context, and an error
+# can name the units that would be right for this key.
 SPELLINGS = {
     "sec": "s", "second": "s", "seconds": "s", "metre": "m", "metres": "m", "meter": "m", "meters": "m",
     "feet": "ft", "foot": "ft", "kph": "km/h", "kmh": "km/h", "knots": "kn", "kt": "kn", "kts": "kn", "°": "deg",
@@ -79,12 +81,16 @@ def convert_units(
         values = document if not section else document.get(section)
         if not isinstance(values, Mapping):
             continue
+        # Every conversion is reported in a note: a wrong unit that passes in silence is worse than
+        # a refusal.
         changed = {}
         for key in (key for key in values if key in known):  # in the order of the file, so that notes are
             name = f"{section}.{key}".lstrip(".")
             changed[key], note, error = _converted(name, values[key], known[key])
             notes += [note] if note else []
             errors += [error] if error else []
+        # A value with a wrong unit must not reach the check of its section, or it would be reported
+        # twice.
         wrong = {key for key in changed if changed[key] is None}
         table = {key: changed.get(key, value) for key, value in values.items() if key not in wrong}
         if section:
@@ -104,9 +110,10 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
     if isinstance(value, str) and not unit:
         match = NUMBER_WITH_UNIT.fullmatch(value)
         if match is None:
-            return given, "", ""  # no number at all: told with the allowed range by the check of the section
+            return given, "", ""  # no number at all: the check of the section reports it with the allowed range
         if not match[2]:
-            return None, "", f"{name} = {value!r} {_unitless(match[1], declared)}"
+            return None, "", f"{name} = {value!r} {_missing_unit(match[1], declared)}"
+        # The pattern reads "0,5 s" as 0 with the unit ",5 s"; name the comma and not the unit.
         if DECIMAL_COMMA.match(match[2]):
             return None, "", f"{name} = {value}: has a decimal comma; write {match[1]}.{match[2][1:]}"
         value, unit = float(match[1]), match[2]
@@ -116,40 +123,43 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
         return given, "", ""
     times = conversion_factor(unit, declared.unit)
     if times is None:
-        others = _others(declared.unit)
+        others = _other_units(declared.unit)
         if declared.unit in ("", "1"):
             return None, "", f"{name} = {written}: has no unit{f'; give a number, or {others}' if others else ''}"
         return None, "", f"{name} = {written}: the unit is {declared.unit}{f', or one of {others}' if others else ''}"
-    scaled = _times(value, times)
+    scaled = _scaled(value, times)
     if scaled is None:
         return given, "", ""
     note = f"{name} = {_short(value)} {unit} is {format_with_unit(_short(scaled), declared.unit)}"
+    # The note leaves out the numbers of a list: a polygon may have 100,000 corners.
     if isinstance(scaled, list):
         note = f"{name} was converted from {unit} to {declared.unit}"
     return ({**given, "value": scaled, "unit": declared.unit} if long else scaled), note, ""
 
 
-def _others(declared: str) -> str:
+def _other_units(declared: str) -> str:
     """List the units that may be written instead of the declared one."""
     return ", ".join(UNITS.get(declared, ()))
 
 
-def _unitless(number: str, declared: Quantity | Points) -> str:
+def _missing_unit(number: str, declared: Quantity | Points) -> str:
     """Return the end of an error line about a number in quotes without a unit: what to write instead."""
     if declared.unit in ("", "1"):
         return f"is text; give {number} without quotes"
-    others = f" (or {_others(declared.unit)})" if _others(declared.unit) else ""
+    others = f" (or {_other_units(declared.unit)})" if _other_units(declared.unit) else ""
     return f"has no unit; give {number} without quotes, or '{number} {declared.unit}'{others}"
 
 
-def _times(value: Any, times: float) -> Any:
+def _scaled(value: Any, times: float) -> Any:
     """Multiply a number, or nested lists of numbers, by a factor; return None where something else is in it."""
     if isinstance(value, bool):
         return None
     if isinstance(value, (int, float)):
+        # Twelve digits drop the rounding of the product, so that a note and a file read as a person
+        # would write them.
         return float(f"{value * times:.12g}") if times != 1.0 else value
     if isinstance(value, (list, tuple)):
-        scaled = [_times(entry, times) for entry in value]
+        scaled = [_scaled(entry, times) for entry in value]
         return None if any(entry is None for entry in scaled) else scaled
     return None
 
@@ -168,6 +178,7 @@ class RelativeSpread(float):
     def __eq__(self, other: object) -> bool:
         return isinstance(other, RelativeSpread) and float(self) == float(other)
 
+    # A class that defines __eq__ loses the hash of float.
     __hash__ = float.__hash__
 
     @classmethod
@@ -177,6 +188,7 @@ class RelativeSpread(float):
         value, unit = (match[1], match[2]) if match else ("", "")
         if isinstance(entry, Mapping):
             value, unit = entry.get("value"), entry.get("unit")
+        # A factor of 1 is the unit 1 itself, so the spread is absolute.
         if isinstance(value, bool) or not isinstance(unit, str) or conversion_factor(unit, "1") in (None, 1.0):
             return None
         try:
@@ -215,13 +227,13 @@ def check_spreads(where: str, table: Mapping[str, Any], known: Mapping[str, Any]
             other = with_share_hint(f"{where}.spread.{key}", f"{where}.spread", known)
             least = format_with_unit("0", declared.unit)
             errors.append(
-                f"{where}.{key}.spread = {_told(value)} is not a standard deviation of {least} or more{other}"
+                f"{where}.{key}.spread = {_as_text(value)} is not a standard deviation of {least} or more{other}"
             )
         else:
             spreads[key] = value if isinstance(value, RelativeSpread) else float(value)
     return spreads, errors
 
 
-def _told(spread: Any) -> str:
+def _as_text(spread: Any) -> str:
     """Format a spread as a file writes it."""
     return f"'{100.0 * spread:g} %'" if isinstance(spread, RelativeSpread) else repr(spread)

@@ -17,6 +17,8 @@ from airflock.support import locks
 
 MARK = ".airflock-"  # in the name of every temporary file
 FRESH = 60.0  # s in which a temporary file may not be locked yet
+# A stranger may have left a link or a named pipe under such a name: neither is followed nor waited
+# for.
 FOUND = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # how what was found is opened
 
 
@@ -41,12 +43,15 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 @contextmanager
 def _beside(target: Path) -> Iterator[Path]:
     """Yield a temporary file that replaces its target at the end, or vanishes without a trace."""
+    # The same folder, since a rename is atomic within one file system only.
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem[:100]}{MARK}", suffix=target.suffix)
     temporary = Path(name)
     try:
         with suppress(OSError):  # some file systems know no locks; then nothing is swept
             locks.lock(handle)
         yield temporary
+        # mkstemp makes files that only the user can read; a finished file gets the rights that
+        # open() gives.
         temporary.chmod(0o666 & ~_umask())
         handle = _let_go(handle)
         temporary.replace(target)
@@ -97,8 +102,10 @@ def _remove(path: Path) -> bool:
     except OSError:
         return False
     try:
+        # Between making a file and locking it another process may look: young files are left alone.
         if time.time() - os.fstat(handle).st_mtime < FRESH:
             return False
+        # Only a file whose writer is gone can be locked.
         locks.lock(handle)
         handle = _let_go(handle)
         path.unlink()
@@ -111,6 +118,7 @@ def _remove(path: Path) -> bool:
 
 
 def _umask() -> int:
+    # The umask can be read only by setting it.
     mask = os.umask(0)
     os.umask(mask)
     return mask

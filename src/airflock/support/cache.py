@@ -40,9 +40,11 @@ def cache_folder_error(base: Path) -> str:
         status = base.stat()
         if OWNERS and status.st_uid not in (0, os.geteuid()):
             return f"{base} belongs to another user"
+        # Whoever writes to this folder runs code as this user, as drivers are loaded from it.
         if OWNERS and status.st_mode & 0o022 and not status.st_mode & stat.S_ISVTX:
             return f"{base} may be written by other users"
         (base / DRIVERS).mkdir(mode=0o700, exist_ok=True)
+        # lstat and not stat: a link could lead to a folder of another user.
         inner = os.lstat(base / DRIVERS)
         if not stat.S_ISDIR(inner.st_mode) or (OWNERS and inner.st_uid != os.geteuid()):
             return f"{base / DRIVERS} is not a folder of this user's"
@@ -59,6 +61,8 @@ def cache_folder_error(base: Path) -> str:
 @cache
 def private_folder() -> Path:
     """Make a folder of this process alone, whose name nobody can guess; it is removed when the process ends."""
+    # A random name for one process: anybody could have made a fixed one such as `/tmp/airflock-UID`
+    # before.
     folder = Path(tempfile.mkdtemp(prefix="airflock-"))
     (folder / DRIVERS).mkdir(mode=0o700)
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -70,6 +74,7 @@ def list_drivers(base: Path) -> list[tuple[float, int, Path]]:
     drivers = []
     for parent in (base, base / DRIVERS):
         for folder in parent.iterdir() if parent.is_dir() else ():
+            # Only names that are digests: other folders of the cache hold studies.
             if re.fullmatch("[0-9a-f]{20}", folder.name) and folder.is_dir() and not folder.is_symlink():
                 size = 0
                 for path in folder.rglob("*"):
@@ -85,6 +90,7 @@ def shrink(base: Path, max_bytes: int = MOST) -> int:
     known, count = list_drivers(base), 0
     total = sum(size for _, size, _ in known)
     for used, size, folder in known:
+        # A driver in use by another process must not vanish between its check and its import.
         if total <= max_bytes or time.time() - used < IN_USE:
             break
         shutil.rmtree(folder, ignore_errors=True)

@@ -24,6 +24,8 @@ class FlightSite:
 
     def __init__(self, latitude: float, longitude: float, altitude: float):
         self.origin = Geodetic(latitude, longitude, altitude)
+        # One length of a degree for the whole site, instead of a projection: all drones share the
+        # error, so that their distances agree.
         e2 = FLATTENING * (2.0 - FLATTENING)
         phi = math.radians(latitude)
         w = 1.0 - e2 * math.sin(phi) ** 2
@@ -34,6 +36,7 @@ class FlightSite:
 
     def local(self, latitude: float, longitude: float, altitude: float) -> tuple[float, float, float]:
         """Return east, north, up (m) of a point in degrees and metres; across the date line, too."""
+        # Modulo a full turn, so that a site beside the date line has no jump in it.
         around = (longitude - self.origin.longitude + 180.0) % 360.0 - 180.0
         north = (latitude - self.origin.latitude) * self._north
         return around * self._east, north, altitude - self.origin.altitude

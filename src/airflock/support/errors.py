@@ -23,11 +23,14 @@ def shortened(text: str, max_letters: int = MOST_LETTERS) -> str:
 def shortened_lines(lines: list[str]) -> list[str]:
     """Return the first lines, each bounded, and the number of those that are left out."""
     shown = [shortened(line) for line in lines[:MOST_LINES]]
+    # The number of the rest is one more line, so that nobody takes the list for complete.
     return shown if len(lines) <= MOST_LINES else [*shown, f"and {len(lines) - MOST_LINES} more faults"]
 
 
 def printable(text: str) -> str:
     """Escape control letters, so that a text stays one line and moves no cursor."""
+    # Text of a stranger's file is echoed in errors; an escape sequence in it could rewrite the
+    # terminal.
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
@@ -147,6 +150,8 @@ class ErrorCollector:
 
     def read(self, reader: Callable[P, T], *parts: P.args, **named: P.kwargs) -> T:
         """Return what a reader makes of parts; INVALID, with its errors collected, where it raises an AirflockError."""
+        # A reader of an invalid part would only report a consequence of an error that is collected
+        # already.
         if not any(part is INVALID for part in (*parts, *named.values())):
             try:
                 return reader(*parts, **named)
@@ -168,6 +173,7 @@ class ErrorCollector:
 
     def raise_errors(self) -> None:
         """Raise the reader's own exception if it is the only error, or else a ScenarioError with all of them."""
+        # A single error keeps its own class, which callers catch: RecordingError, StudyError, ...
         if len(self._raised) == 1 and self.faults == str(self._raised[0]).splitlines():
             raise self._raised[0]
         if self.faults:
@@ -202,6 +208,7 @@ def describe_error(error: BaseException) -> str:
     "AttributeError: module 'math' has no attribute 'sqr'; did you mean sqrt?"
     """
     line = " ".join(f"{type(error).__name__}: {error}".removesuffix(": ").split())
+    # Python's own suggestion is added by the traceback printer, which never runs here.
     if isinstance(error, AttributeError) and error.name is not None:
         line += suggest(error.name, (name for name in dir(error.obj) if not name.startswith("_")), lead="; ")
     return line

@@ -24,24 +24,27 @@ def unavailable_reason() -> str | None:
     except ImportError as error:
         missing = isinstance(error, ModuleNotFoundError) and error.name == "numba_cuda"
         return f"numba-cuda is not installed; {INSTALL}" if missing else f"numba-cuda: {_first_line(error)}"
+    # The simulator of numba-cuda says that a GPU is available.
     if is_simulated():
         return "the CUDA simulator is on (NUMBA_ENABLE_CUDASIM); it is only for tests"
     try:
         if not cuda.is_available():
-            return f"no GPU can be used: {_driver_fault()}"
+            return f"no GPU can be used: {_driver_error()}"
+        # A driver may report a device that it then cannot open.
         cuda.get_current_device()
-    except Exception as error:  # the driver's own faults come in many types
+    except Exception as error:  # the driver's own errors come in many types
         return f"the GPU cannot be used: {_first_line(error)}"
     return None
 
 
-def _driver_fault() -> str:
+def _driver_error() -> str:
     """Return the driver's own error."""
     error = cuda_runtime().cuda_error()
     return _first_line(error) if error else "no device found"
 
 
 def _first_line(fault: BaseException | str) -> str:
+    # Messages of the driver begin with blank lines and underlines.
     lines = [line.strip(" .:-") for line in str(fault).splitlines() if line.strip(" .:-")]
     return lines[0] if lines else type(fault).__name__
 

@@ -31,11 +31,13 @@ def _lock_byte(handle: int) -> None:
     """Lock the byte that stands for all of a file."""
     import msvcrt
 
+    # msvcrt locks from the current position on, so it is moved and put back.
     place = os.lseek(handle, 0, os.SEEK_CUR)
     os.lseek(handle, BYTE, os.SEEK_SET)
     try:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
     except OSError as error:
+        # Windows reports a lock of another process with either of these two.
         if error.errno in (errno.EACCES, errno.EDEADLK):
             raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)) from error
         raise

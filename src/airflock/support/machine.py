@@ -43,6 +43,8 @@ def processor_kind() -> str:
 
 def vector_bits() -> int:
     """Return the width of the vectors of drivers."""
+    # From Ice Lake and Zen 4 on processors keep their clock with vectors of 512 bits; avx512vbmi2
+    # marks them, as avx512f is also set on Skylake, which lowers it.
     features = target()[1]
     return 512 if "avx512vbmi2" in features else 256 if "avx2" in features else 128
 
@@ -54,6 +56,7 @@ def toolchain_versions() -> str:
     import numba
     import numpy
 
+    # Compiled code is kept under this text: if any of these changes, it is compiled again.
     return "|".join(
         (
             platform.python_version(),
@@ -76,6 +79,7 @@ def free_memory() -> int | None:
         names = os.sysconf_names if hasattr(os, "sysconf_names") else {}
         if {"SC_PHYS_PAGES", "SC_PAGE_SIZE"} <= set(names):
             limits.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    # In a container the machine's free memory is more than the process may take.
     for limit in map(Path, LIMITS):
         try:
             limits.append(int(limit.read_text(encoding="ascii")))

@@ -8,7 +8,7 @@ from queue import SimpleQueue
 from threading import Event, Thread, local
 from typing import Any
 
-_thread = local()  # of each worker: the event that tells it to give up its flight
+_thread = local()  # of each worker: the event that makes it abandon its flight
 
 
 class Interrupted(Exception):
@@ -42,6 +42,7 @@ def run_in_threads(
             if on_done:
                 on_done()
         return
+    # A queue whose put and get are single calls of C: an interruption cannot leave it locked.
     ended: SimpleQueue[_Ended] = SimpleQueue()
     interrupted, turns = Event(), iter(range(len(jobs)))
     team = [Thread(target=_work, args=(jobs, turns, ended, interrupted), daemon=True) for _ in range(workers)]
@@ -50,16 +51,20 @@ def run_in_threads(
     kept: dict[int, _Ended] = {}
     try:
         for number in range(len(jobs)):
+            # Results arrive in any order and are handed on in the order of the jobs, so that output
+            # never depends on timing.
             while number not in kept:
                 latest = ended.get()
                 kept[latest.number] = latest
-                if on_done and latest.fault is None:
+                if on_done and latest.error is None:
                     on_done()
             mine = kept.pop(number)
-            if mine.fault is not None:
-                raise mine.fault
+            if mine.error is not None:
+                raise mine.error
             yield mine.result
     finally:
+        # Also where the caller stops iterating: the workers abandon their flights at the next
+        # check.
         interrupted.set()
         for thread in team:
             thread.join()
@@ -69,7 +74,7 @@ def run_in_threads(
 class _Ended:
     number: int
     result: Any = None
-    fault: BaseException | None = None
+    error: BaseException | None = None
 
 
 def _work(
@@ -82,8 +87,8 @@ def _work(
             return
         try:
             ended.put(_Ended(number, jobs[number]()))
-        except BaseException as error:  # raised again where the result is asked for
-            ended.put(_Ended(number, fault=error))
+        except BaseException as error:  # raised again where the result is read
+            ended.put(_Ended(number, error=error))
 
 
 def run_in_background(work: Callable[[], Any]) -> Future[Any]:
@@ -99,9 +104,10 @@ def run_in_background(work: Callable[[], Any]) -> Future[Any]:
         released.wait()
         try:
             future.set_result(work())
-        except Exception as error:  # raised again where the result is asked for
+        except Exception as error:  # raised again where the result is read
             future.set_exception(error)
 
+    # A daemon, so that a compilation in the background does not keep the program from ending.
     Thread(target=run, daemon=True).start()
     released.set()
     return future
