@@ -28,7 +28,8 @@ ROUNDS = 40  # of Lloyd's iteration
 
 
 def shape_points(shape: str, count: int, spacing: float = 3.0, height: float = 15.0, seed: int = 0) -> Points:
-    """Points (count, 3) of a shape, m: at least spacing (m) apart, all above height (m), centred over the origin.
+    """Return points (count, 3) of a shape, m: at least spacing (m) apart, all above height (m), centred over the
+    origin.
 
     shape : the path of an image or mesh, or any other text, which is written
 
@@ -66,7 +67,7 @@ def shape_points(shape: str, count: int, spacing: float = 3.0, height: float = 1
 
 
 def _pixels_of_text(text: str) -> NDArray[np.bool_]:
-    """Pixels of a text, upright."""
+    """Return the pixels of a text, upright."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -78,7 +79,7 @@ def _pixels_of_text(text: str) -> NDArray[np.bool_]:
 
 
 def _pixels_of_image(path: Path) -> NDArray[np.bool_]:
-    """Opaque or, without transparency, dark pixels."""
+    """Return opaque or, without transparency, dark pixels."""
     import imageio.v3 as iio
 
     try:
@@ -98,7 +99,7 @@ def _pixels_of_image(path: Path) -> NDArray[np.bool_]:
 
 
 def _evenly(filled: NDArray[np.bool_], count: int, rng: np.random.Generator) -> Points:
-    """Points (count, 2) right and up, at the centres of equal shares of the filled pixels."""
+    """Return points (count, 2) right and up, at the centres of equal shares of the filled pixels."""
     rows, columns = np.nonzero(filled)
     pixels = np.column_stack([columns, -rows]).astype(float)
     if len(pixels) < count:
@@ -115,7 +116,7 @@ def _evenly(filled: NDArray[np.bool_], count: int, rng: np.random.Generator) -> 
 
 
 def _spread_over_mesh(path: Path, count: int, rng: np.random.Generator) -> Points:
-    """Points on the surface, each as far as can be from those before."""
+    """Return points on the surface, each as far as possible from those before."""
     from airflock.world import read_mesh
 
     try:

@@ -34,7 +34,7 @@ def make_dataset(
     command: str,
     groups: Sequence[str] = (),
 ) -> xr.Dataset:
-    """Dataset from frames (time, component, agent): position, velocity and command components.
+    """Make a dataset of frames (time, component, agent), whose components are position, velocity and command.
 
     times   : time of each frame, or the constant time between two, s
     command : what the model commands: velocity (m/s), acceleration (m/s²) or heading
@@ -108,7 +108,7 @@ def check_recording(recording: xr.Dataset, where: str = "recording") -> None:
 
 
 def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any], float, NDArray[np.bool_]]:
-    """Frames (time, component, agent) of position and velocity, the time between frames (s), and who is there.
+    """Return frames (time, component, agent) of position and velocity, the time between frames (s), and presence.
 
     An agent of which a number is missing (nan) at an instant is not there then: (time, agent). Velocity is
     differentiated from position, within stretches in which the agent is there, where it is not recorded.
@@ -149,7 +149,7 @@ Array = NDArray[Any]
 
 
 def central_difference(position: Array, times: Array) -> Array:
-    """Velocity (time, ...), m/s, from positions in m at times in s: central differences, one-sided at both ends.
+    """Compute velocity (time, ...), m/s, of positions in m at times in s: central differences, one-sided at both ends.
 
     Exactly 0 where a position stays the same over the frames that it is taken from: `numpy.gradient` leaves a rounding
     error there, which is a velocity of 1e-15 m/s with a heading.
@@ -161,7 +161,9 @@ def central_difference(position: Array, times: Array) -> Array:
 
 
 def differentiated_velocity(position: Array, times: Array) -> Array:
-    """Velocity (time, axis, individual), m/s, within the stretches in which each individual is there; else nan."""
+    """Compute velocity (time, axis, individual), m/s, within the stretches in which each individual is present; else
+    nan.
+    """
     there = np.asarray(~np.isnan(position).any(axis=1))
     if there.all():
         return central_difference(position, times)
@@ -176,12 +178,12 @@ def differentiated_velocity(position: Array, times: Array) -> Array:
 
 
 def box_sides(world: arena.Parameters, dimensions: int) -> Array | None:
-    """Sides of a periodic world, (axis,) m; None of any other."""
+    """Return the sides of a periodic world, (axis,) m; None of any other world."""
     return 2.0 * np.array(half_sizes(world)[:dimensions]) if world.edges == "periodic" else None
 
 
 def nearest_image(offset: Array, box: Array | None, axis: int = 0) -> Array:
-    """Offsets (m) to the nearest images; `axis` is that of coordinates, `box` what `box_sides` returns."""
+    """Return offsets (m) to the nearest images; `axis` is that of the coordinates, `box` is from `box_sides`."""
     if box is None:
         return offset
     side = box.reshape([-1 if a == axis else 1 for a in range(offset.ndim)])

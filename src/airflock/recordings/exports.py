@@ -64,7 +64,7 @@ COLUMNS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "command
 
 
 def to_table(recording: xr.Dataset) -> pd.DataFrame:
-    """Long table: id, t [s], x [m], ..., vx [m/s], ..., cx [m/s], ...; no rows where one is absent."""
+    """Make a long table: id, t [s], x [m], ..., vx [m/s], ..., cx [m/s], ...; absent individuals have no rows."""
     check_recording(recording)
     order = ("individual", "time", "space", "keypoint")
     count, times = recording.sizes["individual"], recording["time"].values.astype(float)
@@ -86,7 +86,7 @@ def to_table(recording: xr.Dataset) -> pd.DataFrame:
 
 
 def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
-    """The table as a log of PX4 has it: `timestamp` in whole microseconds, x north, y east, z down (a plane has z = 0).
+    """Make the table of a PX4 log: `timestamp` in whole microseconds, x north, y east, z down (a plane has z = 0).
 
     The fields are those of `vehicle_local_position`; commanded velocities are cx, cy, cz in the same axes.
     """
@@ -130,7 +130,7 @@ PLURAL = {"keypoint": "keypoints", "individual": "individuals"}
 
 
 def to_movement(recording: xr.Dataset, *, plural_dimensions: bool = False) -> xr.Dataset:
-    """Dataset with position, confidence and the attributes of poses; velocity and command beside, where there are any.
+    """Make a dataset of poses with position and confidence, and with velocity and command where there are any.
 
     plural_dimensions : the dimensions keypoints and individuals, as `movement` up to 0.16 asks for
     """
@@ -149,7 +149,7 @@ def to_movement(recording: xr.Dataset, *, plural_dimensions: bool = False) -> xr
 
 
 def write_movement(recording: xr.Dataset, path: str | os.PathLike[str], *, plural_dimensions: bool = False) -> Path:
-    """Write such a dataset as netCDF."""
+    """Write a dataset of `movement` as netCDF."""
     atomic.write_file(
         path, to_movement(recording, plural_dimensions=plural_dimensions).to_netcdf(None, engine="h5netcdf")
     )

@@ -29,7 +29,7 @@ UNKNOWN = Model(name="unknown", Parameters=_Nothing, command="velocity", decide=
 
 
 def power_settings(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Settings that measure the power of a recording's geometry; `changed` goes before them.
+    """Return settings that measure the power which a recording's geometry saves; `changed` has priority.
 
     A law that solves for the wings of the flock flies in a frame that moves with the air; elsewhere forward is the
     flock's mean heading.
@@ -43,7 +43,7 @@ def power_settings(recording: xr.Dataset, settings: Mapping[str, Any] | None = N
 def scenario_of_recording(
     recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False
 ) -> Scenario:
-    """Scenario that a recording was flown with, or for a flight log one that only says how to score it.
+    """Rebuild the scenario of a recording; for a flight log, build one that only defines the metrics.
 
     A law, a body or a metric set of the user's own is not in the file: the law is unknown then, and the others are the
     usual ones, unless settings give a file ({"metrics.kind": "mine.py"}), which runs with `trust`. A log brings no
@@ -70,7 +70,7 @@ def scenario_of_recording(
 
 
 def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dataset, trust: bool) -> Scenario:
-    """Scenario of a simulated recording, with stand-ins for what the file does not hold and nobody gave."""
+    """Rebuild the scenario of a simulated recording, with stand-ins for the user's own code that is not at hand."""
     name = str(recording.attrs.get("airflock_name", "recording"))
     missing = missing_user_parts(document, given)
     document, settings = with_user_files(document, given)
@@ -102,13 +102,13 @@ def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dat
 
 
 def _usual_metrics(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of a section metrics that every set has."""
+    """Return the keys of a section [metrics] that every set has."""
     known = {key for key, _, _ in declarations(SECTIONS["metrics"])} - {"kind"}
     return {key: value for key, value in table.items() if key in known}
 
 
 def user_parts(document: Mapping[str, Any]) -> dict[str, str]:
-    """Section → name of what the user's own was there, of the scenario that a recording was flown with."""
+    """Return section → name of each kind of part that was the user's own in the recorded scenario."""
     found = {}
     for family in PART_KINDS:
         table = document.get(family.section)
@@ -119,12 +119,12 @@ def user_parts(document: Mapping[str, Any]) -> dict[str, str]:
 
 
 def missing_user_parts(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, str]:
-    """Those of them for which settings give no file."""
+    """Return those of the user's own kinds of parts for which the settings name no file."""
     return {s: kind for s, kind in user_parts(document).items() if not str(settings.get(f"{s}.kind")).endswith(".py")}
 
 
 def with_user_files(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The document with the files that settings give for such kinds, whose numbers stay; and all other settings."""
+    """Return the document with the files that settings name for the user's own kinds, and the other settings."""
     found, rest = dict(document), dict(settings)
     for section in user_parts(document).keys() - missing_user_parts(document, settings).keys():
         found[section] = {**found[section], "kind": rest.pop(f"{section}.kind")}

@@ -181,7 +181,7 @@ class ReaderProcess:
             return xr.decode_cf(dataset) if self.decoded else dataset
 
     def _ended(self) -> RecordingError:
-        """Say why the process ended before its answer was complete."""
+        """Return the error that says why the process ended before its answer was complete."""
         code = self.process.wait(timeout=10.0)
         if code in ENDED_LATE or time.monotonic() >= self.deadline:
             return RecordingError(f"{self.path}: could not be opened within {self.limit:.0f} s; it may be damaged")
@@ -221,7 +221,7 @@ def run_reader(request: Mapping[str, Any]) -> None:
 
 
 def _limit(room: int, seconds: int) -> None:
-    """Allow no core file, no file written, no more memory than the arrays may need, so many seconds of a processor."""
+    """Limit this process: no core file, no file written, memory for the arrays, and seconds of a processor."""
     try:
         import resource
     except ImportError:  # Windows has no such limits

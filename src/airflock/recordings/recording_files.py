@@ -1,4 +1,4 @@
-"""Recordings on disk: netCDF that other tools open, complete or not there at all."""
+"""Recordings on disk: netCDF that other tools open. A file is complete, or is not there."""
 
 import os
 import warnings
@@ -161,7 +161,7 @@ def _refuse_missing_laws(recording: xr.Dataset, document: Mapping[str, Any], own
 
 
 def _differences(recording: xr.Dataset, scenario: Scenario, now: Mapping[str, Any]) -> list[str]:
-    """What could explain other bits than those of a recording; now : provenance of the flight that is compared."""
+    """Return the differences that could explain other bits; now : provenance of the flight that is compared."""
     words = {
         "airflock_version": "version of Airflock",
         "airflock_sources": "rules and driver",

@@ -107,7 +107,7 @@ def simulate(
 
 
 def recording_of(flight: Flight) -> xr.Dataset:
-    """Recording of what an open flight has flown so far.
+    """Make a recording of an open flight up to now.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def recording_of(flight: Flight) -> xr.Dataset:
 
 
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
-    """Everything that decides the bits of a flight, as plain attributes."""
+    """Return everything that decides the bits of a flight, as plain attributes."""
     text = driver_text(scenario, precision=precision)
     own = scenario.document.get("model", {}).get("kind") not in MODELS
     return {
@@ -169,7 +169,7 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
 
 
 def bare_document(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain values, of which code of the user's own is its bare name: no file, and no place of one."""
+    """Return the scenario as plain values; code of the user's own is its bare name, without a file."""
     document: dict[str, Any] = to_plain_values(scenario.document)
     for section in ("model", "body", "sensors", "metrics"):
         table = document.get(section, {})
@@ -184,7 +184,7 @@ def bare_document(scenario: Scenario) -> dict[str, Any]:
 
 
 def to_plain_values(value: Any) -> Any:
-    """A nested dict of plain Python values, for JSON."""
+    """Convert nested values to plain Python values, for JSON."""
     if isinstance(value, dict) or hasattr(value, "items"):
         return {str(key): to_plain_values(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
@@ -263,7 +263,9 @@ def _variables(measured: list[Array], ages: list[Array], dimensions: int) -> dic
 
 
 def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
-    """Uniform number of each pair (receiver, sender) in a decision: `core.random.pair_uniform` for a whole flock."""
+    """Draw the uniform number of each pair (receiver, sender) in a decision: `core.random.pair_uniform` of a whole
+    flock.
+    """
     fours, senders = -(-agents // 4), np.arange(agents, dtype=np.uint64)
     first = random.pair_number(4 * np.arange(fours, dtype=np.uint64)[:, None], senders, agents)
     zero = np.zeros_like(first)
@@ -274,7 +276,9 @@ def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
 
 
 def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float) -> Array:
-    """When what each agent knows of each other one was sent, s, after a decision; nan: never heard."""
+    """Return the time stamps (s) of the states that each agent knows of each other one after a decision; nan: never
+    heard.
+    """
     k, n = flight.scenario.radio, flight.agents
     if flight.scenario.transceiver.keeps_packets:
         return np.where(np.eye(n, dtype=bool), np.nan, flight.sent)

@@ -16,14 +16,14 @@ from airflock.parts.bodies import held
 
 
 def second_derivative(loss: Callable[[Any], float], z: NDArray[np.float64], i: int, j: int, step: float) -> float:
-    """Derivative of a loss by its numbers i and j at z (number,)."""
+    """Differentiate a loss by its numbers i and j at z (number,)."""
     one, other = step * np.eye(len(z))[[i, j]]
     differences = loss(z + one + other) - loss(z + one - other) - loss(z - one + other) + loss(z - one - other)
     return differences / (4.0 * step * step)
 
 
 def hessian(loss: Callable[[Any], float], z: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    """All second derivatives of a loss at z, (row, column)."""
+    """Return all second derivatives of a loss at z, (row, column)."""
     n = len(z)
     return np.array([[second_derivative(loss, z, i, j, step) for j in range(n)] for i in range(n)])
 
@@ -46,7 +46,7 @@ BEYOND = np.array([0.01, 0.01, 0.005, 0.005])
 
 @dataclass
 class BodyFit:
-    """What the log says about the body; values and 95 % intervals by name.
+    """Fit of the body: values and 95 % intervals by name.
 
     refused : name → reason, for numbers that cannot be told apart
     gain    : 2 Δ log-likelihood of a limited against an unlimited acceleration
@@ -68,7 +68,7 @@ class BodyFit:
 
 @cache
 def _body_kernel() -> Any:
-    """Negative log-likelihood per block, compiled."""
+    """Compile the negative log-likelihood per block."""
     from numba import njit
 
     decay_rate, wander, gap_left = njit(held.decay_rate), njit(held.wander), njit(held.gap_left)
@@ -188,7 +188,7 @@ def _nothing(reason: str) -> BodyFit:
 
 
 def _told(logs: FlightLogs) -> NDArray[np.bool_]:
-    """Of each row whether its increment counts: not one that begins as a command is given.
+    """Return True for rows whose increment counts: not for one that begins as a command arrives.
 
     That command was computed from the very velocity that the filter does not know, so that the gap to it is wrong by
     what the filter is wrong by. Where most rows have a command of their own, all count.
@@ -199,13 +199,13 @@ def _told(logs: FlightLogs) -> NDArray[np.bool_]:
 
 
 def _blocks(logs: FlightLogs) -> NDArray[np.int64]:
-    """Number of a stretch of BLOCK s of one drone, for every row."""
+    """Return the number of a stretch of BLOCK s of one drone, for every row."""
     part = np.floor((logs.time - logs.time.min()) / BLOCK).astype(np.int64)
     return np.unique(logs.who * (part.max() + 1) + part, return_inverse=True)[1].astype(np.int64)
 
 
 def _lowest(loss: Callable[[Any], float], gap: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Log parameters of the highest hill of likelihood.
+    """Return the log parameters of the highest mode of the likelihood.
 
     Where no row is at the limit, the limit has no slope: a descent that went there with too long a tau stays. So other
     limits are looked at, with shorter lags beside them.
@@ -222,7 +222,9 @@ def _lowest(loss: Callable[[Any], float], gap: NDArray[np.float64]) -> NDArray[n
 
 
 def _least_limit(loss: Callable[[Any], float], z: NDArray[np.float64], lowest: float, top: float) -> float:
-    """Least limit of acceleration whose likelihood, the others fitted, is within 95 % of the highest; at most `top`."""
+    """Return the least limit of acceleration whose likelihood, the others fitted, is within 95 % of the highest; at
+    most `top`.
+    """
     others, unit = [0, 2, 3], 0.01 * np.eye(len(z))[[0, 2, 3]]
 
     def fitted(limit: float) -> float:
@@ -250,7 +252,9 @@ def _settled(loss: Callable[[Any], float], start: Any) -> float:
 
 
 def _body_errors(loss: Any, z: NDArray[np.float64], blocks: int) -> tuple[NDArray[np.float64], int]:
-    """Standard errors of log parameters, and degrees of freedom: curvature, slopes of each block, curvature."""
+    """Return standard errors of log parameters, and degrees of freedom, by a sandwich of curvature and slopes of
+    blocks.
+    """
     d, n = 0.01, len(z)
     unit = np.eye(n) * d
     curve = np.zeros((n, n))
@@ -342,7 +346,7 @@ def instrumental_tau(logs: FlightLogs, tau: float, a_max: float) -> float:
 
 
 def gust_correlation(logs: FlightLogs, value: dict[str, float]) -> float:
-    """Mean correlation of drones' unexplained accelerations: gusts that all feel, rather than noise of each one."""
+    """Return the mean correlation of drones' unexplained accelerations: gusts are common to all, noise is not."""
     if logs.drones < 2:
         return 0.0
     h = np.diff(logs.time)
@@ -365,7 +369,9 @@ def gust_correlation(logs: FlightLogs, value: dict[str, float]) -> float:
 
 
 def command_delay(logs: FlightLogs, value: dict[str, float]) -> float:
-    """Delay of commands that explains the increments best, s, to a row: a body has none, so it is only told."""
+    """Return the delay of commands that explains the increments best, s, to a row; for a note, since a body has no
+    delay.
+    """
     best, kept = np.inf, 0.0
     run = np.cumsum(logs.is_new)
     for late in range(0, 11):
@@ -390,7 +396,7 @@ RESTARTS = 2  # a simplex that has shrunk on a slope is spread again
 
 @dataclass
 class SensorFit:
-    """Values and 95 % intervals by name, m²/s², 1/s, m, m/s; reasons for what is refused."""
+    """Fit of the sensor: values and 95 % intervals by name, m²/s², 1/s, m, m/s; reasons for refused numbers."""
 
     value: dict[str, float]
     intervals: dict[str, tuple[float, float]]
@@ -493,7 +499,7 @@ def fit_sensors(logs: FlightLogs, period: float) -> SensorFit:
 
 
 def _series(ground: FlightLogs, period: float) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Stretches of one drone and axis, one row per period: positions and velocities."""
+    """Return stretches of one drone and axis, one row per period: positions and velocities."""
     found = []
     edges = [*np.flatnonzero(ground.is_new), len(ground.time)]
     for begin, end in zip(edges[:-1], edges[1:], strict=True):
@@ -506,5 +512,5 @@ def _series(ground: FlightLogs, period: float) -> list[tuple[NDArray[np.float64]
 
 
 def _sensor_errors(loss: Any, z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard errors of log parameters, by the curvature of the likelihood."""
+    """Return standard errors of log parameters, by the curvature of the likelihood."""
     return np.asarray(np.sqrt(np.clip(np.diag(np.linalg.pinv(hessian(loss, z, 0.03))), 0.0, None)))

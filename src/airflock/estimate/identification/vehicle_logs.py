@@ -34,31 +34,31 @@ class FlightLogs:
 
     @property
     def step(self) -> float:
-        """Usual time between rows, s."""
+        """Return the usual time between rows, s."""
         return float(np.median(np.diff(self.time)[~self.is_new[1:]]))
 
     @property
     def drones(self) -> int:
-        """Number of drones."""
+        """Return the number of drones."""
         return len(self.names)
 
     def of(self, drone: int) -> NDArray[np.int64]:
-        """Rows of one drone."""
+        """Return the rows of one drone."""
         return np.flatnonzero(self.who == drone)
 
     def flying(self) -> "FlightLogs":
-        """Rows in flight that have a command; new where something was left out."""
+        """Return the rows in flight that have a command; a row after a left-out one is new."""
         keep = np.isfinite(self.command).all(axis=1) & np.isfinite(self.velocity).all(axis=1) & ~self.standing
         return self.select_rows(keep)
 
     def grounded_rows(self) -> "FlightLogs":
-        """Rows on the ground, in stretches without a gap of more than 1 s: a log may be slower there."""
+        """Return the rows on the ground, in stretches without a gap of more than 1 s: a log may be slower there."""
         found = self.select_rows(self.standing)
         apart = np.concatenate([[True], (np.diff(found.time) > 1.0) | (np.diff(found.who) != 0)])[: len(found.time)]
         return replace(found, is_new=apart)
 
     def select_rows(self, mask: NDArray[np.bool_]) -> "FlightLogs":
-        """Some of the rows; a row that follows one left out is new."""
+        """Select rows; a row that follows a left-out one is new."""
         left_out = np.concatenate([[False], ~mask[:-1]])
         new = (self.is_new | left_out)[mask]
         return FlightLogs(
@@ -68,7 +68,7 @@ class FlightLogs:
 
 
 def logs_from_tracks(tracks: list[ImportedTrack], standing: tuple[float, float] | None = None) -> FlightLogs:
-    """Logs from imported tracks; raises RecordingError where velocities are missing.
+    """Make logs of imported tracks; raise RecordingError where velocities are missing.
 
     standing : first and last time (s after each drone's first row) on the ground, unless the log tells it itself
     """
@@ -98,7 +98,7 @@ def logs_from_tracks(tracks: list[ImportedTrack], standing: tuple[float, float] 
 
 
 def logs_from_recording(recording: xr.Dataset) -> FlightLogs:
-    """Logs from a recording, simulated or imported; rows that were bridged or are absent are left out."""
+    """Make logs of a recording, simulated or imported; leave out rows that are bridged or absent."""
     if "velocity" not in recording or "command" not in recording:
         raise RecordingError("recording: has no velocity or no command, which identify compares")
     order = ("individual", "time", "space", "keypoint")

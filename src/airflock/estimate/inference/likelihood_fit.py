@@ -1,4 +1,4 @@
-"""Fit: climb to the numbers of a law under which the next frame is least surprising.
+"""Fit the numbers of a law: climb to the maximum of the likelihood of the next frame.
 
 The likelihood is that of the walk (`likelihood`, `walk`). Gauss-Newton steps climb it from a place; `search` says from
 which. Slopes are taken by wide steps first, which look over what is rough, then by steps that change the likelihood by
@@ -38,7 +38,7 @@ SLOPE_SEQUENCE = (WIDE_SLOPES, FINE_SLOPES, CENTRAL_SLOPES)
 
 @dataclass
 class Fit:
-    """Where a model fits best.
+    """Point at which a model fits best.
 
     place : of all numbers; free : indices of those that were fitted; score : on the spans of the fit
     loss  : negative log-likelihood with the prior
@@ -53,17 +53,17 @@ class Fit:
 
 
 def log_prior(u: Array, free: Sequence[int]) -> float:
-    """Weak prior: a normal one of SD 1/2 about the middle of each range."""
+    """Return the negative logarithm of a weak normal prior of SD 1/2 about the middle of each range."""
     return float((2.0 * (u[list(free)] - 0.5) ** 2).sum())
 
 
 def loss_at(model: FitModel, u: Array, free: Sequence[int], spans: Sequence[int] | None) -> float:
-    """Negative log-likelihood with the prior of the free numbers."""
+    """Return the negative log-likelihood with the prior of the free numbers."""
     return model.score(u, spans).loss() + log_prior(u, free)
 
 
 def fit_with_parameter(model: FitModel, fit: Fit, index: int, coordinate: float, spans: Sequence[int] | None) -> Fit:
-    """A fit with one more number, which stands at a place; model : with the number, fit : without it."""
+    """Return a fit with one more number at a coordinate; model : with the number, fit : without it."""
     u = np.insert(fit.place, index, coordinate)
     free = sorted([index, *(f + (f >= index) for f in fit.free)])
     score = model.score(u, spans)
@@ -78,7 +78,7 @@ def jacobian(
     steps: Array | float = PROBE,
     here: Array | None = None,
 ) -> Array:
-    """Slopes of the differences (step, component, free number); to one side only where those at `u` are given.
+    """Return slopes of the differences (step, component, free number); one-sided if those at `u` are given.
 
     steps : of all, or of each free number
     """
@@ -102,7 +102,7 @@ def climb_to_maximum(
     steps: int = MAX_CLIMB_STEPS,
     slopes: Sequence[int] = SLOPE_SEQUENCE,
 ) -> Fit:
-    """Gauss-Newton with damping (Levenberg-Marquardt) from a place, over the free numbers.
+    """Climb from a point over the free numbers, by Gauss-Newton with damping (Levenberg-Marquardt).
 
     slopes : how they are taken; each way until it leads no further
     """
@@ -139,7 +139,7 @@ def climb_to_maximum(
 
 
 def settle_fit(model: FitModel, fit: Fit, spans: Sequence[int] | None) -> Fit:
-    """A fit moved along one number at a time, by strides that grow shorter, and climbed again.
+    """Move a fit along one number at a time, by strides that grow shorter, and climb again.
 
     A radius changes who is a neighbour at once or not at all: the likelihood has steps there, which slopes do not see.
     """
@@ -158,7 +158,7 @@ def settle_fit(model: FitModel, fit: Fit, spans: Sequence[int] | None) -> Fit:
 
 
 def standard_errors(model: FitModel, fit: Fit, spans: Sequence[int]) -> Array:
-    """Standard errors of all numbers, as shares of their ranges, by the curvature at a fit; 0 of those not fitted.
+    """Return standard errors of all numbers, as shares of their ranges, by the curvature at a fit; 0 of fixed ones.
 
     The larger of two: by wide slopes, which cut the corners of a bent ridge, and by fine ones, in which single pairs
     show that a radius takes in or leaves out. The prior is part of it: a number that the tracks do not tell has about
@@ -171,7 +171,7 @@ def standard_errors(model: FitModel, fit: Fit, spans: Sequence[int]) -> Array:
 
 
 def open_ends(model: FitModel, fit: Fit, spans: Sequence[int]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Numbers for which the tracks set no lower, and no upper limit: on the whole way there nothing is explained worse.
+    """Return the numbers without a lower, and without an upper limit: nothing on the way to that end fits worse.
 
     Such as a largest force that nobody ever uses.
     """
@@ -184,7 +184,7 @@ def open_ends(model: FitModel, fit: Fit, spans: Sequence[int]) -> tuple[NDArray[
 
 
 def distance_to_worse(model: FitModel, fit: Fit, spans: Sequence[int], index: int, end: float) -> float:
-    """Distance of a place, towards an end of its range, beyond which the tracks are explained worse; others stay."""
+    """Return the distance of a point towards an end of its range beyond which the tracks fit worse; others stay."""
     near, far = 0.0, abs(end - float(fit.place[index]))
     for _ in range(HALVED):
         middle = 0.5 * (near + far)
@@ -205,7 +205,7 @@ def with_coordinate(place: Array, number: int, x: float) -> Array:
 
 
 def curvature(model: FitModel, fit: Fit, spans: Sequence[int] | None, slopes: int = WIDE_SLOPES) -> Array:
-    """Second derivatives of the loss by the free numbers, with the prior."""
+    """Return second derivatives of the loss by the free numbers, with the prior."""
     e, _ = model.differences(fit.place, spans)
     if slopes == WIDE_CENTRAL_SLOPES:
         curvature = _normal(model, fit, spans, e, PROBE / 8.0, False)[0]
@@ -217,12 +217,12 @@ def curvature(model: FitModel, fit: Fit, spans: Sequence[int] | None, slopes: in
 
 
 def _probes(hessian: Array) -> Array:
-    """Steps by which slopes are taken finely: so far that the likelihood changes by a little more than 1."""
+    """Return fine steps for slopes: those that change the log-likelihood by a little more than 1."""
     return np.asarray(np.clip(SHOWN / np.sqrt(np.diag(hessian) + 4.0), MIN_FINE_STEP, PROBE))
 
 
 def conditional_point(fit: Fit, curved: Array, index: int, coordinate: float) -> Array:
-    """A fit's place with one number elsewhere, and the others where they make up for it as the curvature says."""
+    """Move one number of a fit, and the others so that they compensate for it by the curvature."""
     u, k = fit.place.copy(), fit.free.index(index)
     others = [f for f in range(len(fit.free)) if f != k]
     moves = -np.linalg.solve(curved[np.ix_(others, others)], curved[others, k]) * (coordinate - u[index])
@@ -270,7 +270,7 @@ def power_law_point(model: FitModel, fit: Fit, moved: Array, index: int, spans: 
 def _normal(
     model: FitModel, fit: Fit, spans: Sequence[int] | None, e: Array, steps: Array | float, one: bool
 ) -> tuple[Array, Array]:
-    """Curvature and slope of the loss, without the prior. one : slopes are taken to one side only."""
+    """Return curvature and slope of the loss, without the prior. one : take slopes to one side only."""
     along, across = fit.score.variances()
     weights = 1.0 / np.array([along, *[across] * (model.axes - 1)])
     j = jacobian(model, fit.place, fit.free, spans, steps, e if one else None)
@@ -288,7 +288,7 @@ BETTER = 1.0  # loss that a move has to gain
 
 
 def default_is_off(model: FitModel) -> list[int]:
-    """Named numbers whose default is a usual one, with which a part of the law is switched off."""
+    """Return the named numbers whose default switches a part of the law off."""
     assert model.law is not None
     known = model.law.scenario.model.usual
     return [
@@ -299,7 +299,7 @@ def default_is_off(model: FitModel) -> list[int]:
 
 
 def draw_points(model: FitModel, start: Array, spans: Sequence[int], seed: int) -> Array:
-    """Places of the named numbers (place, number): `start` and others spread over the whole range, best first.
+    """Return points of the named numbers (point, number): `start` and others over the whole range, best first.
 
     Usual numbers stay usual.
     """
@@ -321,7 +321,7 @@ def race_from_points(
     spans: Sequence[int],
     on_progress: Callable[[], None],
 ) -> Fit:
-    """The best climb from the start and from the first of some places; usual numbers are free in its last steps.
+    """Return the best climb from the start and from the first of some points; usual numbers are free in its last steps.
 
     start : a place whose named numbers are defaults; begin : places of the named numbers, best first
     """
@@ -337,7 +337,7 @@ def race_from_points(
 
 
 def scan_ranges(model: FitModel, point: Array, free: Sequence[int], spans: Sequence[int] | None) -> tuple[Array, bool]:
-    """A better place found along the range of one named number at a time, and whether there is one.
+    """Scan the range of one named number at a time; return the best point, and True if it is better.
 
     Where a threshold lies beyond all that happens, a slope shows nothing; a look along the range does.
     """
@@ -353,7 +353,7 @@ def scan_ranges(model: FitModel, point: Array, free: Sequence[int], spans: Seque
 
 
 def profile_ranges(model: FitModel, fit: Fit, spans: Sequence[int], on_progress: Callable[[], None]) -> Fit:
-    """The best place found along the range of one named number at a time while all the others follow."""
+    """Scan the range of one named number at a time while all the others follow; return the best fit."""
     best, curved = fit, curvature(model, fit, spans)
     for _ in range(SWEEPS):
         before = best.loss
@@ -375,7 +375,7 @@ def profile_ranges(model: FitModel, fit: Fit, spans: Sequence[int], on_progress:
 
 
 def _lower(model: FitModel, places: Sequence[Array], free: Sequence[int], spans: Sequence[int]) -> Fit:
-    """A short climb from that of some places which begins lower."""
+    """Climb a few steps from that of some points which begins lower."""
     return climb_to_maximum(
         model, min(places, key=lambda u: loss_at(model, u, free, spans)), free, spans, FOLLOW, slopes=(WIDE_SLOPES,)
     )
@@ -399,7 +399,7 @@ MODE_GAIN = 0.5  # loss that a move has to gain
 def search_modes(
     model: FitModel, fit: Fit, few_spans: Sequence[int], spans: Sequence[int], on_progress: Callable[[], None]
 ) -> Fit:
-    """The fit, or a better one elsewhere for numbers that act together; with the other ends that were met.
+    """Search other modes of numbers that act together; return the best fit, with the other ends on the way.
 
     few, spans : on which is looked, and on which is fitted
     """
@@ -424,7 +424,7 @@ def search_modes(
 
 
 def redraw_group(model: FitModel, fit: Fit, group: Sequence[int], few_spans: Sequence[int]) -> list[Array]:
-    """Places from which all are to climb, after a group was drawn anew: ends of a race, and of the group by itself."""
+    """Draw a group anew from a Sobol sequence; return ends of a race, and of the group by itself."""
     from scipy.stats import qmc
 
     drawn = np.tile(fit.place, (2**REDRAWN, 1))
@@ -443,7 +443,7 @@ def redraw_group(model: FitModel, fit: Fit, group: Sequence[int], few_spans: Seq
 
 
 def race_climbs(model: FitModel, points: Sequence[Array], free: Sequence[int], spans: Sequence[int]) -> list[Fit]:
-    """Ends of climbs over all numbers, best first: of the first of some places, the better ones of which go on."""
+    """Race climbs over all numbers from the first of some points, the better ones go on; return ends, best first."""
     found: list[Fit] = []
     for count, steps in MODE_RACE:
         found = [climb_to_maximum(model, u, free, spans, steps, slopes=(WIDE_SLOPES,)) for u in points[:count]]
@@ -460,7 +460,7 @@ def climb_beyond(
     spans: Sequence[int],
     on_progress: Callable[[], None],
 ) -> list[Fit]:
-    """Ends of climbs, best first, with those that are met beyond the best one, seen from the next ones.
+    """Climb beyond the best end, away from the next ones; return all ends, best first.
 
     Two ends on one ridge tell which way it goes, however narrow it is.
     """
@@ -485,7 +485,7 @@ def climb_beyond(
 
 
 def distinct_points(points: Sequence[Array], group: Sequence[int], known_points: Sequence[Array] = ()) -> list[Array]:
-    """Places that differ from known ones, and from all before them, in some number of a group."""
+    """Return the points that differ from known ones, and from all before them, in some number of a group."""
     found = list(known_points)
     for u in points:
         if all(np.abs(u - other)[list(group)].max() > SAME for other in found):
@@ -494,7 +494,7 @@ def distinct_points(points: Sequence[Array], group: Sequence[int], known_points:
 
 
 def parameter_groups(model: FitModel, fit: Fit, spans: Sequence[int]) -> list[list[int]]:
-    """Groups of named numbers that act on the same steps, around those that are least certain."""
+    """Group named numbers that act on the same steps, around the least certain ones."""
     named = [k for k in fit.free if k < model.named]
     slopes = np.abs(jacobian(model, fit.place, named, spans, here=model.differences(fit.place, spans)[0]))
     flat = np.sqrt(slopes.reshape(-1, len(named)))  # a few steps at edges would outweigh all others
@@ -511,7 +511,7 @@ def parameter_groups(model: FitModel, fit: Fit, spans: Sequence[int]) -> list[li
 
 
 def sort_groups(groups: Sequence[list[int]]) -> list[list[int]]:
-    """Groups in their order, but those that mostly stand in earlier ones last.
+    """Sort groups: those that mostly repeat earlier ones come last.
 
     Else the numbers of friction, the least certain, would come three times in other company, and those of a wall never.
     """

@@ -51,7 +51,7 @@ class FitNoise:
     seen: float
 
     def shifted(self, steps: Array) -> "FitNoise":
-        """The noise with logarithms changed."""
+        """Return the noise with its logarithms changed."""
         law, speed, seen = (
             value * float(np.exp(step)) for value, step in zip((self.law, self.speed, self.seen), steps, strict=True)
         )
@@ -75,7 +75,7 @@ class NoisyFlight:
         self.error: Array | None = None  # of everybody's position as it is perceived, m
 
     def begin(self, world: int) -> None:
-        """Forget the flight before. world : which random numbers the law draws."""
+        """Forget the flight before. world : number of the random world of the law."""
         if self.noise.column == BLURRED:
             self.error = self.generator.normal(0.0, self.noise.law, self.shape)
         self.walk.begin(self.columns, world=world)
@@ -114,7 +114,7 @@ def fly_tracks(
     spans: Sequence[int],
     seed: int,
 ) -> SpanTracks:
-    """Tracks of the law flown again from the beginning of each span.
+    """Fly the law from the beginning of each span, and return tracks of these flights.
 
     place : numbers by column, gains, usual speed (`Model.split`); kept : where individuals were (`Walk.errors`)
     """
@@ -141,7 +141,7 @@ def fly_tracks(
 def next_speed(
     speed: Array, persistence: float, mean_speed: float, noise: float, generator: np.random.Generator
 ) -> Array:
-    """Own speeds (individual,) a period later, m/s: they return to the usual one, and wander.
+    """Return own speeds (individual,) a period later, m/s: they relax to the usual one, and wander.
 
     persistence : share of a difference from the usual speed that is left; noise : standard deviation of a period's
                   change
@@ -161,7 +161,7 @@ def stretch_last_step(walk: InnovationFilter, previous: Array, factor: Array) ->
 
 
 def noise_statistics(model: FitModel, u: Array, spans: Sequence[int]) -> Array:
-    """What noise shows in: logarithms of the variances along and across, and correlations from frame to frame."""
+    """Return statistics of noise: logarithms of the variances along and across, and correlations between frames."""
     found = []
     for walk, own in model.parts(spans):
         by_column, gains, usual = model.split(u)
@@ -189,7 +189,7 @@ class FittedFlights:
             self.kept.append(kept)
 
     def tracks(self, point: Array, noise: FitNoise, seed: int) -> list[SpanTracks]:
-        """Tracks of one flight of all spans."""
+        """Return the tracks of one flight of all spans."""
         found = []
         by_walk = dict(self.model.parts(self.spans))
         for t, walk in enumerate(self.model.filters):
@@ -198,13 +198,13 @@ class FittedFlights:
         return found
 
     def model_on(self, tracks: list[SpanTracks]) -> FitModel:
-        """The same model on other tracks."""
+        """Return the model on other tracks."""
         twin = FitModel(self.model.law, tracks, self.model.scale)
         twin = twin.with_fixed(sorted(self.model.held))
         return twin.robust() if self.model.soft else twin
 
     def noise(self, point: Array, first_noise: FitNoise, fitted: Array) -> tuple[FitNoise, float]:
-        """Noise with which the flights' statistics are those of the tracks, and the misfit.
+        """Return the noise whose flights have the statistics of the tracks, and the misfit.
 
         fitted : place at which statistics are taken, that of the fit to the tracks
         """
@@ -227,7 +227,7 @@ class FittedFlights:
 
 
 def first_noise(model: FitModel, point: Array, spans: Sequence[int]) -> list[FitNoise]:
-    """Noise to begin with, of each kind that there may be.
+    """Return the noise to begin with, of each possible kind.
 
     What the gains say of the noise of the tracks, and a guess of that of the flight.
     """
@@ -269,7 +269,7 @@ def estimate_law_noise(
     levels: Sequence[float],
     seed: int,
 ) -> tuple[FitNoise, list[IntervalEnds]]:
-    """The likeliest noise, and the ends of an interval for each level; None where the tracks set no limit.
+    """Estimate the noise of a law, and the ends of an interval for each level; None where the tracks set no limit.
 
     place, scatter : numbers of the law, as places, and their standard errors; fitted: where statistics are taken
     levels         : shares of Student's distribution below an upper end, such as 0.975
@@ -303,7 +303,7 @@ def _look(
     flights: FittedFlights, place: Array, scatter: Array, noise: FitNoise, fitted: Array, levels: Sequence[float],
     centre: float, half: float, generator: np.random.Generator,
 ) -> tuple[Array, list[IntervalEnds]]:  # fmt: skip
-    """Logarithms by which noises are the likeliest, and ends of that of the law, by flights over a range."""
+    """Fly over a range of noise; return the logarithms of the likeliest noises, and the ends of that of the law."""
     from scipy.stats import t as student
 
     named = flights.model.named
@@ -360,7 +360,7 @@ WIDER = (1.0, 3.0)  # least and largest variance of refitted numbers, in units o
 
 @dataclass
 class CorrectedFit:
-    """A fit corrected by flights of its own law, and how sure it is.
+    """A fit corrected by flights of its own law, with intervals.
 
     place  : of all numbers, corrected
     alone  : ends of 95 % intervals of each number by itself, as places; low and high
@@ -377,7 +377,7 @@ class CorrectedFit:
 
 
 def interval_levels(numbers: int) -> tuple[float, float]:
-    """Shares below the upper end of an interval: of one number, and of so many that hold together (Šidák 1967)."""
+    """Return shares below the upper end of an interval: of one number, and of so many jointly (Šidák 1967)."""
     return 0.5 + 0.5 * SURE, 0.5 + 0.5 * SURE ** (1.0 / max(numbers, 1))
 
 
@@ -427,7 +427,9 @@ def correct_fit(
 
 
 def _softened(model: FitModel, fit: Fit, spans: Sequence[int]) -> tuple[FitModel, Fit]:
-    """The model in which large differences count less, and its fit, from that of all differences or another end."""
+    """Refit with less weight of large differences, from the fit of all differences or another end; return model and
+    fit.
+    """
     model = model.robust()
     here = model.score(fit.place, spans).loss()
     near = [u for u in fit.others if model.score(u, spans).loss() < here + UNLIKELY]
@@ -441,7 +443,9 @@ def _softened(model: FitModel, fit: Fit, spans: Sequence[int]) -> tuple[FitModel
 def _put_right(
     flights: FittedFlights, fit: Fit, kinds: list[FitNoise], curved: Array, say: Callable[[], None]
 ) -> tuple[Array, list[FitNoise], Array]:
-    """The place put right, the noise of each kind that goes with it, and the misses of the last flights."""
+    """Correct the bias; return the point, the noise of each kind that belongs to it, and the misses of the last
+    flights.
+    """
     model, spans, fitted = flights.model, flights.spans, fit.place
     named = [k for k in fit.free if k < model.named]
     place, number, misses = fitted.copy(), 1, np.zeros((1, len(fitted)))
@@ -480,7 +484,7 @@ def _put_right(
 def _noise(
     flights: FittedFlights, place: Array, scatter: Array, noise: FitNoise, fitted: Array, shares: tuple[float, float]
 ) -> tuple[FitNoise, list[IntervalEnds]]:
-    """The number of noise, and its ends alone and together, with what flights leave out."""
+    """Return the noise, and its ends alone and jointly, widened by what flights leave out."""
     from scipy.stats import norm as normal
 
     noise, ends = estimate_law_noise(flights, place, scatter, noise, fitted, shares, len(flights.spans))
@@ -492,7 +496,7 @@ def _noise(
 
 
 def _farther(value: float, end: float | None, more: float) -> float | None:
-    """An end whose logarithm lies further off, by what flights leave out."""
+    """Move an end outwards on a logarithmic scale, by what flights leave out."""
     if end is None:
         return None
     away = float(np.log(end / value))

@@ -26,7 +26,7 @@ COMMAND = "\"import numpy as np; np.save('plain.npy', np.load('FILE', allow_pick
 def read_array(
     array: Any, options: ImportOptions, where: str = "array", names: list[str] | None = None, fps: float | None = None
 ) -> list[ImportedTrack]:
-    """Tracks of an array (frame, individual, 2 or 3); nan where an individual is not there."""
+    """Read tracks of an array (frame, individual, 2 or 3); nan where an individual is absent."""
     values = _numbers(array, where)
     if values.ndim == 2 and values.shape[1] in (2, 3):
         values = values[:, None, :]
@@ -49,7 +49,7 @@ def read_array(
 
 
 def _numbers(array: Any, where: str) -> Any:
-    """An array of numbers; nan where it is masked."""
+    """Return an array of numbers; nan where it is masked."""
     hidden = np.ma.getmaskarray(array) if np.ma.isMaskedArray(array) else None
     values = np.asarray(array)
     if values.dtype.kind not in "fiuO":
@@ -62,7 +62,7 @@ def _numbers(array: Any, where: str) -> Any:
 
 
 def read_npy(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a .npy or .npz file of plain numbers."""
+    """Read tracks of a .npy or .npz file of plain numbers."""
     refuse_pickled_arrays(path)
     with path.open("rb") as file:
         start = file.read(6)
@@ -101,7 +101,7 @@ def _pickled(path: Path) -> str:
 
 
 def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of trajectories.h5 of idtracker.ai (its documented keys), or of any HDF5 file with such a dataset.
+    """Read trajectories.h5 of idtracker.ai (its documented keys), or any HDF5 file with such a dataset.
 
     file : its arrays and attributes, as `recordings.reader_process` hands them over
     """
@@ -126,7 +126,7 @@ OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0
 
 
 def read_netcdf(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a netCDF file of `movement`, or of trajectories.h5 of idtracker.ai."""
+    """Read tracks of a netCDF file of `movement`, or of trajectories.h5 of idtracker.ai."""
     if path.suffix.lower() in (".h5", ".hdf5"):
         plain = ReaderProcess(path, read_hdf5_arrays, "a HDF5 file").answer()
         if "position" not in plain:
@@ -135,7 +135,7 @@ def read_netcdf(path: Path, options: ImportOptions, findings: ImportReport) -> l
 
 
 def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "dataset") -> list[ImportedTrack]:
-    """Tracks of a dataset with a variable position (time, space, [keypoint,] individual), either generation's names."""
+    """Read a dataset with the variable position (time, space, [keypoint,] individual), old or new dimension names."""
     found = dataset.rename({old: new for old, new in OLD.items() if old in dataset.dims})
     if "position" not in found:
         raise RecordingError(f"{where}: has no variable position; it has {', '.join(map(str, found.data_vars))}")

@@ -26,7 +26,7 @@ NED = (("x", "y", "z"), ("vx", "vy", "vz"))
 
 
 def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Track of a PX4 log: vehicle_local_position, and trajectory_setpoint as the command in force.
+    """Read a PX4 log: vehicle_local_position, and trajectory_setpoint as the command in force.
 
     The set-point is what the companion asked for; vehicle_local_position_setpoint is the controller's own output and
     is not read. Rows where the estimator calls its position invalid are left out.
@@ -75,7 +75,7 @@ def _enu(ned: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _command(topic: Any, time: Any, path: Path, findings: ImportReport) -> dict[str, Any]:
-    """Velocity set-point held until the next one; nan where the position was controlled instead."""
+    """Return the velocity set-point, constant until the next one; nan where the position was controlled instead."""
     if topic is None:
         findings.notes.append(f"{path}: has no {SETPOINT}: no commands")
         return {}
@@ -113,7 +113,7 @@ LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so 
 
 
 def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Track of a DataFlash log: PSCN, PSCE, PSCD (position, velocity, commanded velocity), ORGN and GPS."""
+    """Read a DataFlash log: PSCN, PSCE, PSCD (position, velocity, commanded velocity), ORGN and GPS."""
     _need_pymavlink(path)
     with path.open("rb") as file:
         if file.read(len(HEAD)) != HEAD:
@@ -135,14 +135,14 @@ def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -
 
 
 def _gps_times(table: Any) -> Any:
-    """Times since the start and since 1970 (row, 2), s, where the first receiver knows the week; None below two."""
+    """Return times since the start and since 1970 (row, 2), s, by the first receiver; None below two."""
     known = table[(table[:, 1] > 0.0) & (table[:, 3] == 0.0)]
     utc = GPS_EPOCH - LEAP_SECONDS + known[:, 1] * 604800.0 + known[:, 2] * 1e-3
     return np.stack([known[:, 0] * 1e-6, utc], axis=1) if len(known) >= 2 else None
 
 
 def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
-    """One table on the times of the north axis; the other axes are written within the same loop."""
+    """Join the axes in one table at the times of the north axis; the autopilot writes all axes in one loop."""
     north, east, down = rows["PSCN"], rows["PSCE"], rows.get("PSCD")
     time = north[:, 0] * 1e-6
 
@@ -167,7 +167,7 @@ def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
 
 
 def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a telemetry log: LOCAL_POSITION_NED of each vehicle, POSITION_TARGET_LOCAL_NED as its command.
+    """Read a telemetry log: LOCAL_POSITION_NED of each vehicle, POSITION_TARGET_LOCAL_NED as its command.
 
     All vehicles are stamped by the receiver's clock, so they share it; their positions are about their own origins.
     """
@@ -198,7 +198,7 @@ def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
 
 
 def _by_vehicle(told: Any, kind: str, columns: tuple[int, ...], factors: tuple[float, ...]) -> dict[int, Any]:
-    """Rows of each vehicle, of these columns (0: the time) times factors, in their order in the log."""
+    """Return rows of each vehicle, of these columns (0: the time) times factors, in their order in the log."""
     if kind not in told:
         return {}
     table = told[kind].values
@@ -258,7 +258,7 @@ OTHERS = "of ArduPilot give the .bin that it was made from"  # whose text logs e
 
 
 def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Track of the drone on which a node flew: local east-north-up of its mission, by the clock of its computer.
+    """Read the log of a node on board: local east-north-up of its mission, by the clock of its computer.
 
     A row is a tick at which the own state was another than at the tick before; between such rows the autopilot had said
     nothing new. Commands are those of phases in which the node flies; their clock is told UTC by the log's first line.

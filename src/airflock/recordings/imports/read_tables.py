@@ -26,7 +26,7 @@ CHUNK = 250_000  # rows that are read at a time, so that an hour of thirty drone
 
 
 def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a text table; raises RecordingError that names column and row."""
+    """Read the tracks of a text table; raise a RecordingError that names column and row."""
     head = read_head(path, options)
     if head.above:
         findings.notes.append(f"{path}: line{'s' * (head.above > 1)} above the table left out: {head.above}")
@@ -51,7 +51,7 @@ def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list
 
 
 def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a Parquet table."""
+    """Read the tracks of a Parquet table."""
     try:
         import pyarrow
         import pyarrow.parquet as parquet
@@ -76,7 +76,7 @@ def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> 
 
 
 def table_from_columns(columns: Mapping[str, Any]) -> pd.DataFrame:
-    """Columns by name as a table, one value for all rows where a column is no list; raises RecordingError."""
+    """Make a table of columns by name; a column that is no list has one value for all rows. Raise RecordingError."""
     lists = {str(k): list(v) for k, v in columns.items() if np.iterable(v) and not isinstance(v, str)}
     if len({len(column) for column in lists.values()}) != 1:
         told = ", ".join(f"{name} has {len(column)}" for name, column in lists.items()) or "there are none"
@@ -85,7 +85,7 @@ def table_from_columns(columns: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def read_frame(table: pd.DataFrame, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a pandas DataFrame; its index is a column too, where it has a name."""
+    """Read the tracks of a pandas DataFrame; a named index is a column, too."""
     flat = table.reset_index() if any(name is not None for name in table.index.names) else table
     flat = flat.set_axis([str(c) for c in flat.columns], axis=1)
     return tracks_from_parts(
@@ -96,7 +96,7 @@ def read_frame(table: pd.DataFrame, options: ImportOptions, findings: ImportRepo
 def tracks_from_parts(
     where: str, stem: str, names: list[str], parts: Any, options: ImportOptions, findings: ImportReport
 ) -> list[ImportedTrack]:
-    """Tracks of a table that comes in parts, by the layout of its columns."""
+    """Read the tracks of a table that comes in parts, by the layout of its columns."""
     wide = (
         wide_columns(names)
         if not any(target in options.map for target in (*POSITION_TARGETS, *GEODETIC_TARGETS))
@@ -136,7 +136,8 @@ def tracks_from_parts(
 
 
 def _numbers(column: Any, where: str, name: str, at: int, *, time: bool) -> Any:
-    """A column as float64; dates become seconds since 1970, durations seconds; texts of neither are faults.
+    """Return a column as float64: dates as seconds since 1970, durations as seconds; raise RecordingError for other
+    texts.
 
     time : whether it tells times, which may be written as dates or as hours:minutes:seconds
     """
@@ -162,7 +163,7 @@ def _numbers(column: Any, where: str, name: str, at: int, *, time: bool) -> Any:
 
 
 def _no_number(text: str, time: bool) -> str:
-    """What is wrong with a cell that is no number, and what to write instead."""
+    """Return the error of a cell that is no number, and its remedy."""
     if re.fullmatch(r"\s*[-+]?\d+,\d+\s*", text):
         return f"{text} has a decimal comma; write --decimal ,"
     if table_columns.is_unit(text):
@@ -195,7 +196,7 @@ def _taken(values: dict[str, Any], rows: Any, chosen: Any) -> tuple[dict[str, An
 def _track(
     name: str, where: str, parts: list[Any], how: ColumnLayout, shared: bool, findings: ImportReport
 ) -> ImportedTrack:
-    """One individual of its pieces; shared: whether others have the same column of times."""
+    """Join the pieces of one individual; shared: True if others have the same column of times."""
     columns = {target: np.concatenate([p[0][target] for p in parts]) for target in parts[0][0]}
     rows = np.concatenate([p[1] for p in parts])
     origin, valid = table_columns.pop_origin_and_validity(columns)
@@ -239,12 +240,12 @@ class TableHead(NamedTuple):
 
     @property
     def first(self) -> int:
-        """Number of the first row of data, as an editor counts."""
+        """Return the number of the first row of data, as an editor counts."""
         return self.above + (1 if self.hidden else 2)
 
 
 def read_head(path: Path, options: ImportOptions) -> TableHead:
-    """How a text table begins; raises RecordingError for what is none, and where columns have no names."""
+    """Read the beginning of a text table; raise RecordingError for other files, and for columns without names."""
     encoding, lines = _lines(path)
     above = next((i for i, line in enumerate(lines) if line.strip() and not _remark(line)), len(lines))
     if above == len(lines):
@@ -266,7 +267,7 @@ def read_head(path: Path, options: ImportOptions) -> TableHead:
 
 
 def _lines(path: Path) -> tuple[str, list[str]]:
-    """Encoding and first lines of a text."""
+    """Return the encoding and the first lines of a text."""
     with path.open("rb") as file:
         start = file.read(MOST)
     if not start.strip():
@@ -288,7 +289,7 @@ def _remark(line: str) -> bool:
 
 
 def _delimiter(first: str, body: list[str]) -> str:
-    """What separates columns: the sign that the first line has most of, or blanks where it has none of them."""
+    """Return the delimiter of columns: the most frequent sign of the first line, or blanks."""
     likely = max(DELIMITERS, key=lambda d: (first.count(d), d == ","))
     if likely in first:
         return likely
@@ -326,7 +327,7 @@ NAME_FIRST = re.compile(r"([a-z][a-z_]*?_?\d+)_([xyz])")  # a number: head_x, ta
 
 
 def wide_columns(names: list[str]) -> dict[str, dict[str, str]]:
-    """Individual → component → column, of a table such as time, x1, y1, x2, y2; empty if it is none."""
+    """Return individual → component → column, of a table such as time, x1, y1, x2, y2; empty for a long table."""
     found: dict[str, dict[str, str]] = {}
     plain = [table_columns.split_header(name)[0] for name in names]
     if any(name in table_columns.ALIASES["x"] for name in plain):
@@ -341,7 +342,7 @@ def wide_columns(names: list[str]) -> dict[str, dict[str, str]]:
 
 
 def first_individual_columns(names: list[str], wide: dict[str, dict[str, str]]) -> list[str]:
-    """Columns of the first individual of a wide table, under the names of a long one."""
+    """Return the columns of the first individual of a wide table, by the names of a long one."""
     taken = {column for parts in wide.values() for column in parts.values()}
     first = next(iter(wide.values()))
     unit = {part: table_columns.split_header(column)[1] for part, column in first.items()}
@@ -351,7 +352,7 @@ def first_individual_columns(names: list[str], wide: dict[str, dict[str, str]]) 
 def split_by_individual(
     table: pd.DataFrame, wide: dict[str, dict[str, str]], layout: ColumnLayout, stem: str
 ) -> Iterable[tuple[str, pd.DataFrame]]:
-    """Rows of a table by individual, each under the names of a long one; all of them as `stem` where it is not wide."""
+    """Yield the rows of each individual by the names of a long table; all rows as `stem` if the table is not wide."""
     if not wide:
         return [(stem, table)]
     taken = [column for parts in wide.values() for column in parts.values()]

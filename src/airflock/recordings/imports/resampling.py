@@ -1,4 +1,4 @@
-"""Tracks on one grid of times: gaps bridged up to a stated length, otherwise absent (nan)."""
+"""Resample tracks to one grid of times: gaps are bridged up to a stated length, otherwise the individual is absent."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ COARSE = 0.01  # m; where places are farther apart in single precision, they are
 def time_grid(
     tracks: list[ImportedTrack], rate: float | None, begin: float | None, end: float | None
 ) -> tuple[Any, float]:
-    """Times (s) from the first to the last row, and their distance; the tracks' own rate unless one is given.
+    """Return times (s) from the first to the last row, and their distance: the tracks' own rate by default.
 
     A window that begins between two rows of the tracks' own rate begins at the later one, so that its times are theirs.
     """
@@ -46,7 +46,7 @@ def time_grid(
 
 
 def grid_tolerance(period: float, *instants: float) -> float:
-    """Time (s) by which rows may miss the grid: 1e-6 of a period, and what doubles of these instants do not tell.
+    """Return the time (s) by which rows may miss the grid: 1e-6 of a period, and the resolution of these instants.
 
     Seconds since 1970 are told to 2.4e-7 s.
     """
@@ -54,7 +54,7 @@ def grid_tolerance(period: float, *instants: float) -> float:
 
 
 def _round(period: float) -> float:
-    """A period (s) as it was meant: that of a rate of four digits, as of 30 or 29.97 Hz; else four digits of itself.
+    """Round a period (s) to a rate of four digits, such as 30 or 29.97 Hz, else to four digits of itself.
 
     Frames of a video are met then, rather than drifted past: with 0.03333 s one is lost in each 10,000 of 30 Hz.
     """
@@ -64,7 +64,7 @@ def _round(period: float) -> float:
 
 
 def needed_bits(tracks: list[ImportedTrack], min_bits: int) -> tuple[int, float]:
-    """Bits per number that tracks need, at least those asked for; and the step of places in single precision, m.
+    """Return the bits per number that tracks need, at least `min_bits`, and the step of places in single precision, m.
 
     Raises RecordingError for places that nobody flies at.
     """
@@ -83,7 +83,7 @@ def needed_bits(tracks: list[ImportedTrack], min_bits: int) -> tuple[int, float]
 def resample(
     tracks: list[ImportedTrack], times: NDArray[np.float64], period: float, bridge: float, precision: int
 ) -> tuple[xr.Dataset, dict[str, float]]:
-    """Dataset of the tracks at the given times, and shares: presence, bridged.
+    """Resample tracks to the given times; return the dataset, and the shares that are present and bridged.
 
     bridge : longest gap (s) that is bridged, by cubic Hermite with the velocities at its ends
     """
@@ -156,7 +156,7 @@ def _fill(
 
 
 def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:
-    """Velocities from positions: central differences within each unbroken stretch."""
+    """Differentiate positions: central differences within each unbroken stretch."""
     found = np.zeros_like(rows)
     gaps = np.flatnonzero(np.diff(times) > 5.0 * usual) + 1
     edges = np.unique(np.concatenate([[0], breaks, gaps, [len(times)]])).astype(int)
@@ -169,7 +169,7 @@ def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:
 
 
 def _hermite(rows: Any, slopes: Any, before: Any, after: Any, step: Any, part: Any) -> tuple[Any, Any]:
-    """Cubic through two points with given slopes: position and velocity."""
+    """Interpolate with a cubic through two points with known slopes; return position and velocity."""
     s, h = part[:, None], step[:, None]
     p0, p1, m0, m1 = rows[before], rows[after], slopes[before] * h, slopes[after] * h
     place = (

@@ -31,7 +31,7 @@ MissingRows = dict[
 
 
 def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks without the rows that have no time or no place; raises RecordingError for a file with no others.
+    """Drop the rows without a time or a place; raise RecordingError for a file with no others.
 
     An individual is absent where its place is nan or inf; one that has no place at any time is left out.
     """
@@ -54,7 +54,7 @@ def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) ->
 
 
 def note_missing_velocities(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """Tell where a velocity or a command is nan or inf; an infinite one is none."""
+    """Note where a velocity or a command is nan or inf; an infinite one becomes nan."""
     for source, own in tracks_by_source(tracks).items():
         _tell(
             findings, source, _lacking(own, VELOCITY_TARGETS), "without a number: differentiated from positions there"
@@ -69,7 +69,7 @@ def note_missing_velocities(tracks: list[ImportedTrack], findings: ImportReport)
 
 
 def tracks_by_source(tracks: Iterable[ImportedTrack]) -> dict[str, list[ImportedTrack]]:
-    """Tracks by the file that they were read from."""
+    """Group tracks by the file that they were read from."""
     found: dict[str, list[ImportedTrack]] = {}
     for track in tracks:
         found.setdefault(track.source, []).append(track)
@@ -89,7 +89,7 @@ def _placed(track: ImportedTrack) -> NDArray[np.bool_]:
 
 
 def _lacking(tracks: list[ImportedTrack], names: Iterable[str]) -> MissingRows:
-    """Rows with a time but no number, by column, under the user's own word for it."""
+    """Return the rows with a time but no number, by column, under the user's own word for it."""
     found: MissingRows = {}
     for track in tracks:
         for name in names:
@@ -101,7 +101,7 @@ def _lacking(tracks: list[ImportedTrack], names: Iterable[str]) -> MissingRows:
 
 
 def _tell(findings: ImportReport, source: str, lacking: MissingRows, what: str) -> None:
-    """One note for columns that lack a number in the same rows."""
+    """Add one note for columns that lack a number in the same rows."""
     lines: dict[tuple[bytes, str], list[str]] = {}
     for column, parts in lacking.items():
         rows = np.concatenate([rows for rows, _ in parts])
@@ -122,13 +122,13 @@ LEAST = 0.2  # share of the common span below which an individual is worth a que
 
 
 def median_period(track: ImportedTrack) -> float:
-    """Usual time between rows, s; 0 for a single row."""
+    """Return the usual time between rows, s; 0 for a single row."""
     steps = np.diff(track.time)
     return float(np.median(steps)) if steps.size else 0.0
 
 
 def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """Rule 1: sort by time, tell of repeated instants and of steps that no log has, each once for a file."""
+    """Rule 1: sort by time, and report repeated instants and impossible steps, each once a file."""
     for source, own in tracks_by_source(tracks).items():
         late = [_sorted(track) for track in own]
         _tell_order(source, [rows for rows in late if rows.size], findings)
@@ -141,7 +141,7 @@ def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 def _sorted(track: ImportedTrack) -> NDArray[np.int64]:
-    """Sort a track by time; the rows that came before an earlier one."""
+    """Sort a track by time; return the rows that came before an earlier one."""
     late = np.flatnonzero(np.diff(track.time) < 0.0) + 1
     rows = track.rows[late]
     if late.size:
@@ -156,7 +156,7 @@ def _tell_order(source: str, late: list[NDArray[np.int64]], findings: ImportRepo
 
 
 def _wrong_step(track: ImportedTrack) -> str:
-    """What is wrong with the time between rows; empty if nothing is."""
+    """Return the error of the time between rows; empty if there is none."""
     step, name = median_period(track), track.label("t")
     where = f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}"
     if step and not STEPS[0] <= step <= STEPS[1]:
@@ -171,7 +171,7 @@ def _wrong_step(track: ImportedTrack) -> str:
 
 
 def _unsaid_step(track: ImportedTrack) -> str:
-    """What is told of times without a unit that would be far apart in seconds; empty if there are none."""
+    """Return the error of times without a unit that would be far apart in seconds; empty if there is none."""
     step, name = median_period(track), track.user_labels.get("t", "")
     if (
         not name.isidentifier()
@@ -188,7 +188,7 @@ def _unsaid_step(track: ImportedTrack) -> str:
 
 
 def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> None:
-    """Rows with the time of the row before: the same row again, or another individual. The first of them is kept."""
+    """Check rows with the time of the row before: the same row again, or another individual. Keep the first."""
     again: list[tuple[ImportedTrack, NDArray[np.int64]]] = []
     for track in own:
         same = np.flatnonzero(np.diff(track.time) == 0.0)
@@ -218,7 +218,7 @@ def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> 
 
 
 def check_names(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """No two individuals with one name."""
+    """Refuse two individuals with one name."""
     known: dict[str, ImportedTrack] = {}
     for track in tracks:
         if track.name in known:
@@ -229,7 +229,7 @@ def check_names(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """A column without a number says nothing, so it is none; a row without a height that others have is no place."""
+    """Drop columns without any number, and rows without a height that other rows have."""
     for track in tracks:
         for name in (*VELOCITY_TARGETS, *COMMAND_TARGETS):
             if name in track.columns and not np.isfinite(track.columns[name]).any():
@@ -257,7 +257,7 @@ def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport) -> None:
-    """Rule 4: heights of all individuals are above the same level; z points up, if `axes` (enu, ned) are the file's."""
+    """Rule 4: require that all heights are above the same level; z points up, if `axes` (enu, ned) are the file's."""
     levels = {track.datum: track for track in tracks if "z" in track.columns or "alt" in track.columns}
     if len(levels) > 1:
         told = ", ".join(f"{t.name}: {level or 'not said'}" for level, t in levels.items())
@@ -283,7 +283,7 @@ def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport
 
 
 def note_resolution(track: ImportedTrack, findings: ImportReport) -> None:
-    """Rule 7: resolution of positions that repeat, the floor of their noise."""
+    """Rule 7: note the resolution of positions that repeat, the floor of their noise."""
     for axis in POSITION_TARGETS[:2]:
         values = track.columns[axis]
         steps = np.abs(np.diff(values))
@@ -300,7 +300,7 @@ def note_resolution(track: ImportedTrack, findings: ImportReport) -> None:
 
 
 def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """Individuals that are hardly there: kept only if that is meant."""
+    """Refuse individuals that are hardly present, unless the user accepts them."""
     first, last = min(t.time[0] for t in tracks), max(t.time[-1] for t in tracks)
     if last <= first:
         return
@@ -335,7 +335,7 @@ REASONS = {  # how many times too fast → why, and what to write: targets and t
 
 
 def check_axes(tracks: Iterable[ImportedTrack], findings: ImportReport) -> None:
-    """Rule 2: along each axis positions change as the velocities say; else name what is swapped, turned or scaled."""
+    """Rule 2: along each axis positions change as the velocities say; else name the swap, the sign or the scale."""
     by_file: dict[str, list[ImportedTrack]] = {}
     for track in tracks:
         if track.has(VELOCITY_TARGETS):
@@ -352,7 +352,7 @@ def check_axes(tracks: Iterable[ImportedTrack], findings: ImportReport) -> None:
 
 
 def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Displacements over about LAG, and the same from the velocities, (pair, axis), m."""
+    """Return displacements over about LAG, and the same from the velocities, (pair, axis), m."""
     step = median_period(track)
     place, speed = track.stack(POSITION_TARGETS, axes), track.stack(VELOCITY_TARGETS, axes)
     steps = np.diff(track.time)
@@ -370,7 +370,7 @@ def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64]
 
 
 class AxisCorrelation(NamedTuple):
-    """How displacements (rows) go with velocities (columns), by axis.
+    """Correlation of displacements (rows) with velocities (columns), by axis.
 
     lively : (axis,) whether the velocity along it varies enough to compare
     r      : (axis, axis) correlation
@@ -383,7 +383,7 @@ class AxisCorrelation(NamedTuple):
 
 
 def _likeness(moved: Array, summed: Array) -> AxisCorrelation:
-    """Compare displacements with the same from velocities, both (pair, axis), m; some velocity must vary."""
+    """Correlate displacements with the same from velocities, both (pair, axis), m; some velocity must vary."""
     strength, spread = summed.std(axis=0), moved.std(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         cross = (moved - moved.mean(0)).T @ (summed - summed.mean(0)) / len(moved)
@@ -429,7 +429,9 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
 
 
 def _swap_fault(source: str, track: ImportedTrack, likeness: AxisCorrelation) -> str:
-    """The first axis of the positions that goes with another axis of the velocities; empty if none does."""
+    """Return the error of the first axis of positions that goes with another axis of velocities; empty if there is
+    none.
+    """
     for i, row in enumerate(likeness.r):
         j = int(np.abs(row).argmax())
         if likeness.lively[i] and i != j and abs(row[i]) < 0.5 and abs(row[j]) > 0.8:
@@ -443,7 +445,7 @@ def _swap_fault(source: str, track: ImportedTrack, likeness: AxisCorrelation) ->
 
 
 def _scale_reason(track: ImportedTrack, slope: float) -> str:
-    """Why positions change so many times as fast as velocities say, and what to write."""
+    """Return the error and remedy for positions that change a multiple as fast as the velocities say."""
     near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
     if abs(np.log(near / slope)) >= 0.1:
         return "units differ"
@@ -452,7 +454,7 @@ def _scale_reason(track: ImportedTrack, slope: float) -> str:
 
 
 def _unswapped(track: ImportedTrack, i: int, j: int) -> str:
-    """What to write where axis i of the positions is axis j of the velocities."""
+    """Return the remedy where axis i of the positions is axis j of the velocities."""
     own = [quote_column(track.label(POSITION_TARGETS[k])) for k in (i, j)]
     told = [header_meaning(track.label(POSITION_TARGETS[k])) for k in (i, j)]
     if [None if one is None else one.target for one in told] == [
@@ -471,7 +473,7 @@ def _unswapped(track: ImportedTrack, i: int, j: int) -> str:
 
 
 def _mapped(track: ImportedTrack, target: str, wrong: float) -> str:
-    """What to write so that a target is `wrong` times what it is now; an expression loses the unit of its header."""
+    """Return the option that multiplies a target by 1 / `wrong`; an expression loses the unit of its header."""
     label = track.label(target)
     name, unit = split_header(label)
     own = {**TIME_UNITS, **LENGTH_UNITS, **SPEED_UNITS}.get(unit, 1.0) if name else 1.0
@@ -479,7 +481,7 @@ def _mapped(track: ImportedTrack, target: str, wrong: float) -> str:
 
 
 def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
-    """Rules 5 and 6: a row off its track is left out; a track that goes on elsewhere was reset, and is split there."""
+    """Rules 5 and 6: drop a row off its track; split a track that continues elsewhere after a reset."""
     surprise, scale = prediction_errors(track)
     if not len(surprise):
         return
@@ -529,7 +531,7 @@ def _returns(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
 
 
 def prediction_errors(track: ImportedTrack) -> tuple[NDArray[np.float64], float]:
-    """What each step is beyond its prediction (row - 1, 2), m, and a robust scale of it; zero across gaps."""
+    """Return the error of each predicted step (row - 1, 2), m, and a robust scale of it; zero across gaps."""
     step = median_period(track)
     place = track.stack(POSITION_TARGETS, 2)
     moved, steps = np.diff(place, axis=0), np.diff(track.time)

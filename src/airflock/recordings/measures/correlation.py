@@ -1,4 +1,4 @@
-"""How far fluctuations of velocity are alike: correlation by distance and its first zero (Cavagna et al. 2010)."""
+"""Correlation of velocity fluctuations by distance, and its first zero (Cavagna et al. 2010)."""
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of record
 
 
 def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | None = None) -> pd.Series:
-    """Correlation of velocities about the group's mean, by distance (m); 1 at distance 0.
+    """Compute the correlation of velocities about the group's mean, by distance (m); 1 at distance 0.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     width     : of a bin of distances, m: about a tenth of the group
@@ -66,7 +66,7 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
 
 
 def correlation_length(recording: xr.Dataset, width: float) -> float:
-    """Distance at which the correlation of velocities first falls to zero, m; nan if it does not.
+    """Return the distance at which the correlation of velocities first falls to zero, m; nan if it does not.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     width     : of a bin of distances, m

@@ -1,4 +1,4 @@
-"""Who leads: the delay at which one's direction is most like another's before (Nagy et al. 2010)."""
+"""Leadership: the delay at which one heading resembles an earlier one of another individual (Nagy et al. 2010)."""
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordin
 
 
 def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: float = 0.0) -> xr.DataArray:
-    """Mean of heading i at t times heading j at t + delay, (leader, follower, delay), -1 to 1.
+    """Compute the mean of heading i at t times heading j at t + delay, (leader, follower, delay), -1 to 1.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     longest   : largest delay, s; slowest: headings at this speed (m/s) or less do not count
@@ -51,7 +51,8 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
 
 
 def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, slowest: float = 0.0) -> pd.DataFrame:
-    """One row for each ordered pair: leader, follower, delay (s) and correlation (-1 to 1) where that is largest.
+    """Find who leads, a row for each ordered pair: leader, follower, and the delay (s) of the largest correlation (-1
+    to 1).
 
     A positive delay says that the leader is first; each pair stands there twice, with both signs. Where several delays
     are as good, such as of two that fly straight, it is the shortest of them.

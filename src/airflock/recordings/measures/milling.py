@@ -8,7 +8,7 @@ from airflock.recordings.measures.states import check_numbers, headings, track_a
 
 
 def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
-    """Length of the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone.
+    """Compute the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     slowest   : speed (m/s) at or below which one has no heading; it still counts for the centre

@@ -8,7 +8,8 @@ from airflock.recordings.measures.states import track_arrays
 
 
 def group_shape(recording: xr.Dataset) -> pd.DataFrame:
-    """By time: number present, hull (m², in space m³), length and width (m), elongation (length / width).
+    """Measure the group by time: number present, hull (m², in space m³), length and width (m), elongation (length /
+    width).
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
 

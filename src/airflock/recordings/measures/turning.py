@@ -1,4 +1,4 @@
-"""Turning speed: how fast headings turn, counter-clockwise positive."""
+"""Turning speed: rate of turn of headings, counter-clockwise positive."""
 
 import numpy as np
 import xarray as xr
@@ -7,7 +7,7 @@ from airflock.recordings.measures.states import check_numbers, headings, track_a
 
 
 def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
-    """Rate of turn of the horizontal heading, (time, individual), rad/s; nan across absences.
+    """Compute the rate of turn of the horizontal heading, (time, individual), rad/s; nan across absences.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     slowest   : speed (m/s) at or below which one has no heading
