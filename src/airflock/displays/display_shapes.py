@@ -104,9 +104,11 @@ def _evenly(filled: NDArray[np.bool_], count: int, rng: np.random.Generator) -> 
     pixels = np.column_stack([columns, -rows]).astype(float)
     if len(pixels) < count:
         raise AirflockError(f"{len(pixels)} filled pixels are fewer than {count} points; give a larger picture")
+    # Lloyd's iteration visits all pixels in each round; 40,000 are as good as more.
     if len(pixels) > 40_000:
         pixels = pixels[rng.choice(len(pixels), 40_000, replace=False)]
     centres = pixels[rng.choice(len(pixels), count, replace=False)]
+    # Lloyd (1982): each centre moves to the mean of its pixels; one without pixels is drawn again.
     for _ in range(ROUNDS):
         owner = cKDTree(centres).query(pixels)[1]
         share = np.bincount(owner, minlength=count)[:, None]
@@ -127,11 +129,13 @@ def _spread_over_mesh(path: Path, count: int, rng: np.random.Generator) -> Point
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     if area.sum() <= 0.0:
         raise AirflockError(f"{path}: the mesh has no area")
+    # Uniform on the surface: faces by area, then points in a triangle by the root of a uniform number.
     face = rng.choice(len(corners), 40 * count, p=area / area.sum())
     u, v = np.sqrt(rng.uniform(size=(1, len(face), 1))), rng.uniform(size=(1, len(face), 1))
     a, b, c = corners[face].transpose(1, 0, 2)
     cloud = ((1.0 - u) * a + u * (1.0 - v) * b + u * v * c)[0]
     chosen, gap = [0], np.linalg.norm(cloud - cloud[0], axis=1)
+    # Farthest points first: greedy, at most a factor of two worse than the best spacing.
     while len(chosen) < count:
         chosen.append(int(gap.argmax()))
         gap = np.minimum(gap, np.linalg.norm(cloud - cloud[chosen[-1]], axis=1))

@@ -19,6 +19,8 @@ Positions = NDArray[np.float64]  # (drone, 3) or (point, 3), m
 ExtraLengths = NDArray[np.float64] | float  # (drone, point), m
 
 
+# Least squared ways: straight lines flown in equal time then keep the spacing over the root of 2 (Turpin et al.
+# 2014).
 def assign_points(
     drones: Positions, points: Positions, blocked: NDArray[np.bool_], extra_lengths: ExtraLengths = 0.0
 ) -> NDArray[np.int64]:
@@ -54,6 +56,9 @@ def _squares(drones: Positions, points: Positions, longer: ExtraLengths) -> Posi
     return straight if isinstance(longer, float) else np.asarray((np.sqrt(straight) + longer) ** 2)
 
 
+# Detours past drones that hover. A drone flies straight for its point and is repelled by what it comes near. Where
+# pull and push balance it stays: a side of a box across the way stops it for good. The control sees that it makes no
+# progress, and first sends it to a point beside the obstacle.
 CLEARANCE = 1.6  # m; a point, or a way, that comes nearer than this to a drone that hovers is not free
 BESIDE = 3.0  # m from a drone that hovers: there its push has ended
 ROOM = 2.4  # m; nearer to others a drone is pushed (`formation.r0_rep`)
@@ -77,6 +82,7 @@ def hulls_in_the_way(positions: Positions, points: Positions, hulls: Positions) 
 def detour_lengths(positions: Positions, points: Positions, hulls: Positions) -> ExtraLengths:
     """Return the extra length (drone, point) of ways that lead around a drone that hovers, m."""
     found = np.zeros((len(positions), len(points)))
+    # One point after another: all pairs of drones, points and hulls at once would be a large table.
     for number, point in enumerate(points):
         found[:, number] = hulls_in_the_way(positions, np.broadcast_to(point, positions.shape), hulls).any(axis=1)
     return 2.0 * BESIDE * found
@@ -95,9 +101,12 @@ def detour_point(
     along = (point - position) / max(float(np.linalg.norm(point - position)), 1e-9)
     side = np.cross(along, (0.0, 0.0, 1.0))
     side = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([1.0, 0.0, 0.0])
+    # Half a circle across the way, from side to side over the top; never below, where a falling drone would pass.
     turn = np.linspace(0.0, np.pi, SIDES)[:, None]
     found = first + BESIDE * (np.cos(turn) * side + np.sin(turn) * np.cross(side, along))
     from_here, onwards = np.broadcast_to(position, found.shape), np.broadcast_to(point, found.shape)
+    # Weights are ordered, not tuned: a tried point is worse than a blocked one, that worse than a crowded one, that
+    # than any length.
     bad = 1e3 * _nearer(found, tried_points, 1.0) + 1e2 * _nearer(found, hulls, CLEARANCE)
     bad += 1e2 * (
         hulls_in_the_way(from_here, found, hulls).sum(axis=1) + hulls_in_the_way(found, onwards, hulls).sum(axis=1)
@@ -139,9 +148,12 @@ class StuckDetector:
         return np.asarray(np.linalg.norm(positions - self.seen[0][0], axis=1) < STEP)
 
 
+# The control assigns points to the drones, again when some fail, are pushed away or are stuck.
 NEAR = 1.0  # m; a drone is placed within
 CHECK = 5.0  # s; how often the master looks once all should be there
 LOOK = 1.0  # s; how often it looks for drones that make no progress
+# On the flat side of a box the pull to the goal and the push off it balance stably: one shape of 25 was never
+# completed.
 PATIENCE = 60.0  # s; how long it waits for a shape at most
 HALF = 0.35  # m; half side of the box that stands for a drone that hovers
 
@@ -292,6 +304,7 @@ class ShowControl:
         standing = self.progress.standing(places)
         self.tried = {int(who): [] for who in held} | self.tried
         self._assign()
+        # Another point may be the simplest way out, so points are assigned again before detours are planned.
         for who in held:
             met = np.array([*self.hulls, *places[standing & (np.arange(len(places)) != who)]]).reshape(-1, 3)
             point = self.points[self.target[who]]
@@ -338,6 +351,7 @@ class ShowControl:
         samples = round(seconds / self.period)
         if flight.time + samples * self.period > flight.scenario.flight.duration:
             flight.change({"duration": flight.time + samples * self.period + PATIENCE})
+        # The flight runs sample by sample, because assignments react to what has just happened.
         for _ in range(samples):
             flight.advance(self.period)
             if flight.time > self.last_look_time + LOOK - 0.5 * self.period:
@@ -352,6 +366,7 @@ class ShowControl:
     def _drop(self, places: FrameArray) -> None:
         """Move the drones that fall, and count those that they strike; places (3, drone) of those that fly."""
         reach, left = self.scenario.metrics.r_coll, []
+        # A falling drone flies outside the engine, which knows no agent without a body that flies.
         for body in self.falling_drones:
             touching = np.zeros(places.shape[1], bool)
             for _ in range(10):  # a fall of 10 m/s takes 10 cm in a tenth of a frame

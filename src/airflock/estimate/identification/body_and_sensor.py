@@ -28,6 +28,11 @@ def hessian(loss: Callable[[Any], float], z: NDArray[np.float64], step: float) -
     return np.array([[second_derivative(loss, z, i, j, step) for j in range(n)] for i in range(n)])
 
 
+# The body: tau, a_max, outer noise and the noise of the log, by the likelihood of a Kalman filter through the
+# saturated lag. State: the velocity of one drone, with one variance for its axes. Between rows the command is
+# constant; the mean follows `parts.bodies.held`, the variance that of an Ornstein-Uhlenbeck process below saturation
+# and of a random walk above. Intervals come from the curvature of the likelihood and the scatter of its slope between
+# stretches of flight (Huber's sandwich), so that they hold where the noise is not quite what the filter assumes.
 BODY_NAMES = ("tau", "a_max", "noise", "white")
 STARTS = ((0.7, 4.0, 0.1, 0.05), (0.25, 8.0, 0.3, 0.02))
 LIMITED = (0.5, 0.7, 0.85, 0.95, 0.99)  # shares of rows below the limit, from which a limit is sought, and
@@ -37,6 +42,7 @@ BLOCK = 20.0  # s of one drone whose slopes are taken together
 FREE = 1e4  # m/s^2: no limit
 WITHIN, NEWTON = 1.92, 3  # half of the 95 % point of chi-squared with 1 degree of freedom; steps of each fit on the way
 GAIN, SATURATED = 200.0, 100  # least 2 Δ log-likelihood and rows at the limit for an a_max
+# The second estimator shares no noise with the first; where set-points run ahead of the vehicle they disagree.
 DISAGREE = 0.15  # of two estimates of tau
 # Relative standard deviation of what the filter leaves out: commands come from the true velocity, so they know more of
 # it than the filter does, also one row after they are given (`_told`). Measured on random fleets with 0.1 m/s of noise
@@ -66,6 +72,8 @@ class BodyFit:
     notes: list[str]
 
 
+# Not least squares of increments: 0.1 m/s of noise is in the gap and in the increment, and tau is 18 to 59 % too
+# short.
 @cache
 def _body_kernel() -> Any:
     """Compile the negative log-likelihood per block."""
@@ -80,9 +88,12 @@ def _body_kernel() -> Any:
         v, e = np.zeros(3), np.zeros(3)
         variance, r2 = 0.0, white * white
         rate, still = decay_rate(tau, dt), noise * wander(tau, dt)
+        # One pass over all rows: predict to the next row, compare with the logged velocity, correct; `new` begins
+        # again.
         for k in range(len(time)):
             if new[k]:
                 for i in range(axes):
+                    # Nothing is known before the first row of a stretch, so its measurement is the state.
                     v[i] = m[k, i]
                 variance = r2
                 continue
@@ -104,6 +115,7 @@ def _body_kernel() -> Any:
                 loss += off * off
                 v[i] = predicted + gain * off
             variance *= 1.0 - gain
+            # Rows that do not count still move the filter, so the next row begins at the right state.
             if told[k]:
                 out[block[k]] += 0.5 * axes * np.log(total) + 0.5 * loss / total
         return out.sum()
@@ -153,9 +165,11 @@ def fit_body(logs: FlightLogs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
         n: (float(np.exp(c - wide * s)), float(np.exp(c + wide * s)))
         for n, c, s in zip(BODY_NAMES, z, spread, strict=True)
     }
+    # The walk of the sensor's own error looks like outer noise in logged velocities, and its rate is known.
     low, high = interval["noise"]
     value["noise"], interval["noise"] = value["noise"] - walk, (max(low - walk, 0.0), max(high - walk, 0.0))
     saturated = int((gap > value["a_max"] * value["tau"]).sum())
+    # A limit that no row reaches cannot be fitted; then the largest demand of the log bounds it from below.
     asked = float(np.quantile(gap, 0.999) / value["tau"])
     seen = _least_limit(loss, z, lowest, min(asked, value["a_max"]))
     free = _settled(lambda y: loss([y[0], np.log(FREE), y[1], y[2]]), z[[0, 2, 3]])
@@ -187,6 +201,7 @@ def _nothing(reason: str) -> BodyFit:
     )
 
 
+# Mean error of tau 0.81 -> 0.18 %, of the limit -1.46 -> -0.91 %; the filter itself still runs through these rows.
 def _told(logs: FlightLogs) -> NDArray[np.bool_]:
     """Return True for rows whose increment counts: not for one that begins as a command arrives.
 
@@ -204,6 +219,7 @@ def _blocks(logs: FlightLogs) -> NDArray[np.int64]:
     return np.unique(logs.who * (part.max() + 1) + part, return_inverse=True)[1].astype(np.int64)
 
 
+# A limit that nobody reaches has no slope, and a longer lag hides it: four of 200 fleets were up to 10 % off.
 def _lowest(loss: Callable[[Any], float], gap: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the log parameters of the highest mode of the likelihood.
 
@@ -230,6 +246,7 @@ def _least_limit(loss: Callable[[Any], float], z: NDArray[np.float64], lowest: f
     def fitted(limit: float) -> float:
         y = np.array([z[0], np.log(limit), z[2], z[3]])
         best = loss(y)
+        # Newton steps along each of the others: the profile needs their best values only roughly.
         for _ in range(NEWTON):
             up, down = np.array([loss(y + u) for u in unit]), np.array([loss(y - u) for u in unit])
             y[others] -= np.clip(0.01 * 0.5 * (up - down) / np.maximum(up + down - 2.0 * loss(y), 1e-3), -0.1, 0.1)
@@ -237,6 +254,7 @@ def _least_limit(loss: Callable[[Any], float], z: NDArray[np.float64], lowest: f
         return best
 
     low, high = top / 8.0, top
+    # Bisection of logarithms: eight halvings of a factor of 8 leave 1 %.
     for _ in range(8):
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if fitted(middle) < lowest + WITHIN else (middle, high)
@@ -267,6 +285,7 @@ def _body_errors(loss: Any, z: NDArray[np.float64], blocks: int) -> tuple[NDArra
         loss(z + unit[i], up)
         loss(z - unit[i], down)
         slopes[i] = (up - down) / (2.0 * d)
+    # Slopes of all blocks sum to zero at the maximum; what remains of the mean is rounding of the descent.
     slopes -= slopes.mean(axis=1, keepdims=True)
     inverse = np.linalg.pinv(curve)
     robust = inverse @ (slopes @ slopes.T) @ inverse * blocks / max(blocks - 1, 1)
@@ -317,6 +336,7 @@ def _judge(found: BodyFit, logs: FlightLogs) -> None:
         )
 
 
+# Checks of a fitted body: the lag by another way, late commands, and gusts that all drones feel.
 MIN_ROWS = 200  # fewest rows for an estimate
 
 
@@ -326,6 +346,7 @@ def instrumental_tau(logs: FlightLogs, tau: float, a_max: float) -> float:
     White noise of the row is not in the earlier velocity, so it does not bias the ratio of covariances. Rows at the
     limit are left out. Where commands run ahead of the vehicle (feed-forward) the two ways disagree.
     """
+    # Three rows: far enough that noise of estimators has faded, near enough that the gap is still similar.
     lag = 3
     gap = logs.command - logs.velocity
     run = np.cumsum(logs.is_new)
@@ -355,6 +376,7 @@ def gust_correlation(logs: FlightLogs, value: dict[str, float]) -> float:
     pull = np.minimum(size / value["tau"], value["a_max"])
     off = np.diff(logs.velocity, axis=0) / np.maximum(h, 1e-9)[:, None] - gap * (pull / size)[:, None]
     sound = ~logs.is_new[1:] & (h > 0.0)
+    # Means over 1 s suppress the noise of single rows, which would hide a common gust.
     slot = np.floor(logs.time[1:] - logs.time.min()).astype(np.int64)  # means over 1 s
     table = np.full((logs.drones, int(slot.max()) + 1), np.nan)
     total, count = np.zeros_like(table), np.zeros_like(table)
@@ -374,6 +396,8 @@ def command_delay(logs: FlightLogs, value: dict[str, float]) -> float:
     """
     best, kept = np.inf, 0.0
     run = np.cumsum(logs.is_new)
+    # Whole rows only: the log knows no command between its rows. A longer delay must win by 2 %, or noise would
+    # choose it.
     for late in range(0, 11):
         k = np.arange(late, len(logs.time) - 1)
         k = k[run[k - late] == run[k + 1]]
@@ -387,8 +411,13 @@ def command_delay(logs: FlightLogs, value: dict[str, float]) -> float:
     return kept
 
 
+# The sensor: errors of satellite navigation of drones that stand. `parts.sensors.langevin.error` in steps of the
+# sensor's period is a linear system of two states, position error q and velocity error u. The unknown place of a
+# drone is a third state; logged velocities may have white noise.
 SENSOR_NAMES = ("noise", "damping", "scale", "white")
 LEAST = 30.0  # s of standing
+# As a variance that grew with the noise it made small noise look likelier: intervals contained the truth in 169 of
+# 200 fleets, now in 185.
 ANYWHERE = 1e4  # m²; variance of where a drone stands: must not depend on what is sought, or it is sought too small
 START = (0.1, 3.0)  # damping, 1/s, and scale, m s^(1/2), to begin with
 RESTARTS = 2  # a simplex that has shrunk on a slope is spread again
@@ -421,6 +450,8 @@ def _sensor_kernel() -> Any:
         rq, ru, total = grain * grain, white * white + 1e-12, 0.0
         x0, x1, x2 = 0.0, 0.0, 0.0
         p00, p01, p02, p11, p12, p22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        # A Kalman filter written out for three states: symmetric covariances need six numbers, and no matrix is
+        # allocated.
         for k in range(len(q)):
             if new[k]:
                 x0, x1, x2 = 0.0, 0.0, q[k]
@@ -440,6 +471,8 @@ def _sensor_kernel() -> Any:
             x0, x1, x2 = x0 + c0 * off / variance, x1 + c1 * off / variance, x2 + c2 * off / variance
             p00, p01, p02 = p00 - c0 * c0 / variance, p01 - c0 * c1 / variance, p02 - c0 * c2 / variance
             p11, p12, p22 = p11 - c1 * c1 / variance, p12 - c1 * c2 / variance, p22 - c2 * c2 / variance
+            # Two scalar updates, of position then of velocity, equal one update by both, since their noises are
+            # independent.
             off, variance = u[k] - x1, p11 + ru  # the logged velocity
             total += 0.5 * np.log(variance) + 0.5 * off * off / variance
             c0, c1, c2 = p01, p11, p12
@@ -472,6 +505,7 @@ def fit_sensors(logs: FlightLogs, period: float) -> SensorFit:
     q, u = (np.concatenate([part[c] for part in series]) for c in (0, 1))
     new = np.concatenate([np.arange(len(part[0])) == 0 for part in series])
     steps = np.abs(np.diff(q))
+    # Logged positions are rounded; without the grain as noise a log with few digits would look exact.
     grain = 0.3 * float(np.min(steps[steps > 1e-9], initial=1.0))
     kernel = _sensor_kernel()
 

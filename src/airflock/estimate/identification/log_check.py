@@ -17,9 +17,11 @@ from airflock.recordings import packet_uniforms, simulate
 from airflock.scenarios import Scenario, build_scenario
 
 Array = NDArray[np.float64]
+# Flights of the identified scenario against the log, by the same measures.
 PERIOD = 0.2  # s between frames of the check
 LONGEST = 600.0  # s that are flown
 SETTLED = 30.0  # s at the start of a flight that are left out
+# Tuning uses small seeds; a check on the same flights would be no check.
 FIRST_SEED = 1_000_000  # beyond the seeds that people tune with
 
 
@@ -70,6 +72,7 @@ def frames_of_logs(logs: FlightLogs) -> tuple[Array, Array, Array]:
     axes = flying.position.shape[1]
     place = np.full((len(times), axes, logs.drones), np.nan)
     speed = place.copy()
+    # Each drone has its own times; interpolation stops at gaps, so that nothing is invented.
     for who in range(logs.drones):
         rows = flying.of(who)
         if len(rows) < 2:
@@ -108,6 +111,7 @@ def check_against_logs(
     ready = build_scenario(document, scenario.name, settings)
     rows: list[dict[str, float]] = []
     courses = []
+    # Only measures are kept: a hundred flights of ten minutes would not fit in memory.
     for number in range(flights):
         values, order = log_measures(*_flown(ready, FIRST_SEED + number, absent))
         rows.append(values)
@@ -150,6 +154,9 @@ def _band(courses: Sequence[Array]) -> Array:
     return band
 
 
+# Synthetic logs: the material that estimators are tested with. A recording keeps true states. The measurements of
+# each drone and its received packets are drawn again from the counters (seed, stream, step, agent), so that nothing
+# in the engine changes.
 WARM = 8.0  # times of decay that receivers have been on before they are logged
 
 
@@ -199,6 +206,7 @@ def own_state_errors(seed: int, decisions: int, agents: int, period: float, s: A
     """Draw errors of own position and velocity (decision, 4, agent), m and m/s, as a flight in the plane does."""
     found = np.zeros((decisions, 4, agents))
     q, u = np.zeros((2, agents)), np.zeros((2, agents))
+    # The error is a process with memory, so decisions follow one another; agents are side by side.
     for k in range(decisions):
         w = agent_words(seed, random.SENSOR, k, np.arange(agents))
         drawn = normal_pair(w[0], w[1])
@@ -226,6 +234,8 @@ def fly_logs(
     errors = own_state_errors(seed, int(at[-1]) + 1, n, period, scenario.sensors)[at]
     clocks = np.stack([generator.normal(0.0, disturbed.offset, n), generator.normal(0.0, disturbed.drift, n)], axis=1)
     rows: list[list[Any]] = []
+    # Per drone: noise, rounding, missing rows and bursts, then its own clock; a row whose clock runs backwards is
+    # lost.
     for i in range(n):
         measured = speed[:, :, i] + errors[:, 2:, i] + generator.normal(0.0, disturbed.white, (len(times), 2))
         where = np.round((place[:, :, i] + errors[:, :2, i]) / disturbed.resolution) * disturbed.resolution
@@ -257,6 +267,7 @@ def _packets(
     i, j = np.nonzero(~np.eye(n, dtype=bool))
     arrives = np.vectorize(links.received, otypes=[float], excluded=[1, 2])
     parts = []
+    # The number of the flight's own draw decides, so that these are the packets that the flight had.
     for step, points in enumerate(place[::every]):
         d = np.hypot(*(points[:, i] - points[:, j]))
         fast, slow = (radio.packets(step, rate, period) for rate in (k_.fast_rate, k_.slow_rate))

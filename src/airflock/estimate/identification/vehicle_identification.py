@@ -63,6 +63,8 @@ class IdentifiedParameter:
     def pessimistic_end(self, level: float) -> float:
         """Return the end of the interval at which flying is harder, for a confidence level of both ends."""
         end = self.high if HARDER[self.key] else self.low
+        # The interval is symmetric in the logarithm, so other levels scale the ratio by quantiles of the normal
+        # distribution.
         ratio = max(end, 1e-12) / self.value
         value = float(self.value * ratio ** (norm.ppf(0.5 + 0.5 * level) / norm.ppf(0.975)))
         return min(value, 1.0) if KEY_UNITS[self.key] == "1" else value
@@ -101,6 +103,7 @@ class IdentifiedParameters:
                 self.by_key[key] = replace(number, reason=reason)
 
 
+# A share of 0 has no logarithm, and a radio that never receives would not fly.
 LEAST = 1e-6  # share of packets; what nothing was heard of
 WIDE = 0.2  # half of an interval of a share of packets, beyond which it says too little
 
@@ -223,6 +226,7 @@ def identify(
         findings.notes += ["clocks of the drones aligned by the ages of their packets"] * aligned
     notes = list(findings.notes)
     numbers = IdentifiedParameters(scenario)
+    # The sensor first: its noise is part of what the body seems to do.
     still = body_and_sensor.fit_sensors(logs, scenario.sensors.period)
     for name in ("noise", "damping", "scale"):
         origin = f"{still.seconds:.0f} s of standing"

@@ -11,6 +11,7 @@ from airflock.recordings import COMMAND_TARGETS, POSITION_TARGETS, VELOCITY_TARG
 from airflock.support import RecordingError
 
 Array = NDArray[np.float64]
+# Logs as estimators need them: rows of one drone after another, at their own times, without interpolation.
 MAX_STEP_RATIO = 1.5  # usual steps between rows: beyond, a command may have come and gone unseen
 
 
@@ -85,6 +86,7 @@ def logs_from_tracks(tracks: list[ImportedTrack], standing: tuple[float, float] 
         time = track.time
         step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
         new = np.concatenate([[True], np.diff(time) > MAX_STEP_RATIO * step])
+        # A reset of the estimator moves the velocity without any force: no increment may cross it.
         new[track.breaks] = True
         wish = track.stack(COMMAND_TARGETS, axes) if track.has(COMMAND_TARGETS) else np.full((len(time), axes), np.nan)
         on_ground = ~track.in_air if track.in_air is not None else np.zeros(len(time), bool)
@@ -118,6 +120,7 @@ def logs_from_recording(recording: xr.Dataset) -> FlightLogs:
     return FlightLogs(time[keep], place, speed, wish, who[keep], left_out[keep], names, np.zeros(int(keep.sum()), bool))
 
 
+# Decision period and largest commanded speed, from the commands alone.
 FEW = 30  # fewest changes of a command for an estimate of the period
 PLATEAU = 0.01  # share of rows within half a per cent of the largest command that make a limit
 
@@ -142,6 +145,8 @@ def decision_period(logs: FlightLogs) -> tuple[float, tuple[float, float], str]:
             (nan, nan),
             f"commands change in every row: the log ({flying.step:.3g} s) is no faster than decisions",
         )
+    # Commands may stay equal for a decision or two, so intervals are whole multiples of the period; fit a line
+    # through them.
     usual = float(np.median(between))
     between = between[(between > 0.5 * usual) & (between < 4.5 * usual)]
     times = np.maximum(np.round(between / usual), 1.0)
@@ -160,6 +165,7 @@ def largest_command(logs: FlightLogs, v_flock: float | None = None) -> tuple[flo
         return float("nan"), "no commands"
     most = float(speed.max())
     share = float((speed > 0.995 * most).mean())
+    # A limit shows as many equal largest commands; a single peak is only a lower bound.
     if share < PLATEAU:
         return (
             most,

@@ -1,4 +1,4 @@
-"""Identifiability: numbers of a law that tracks can identify, ridges on which numbers compensate, and dropped numbers."""
+"""Identifiability: numbers of a law that tracks can identify, ridges of the likelihood, and dropped numbers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -28,6 +28,8 @@ from airflock.estimate.inference.likelihood_fit import (
 )
 
 Array = NDArray[np.float64]
+# Numbers that tracks can identify. Of two numbers of which either explains the tracks, the first declared is
+# reported: authors declare important ones first.
 DEPENDENT = 0.2  # share of a slope that other numbers do not explain; below it a number is not identifiable
 EFFECT_POINTS = 6  # best places at which the effect of a number is looked for
 ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where the effect of a number is looked for
@@ -45,6 +47,7 @@ def identifiable_indices(model: FitModel, start: Array, start_points: Array, spa
     all weights. A radius within which nobody is at these places has no slope, but an effect along its range: kept.
     """
     places = []
+    # Slopes at several good points: one point may lie where a part of the law is switched off.
     for x in start_points[:EFFECT_POINTS]:
         u = start.copy()
         u[: model.named] = x
@@ -53,6 +56,7 @@ def identifiable_indices(model: FitModel, start: Array, start_points: Array, spa
     flat = np.concatenate([_slopes(model, u, alive, spans) for u in places])
     kept: list[int] = []
     basis = np.zeros((len(flat), 0))
+    # Gram-Schmidt in the order of declaration: a column that earlier ones explain is a number that they replace.
     for column, number in zip(flat.T, alive, strict=True):
         size = float(np.linalg.norm(column))
         rest = column - basis @ (basis.T @ column)
@@ -67,6 +71,7 @@ def identifiable_indices(model: FitModel, start: Array, start_points: Array, spa
 
 def has_effect(model: FitModel, points: Sequence[Array], index: int, spans: Sequence[int]) -> bool:
     """Return True if a number changes the loss anywhere along its range."""
+    # A threshold beyond all that happens has no slope but an effect, so values along the range are tried.
     for u in points:
         here = model.score(u, spans).loss()
         for x in ALONG:
@@ -97,6 +102,7 @@ def canonical_model(
     """
     few = model.few()
     place, lowest = fit.place, climb_to_maximum(model, fit.place, fit.free, few, slopes=(WIDE_SLOPES,)).loss
+    # Bring back each dropped number that is declared earlier, and try to drop a later one in its place.
     for earlier in law.numbers:
         assert model.law is not None
         if earlier in model.law.numbers:
@@ -104,11 +110,13 @@ def canonical_model(
         fuller, i = model.with_parameter(law, earlier)
         full = fit_with_parameter(fuller, replace(fit, place=place), i, earlier.place(earlier.default), few)
         curved = curvature(fuller, full, few, WIDE_CENTRAL_SLOPES)
+        # The last declared goes first, since it matters least to the authors.
         for k in reversed(range(i + 1, fuller.named)):
             if not (_may_go(fuller, k) and _away(fuller, full, k)):
                 continue
             without, rest = fuller.with_fixed([k]), [f for f in full.free if f != k]
             start = _given_up(without, full, curved, k, few)
+            # Where the start is hopeless, or the earlier number has not moved, a climb would only cost time.
             if loss_at(without, start, rest, few) > full.loss + UNLIKELY or abs(start[i] - full.place[i]) < APART:
                 continue
             found = climb_to_maximum(
@@ -157,6 +165,7 @@ def droppable_parameters(model: FitModel, fit: Fit, on_progress: Callable[[], No
     few = model.few()
     best = climb_to_maximum(model, fit.place, fit.free, few, slopes=(WIDE_SLOPES,))
     carried, lowest, gone = fit.place, best.loss, list[int]()
+    # Backward elimination: every drop is final, and the next number is judged without the dropped ones.
     for k in reversed(range(model.named)):
         if not _may_go(model, k):
             continue
@@ -189,8 +198,17 @@ def _given_up(model: FitModel, fit: Fit, curved: Array, number: int, spans: Sequ
 
 
 RidgePath = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
+# Ridges: how far numbers that compensate for each other go together before the tracks are explained worse. The
+# numbers of a braking curve lie on a ridge that bends. The curvature at the fit knows its first steps only, and a fit
+# repeated from beside its end does not follow it. So the ridge is followed: one number is moved step by step, all
+# others follow, and the points on the way bound each of them. Where numbers compensate in more than one way the ridge
+# is a surface, and the way of one number misses where another could go; so the least certain numbers are followed one
+# by one, and so are those that act similarly. A number such as a largest force acts nowhere beyond some value: a
+# plateau, to which no way leads; so each end of each range is tried by itself, with all others following there.
 WORST, WALKED = 4, 8  # least certain numbers, and numbers that are walked, at most
 TIED = 0.9  # correlation of the slopes of two numbers, from which both are walked, however certain they seem
+# The number that acts most like the moved one follows first. With all at once the way lost a ridge on which the
+# likelihood does not fall (gain 1.6 to 19 1/s of a wall).
 NESTED = 3  # numbers that act most like the moved one, which follow before all do
 WINDOW, LINE_STEPS = (
     0.05,
@@ -221,6 +239,7 @@ class Ridges:
         """Return the least and largest points of all numbers where the log-likelihood has fallen by at most `drop`."""
         low, high = point.copy(), point.copy()
         for way in self.paths:
+            # Between two points the drop is taken as a parabola, so its root is linear in the distance.
             for (inner, less), (outer, more) in zip(way[:-1], way[1:], strict=True):
                 if less > drop:
                     break
@@ -242,6 +261,8 @@ def profile_ridges(
     """
     ways: list[RidgePath] = []
     met = list(fit.others)
+    # A way may lead to a better fit than the one it began at; then everything begins again there, at most AGAIN
+    # times.
     for turn in range(AGAIN + 1):
         ways, better = _ways(model, fit, spans, drop, turn < AGAIN)
         on_progress()
@@ -260,9 +281,11 @@ def _ways(
     """Return the ways along all ridges; and a better point, where a ridge may be left for it."""
     view = CurvatureView(model, fit, spans, drop)
     named = [k for k, f in enumerate(fit.free) if f < model.named]
+    # Following a ridge costs tens of climbs, so only uncertain or tied numbers are followed.
     worst = [k for k in sorted(named, key=lambda k: -view.reach[k]) if view.reach[k] >= SHORTEST][:WORST]
     tied = [k for k in sorted(named, key=lambda k: -view.alike[k, named].max()) if view.alike[k, named].max() > TIED]
     ways: list[RidgePath] = []
+    # The ends of all ranges: a plateau shows there, and nowhere on a ridge.
     for k, end in ((fit.free[k], end) for k in named for end in (0.0, 1.0)):
         found, fell = fit_at_end(model, fit, spans, k, end)
         if leave and fell < -HIGHER:
@@ -368,6 +391,7 @@ def _walk(
     best: tuple[Array | None, float] = (None, -HIGHER)
     step = float(np.clip(step, MIN_FINE_STEP, STRIDE[1]))
     least = min(step, STRIDE[0])
+    # Predictor and corrector: a step along the slope of the way so far, then the others climb back to the ridge.
     for _ in range(PLACES):
         last = way[-1][0]
         start = np.clip(last + step * slope, 0.0, 1.0)
@@ -388,6 +412,7 @@ def _walk(
         moved = abs(found.place[number] - last[number])
         if moved == 0.0:
             break
+        # The likelihood has fallen too far at once: the others could not follow, so repeat with a shorter step.
         if fell - way[-1][1] > 0.5 * drop and step > least:
             step = max(step / SHORTER, least)
             continue
@@ -395,11 +420,14 @@ def _walk(
         if fell >= drop or not 0.0 < found.place[number] < 1.0:
             break
         slope = (found.place - last) / moved
+        # On flat ridges steps grow, so that a plateau over the whole range takes few climbs.
         if fell - way[-2][1] < 0.1 * drop:
             step = min(FASTER * step, STRIDE[1])
     return tuple(way), best[0]
 
 
+# Dropped numbers: if their defaults explain the tracks as well, the intervals of the others must still allow for
+# them.
 AWAY = 0.2  # of a range: move of a number of which is asked whether the others make up for it exactly
 DROP = 12.0  # fall of the log-likelihood at which a walk ends that looks for a higher place
 EXACT = 0.05  # change of the log-likelihood by such a move, below which they do
@@ -414,6 +442,8 @@ def restore_parameters(
 
     law : with all its numbers
     """
+    # A default that explains the tracks as well may lie on a ridge: the true point was 34 units higher and no climb
+    # found it.
     for number in model.dropped_parameters(law):
         fuller, i = model.with_parameter(law, number)
         view = _view(fuller, fit, i, number.place(number.default), spans, DROP)
@@ -424,6 +454,7 @@ def restore_parameters(
             on_progress()
             if better is not None:
                 higher = climb_to_maximum(fuller, better, view.fit.free, spans, slopes=(FINE_SLOPES, CENTRAL_SLOPES))
+                # One restored number may make another one useful: begin again with the fuller model.
                 return restore_parameters(law, fuller, higher, spans, on_progress)
     return model, fit
 

@@ -28,6 +28,7 @@ from airflock.estimate.inference.observed_tracks import (
 )
 
 Array = NDArray[np.float64]
+# Flights of a fitted law from the beginnings of its tracks, observed with the same gaps and noise.
 FREE = 1e-9  # m²: least variance
 PUSHED, BLURRED = -1, -2  # noise that is no number of the law or its body
 LASTING = 1.0  # s; correlation time of errors of what is perceived
@@ -87,6 +88,7 @@ class NoisyFlight:
         """
         walk, axes = self.walk, self.walk.axes
         was = walk.now().copy()
+        # Three kinds of noise: pushes of the velocity, errors of perceived positions, or a number of the law itself.
         if self.noise.column == PUSHED:
             walk.now()[axes:] += self.generator.normal(0.0, self.noise.law, self.shape)
         if self.error is None:
@@ -121,6 +123,7 @@ def fly_tracks(
     tracks, axes = walk.tracks, walk.axes
     flight = NoisyFlight(walk, fitted, noise, seed)
     seen = np.full_like(tracks.seen, np.nan)
+    # Each span has a world of its own; 1009 is prime, so that seeds and spans do not meet.
     for s in spans:
         begin, end = tracks.spans[s]
         flight.begin((seed * 1009 + s + 1) % 2**31)
@@ -128,6 +131,7 @@ def fly_tracks(
             state = tracks.state[k]
             if k > begin:
                 flight.step()
+            # Who enters or is absent follows the record, so that the flight has the gaps of the tracks.
             enters = (state == ENTERS) | (state == ABSENT)
             walk.now()[:, enters] = filtered_states[k][:, enters]
             if k == begin:
@@ -169,6 +173,8 @@ def noise_statistics(model: FitModel, u: Array, spans: Sequence[int]) -> Array:
         rows = np.concatenate([np.arange(*walk.tracks.spans[s]) for s in own])
         found.append(e[rows])
     parts = []
+    # Variances mix both noises; the correlation from frame to frame separates them: noise of tracks is not
+    # correlated.
     for c in range(2):
         x = np.concatenate([e[:, c].ravel() for e in found])
         pairs = np.concatenate([(e[1:, c] * e[:-1, c]).ravel() for e in found])
@@ -212,6 +218,7 @@ class FittedFlights:
 
         active = [0, 2] if not self.model.own_speed else [0, 1, 2]
 
+        # The same seed for all noises: differences between flights then come from the noise alone.
         def off(z: Array, base: FitNoise = first_noise) -> Array:
             steps = np.zeros(3)
             steps[active] = z
@@ -249,6 +256,9 @@ def first_noise(model: FitModel, point: Array, spans: Sequence[int]) -> list[Fit
     return [found, replace(found, column=BLURRED, law=BLUR * model.scale.near)]
 
 
+# Noise of the law. Small noise hardly shows beside that of the tracks: one flight differs from the next by as much as
+# half of the noise. So the law is flown with noise over a wide range, and curves through all these flights relate the
+# statistics to the noise. The scatter about the curves gives the uncertainty (a synthetic likelihood: Wood 2010).
 FLOWN = 40  # flights of each look
 RANGE = 1.6  # of the logarithm of noise, to each side, at the first look
 NARROW = 0.15  # at the second, at least
@@ -276,6 +286,7 @@ def estimate_law_noise(
     """
     generator = np.random.default_rng(seed)
     centre, half, widest = 0.0, RANGE, int(np.argmax(levels))
+    # Shift the window until the likeliest noise lies inside it; a noise without a lower limit must be near its edge.
     for _ in range(MOVED):
         steps, first = _look(flights, point, scatter, noise, fitted, levels, centre, half, generator)
         low, high = first[widest]
@@ -309,6 +320,8 @@ def _look(
     named = flights.model.named
     speeds = flights.model.own_speed
     design, rows = [], []
+    # Stratified draws of the noise along the window; numbers of the law are drawn within their errors, which widens
+    # the interval as it should.
     for number in range(FLOWN):
         x = 2.0 * (number + generator.random()) / FLOWN - 1.0
         speed, seen = generator.uniform(-1.0, 1.0, 2) * (1.0 if speeds else 0.0, 1.0)
@@ -319,6 +332,7 @@ def _look(
         rows.append(np.nan_to_num(noise_statistics(twin, fitted, flights.spans) - flights.wanted, nan=10.0))
         design.append([*(x**power for power in range(POWERS + 1)), seen, *([speed] if speeds else [])])
     matrix, found = np.array(design), np.array(rows)
+    # Cubic curves in the logarithm of the noise, and lines in the two nuisance noises.
     curves = np.linalg.lstsq(matrix, found, rcond=None)[0]
     left = found - matrix @ curves
     freedom = FLOWN - matrix.shape[1]
@@ -349,6 +363,7 @@ MATCHED = 0.005  # sum of squares by which statistics of flights may differ from
 STEPS = 6  # of a climb
 # Relative standard deviations of what flights leave out, of numbers and of noise, such as where steps of the motion
 # fall between frames. Measured on tracks of known laws (tests/nightly/infer.py).
+# Our choices, made on tracks of known laws: flights only have noise of the known kinds.
 BEYOND = (0.0075, 0.05)
 DOUBT = 0.5  # share of a correction that is not trusted
 ONE = 1.96  # standard errors that hold one number in 95 %
