@@ -104,7 +104,7 @@ def _evenly(filled: NDArray[np.bool_], count: int, rng: np.random.Generator) -> 
     pixels = np.column_stack([columns, -rows]).astype(float)
     if len(pixels) < count:
         raise AirflockError(f"{len(pixels)} filled pixels are fewer than {count} points; give a larger picture")
-    # Lloyd's iteration visits all pixels in each round; 40,000 are as good as more.
+    # Every round visits all pixels: a sample bounds the time.
     if len(pixels) > 40_000:
         pixels = pixels[rng.choice(len(pixels), 40_000, replace=False)]
     centres = pixels[rng.choice(len(pixels), count, replace=False)]

@@ -101,7 +101,7 @@ def detour_point(
     along = (point - position) / max(float(np.linalg.norm(point - position)), 1e-9)
     side = np.cross(along, (0.0, 0.0, 1.0))
     side = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([1.0, 0.0, 0.0])
-    # Half a circle across the way, from side to side over the top; never below, where a falling drone would pass.
+    # Points of the upper half of a circle across the way, from one side over the top to the other.
     turn = np.linspace(0.0, np.pi, SIDES)[:, None]
     found = first + BESIDE * (np.cos(turn) * side + np.sin(turn) * np.cross(side, along))
     from_here, onwards = np.broadcast_to(position, found.shape), np.broadcast_to(point, found.shape)
@@ -366,7 +366,7 @@ class ShowControl:
     def _drop(self, places: FrameArray) -> None:
         """Move the drones that fall, and count those that they strike; places (3, drone) of those that fly."""
         reach, left = self.scenario.metrics.r_coll, []
-        # A falling drone flies outside the engine, which knows no agent without a body that flies.
+        # A failed drone has left the flock, so its fall is integrated here.
         for body in self.falling_drones:
             touching = np.zeros(places.shape[1], bool)
             for _ in range(10):  # a fall of 10 m/s takes 10 cm in a tenth of a frame

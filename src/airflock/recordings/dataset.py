@@ -60,6 +60,7 @@ def make_dataset(
         name: (DIMENSIONS, frames[:, c * dimensions : (c + 1) * dimensions, None, :], {"units": units[name]})
         for c, name in enumerate(names)
     }
+    # Absent agents have nan in the frames; `movement` expects a confidence besides, which is 0 for them.
     there = np.isfinite(frames[:, None, :dimensions]).all(axis=2).astype(np.float32)  # 0 of those who are absent
     variables["confidence"] = (("time", "keypoint", "individual"), there)
     fixed = {"source_software": "airflock", "ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds"}
@@ -87,6 +88,7 @@ def check_recording(recording: xr.Dataset, where: str = "recording") -> None:
         missing = [name for name in DIMENSIONS if name not in recording["position"].dims]
         if missing:
             faults.append(f"position lacks the dimension{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
+    # Without all dimensions the other checks would fail by themselves, and hide the first error.
     if not faults:
         sizes = recording["position"].sizes
         if sizes["time"] < 1 or sizes["individual"] < 1:
@@ -121,6 +123,7 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
     period = float(np.median(steps)) if steps.size else 1.0
     if not SHORTEST <= period < np.inf:
         raise RecordingError(f"{where}: frames are {period:g} s apart, less than {SHORTEST:g} s or more than any time")
+    # A law and its metrics assume a constant step; deviations of up to 1 % are taken as rounding of times.
     if steps.size and np.abs(steps - period).max() > 0.01 * period + 1e-9:
         raise RecordingError(
             f"{where}: frames are {steps.min():g} to {steps.max():g} s apart; resample to a constant rate"
@@ -132,6 +135,7 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
     else:
         raise RecordingError(f"{where}: one frame without velocity has no speed to score")
     frames = np.concatenate([position, velocity], axis=1)
+    # nan means absent, infinity is an error: it would turn every mean into infinity.
     endless = np.argwhere(np.isinf(frames))
     if len(endless):
         time, component, agent = endless[0]
@@ -148,6 +152,7 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
 Array = NDArray[Any]
 
 
+# numpy.gradient weighs three equal positions with weights that do not cancel: a group at rest then had a heading.
 def central_difference(position: Array, times: Array) -> Array:
     """Compute velocity (time, ...), m/s, of positions in m at times in s: central differences, one-sided at both ends.
 
@@ -182,6 +187,7 @@ def box_sides(world: arena.Parameters, dimensions: int) -> Array | None:
     return 2.0 * np.array(half_sizes(world)[:dimensions]) if world.edges == "periodic" else None
 
 
+# In a periodic world the shortest way between two places may lead across the border.
 def nearest_image(offset: Array, box: Array | None, axis: int = 0) -> Array:
     """Return offsets (m) to the nearest images; `axis` is that of the coordinates, `box` is from `box_sides`."""
     if box is None:

@@ -11,6 +11,7 @@ import xarray as xr
 from airflock.recordings.dataset import DIMENSIONS, check_recording
 from airflock.support import RecordingError, atomic, suffix_error, to_path
 
+# Exports: the ending of the name decides the format, `layout` the names inside.
 SUFFIXES = (".csv", ".parquet", ".nc")
 LAYOUTS = ("movement", "movement-0.16", "px4")
 
@@ -60,6 +61,7 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
     return write_parquet(recording, target)
 
 
+# Long tables: one row per instant and individual that is present.
 COLUMNS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "command": ("cx", "cy", "cz")}
 
 
@@ -101,6 +103,7 @@ def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
             continue
         unit = headers[x].partition(" ")[2]
         up = table[headers[z]] if z in headers else 0.0 * table[headers[x]]
+        # East-north-up to north-east-down: x and y change places, z its sign; 0.0 - up writes 0 and not -0.
         for name, values in ((x, table[headers[y]]), (y, table[headers[x]]), (z, 0.0 - up)):
             found[f"{name} {unit}".strip()] = values
     return pd.DataFrame(found)
@@ -125,6 +128,7 @@ def write_parquet(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
+# Datasets of `movement`, in the layout of today and of releases until 0.16.
 STATES = ("position", "velocity", "command")
 PLURAL = {"keypoint": "keypoints", "individual": "individuals"}
 

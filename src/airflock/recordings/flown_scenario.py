@@ -55,6 +55,7 @@ def scenario_of_recording(
     if document is not None:
         with as_error(str(recording.attrs.get("airflock_name", "recording")), RecordingError):
             return _flown(document, settings, recording, trust)
+    # A log has no scenario: one agent with the recorded speed carries the metrics.
     frames, period, _ = recording_frames(recording)
     dims = frames.shape[1] // 2
     speed = float(np.nanmean(np.linalg.norm(frames[:, dims:], axis=1)))
@@ -76,6 +77,8 @@ def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dat
     document, settings = with_user_files(document, given)
     if "metrics" in missing:
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
+    # A missing part is replaced by the usual one: recordings are measured here, not flown, so its physics does not
+    # matter.
     if "body" in missing:
         document = {**{key: value for key, value in document.items() if key != "groups"}, "body": {}}
     if "sensors" in missing:
@@ -97,6 +100,7 @@ def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dat
             {key: group[key] for key in ("name", "agents") if key in group} if isinstance(group, Mapping) else group
             for group in document["groups"]
         ]
+    # Numbers of the unknown law cannot be checked, and no metric reads them.
     others = {key: value for key, value in settings.items() if not key.startswith("model.")}
     return build_scenario(stand_in, name, others, caller_parts=CallerParts(law=UNKNOWN), trust=trust)
 
@@ -107,6 +111,7 @@ def _usual_metrics(table: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if key in known}
 
 
+# A recording names the user's own kinds of parts, but never contains their code.
 def user_parts(document: Mapping[str, Any]) -> dict[str, str]:
     """Return section → name of each kind of part that was the user's own in the recorded scenario."""
     found = {}

@@ -41,6 +41,7 @@ def packet_age(heard: xr.Dataset | pd.DataFrame, bins: int = BINS) -> pd.DataFra
     edges = np.linspace(0.0, max(float(distance.max()), 1e-6), bins + 1)
     place = np.clip(np.searchsorted(edges, distance, side="right") - 1, 0, bins - 1)
     rows = []
+    # Quantiles per bin: ages have long tails under loss, for which means would be misleading.
     for number in range(bins):
         ages = age[place == number]
         known = ages[np.isfinite(ages)]
@@ -79,5 +80,6 @@ def _of_table(heard: pd.DataFrame) -> tuple[NDArray[Any], NDArray[Any]]:
     if lacking:
         raise RecordingError(f"heard: no column {', '.join(lacking)}; give {', '.join(COLUMNS)}")
     rows = heard.sort_values("t", kind="stable")
+    # Between two packets the last one is what the receiver knows, so its stamp is carried forward.
     stamp = rows["stamp"].where(rows["got"] > 0).groupby([rows["receiver"], rows["sender"]]).ffill()
     return rows["distance"].to_numpy(float), (rows["t"] - stamp).to_numpy(float)

@@ -21,6 +21,7 @@ def rare_event_notes(scores: Sequence[Mapping[str, Any]], seeds: Sequence[int]) 
     if len(scores) < 2:
         return []
     said = []
+    # No collision in ten flights is weak evidence: the bound says how weak.
     if all("n_coll" in row for row in scores):
         hit = sum(row["n_coll"] > 0.0 for row in scores)
         bound = upper_probability_bound(hit, len(scores))

@@ -24,6 +24,7 @@ from typing import Any
 
 from airflock.support import RecordingError, as_error, is_file, to_path
 
+# Archives, compressed files and pickles are no recordings, whatever their names say; one line names the remedy.
 ARCHIVES = (".zip", ".gz", ".7z", ".tar", ".rar", ".xz", ".bz2")
 STARTS = {b"PK\x03\x04": "a zip archive; unpack it first: unzip", b"\x1f\x8b": "compressed; unpack it first: gunzip"}
 PICKLES = (".pkl", ".pickle")
@@ -49,6 +50,8 @@ def refuse_pickle_file(path: Path) -> None:
         )
 
 
+# A file of 34 kB with 350 zeroed bytes keeps HDF5 busy for ever, beyond Ctrl-C. Not a fork: a process with threads
+# may fork while a lock is taken.
 LEAST_TIME = 15.0  # s of a processor that a file of any size may take
 WAIT = 4.0  # time by the clock over that of a processor, for machines that are busy with other things
 MOST_HEADER = 200_000_000  # bytes of names and attributes
@@ -162,6 +165,7 @@ class ReaderProcess:
 
         with self, as_error(self.path, RecordingError):
             header: dict[str, Any] = {"share": 0.0}
+            # Reports of progress come first, any number of them; the header of the arrays ends them.
             while "share" in header:
                 if on_progress is not None:
                     on_progress(min(0.99, header["share"]))
@@ -173,6 +177,7 @@ class ReaderProcess:
                 raise RecordingError(f"{self.path}: is not {self.kind} that can be read: {header['error']}")
             variables = {}
             for name, dims, attributes, dtype, shape in header["variables"]:
+                # Arrays arrive as plain bytes behind the header: no pickle, and no copy.
                 values = np.empty(shape, dtype)
                 if self.stdout.readinto(_bytes_of(values)) < values.nbytes:
                     raise self._ended()
@@ -213,6 +218,7 @@ def run_reader(request: Mapping[str, Any]) -> None:
                 entries.append([name, dims, own, array.dtype.str, list(array.shape)])
                 arrays.append(array)
             send({"attributes": attributes, "variables": entries})
+        # The process must answer with one line, whatever a damaged file makes a library raise.
         except Exception as error:  # a damaged file may raise anything
             send({"error": (str(error).splitlines() or [""])[0] or type(error).__name__})
             return
@@ -226,6 +232,7 @@ def _limit(room: int, seconds: int) -> None:
         import resource
     except ImportError:  # Windows has no such limits
         return
+    # Three times the arrays: decoding and copying need more memory than the result.
     limits = {"CORE": 0, "FSIZE": 0, "AS": 3 * room + SPARE, "CPU": seconds}
     for kind, value in ((getattr(resource, f"RLIMIT_{name}"), value) for name, value in limits.items()):
         with suppress(ValueError):  # a hard limit below this one stays
@@ -238,6 +245,7 @@ def _refuse_outside(path: str, room: int) -> None:
 
     total = 0.0
     with h5py.File(path, "r") as file:
+        # A link or a virtual dataset could read any file of this user into the recording.
         for name in file:
             if isinstance(file.get(name, getlink=True), h5py.ExternalLink):
                 raise ValueError(f"{name} is a link to another file")

@@ -132,6 +132,7 @@ def _of_recording(
 ) -> pd.DataFrame:
     """Return the table of a recording."""
     settings = settings_dict(given, "recording")
+    # Explicit settings have priority over what follows from the length of a body.
     settings = body_length_settings(body_length) | settings if body_length is not None else settings
     settings = power_settings(recording, settings) if aero else settings
     scenario = scenario_of_recording(recording, settings, trust=trust)
@@ -240,7 +241,9 @@ def measure_recording(
     scenario = scenario_of_recording(recording, settings, trust=trust)
     precision = 64 if frames.dtype == np.float64 else 32
     q = scenario.resolved_metrics()
+    # Frames farther apart than the metrics' period are used one by one; they are never interpolated.
     every = max(1, round(q.period / period)), max(1, round((q.collision_period or period) / period))
+    # The very stages of a flight measure, so a score never depends on where it was computed.
     values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times)
@@ -254,6 +257,7 @@ def measure_recording(
     return kept, course[[name for name in course if name not in untold]]
 
 
+# Groups: order parameters of each group of a recording, and between each two of them.
 PAIR_METRICS = {
     "r_centres": ("m", "mean distance between the centres of two groups; nan in a periodic world"),
     "r_between": ("m", "smallest distance between agents of the two groups"),
@@ -302,6 +306,7 @@ def _between(
     heading = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12)
     both = np.logical_and(np.any(present[:, pair[0]], axis=1), np.any(present[:, pair[1]], axis=1))
     apart, nearest, cosines = [], np.inf, []
+    # In parts of 200 instants: all pairs of two large groups at all instants would not fit in memory.
     for first in range(0, len(x), PART):
         part = np.flatnonzero(both[first : first + PART]) + first
         if not len(part):
@@ -320,6 +325,9 @@ def _between(
     }
 
 
+# Lengths: without one that fits, some order parameters of tracks say nothing. Fish of 4 cm were scored with lengths
+# of drones: all in collision at 3 m. A recording without a scenario gets no order parameter whose length, centre or
+# wanted speed nobody gave. Excursions and rotations are left out, too: the origin may be a corner of a picture.
 FITNESS = "r_cluster", "r_coll", "r_comm", "v_flock"
 # Order parameter: keys of `metrics` that it depends on.
 NEEDS: dict[str, tuple[str, ...]] = {
@@ -394,6 +402,7 @@ def missing_lengths_note(undefined: Mapping[str, tuple[str, ...]]) -> str:
     return f"not shown, as tracks do not say what is near, fast or the centre: {', '.join(undefined)}; give {lengths}"
 
 
+# A subclass and no wrapper: everything that takes a DataFrame takes it.
 class ScoreTable(pd.DataFrame):  # type: ignore[misc]  # pandas has no types here
     """Table of order parameters, a column each; `attrs["units"]` and `attrs["meanings"]` describe them.
 

@@ -83,6 +83,7 @@ def simulate(
     scenario = load_if_named(scenario).with_drawn_scene(seed)
     check_keep(keep, events, scenario)
     device = pick_device([scenario], device, precision=precision, record=True, notify=say)
+    # Open flights exist on these devices only; others fly the whole flight in one launch.
     if device in Flight.DEVICES:
         flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events, device=device)
         perceived = finish_keeping(flight, keep) if keep else {}
@@ -192,6 +193,9 @@ def to_plain_values(value: Any) -> Any:
     return value
 
 
+# What agents measured and received, beside a recording. The flight is the closed one, bit for bit: it is cut at its
+# decisions, where an open flight may be cut. Measured states are read from it; packets of a plain radio are drawn
+# again from the same counters as in the driver.
 Array = NDArray[Any]
 KINDS = ("measured", "heard")
 FARTHEST = 1e8  # m; the limit of any range in a driver
@@ -224,6 +228,7 @@ def finish_keeping(flight: Flight, keep: Sequence[str]) -> dict[str, xr.Variable
     measured: list[Array] = []
     ages: list[Array] = []
     following = 0  # frame
+    # One turn per decision: sense, note what the frames until the next decision see, then fly on.
     while not flight.over:
         flight.sense()
         now = flight.step * dt
@@ -266,6 +271,7 @@ def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
     """Draw the uniform number of each pair (receiver, sender) in a decision: `core.random.pair_uniform` of a whole
     flock.
     """
+    # The driver draws for four receivers by one Philox call; the same grouping here gives the same numbers.
     fours, senders = -(-agents // 4), np.arange(agents, dtype=np.uint64)
     first = random.pair_number(4 * np.arange(fours, dtype=np.uint64)[:, None], senders, agents)
     zero = np.zeros_like(first)
@@ -280,6 +286,7 @@ def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float)
     heard.
     """
     k, n = flight.scenario.radio, flight.agents
+    # Such a radio keeps the stamps in the flight itself; only a plain one must be drawn again.
     if flight.scenario.transceiver.keeps_packets:
         return np.where(np.eye(n, dtype=bool), np.nan, flight.sent)
     place = flight.state[: flight.scenario.dimensions].astype(float)
@@ -290,6 +297,7 @@ def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float)
             d -= 2.0 * half * np.round(d / (2.0 * half))
     apart = np.sqrt((offset**2).sum(axis=0))
     heard = (apart <= min(k.range, FARTHEST)) & ~np.eye(n, dtype=bool)
+    # Probabilities only for pairs in range: the rule is a Python call for each pair.
     if k.loss > 0.0:
         i, j = np.nonzero(heard)
         lost = np.array([radio.lost(float(d), k) for d in apart[i, j]])

@@ -109,6 +109,7 @@ def scenarios_at(
     """Build the scenario at each point of a grid; raise ScenarioError with the errors of all points."""
     faults: list[str] = []
     found = []
+    # All points are built before any flies, so that an error in the last one costs no flights.
     for point in points:
         with collect_errors(faults):
             changed = {**(settings or {}), **point}
@@ -133,6 +134,7 @@ def fly_points(
     points: Sequence[Mapping[str, Any]], scenarios: Sequence[Scenario], seeds: Sequence[int], **options: Any
 ) -> pd.DataFrame:
     """Fly all seeds at all points and return a tidy table; options as in `sweep`."""
+    # One list of all flights: workers are busy until the end of the sweep, not of each point.
     jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in seeds]
     flights = [found for _, found, _ in jobs]
     rows = score_scenarios(flights, [seed for _, _, seed in jobs], **options)

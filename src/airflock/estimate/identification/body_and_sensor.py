@@ -346,7 +346,6 @@ def instrumental_tau(logs: FlightLogs, tau: float, a_max: float) -> float:
     White noise of the row is not in the earlier velocity, so it does not bias the ratio of covariances. Rows at the
     limit are left out. Where commands run ahead of the vehicle (feed-forward) the two ways disagree.
     """
-    # Three rows: far enough that noise of estimators has faded, near enough that the gap is still similar.
     lag = 3
     gap = logs.command - logs.velocity
     run = np.cumsum(logs.is_new)
@@ -505,7 +504,7 @@ def fit_sensors(logs: FlightLogs, period: float) -> SensorFit:
     q, u = (np.concatenate([part[c] for part in series]) for c in (0, 1))
     new = np.concatenate([np.arange(len(part[0])) == 0 for part in series])
     steps = np.abs(np.diff(q))
-    # Logged positions are rounded; without the grain as noise a log with few digits would look exact.
+    # Logged positions are rounded: 0.3 of a step is about the standard deviation of rounding, 1 / sqrt(12).
     grain = 0.3 * float(np.min(steps[steps > 1e-9], initial=1.0))
     kernel = _sensor_kernel()
 

@@ -103,7 +103,7 @@ class IdentifiedParameters:
                 self.by_key[key] = replace(number, reason=reason)
 
 
-# A share of 0 has no logarithm, and a radio that never receives would not fly.
+# A share of 0 has no logarithm.
 LEAST = 1e-6  # share of packets; what nothing was heard of
 WIDE = 0.2  # half of an interval of a share of packets, beyond which it says too little
 

@@ -151,7 +151,7 @@ def settle_fit(model: FitModel, fit: Fit, spans: Sequence[int] | None) -> Fit:
     """
     place, lowest = fit.place.copy(), fit.loss
     for stride in STRIDES:
-        # The gains of the filter come after the named numbers and are smooth, so only named numbers are strode along.
+        # The gains of the filter come after the named numbers; they make nobody a neighbour, so they need no strides.
         for k in [k for k in fit.free if k < model.named]:
             for move in (stride, -stride):
                 while True:
@@ -326,7 +326,8 @@ def draw_points(model: FitModel, start: Array, spans: Sequence[int], seed: int) 
 
     named = list(range(model.named))
     found = np.vstack([start[named], qmc.Sobol(len(named), seed=seed).random_base2(DRAWN)])
-    # Half of all drawn points would close a part of the law by its switch, and climb on a simpler one.
+    # Drawn values would switch a part on that the simpler law does without; these numbers wait until the rest is
+    # fitted.
     found[:, default_is_off(model)] = start[default_is_off(model)]
     places = np.tile(start, (len(found), 1))
     places[:, named] = found

@@ -173,8 +173,7 @@ def noise_statistics(model: FitModel, u: Array, spans: Sequence[int]) -> Array:
         rows = np.concatenate([np.arange(*walk.tracks.spans[s]) for s in own])
         found.append(e[rows])
     parts = []
-    # Variances mix both noises; the correlation from frame to frame separates them: noise of tracks is not
-    # correlated.
+    # Variances mix noise of the flight and of the tracks; correlations from frame to frame help to separate them.
     for c in range(2):
         x = np.concatenate([e[:, c].ravel() for e in found])
         pairs = np.concatenate([(e[1:, c] * e[:-1, c]).ravel() for e in found])
@@ -286,7 +285,7 @@ def estimate_law_noise(
     """
     generator = np.random.default_rng(seed)
     centre, half, widest = 0.0, RANGE, int(np.argmax(levels))
-    # Shift the window until the likeliest noise lies inside it; a noise without a lower limit must be near its edge.
+    # Shift the window until the ends of the interval lie inside it.
     for _ in range(MOVED):
         steps, first = _look(flights, point, scatter, noise, fitted, levels, centre, half, generator)
         low, high = first[widest]

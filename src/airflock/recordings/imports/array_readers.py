@@ -19,6 +19,7 @@ from airflock.recordings.imports.track import (
 from airflock.recordings.reader_process import ReaderProcess, read_hdf5_arrays, read_netcdf_arrays
 from airflock.support import RecordingError, collect_errors
 
+# NumPy arrays are never unpickled: a pickle runs code when it is read.
 PLAIN = "idtrackerai_format SESSION --formats h5 writes plain numbers; or, if you trust the file, python -c "
 COMMAND = "\"import numpy as np; np.save('plain.npy', np.load('FILE', allow_pickle=True).item()['trajectories'])\""
 
@@ -122,6 +123,7 @@ def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, finding
     return read_array(values, options, str(path), names, fps)
 
 
+# Datasets of `movement`, and Airflock's own.
 OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
 
 
@@ -157,6 +159,7 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
         raise RecordingError("\n".join(faults))
     rows = np.arange(len(seconds))
     tracks = []
+    # Variables of unknown unit are ignored rather than guessed; velocities are then differentiated from positions.
     for number, name in enumerate(found["individual"].values):
         own = found.isel(individual=number)
         position = own["position"].transpose("time", "space").values.astype(float) * scale

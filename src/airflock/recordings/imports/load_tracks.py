@@ -202,6 +202,7 @@ def read_tracks(
     findings.raise_errors()
     track_checks.check_axes(tracks, findings)
     findings.raise_errors()
+    # Axes first: jumps are judged by velocities, which must belong to the same axes as positions.
     comparable = common_frame.align_clocks(tracks, same_clock, findings)
     if begin is not None or end is not None:
         tracks = cut_window(tracks, begin, end)
@@ -215,6 +216,7 @@ def read_tracks(
 def cut_window(tracks: list[ImportedTrack], begin: float | None, end: float | None) -> list[ImportedTrack]:
     """Cut tracks to a window of time, s; leave out those without a row in it."""
     low, high = -np.inf if begin is None else begin, np.inf if end is None else end
+    # The tolerance of the grid, so that a frame exactly on the border is not lost by rounding.
     for track in tracks:
         late = resampling.grid_tolerance(track_checks.median_period(track), *track.time[[0, -1]])
         track.keep((track.time >= low - late) & (track.time <= high + late))
@@ -261,6 +263,7 @@ def _placed(path: Path, tracks: list[ImportedTrack]) -> list[ImportedTrack]:
     return tracks
 
 
+# All options are checked together, so that a user corrects them in one go.
 def check_options(
     options: ImportOptions, findings: ImportReport, numbers: Mapping[str, Any], precision: Any, accept: Any, origin: Any
 ) -> None:
@@ -313,6 +316,7 @@ def _is_origin(given: Any) -> bool:
     return sound and abs(numbers[0]) <= 90.0 and abs(numbers[1]) <= 360.0
 
 
+# Formats by the ending of a file: to add one, write a reader and name it here.
 Reader = Callable[[Path, ImportOptions, ImportReport], list[ImportedTrack]]
 READERS: dict[str, tuple[str, Reader]] = {
     ".csv": ("table", read_tables.read_csv),

@@ -39,6 +39,7 @@ def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list
         with path.open("rb") as file:
             wanted = None if columns is None else lambda c: c.strip() in columns
             try:
+                # In chunks, and only the needed columns: an hour of thirty drones does not fit as text.
                 for part in pd.read_csv(file, usecols=wanted, chunksize=CHUNK, low_memory=False, **text):
                     part.columns = [str(c).strip() for c in part.columns]
                     yield at, part
@@ -110,6 +111,7 @@ def tracks_from_parts(
     gathered: dict[str, list[Any]] = {}
     nameless: list[Any] = [np.empty(0, int)]
     columns = None if wide else how.used
+    # Parts are split by individual at once and joined at the end, so that only numbers stay in memory.
     for at, part in parts(columns):
         rows = np.arange(at, at + len(part))
         for name, piece in split_by_individual(part, wide, how, stem):
@@ -206,6 +208,7 @@ def _track(
     utc = columns.pop("utc", None)
     time = columns.pop("t") if "t" in columns else utc
     assert time is not None
+    # More than 1e9 s: a clock since 1970, and no time since a start, which would be 31 years.
     of_day = bool((time[np.isfinite(time)][:1] > 1e9).any())  # seconds since 1970
     clock = "utc" if of_day or (utc is not None and utc is time) else ("shared" if shared else "own")
     pair = None
@@ -218,6 +221,7 @@ def _track(
     return found
 
 
+# The beginning of a text table: its encoding, lines above it, its delimiter, and names of columns.
 DELIMITERS = (",", ";", "\t", "|")
 BLANKS = r"\s+"  # where nothing else separates columns, as NumPy writes tables
 MOST = 1 << 20  # bytes that are looked at
@@ -256,6 +260,7 @@ def read_head(path: Path, options: ImportOptions) -> TableHead:
     names = _cells(lines[above], delimiter)
     if len(names) > MAX_COLUMNS:
         column_layout(str(path), names, options)
+    # Some trackers write the names in a comment above the numbers; they are used if their count fits.
     hidden = False
     if all(_numeric(name) for name in names):
         over = _cells(lines[above - 1].strip().lstrip(REMARK), delimiter) if above else []
@@ -310,6 +315,7 @@ def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: 
     """Refuse decimal commas that nobody has announced; at: number of the first row."""
     if options.decimal != ".":
         return
+    # A decimal comma beside a comma as delimiter cannot be read: the cells of a row are then too many.
     for number, line in enumerate(body, at):
         cells = line.split() if delimiter == BLANKS else line.split(delimiter)
         comma = [cell.strip() for cell in cells if re.fullmatch(r'\s*"?[-+]?\d+,\d+"?\s*', cell)]
@@ -322,6 +328,7 @@ def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: 
             )
 
 
+# Wide tables: columns for each individual, as x1, y1, x2, y2 or fish1_x, fish1_y, fish2_x, fish2_y.
 AXIS_FIRST = re.compile(r"([xyz])_?(\d+)")
 NAME_FIRST = re.compile(r"([a-z][a-z_]*?_?\d+)_([xyz])")  # a number: head_x, tail_x are places on one individual
 

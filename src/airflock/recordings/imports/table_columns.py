@@ -19,6 +19,7 @@ from airflock.recordings.imports.track import (
 )
 from airflock.support import RecordingError, collect_errors, suggest
 
+# Headers: the quantity in a column, and its unit.
 LENGTH_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048, "in": 0.0254}
 TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 SPEED_UNITS = {"m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 1e-3, "km/h": 1 / 3.6, "kmh": 1 / 3.6,
@@ -78,6 +79,7 @@ def split_header(header: str) -> tuple[str, str]:
     plain = _plain(text)
     if plain == "timeus":  # as ArduPilot writes it
         return "time", "us"
+    # Known names first: a name that ends like a unit, such as pos_m, may be a column of its own.
     if plain not in _TARGET:
         for unit in _SUFFIXES:
             if plain.endswith(f"_{unit}") and len(plain) > len(unit) + 1:
@@ -124,6 +126,7 @@ def column_factor(target: str, unit: str, where: str, options: ImportOptions) ->
         unit = options.time_unit if options.time_unit != "frames" else ""
     if not unit and target in POSITION_TARGETS:
         unit = options.unit
+    # A length unit on the command line means the same unit per second for velocities.
     if not unit and target in (*VELOCITY_TARGETS, *COMMAND_TARGETS) and options.unit not in ("", *PIXEL_UNITS):
         return LENGTH_UNITS[options.unit]
     if unit in PIXEL_UNITS and target in POSITION_TARGETS:
@@ -145,6 +148,7 @@ def unit_in_metres(unit: str, where: str, subject: str, options: ImportOptions) 
     raise RecordingError(f"{where}: {subject} has no unit; {UNIT_HINT}")
 
 
+# Tables with the fields of PX4: x is north, z is down and times are microseconds, although no header says so.
 FIELDS = {"timestamp", *POSITION_TARGETS, *VELOCITY_TARGETS}
 # fields of vehicle_local_position that no other table has; source: PX4, msg/VehicleLocalPosition.msg
 MARKS = {"ref_timestamp", "xy_valid", "z_valid", "v_xy_valid", "xy_reset_counter", "vxy_reset_counter", "z_deriv"}
@@ -211,6 +215,8 @@ def px4_origin(local: Mapping[str, Any]) -> tuple[float, float, float] | None:
     return None if not len(known) else (float(known[-1, 0]), float(known[-1, 1]), float(known[-1, 2]))
 
 
+# A list of allowed ast nodes, walked by us: eval with a cleaned namespace still reaches the interpreter by
+# attributes.
 LONGEST = 300  # characters; nothing that a column needs is longer
 OPERATIONS = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
 ALLOWED = "column names, numbers, + - * / and parentheses; a name with blanks stands in quotes"
@@ -276,6 +282,7 @@ def quote_column(column: str) -> str:
     return column if column.isidentifier() else f"'{column}'"
 
 
+# Layout: the column of each quantity, by --map or by the headers; and the values in SI units.
 MAX_COLUMNS = 2000
 OF_A_TRACKER = ("probability", "likelihood", "score", "confidence")
 
@@ -327,6 +334,7 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
         _recognised(found, [column for column in columns if column not in other], options)
     if other:
         found.notes.append(f"{where}: {', '.join(other)}: no commanded velocity: left out")
+    # Missing targets are only reported if all columns could be read: they may be the unreadable ones.
     whole = not faults
     _frames(found, options, faults)
     if whole:
@@ -410,6 +418,8 @@ def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOpti
         _drop(found, "z")
     if faults:
         raise RecordingError("\n".join(faults))
+    # Lengths without a unit are metres in logs of robots, but pixels in files of trackers and cameras: there they are
+    # refused.
     if unsaid:
         tells = [f"{c} comes from a tracker" for c in columns if split_header(c)[0] in OF_A_TRACKER]
         if "t" not in found.expressions and "frame" in found.expressions:
@@ -458,6 +468,7 @@ def _ned(found: ColumnLayout, options: ImportOptions) -> None:
     """Swap north and east and turn z over, if the user declares that x is north."""
     if options.axes != "ned":
         return
+    # Swapped by way of an empty name, for positions, velocities and commands.
     for first, second, third in (POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS):
         if first in found.expressions and second in found.expressions:
             _copy(found, first, "")

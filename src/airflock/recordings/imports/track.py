@@ -103,6 +103,7 @@ class ImportedTrack:
 
     def keep(self, chosen: NDArray[Any]) -> None:
         """Keep only the chosen rows (a mask or an order)."""
+        # Breaks are row numbers: after rows are dropped each break belongs to the next kept row.
         last = np.arange(len(self.time))[chosen]
         place = np.searchsorted(last, self.breaks) if last.size and (np.diff(last) > 0).all() else self.breaks
         self.breaks = np.unique(place[place < len(last)]).astype(np.int64)
@@ -111,6 +112,8 @@ class ImportedTrack:
         self.in_air = None if self.in_air is None else self.in_air[chosen]
 
 
+# Checks see tracks and know no format; errors that may be intended have a kind that `--accept` names. There is no
+# "all".
 @dataclass
 class ImportReport:
     """Errors and notes of an import, collected to be reported together."""

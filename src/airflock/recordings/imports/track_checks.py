@@ -24,6 +24,7 @@ from airflock.recordings.imports.track import (
 )
 from airflock.support import RecordingError
 
+# Rows without a time, a place or a speed: each is reported with file, column, number and first row.
 PLACE_TARGETS = (*POSITION_TARGETS[:2], *GEODETIC_TARGETS[:2])
 MissingRows = dict[
     str, list[tuple[NDArray[np.int64], int]]
@@ -36,6 +37,7 @@ def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) ->
     An individual is absent where its place is nan or inf; one that has no place at any time is left out.
     """
     kept = []
+    # By file: a thousand individuals with the same gap give one note.
     for source, own in tracks_by_source(tracks).items():
         whole = [_timed(track) & _placed(track) for track in own]
         there = [track for track, sound in zip(own, whole, strict=True) if sound.any()]
@@ -115,6 +117,7 @@ def _tell(findings: ImportReport, source: str, lacking: MissingRows, what: str) 
         findings.notes.append(f"{source}: {named}{line}")
 
 
+# Times, individuals and heights: rules 1, 4, 7 and presence. Each error is one line.
 STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
 SLOW = 5.0  # s between rows: a unit of thousandths would be odd for so slow a log
 SINCE_1970 = 1e8  # s; times beyond are dates, and their unit is plain
@@ -197,6 +200,7 @@ def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> 
         place = track.stack(POSITION_TARGETS, 2)
         apart = np.hypot(*(place[same + 1] - place[same]).T)
         other = np.flatnonzero(apart > 1e-9)
+        # Mostly at different places: two individuals share an id. Otherwise the logger repeated rows.
         if len(other) > 0.5 * len(same):
             findings.fault(
                 f"{source}: column {track.label('t')}: {track.name} is at two places at once, first row "
@@ -266,6 +270,7 @@ def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport
         heights = [(track, track.columns["z"]) for track in own if "z" in track.columns]
         rows = sum(len(z) for _, z in heights)
         deep = [(track, np.flatnonzero(z < -1.0)) for track, z in heights]
+        # Heights above the start scatter about 0 on the ground, so a few below -1 m are no error.
         if not rows or sum(len(low) for _, low in deep) <= 0.9 * rows:  # around 0 some are always below
             continue
         track, low = next((track, low) for track, low in deep if len(low))
@@ -288,6 +293,7 @@ def note_resolution(track: ImportedTrack, findings: ImportReport) -> None:
         values = track.columns[axis]
         steps = np.abs(np.diff(values))
         moved = steps[steps > 0.0]
+        # Positions that change in most rows have no visible resolution.
         if len(steps) < 20 or not len(moved) or len(moved) > 0.8 * len(steps):
             continue
         least = float(moved.min())
@@ -319,6 +325,7 @@ def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 Array = NDArray[np.float64]
+# Displacements against summed velocities decide axes, signs and units together; names of columns cannot.
 LAG = 0.5  # s over which velocities are summed up, so that resolution does not hide the slope
 TOLERANCE = 0.1  # of a slope that should be 1
 SIGMAS, WILD = 8.0, 20.0  # of a jump, with and without a velocity to predict it
@@ -341,6 +348,7 @@ def check_axes(tracks: Iterable[ImportedTrack], findings: ImportReport) -> None:
         if track.has(VELOCITY_TARGETS):
             by_file.setdefault(track.source, []).append(track)
     for source, own in by_file.items():
+        # A group is compared as a whole: one individual may fly straight, and show one axis only.
         axes = 3 if all("z" in t.columns and "vz" in t.columns for t in own) else 2
         pairs = [_displacements(track, axes) for track in own]
         moved = np.concatenate([p[0] for p in pairs])
@@ -359,6 +367,7 @@ def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64]
     if not step:
         return np.empty((0, axes)), np.empty((0, axes))
     whole = (steps < 3.0 * step) & np.isfinite(speed[1:]).all(axis=1) & np.isfinite(speed[:-1]).all(axis=1)
+    # Trapezoids of the velocity; rows across a gap count as broken, so that no pair spans one.
     path = np.cumsum(np.where(whole[:, None], 0.5 * (speed[1:] + speed[:-1]) * steps[:, None], 0.0), axis=0)
     path = np.concatenate([np.zeros((1, axes)), path])
     broken = np.concatenate([[0], np.cumsum(~whole)])
@@ -417,6 +426,7 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
             f'write --map "{VELOCITY_TARGETS[i]}:=-{quote_column(speed)}"',
             "axes",
         )
+    # A sign is reported before a scale: a turned axis has a slope of -1, which is no wrong unit.
     wrong = [i for i in axes if lively[i] and i not in turned and abs(slopes[i] - 1.0) > TOLERANCE]
     wrong = [i for i in wrong if abs(r[i, i]) > 0.5]
     if wrong:
@@ -487,6 +497,7 @@ def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
         return
     place = track.stack(POSITION_TARGETS, 2)
     next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
+    # Every second row is near, the next one far: two individuals alternate.
     if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
         findings.fault(
             f"{track.source}: {track.name} jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on: "
@@ -506,6 +517,7 @@ def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
             "jumps",
         )
         return
+    # A row off its track is followed by a jump back; a reset is not.
     away = [int(k) for k in jumps if k + 1 < len(size) and _returns(surprise[k], surprise[k + 1])]
     back = {k + 1 for k in away}
     resets = [int(k) for k in jumps if k not in away and k not in back]
@@ -537,6 +549,8 @@ def prediction_errors(track: ImportedTrack) -> tuple[NDArray[np.float64], float]
     moved, steps = np.diff(place, axis=0), np.diff(track.time)
     if len(moved) < 20:
         return np.empty((0, 2)), 0.0
+    # The logged velocity predicts best; without one the last step is continued, which is noisier: hence the wider
+    # limit WILD.
     if track.has(VELOCITY_TARGETS):
         speed = track.stack(VELOCITY_TARGETS, 2)
         predicted = 0.5 * (speed[1:] + speed[:-1]) * steps[:, None]

@@ -41,6 +41,7 @@ def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame
     found, rows = track_arrays(recording), []
     for i, name in enumerate(found.names):
         begun: dict[str, int] = {}
+        # One frame more than there is, in which nobody is present, ends all contacts.
         for k in range(len(found.time) + 1):
             there = k < len(found.time) and found.placed[k, i]
             now = set()

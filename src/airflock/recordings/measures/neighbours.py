@@ -66,6 +66,7 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
     edges = np.linspace(0.0, farthest, round(farthest / width) + 1)
     width = farthest / (len(edges) - 1)
     counts, pairs = np.zeros(len(edges) - 1), 0
+    # Frame by frame: positions of all frames at once would need pairs times frames.
     for place, there in zip(found.position, found.placed, strict=True):
         x = place[:, there]
         i, j = np.triu_indices(x.shape[1], 1)
