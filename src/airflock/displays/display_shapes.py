@@ -129,7 +129,8 @@ def _spread_over_mesh(path: Path, count: int, rng: np.random.Generator) -> Point
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     if area.sum() <= 0.0:
         raise AirflockError(f"{path}: the mesh has no area")
-    # Uniform on the surface: faces by area, then points in a triangle by the root of a uniform number.
+    # Uniform on the surface: faces by area, then points in a triangle by the root of a uniform
+    # number.
     face = rng.choice(len(corners), 40 * count, p=area / area.sum())
     u, v = np.sqrt(rng.uniform(size=(1, len(face), 1))), rng.uniform(size=(1, len(face), 1))
     a, b, c = corners[face].transpose(1, 0, 2)

@@ -19,8 +19,8 @@ Positions = NDArray[np.float64]  # (drone, 3) or (point, 3), m
 ExtraLengths = NDArray[np.float64] | float  # (drone, point), m
 
 
-# Least squared ways: straight lines flown in equal time then keep the spacing over the root of 2 (Turpin et al.
-# 2014).
+# Least squared ways: straight lines flown in equal time then keep the spacing over the root of 2
+# (Turpin et al. 2014).
 def assign_points(
     drones: Positions, points: Positions, blocked: NDArray[np.bool_], extra_lengths: ExtraLengths = 0.0
 ) -> NDArray[np.int64]:
@@ -56,9 +56,10 @@ def _squares(drones: Positions, points: Positions, longer: ExtraLengths) -> Posi
     return straight if isinstance(longer, float) else np.asarray((np.sqrt(straight) + longer) ** 2)
 
 
-# Detours past drones that hover. A drone flies straight for its point and is repelled by what it comes near. Where
-# pull and push balance it stays: a side of a box across the way stops it for good. The control sees that it makes no
-# progress, and first sends it to a point beside the obstacle.
+# Detours past drones that hover. A drone flies straight for its point and is repelled by what it
+# comes near. Where pull and push balance it stays: a side of a box across the way stops it for
+# good. The control sees that it makes no progress, and first sends it to a point beside the
+# obstacle.
 CLEARANCE = 1.6  # m; a point, or a way, that comes nearer than this to a drone that hovers is not free
 BESIDE = 3.0  # m from a drone that hovers: there its push has ended
 ROOM = 2.4  # m; nearer to others a drone is pushed (`formation.r0_rep`)
@@ -105,8 +106,8 @@ def detour_point(
     turn = np.linspace(0.0, np.pi, SIDES)[:, None]
     found = first + BESIDE * (np.cos(turn) * side + np.sin(turn) * np.cross(side, along))
     from_here, onwards = np.broadcast_to(position, found.shape), np.broadcast_to(point, found.shape)
-    # Weights are ordered, not tuned: a tried point is worse than a blocked one, that worse than a crowded one, that
-    # than any length.
+    # Weights are ordered, not tuned: a tried point is worse than a blocked one, that worse than a
+    # crowded one, that than any length.
     bad = 1e3 * _nearer(found, tried_points, 1.0) + 1e2 * _nearer(found, hulls, CLEARANCE)
     bad += 1e2 * (
         hulls_in_the_way(from_here, found, hulls).sum(axis=1) + hulls_in_the_way(found, onwards, hulls).sum(axis=1)
@@ -152,8 +153,8 @@ class StuckDetector:
 NEAR = 1.0  # m; a drone is placed within
 CHECK = 5.0  # s; how often the master looks once all should be there
 LOOK = 1.0  # s; how often it looks for drones that make no progress
-# On the flat side of a box the pull to the goal and the push off it balance stably: one shape of 25 was never
-# completed.
+# On the flat side of a box the pull to the goal and the push off it balance stably: one shape of 25
+# was never completed.
 PATIENCE = 60.0  # s; how long it waits for a shape at most
 HALF = 0.35  # m; half side of the box that stands for a drone that hovers
 
@@ -304,7 +305,8 @@ class ShowControl:
         standing = self.progress.standing(places)
         self.tried = {int(who): [] for who in held} | self.tried
         self._assign()
-        # Another point may be the simplest way out, so points are assigned again before detours are planned.
+        # Another point may be the simplest way out, so points are assigned again before detours are
+        # planned.
         for who in held:
             met = np.array([*self.hulls, *places[standing & (np.arange(len(places)) != who)]]).reshape(-1, 3)
             point = self.points[self.target[who]]

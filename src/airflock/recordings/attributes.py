@@ -17,7 +17,8 @@ from airflock.recordings.dataset import EAST_NORTH_UP, FRAME_ATTRIBUTE, check_da
 from airflock.scenarios import MODELS
 from airflock.support import RecordingError, as_error, parse_json_object, shortened
 
-# A file is data from outside: every attribute is read as text and checked, and none of it is executed.
+# A file is data from outside: every attribute is read as text and checked, and none of it is
+# executed.
 RECORDING_FORMAT = 2
 FORMAT_ATTRIBUTE, CHECKSUM_ATTRIBUTE, LAW_ATTRIBUTE = "airflock_format", "airflock_checksum", "airflock_law"
 EVENTS, FAULTS_ATTRIBUTE = "airflock_events", "airflock_faults"
@@ -138,7 +139,8 @@ def recording_checksum(recording: xr.Dataset) -> str:
     # Sorted, and with shapes: the order of variables in a file may change when other tools copy it.
     for name in sorted(map(str, recording.variables)):
         values = recording[name].values
-        # Texts are hashed as JSON, because their type (fixed width or objects) changes between saving and loading.
+        # Texts are hashed as JSON, because their type (fixed width or objects) changes between
+        # saving and loading.
         plain = values.astype(str) if values.dtype.kind in "OSU" else values
         content = json.dumps(plain.tolist()).encode() if plain.dtype.kind == "U" else np.ascontiguousarray(plain).data
         found.update(f"{name} {recording[name].dims} {plain.shape}\n".encode())

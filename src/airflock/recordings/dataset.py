@@ -60,7 +60,8 @@ def make_dataset(
         name: (DIMENSIONS, frames[:, c * dimensions : (c + 1) * dimensions, None, :], {"units": units[name]})
         for c, name in enumerate(names)
     }
-    # Absent agents have nan in the frames; `movement` expects a confidence besides, which is 0 for them.
+    # Absent agents have nan in the frames; `movement` expects a confidence besides, which is 0 for
+    # them.
     there = np.isfinite(frames[:, None, :dimensions]).all(axis=2).astype(np.float32)  # 0 of those who are absent
     variables["confidence"] = (("time", "keypoint", "individual"), there)
     fixed = {"source_software": "airflock", "ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds"}
@@ -123,7 +124,8 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
     period = float(np.median(steps)) if steps.size else 1.0
     if not SHORTEST <= period < np.inf:
         raise RecordingError(f"{where}: frames are {period:g} s apart, less than {SHORTEST:g} s or more than any time")
-    # A law and its metrics assume a constant step; deviations of up to 1 % are taken as rounding of times.
+    # A law and its metrics assume a constant step; deviations of up to 1 % are taken as rounding of
+    # times.
     if steps.size and np.abs(steps - period).max() > 0.01 * period + 1e-9:
         raise RecordingError(
             f"{where}: frames are {steps.min():g} to {steps.max():g} s apart; resample to a constant rate"
@@ -152,7 +154,8 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
 Array = NDArray[Any]
 
 
-# numpy.gradient weighs three equal positions with weights that do not cancel: a group at rest then had a heading.
+# numpy.gradient weighs three equal positions with weights that do not cancel: a group at rest then
+# had a heading.
 def central_difference(position: Array, times: Array) -> Array:
     """Compute velocity (time, ...), m/s, of positions in m at times in s: central differences, one-sided at both ends.
 

@@ -103,7 +103,8 @@ def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
             continue
         unit = headers[x].partition(" ")[2]
         up = table[headers[z]] if z in headers else 0.0 * table[headers[x]]
-        # East-north-up to north-east-down: x and y change places, z its sign; 0.0 - up writes 0 and not -0.
+        # East-north-up to north-east-down: x and y change places, z its sign; 0.0 - up writes 0 and
+        # not -0.
         for name, values in ((x, table[headers[y]]), (y, table[headers[x]]), (z, 0.0 - up)):
             found[f"{name} {unit}".strip()] = values
     return pd.DataFrame(found)

@@ -77,8 +77,8 @@ def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dat
     document, settings = with_user_files(document, given)
     if "metrics" in missing:
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
-    # A missing part is replaced by the usual one: recordings are measured here, not flown, so its physics does not
-    # matter.
+    # A missing part is replaced by the usual one: recordings are measured here, not flown, so its
+    # physics does not matter.
     if "body" in missing:
         document = {**{key: value for key, value in document.items() if key != "groups"}, "body": {}}
     if "sensors" in missing:

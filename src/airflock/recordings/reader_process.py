@@ -24,7 +24,8 @@ from typing import Any
 
 from airflock.support import RecordingError, as_error, is_file, to_path
 
-# Archives, compressed files and pickles are no recordings, whatever their names say; one line names the remedy.
+# Archives, compressed files and pickles are no recordings, whatever their names say; one line names
+# the remedy.
 ARCHIVES = (".zip", ".gz", ".7z", ".tar", ".rar", ".xz", ".bz2")
 STARTS = {b"PK\x03\x04": "a zip archive; unpack it first: unzip", b"\x1f\x8b": "compressed; unpack it first: gunzip"}
 PICKLES = (".pkl", ".pickle")
@@ -50,8 +51,8 @@ def refuse_pickle_file(path: Path) -> None:
         )
 
 
-# A file of 34 kB with 350 zeroed bytes keeps HDF5 busy for ever, beyond Ctrl-C. Not a fork: a process with threads
-# may fork while a lock is taken.
+# A file of 34 kB with 350 zeroed bytes keeps HDF5 busy for ever, beyond Ctrl-C. Not a fork: a
+# process with threads may fork while a lock is taken.
 LEAST_TIME = 15.0  # s of a processor that a file of any size may take
 WAIT = 4.0  # time by the clock over that of a processor, for machines that are busy with other things
 MOST_HEADER = 200_000_000  # bytes of names and attributes
@@ -124,7 +125,8 @@ class ReaderProcess:
             "paths": [path for path in sys.path if os.path.isabs(path)], "file": str(self.path.absolute()),
             "read": [read.__module__, read.__name__], "room": memory // 4, "seconds": math.ceil(self.limit),
         }  # fmt: skip
-        # isolated (-I, -S): neither the folder of the recording nor a start-up file decides what is imported
+        # isolated (-I, -S): neither the folder of the recording nor a start-up file decides what is
+        # imported
         command = [sys.executable or "", "-I", "-S", "-c", START]
         # one thread, and no filter of HDF5 from outside its own library
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::"}
@@ -165,7 +167,8 @@ class ReaderProcess:
 
         with self, as_error(self.path, RecordingError):
             header: dict[str, Any] = {"share": 0.0}
-            # Reports of progress come first, any number of them; the header of the arrays ends them.
+            # Reports of progress come first, any number of them; the header of the arrays ends
+            # them.
             while "share" in header:
                 if on_progress is not None:
                     on_progress(min(0.99, header["share"]))

@@ -105,7 +105,8 @@ def load_recording(path: str | os.PathLike[str] | ReaderProcess) -> xr.Dataset:
     with as_error(where, RecordingError):
         check_recording(recording, where)
         attributes.check_format(recording, where)
-        # A changed recording is still readable; it only can no longer be trusted to be the flight of its attributes.
+        # A changed recording is still readable; it only can no longer be trusted to be the flight
+        # of its attributes.
         noted = recording.attrs.get(attributes.CHECKSUM_ATTRIBUTE)
         if noted is not None and noted != attributes.recording_checksum(recording):
             warnings.warn(f"{where}: was changed since Airflock wrote it", stacklevel=2)

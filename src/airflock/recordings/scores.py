@@ -241,7 +241,8 @@ def measure_recording(
     scenario = scenario_of_recording(recording, settings, trust=trust)
     precision = 64 if frames.dtype == np.float64 else 32
     q = scenario.resolved_metrics()
-    # Frames farther apart than the metrics' period are used one by one; they are never interpolated.
+    # Frames farther apart than the metrics' period are used one by one; they are never
+    # interpolated.
     every = max(1, round(q.period / period)), max(1, round((q.collision_period or period) / period))
     # The very stages of a flight measure, so a score never depends on where it was computed.
     values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
@@ -306,7 +307,8 @@ def _between(
     heading = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12)
     both = np.logical_and(np.any(present[:, pair[0]], axis=1), np.any(present[:, pair[1]], axis=1))
     apart, nearest, cosines = [], np.inf, []
-    # In parts of 200 instants: all pairs of two large groups at all instants would not fit in memory.
+    # In parts of 200 instants: all pairs of two large groups at all instants would not fit in
+    # memory.
     for first in range(0, len(x), PART):
         part = np.flatnonzero(both[first : first + PART]) + first
         if not len(part):
@@ -325,9 +327,10 @@ def _between(
     }
 
 
-# Lengths: without one that fits, some order parameters of tracks say nothing. Fish of 4 cm were scored with lengths
-# of drones: all in collision at 3 m. A recording without a scenario gets no order parameter whose length, centre or
-# wanted speed nobody gave. Excursions and rotations are left out, too: the origin may be a corner of a picture.
+# Lengths: without one that fits, some order parameters of tracks say nothing. Fish of 4 cm were
+# scored with lengths of drones: all in collision at 3 m. A recording without a scenario gets no
+# order parameter whose length, centre or wanted speed nobody gave. Excursions and rotations are
+# left out, too: the origin may be a corner of a picture.
 FITNESS = "r_cluster", "r_coll", "r_comm", "v_flock"
 # Order parameter: keys of `metrics` that it depends on.
 NEEDS: dict[str, tuple[str, ...]] = {

@@ -193,9 +193,9 @@ def to_plain_values(value: Any) -> Any:
     return value
 
 
-# What agents measured and received, beside a recording. The flight is the closed one, bit for bit: it is cut at its
-# decisions, where an open flight may be cut. Measured states are read from it; packets of a plain radio are drawn
-# again from the same counters as in the driver.
+# What agents measured and received, beside a recording. The flight is the closed one, bit for bit:
+# it is cut at its decisions, where an open flight may be cut. Measured states are read from it;
+# packets of a plain radio are drawn again from the same counters as in the driver.
 Array = NDArray[Any]
 KINDS = ("measured", "heard")
 FARTHEST = 1e8  # m; the limit of any range in a driver
@@ -271,7 +271,8 @@ def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
     """Draw the uniform number of each pair (receiver, sender) in a decision: `core.random.pair_uniform` of a whole
     flock.
     """
-    # The driver draws for four receivers by one Philox call; the same grouping here gives the same numbers.
+    # The driver draws for four receivers by one Philox call; the same grouping here gives the same
+    # numbers.
     fours, senders = -(-agents // 4), np.arange(agents, dtype=np.uint64)
     first = random.pair_number(4 * np.arange(fours, dtype=np.uint64)[:, None], senders, agents)
     zero = np.zeros_like(first)

@@ -28,11 +28,12 @@ def hessian(loss: Callable[[Any], float], z: NDArray[np.float64], step: float) -
     return np.array([[second_derivative(loss, z, i, j, step) for j in range(n)] for i in range(n)])
 
 
-# The body: tau, a_max, outer noise and the noise of the log, by the likelihood of a Kalman filter through the
-# saturated lag. State: the velocity of one drone, with one variance for its axes. Between rows the command is
-# constant; the mean follows `parts.bodies.held`, the variance that of an Ornstein-Uhlenbeck process below saturation
-# and of a random walk above. Intervals come from the curvature of the likelihood and the scatter of its slope between
-# stretches of flight (Huber's sandwich), so that they hold where the noise is not quite what the filter assumes.
+# The body: tau, a_max, outer noise and the noise of the log, by the likelihood of a Kalman filter
+# through the saturated lag. State: the velocity of one drone, with one variance for its axes.
+# Between rows the command is constant; the mean follows `parts.bodies.held`, the variance that of
+# an Ornstein-Uhlenbeck process below saturation and of a random walk above. Intervals come from the
+# curvature of the likelihood and the scatter of its slope between stretches of flight (Huber's
+# sandwich), so that they hold where the noise is not quite what the filter assumes.
 BODY_NAMES = ("tau", "a_max", "noise", "white")
 STARTS = ((0.7, 4.0, 0.1, 0.05), (0.25, 8.0, 0.3, 0.02))
 LIMITED = (0.5, 0.7, 0.85, 0.95, 0.99)  # shares of rows below the limit, from which a limit is sought, and
@@ -42,11 +43,12 @@ BLOCK = 20.0  # s of one drone whose slopes are taken together
 FREE = 1e4  # m/s^2: no limit
 WITHIN, NEWTON = 1.92, 3  # half of the 95 % point of chi-squared with 1 degree of freedom; steps of each fit on the way
 GAIN, SATURATED = 200.0, 100  # least 2 Δ log-likelihood and rows at the limit for an a_max
-# The second estimator shares no noise with the first; where set-points run ahead of the vehicle they disagree.
+# The second estimator shares no noise with the first; where set-points run ahead of the vehicle
+# they disagree.
 DISAGREE = 0.15  # of two estimates of tau
-# Relative standard deviation of what the filter leaves out: commands come from the true velocity, so they know more of
-# it than the filter does, also one row after they are given (`_told`). Measured on random fleets with 0.1 m/s of noise
-# in the log (benchmarks/identify.py).
+# Relative standard deviation of what the filter leaves out: commands come from the true velocity,
+# so they know more of it than the filter does, also one row after they are given (`_told`).
+# Measured on random fleets with 0.1 m/s of noise in the log (benchmarks/identify.py).
 BEYOND = np.array([0.01, 0.01, 0.005, 0.005])
 
 
@@ -72,8 +74,8 @@ class BodyFit:
     notes: list[str]
 
 
-# Not least squares of increments: 0.1 m/s of noise is in the gap and in the increment, and tau is 18 to 59 % too
-# short.
+# Not least squares of increments: 0.1 m/s of noise is in the gap and in the increment, and tau is
+# 18 to 59 % too short.
 @cache
 def _body_kernel() -> Any:
     """Compile the negative log-likelihood per block."""
@@ -88,12 +90,13 @@ def _body_kernel() -> Any:
         v, e = np.zeros(3), np.zeros(3)
         variance, r2 = 0.0, white * white
         rate, still = decay_rate(tau, dt), noise * wander(tau, dt)
-        # One pass over all rows: predict to the next row, compare with the logged velocity, correct; `new` begins
-        # again.
+        # One pass over all rows: predict to the next row, compare with the logged velocity,
+        # correct; `new` begins again.
         for k in range(len(time)):
             if new[k]:
                 for i in range(axes):
-                    # Nothing is known before the first row of a stretch, so its measurement is the state.
+                    # Nothing is known before the first row of a stretch, so its measurement is the
+                    # state.
                     v[i] = m[k, i]
                 variance = r2
                 continue
@@ -105,7 +108,8 @@ def _body_kernel() -> Any:
             size = np.sqrt(size)
             left, limited = gap_left(size, h, tau, rate, a_max)
             keep = np.exp(-2.0 * rate * (h - limited))
-            # across the gap a limited motion keeps errors as they are; along it both ends move alike
+            # across the gap a limited motion keeps errors as they are; along it both ends move
+            # alike
             variance = keep * variance + 2.0 * noise * limited * keep + still * (1.0 - keep)
             total, loss = variance + r2, 0.0
             gain = variance / total
@@ -115,7 +119,8 @@ def _body_kernel() -> Any:
                 loss += off * off
                 v[i] = predicted + gain * off
             variance *= 1.0 - gain
-            # Rows that do not count still move the filter, so the next row begins at the right state.
+            # Rows that do not count still move the filter, so the next row begins at the right
+            # state.
             if told[k]:
                 out[block[k]] += 0.5 * axes * np.log(total) + 0.5 * loss / total
         return out.sum()
@@ -165,11 +170,13 @@ def fit_body(logs: FlightLogs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
         n: (float(np.exp(c - wide * s)), float(np.exp(c + wide * s)))
         for n, c, s in zip(BODY_NAMES, z, spread, strict=True)
     }
-    # The walk of the sensor's own error looks like outer noise in logged velocities, and its rate is known.
+    # The walk of the sensor's own error looks like outer noise in logged velocities, and its rate
+    # is known.
     low, high = interval["noise"]
     value["noise"], interval["noise"] = value["noise"] - walk, (max(low - walk, 0.0), max(high - walk, 0.0))
     saturated = int((gap > value["a_max"] * value["tau"]).sum())
-    # A limit that no row reaches cannot be fitted; then the largest demand of the log bounds it from below.
+    # A limit that no row reaches cannot be fitted; then the largest demand of the log bounds it
+    # from below.
     asked = float(np.quantile(gap, 0.999) / value["tau"])
     seen = _least_limit(loss, z, lowest, min(asked, value["a_max"]))
     free = _settled(lambda y: loss([y[0], np.log(FREE), y[1], y[2]]), z[[0, 2, 3]])
@@ -201,7 +208,8 @@ def _nothing(reason: str) -> BodyFit:
     )
 
 
-# Mean error of tau 0.81 -> 0.18 %, of the limit -1.46 -> -0.91 %; the filter itself still runs through these rows.
+# Mean error of tau 0.81 -> 0.18 %, of the limit -1.46 -> -0.91 %; the filter itself still runs
+# through these rows.
 def _told(logs: FlightLogs) -> NDArray[np.bool_]:
     """Return True for rows whose increment counts: not for one that begins as a command arrives.
 
@@ -219,7 +227,8 @@ def _blocks(logs: FlightLogs) -> NDArray[np.int64]:
     return np.unique(logs.who * (part.max() + 1) + part, return_inverse=True)[1].astype(np.int64)
 
 
-# A limit that nobody reaches has no slope, and a longer lag hides it: four of 200 fleets were up to 10 % off.
+# A limit that nobody reaches has no slope, and a longer lag hides it: four of 200 fleets were up to
+# 10 % off.
 def _lowest(loss: Callable[[Any], float], gap: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the log parameters of the highest mode of the likelihood.
 
@@ -285,7 +294,8 @@ def _body_errors(loss: Any, z: NDArray[np.float64], blocks: int) -> tuple[NDArra
         loss(z + unit[i], up)
         loss(z - unit[i], down)
         slopes[i] = (up - down) / (2.0 * d)
-    # Slopes of all blocks sum to zero at the maximum; what remains of the mean is rounding of the descent.
+    # Slopes of all blocks sum to zero at the maximum; what remains of the mean is rounding of the
+    # descent.
     slopes -= slopes.mean(axis=1, keepdims=True)
     inverse = np.linalg.pinv(curve)
     robust = inverse @ (slopes @ slopes.T) @ inverse * blocks / max(blocks - 1, 1)
@@ -395,8 +405,8 @@ def command_delay(logs: FlightLogs, value: dict[str, float]) -> float:
     """
     best, kept = np.inf, 0.0
     run = np.cumsum(logs.is_new)
-    # Whole rows only: the log knows no command between its rows. A longer delay must win by 2 %, or noise would
-    # choose it.
+    # Whole rows only: the log knows no command between its rows. A longer delay must win by 2 %, or
+    # noise would choose it.
     for late in range(0, 11):
         k = np.arange(late, len(logs.time) - 1)
         k = k[run[k - late] == run[k + 1]]
@@ -410,13 +420,13 @@ def command_delay(logs: FlightLogs, value: dict[str, float]) -> float:
     return kept
 
 
-# The sensor: errors of satellite navigation of drones that stand. `parts.sensors.langevin.error` in steps of the
-# sensor's period is a linear system of two states, position error q and velocity error u. The unknown place of a
-# drone is a third state; logged velocities may have white noise.
+# The sensor: errors of satellite navigation of drones that stand. `parts.sensors.langevin.error` in
+# steps of the sensor's period is a linear system of two states, position error q and velocity error
+# u. The unknown place of a drone is a third state; logged velocities may have white noise.
 SENSOR_NAMES = ("noise", "damping", "scale", "white")
 LEAST = 30.0  # s of standing
-# As a variance that grew with the noise it made small noise look likelier: intervals contained the truth in 169 of
-# 200 fleets, now in 185.
+# As a variance that grew with the noise it made small noise look likelier: intervals contained the
+# truth in 169 of 200 fleets, now in 185.
 ANYWHERE = 1e4  # m²; variance of where a drone stands: must not depend on what is sought, or it is sought too small
 START = (0.1, 3.0)  # damping, 1/s, and scale, m s^(1/2), to begin with
 RESTARTS = 2  # a simplex that has shrunk on a slope is spread again
@@ -444,13 +454,14 @@ def _sensor_kernel() -> Any:
         a10, a11 = -spring * h, 1.0 - damping * h
         a00, a01 = 1.0 + h * a10, h * a11
         push = 2.0 * damping * h * noise
-        # stationary variances (sensors.langevin): of u the noise, of q scale sqrt(noise / (2 damping))
+        # stationary variances (sensors.langevin): of u the noise, of q scale sqrt(noise / (2
+        # damping))
         still = scale * np.sqrt(noise / (2.0 * damping))
         rq, ru, total = grain * grain, white * white + 1e-12, 0.0
         x0, x1, x2 = 0.0, 0.0, 0.0
         p00, p01, p02, p11, p12, p22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        # A Kalman filter written out for three states: symmetric covariances need six numbers, and no matrix is
-        # allocated.
+        # A Kalman filter written out for three states: symmetric covariances need six numbers, and
+        # no matrix is allocated.
         for k in range(len(q)):
             if new[k]:
                 x0, x1, x2 = 0.0, 0.0, q[k]
@@ -470,8 +481,8 @@ def _sensor_kernel() -> Any:
             x0, x1, x2 = x0 + c0 * off / variance, x1 + c1 * off / variance, x2 + c2 * off / variance
             p00, p01, p02 = p00 - c0 * c0 / variance, p01 - c0 * c1 / variance, p02 - c0 * c2 / variance
             p11, p12, p22 = p11 - c1 * c1 / variance, p12 - c1 * c2 / variance, p22 - c2 * c2 / variance
-            # Two scalar updates, of position then of velocity, equal one update by both, since their noises are
-            # independent.
+            # Two scalar updates, of position then of velocity, equal one update by both, since
+            # their noises are independent.
             off, variance = u[k] - x1, p11 + ru  # the logged velocity
             total += 0.5 * np.log(variance) + 0.5 * off * off / variance
             c0, c1, c2 = p01, p11, p12
@@ -504,7 +515,8 @@ def fit_sensors(logs: FlightLogs, period: float) -> SensorFit:
     q, u = (np.concatenate([part[c] for part in series]) for c in (0, 1))
     new = np.concatenate([np.arange(len(part[0])) == 0 for part in series])
     steps = np.abs(np.diff(q))
-    # Logged positions are rounded: 0.3 of a step is about the standard deviation of rounding, 1 / sqrt(12).
+    # Logged positions are rounded: 0.3 of a step is about the standard deviation of rounding, 1 /
+    # sqrt(12).
     grain = 0.3 * float(np.min(steps[steps > 1e-9], initial=1.0))
     kernel = _sensor_kernel()
 

@@ -154,9 +154,9 @@ def _band(courses: Sequence[Array]) -> Array:
     return band
 
 
-# Synthetic logs: the material that estimators are tested with. A recording keeps true states. The measurements of
-# each drone and its received packets are drawn again from the counters (seed, stream, step, agent), so that nothing
-# in the engine changes.
+# Synthetic logs: the material that estimators are tested with. A recording keeps true states. The
+# measurements of each drone and its received packets are drawn again from the counters (seed,
+# stream, step, agent), so that nothing in the engine changes.
 WARM = 8.0  # times of decay that receivers have been on before they are logged
 
 
@@ -234,8 +234,8 @@ def fly_logs(
     errors = own_state_errors(seed, int(at[-1]) + 1, n, period, scenario.sensors)[at]
     clocks = np.stack([generator.normal(0.0, disturbed.offset, n), generator.normal(0.0, disturbed.drift, n)], axis=1)
     rows: list[list[Any]] = []
-    # Per drone: noise, rounding, missing rows and bursts, then its own clock; a row whose clock runs backwards is
-    # lost.
+    # Per drone: noise, rounding, missing rows and bursts, then its own clock; a row whose clock
+    # runs backwards is lost.
     for i in range(n):
         measured = speed[:, :, i] + errors[:, 2:, i] + generator.normal(0.0, disturbed.white, (len(times), 2))
         where = np.round((place[:, :, i] + errors[:, :2, i]) / disturbed.resolution) * disturbed.resolution
@@ -267,7 +267,8 @@ def _packets(
     i, j = np.nonzero(~np.eye(n, dtype=bool))
     arrives = np.vectorize(links.received, otypes=[float], excluded=[1, 2])
     parts = []
-    # The number of the flight's own draw decides, so that these are the packets that the flight had.
+    # The number of the flight's own draw decides, so that these are the packets that the flight
+    # had.
     for step, points in enumerate(place[::every]):
         d = np.hypot(*(points[:, i] - points[:, j]))
         fast, slow = (radio.packets(step, rate, period) for rate in (k_.fast_rate, k_.slow_rate))

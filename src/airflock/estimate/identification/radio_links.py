@@ -21,8 +21,8 @@ TABLE_KEYS: tuple[str, ...] = tuple(f"radio.received_{n}" for n in range(table.E
 COLUMNS = ("receiver", "sender", "t", "stamp")
 NUMBERS = ("t", "stamp", "distance", "got", "fast", "slow")
 OLDEST = 60.0  # s; no radio brings packets so late (radio.delay ends at 30 s)
-# half of an interval, relative, beyond which a number is not told
-# At 20 % one fleet in twenty may be 65 % off and raise the rms from 1.8 to 17 %; at 15 % the worst was 13.8 %.
+# half of an interval, relative, beyond which a number is not told At 20 % one fleet in twenty may
+# be 65 % off and raise the rms from 1.8 to 17 %; at 15 % the worst was 13.8 %.
 WIDEST = {"near": 0.15, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
 FEW = 500  # rows below which no curve is fitted
 EXPECTED = 20.0  # packets that a curve would still bring; where none came, the radio's range ends before
@@ -73,7 +73,8 @@ def _kernel() -> Any:
                 sent = fast[row] if link == 0 else slow[row]
                 arrives = received(distance[row], float(link), k)
                 whole = np.floor(sent + 1e-9)
-                # a packet that is sent in a share of the decisions, where the log does not tell in which
+                # a packet that is sent in a share of the decisions, where the log does not tell in
+                # which
                 missed[row] *= (1.0 - arrives) ** whole * (1.0 - (sent - whole) * arrives)
             missed[row] = min(max(missed[row], 1e-9), 1.0 - 1e-9)
         return missed
@@ -225,8 +226,8 @@ def radio_range(due: pd.DataFrame) -> float:
     if not len(some):
         return float("inf")
     last = float(some["distance"].max())
-    # The share at the edge, extrapolated by the inverse square, says how many packets the curve would still bring
-    # beyond.
+    # The share at the edge, extrapolated by the inverse square, says how many packets the curve
+    # would still bring beyond.
     edge = due[(due["distance"] > INSIDE * last) & (due["distance"] <= last)]
     beyond = due[due["distance"] > last]
     share = float(edge["got"].sum() / edge["due"].sum())
@@ -280,7 +281,8 @@ def fit_table(heard: pd.DataFrame, spacing: float) -> tuple[NDArray[np.float64],
         raise RecordingError(f"spacing = {spacing:g} m is not positive")
     s, got = heard["distance"].to_numpy(float) / spacing, heard["got"].to_numpy(float)
     number = np.arange(table.ENTRIES)
-    # Entries of straight lines between knots: each row is a mean of the two entries beside it, so the fit is linear.
+    # Entries of straight lines between knots: each row is a mean of the two entries beside it, so
+    # the fit is linear.
     hats = np.maximum(1.0 - np.abs(s[:, None] - number), 0.0)
     seen = np.flatnonzero(hats.sum(axis=0) > 0.0)
     if not len(seen):
@@ -317,13 +319,15 @@ def _pictured(due: pd.DataFrame) -> pd.DataFrame:
     return sums.assign(share=sums["got"] / sums["due"], model=sums["expected"] / sums["due"])
 
 
-# Modes of the likelihood of a reception curve, and their width. Four numbers (`parts.radios.links`): near, far (m)
-# and the shares received there. The search is unbounded, in the numbers of `unpack`.
+# Modes of the likelihood of a reception curve, and their width. Four numbers
+# (`parts.radios.links`): near, far (m) and the shares received there. The search is unbounded, in
+# the numbers of `unpack`.
 CURVE_PARAMETERS = ("near", "far", "received_near", "received_far")
 ALIKE = 3.0  # of log-likelihood: half of a chi-square at 95 % and what the descent leaves open
 FARS = 20  # lengths of far that are tried, and from where the others are fitted:
 SHARES, RATIOS = (0.2, 0.5), (0.0, -1.5)  # of near in far; of the far share in the near one, by its logit
-# A far of 50 m hid between two tried lengths, 42.7 and 55.1 m, whose profile falls towards the wrong mode only.
+# A far of 50 m hid between two tried lengths, 42.7 and 55.1 m, whose profile falls towards the
+# wrong mode only.
 BETWEEN = 20.0  # of log-likelihood above the best of these lengths, up to which all four are fitted from there
 SAME = 0.01  # relative distance of two lengths of far up to which they are one hill
 RESTARTS = 6  # of a descent
@@ -341,7 +345,8 @@ def best_mode(loss: Any, farthest: float) -> list[Any]:
     beside it, or likely enough for a hill to stand between it and the next. Returns the best, and others that are
     nearly as likely.
     """
-    # Lengths grow by a constant factor: the likelihood depends on the ratio of far to the distances flown.
+    # Lengths grow by a constant factor: the likelihood depends on the ratio of far to the distances
+    # flown.
     fars = np.geomspace(0.08, 0.9, FARS) * farthest
     profile = [min((_beside(loss, far, *start) for start in product(SHARES, RATIOS)), key=_fun) for far in fars]
     height = np.array([np.inf, *(_fun(found) for found in profile), np.inf])
@@ -406,7 +411,8 @@ def profile_intervals(loss: Any, z: Any) -> dict[str, tuple[float, float]]:
     """
     lowest_loss, spread, values = float(loss(z)), _spread(loss, z), unpack(z)
     ends = np.array([values, values])
-    # Each end of each number by itself; likely points on the way to one end may widen the interval of another number.
+    # Each end of each number by itself; likely points on the way to one end may widen the interval
+    # of another number.
     for k in range(len(CURVE_PARAMETERS)):
         for row, side in enumerate((-1.0, 1.0)):
             end, likely = _end(loss, values, lowest_loss, k, side, float(spread[k]))
@@ -428,8 +434,8 @@ def _end(
     near, there = values[k], np.asarray(values)  # within the limit so far, and all numbers there
     step, low, high = float(np.clip(wide, 0.01 * near, 0.3 * near)), -(HARDLY**0.5), math.inf
     beyond = near
-    # First double the step until the likelihood is too low, then regula falsi on the root of the loss, which is
-    # nearly straight.
+    # First double the step until the likelihood is too low, then regula falsi on the root of the
+    # loss, which is nearly straight.
     for _ in range(LOOKS):
         if math.isinf(high):  # farther, until the likelihood is too low
             beyond = near + side * step
@@ -452,7 +458,8 @@ def _end(
 def _others(loss: Any, k: int, value: float, there: Any) -> tuple[float, Any]:
     """Return the least loss with number k fixed, and all four numbers there; numbers elsewhere are the start."""
 
-    # Four numbers by the free three, so that near stays below far and the far share below the near one.
+    # Four numbers by the free three, so that near stays below far and the far share below the near
+    # one.
     def all_four(y: Any) -> Any:
         one, two, three = np.clip(y, -11.9, 11.9)
         if k == 1:

@@ -11,7 +11,8 @@ from airflock.recordings import COMMAND_TARGETS, POSITION_TARGETS, VELOCITY_TARG
 from airflock.support import RecordingError
 
 Array = NDArray[np.float64]
-# Logs as estimators need them: rows of one drone after another, at their own times, without interpolation.
+# Logs as estimators need them: rows of one drone after another, at their own times, without
+# interpolation.
 MAX_STEP_RATIO = 1.5  # usual steps between rows: beyond, a command may have come and gone unseen
 
 
@@ -145,8 +146,8 @@ def decision_period(logs: FlightLogs) -> tuple[float, tuple[float, float], str]:
             (nan, nan),
             f"commands change in every row: the log ({flying.step:.3g} s) is no faster than decisions",
         )
-    # Commands may stay equal for a decision or two, so intervals are whole multiples of the period; fit a line
-    # through them.
+    # Commands may stay equal for a decision or two, so intervals are whole multiples of the period;
+    # fit a line through them.
     usual = float(np.median(between))
     between = between[(between > 0.5 * usual) & (between < 4.5 * usual)]
     times = np.maximum(np.round(between / usual), 1.0)

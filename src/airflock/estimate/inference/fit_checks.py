@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 SHELLS = (0.35, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0)  # nearest distances
 CLOSE = 2.0  # nearest distances, within which differences of velocity are summed besides
 MANY = 3  # neighbours in a shell, beyond which more make no difference
-# A linear sum of forces explained 0 to 2 % where 43 % was missing. Laws saturate, so the test needs saturating
-# functions.
+# A linear sum of forces explained 0 to 2 % where 43 % was missing. Laws saturate, so the test needs
+# saturating functions.
 UNITS = 400
 SHARE = 0.15  # of what neighbours do, that one unit looks at
 RIDGE = 0.5  # share of a unit's power

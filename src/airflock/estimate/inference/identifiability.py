@@ -28,8 +28,8 @@ from airflock.estimate.inference.likelihood_fit import (
 )
 
 Array = NDArray[np.float64]
-# Numbers that tracks can identify. Of two numbers of which either explains the tracks, the first declared is
-# reported: authors declare important ones first.
+# Numbers that tracks can identify. Of two numbers of which either explains the tracks, the first
+# declared is reported: authors declare important ones first.
 DEPENDENT = 0.2  # share of a slope that other numbers do not explain; below it a number is not identifiable
 EFFECT_POINTS = 6  # best places at which the effect of a number is looked for
 ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where the effect of a number is looked for
@@ -56,7 +56,8 @@ def identifiable_indices(model: FitModel, start: Array, start_points: Array, spa
     flat = np.concatenate([_slopes(model, u, alive, spans) for u in places])
     kept: list[int] = []
     basis = np.zeros((len(flat), 0))
-    # Gram-Schmidt in the order of declaration: a column that earlier ones explain is a number that they replace.
+    # Gram-Schmidt in the order of declaration: a column that earlier ones explain is a number that
+    # they replace.
     for column, number in zip(flat.T, alive, strict=True):
         size = float(np.linalg.norm(column))
         rest = column - basis @ (basis.T @ column)
@@ -71,7 +72,8 @@ def identifiable_indices(model: FitModel, start: Array, start_points: Array, spa
 
 def has_effect(model: FitModel, points: Sequence[Array], index: int, spans: Sequence[int]) -> bool:
     """Return True if a number changes the loss anywhere along its range."""
-    # A threshold beyond all that happens has no slope but an effect, so values along the range are tried.
+    # A threshold beyond all that happens has no slope but an effect, so values along the range are
+    # tried.
     for u in points:
         here = model.score(u, spans).loss()
         for x in ALONG:
@@ -102,7 +104,8 @@ def canonical_model(
     """
     few = model.few()
     place, lowest = fit.place, climb_to_maximum(model, fit.place, fit.free, few, slopes=(WIDE_SLOPES,)).loss
-    # Bring back each dropped number that is declared earlier, and try to drop a later one in its place.
+    # Bring back each dropped number that is declared earlier, and try to drop a later one in its
+    # place.
     for earlier in law.numbers:
         assert model.law is not None
         if earlier in model.law.numbers:
@@ -116,7 +119,8 @@ def canonical_model(
                 continue
             without, rest = fuller.with_fixed([k]), [f for f in full.free if f != k]
             start = _given_up(without, full, curved, k, few)
-            # Where the start is hopeless, or the earlier number has not moved, a climb would only cost time.
+            # Where the start is hopeless, or the earlier number has not moved, a climb would only
+            # cost time.
             if loss_at(without, start, rest, few) > full.loss + UNLIKELY or abs(start[i] - full.place[i]) < APART:
                 continue
             found = climb_to_maximum(
@@ -165,7 +169,8 @@ def droppable_parameters(model: FitModel, fit: Fit, on_progress: Callable[[], No
     few = model.few()
     best = climb_to_maximum(model, fit.place, fit.free, few, slopes=(WIDE_SLOPES,))
     carried, lowest, gone = fit.place, best.loss, list[int]()
-    # Backward elimination: every drop is final, and the next number is judged without the dropped ones.
+    # Backward elimination: every drop is final, and the next number is judged without the dropped
+    # ones.
     for k in reversed(range(model.named)):
         if not _may_go(model, k):
             continue
@@ -198,17 +203,19 @@ def _given_up(model: FitModel, fit: Fit, curved: Array, number: int, spans: Sequ
 
 
 RidgePath = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
-# Ridges: how far numbers that compensate for each other go together before the tracks are explained worse. The
-# numbers of a braking curve lie on a ridge that bends. The curvature at the fit knows its first steps only, and a fit
-# repeated from beside its end does not follow it. So the ridge is followed: one number is moved step by step, all
-# others follow, and the points on the way bound each of them. Where numbers compensate in more than one way the ridge
-# is a surface, and the way of one number misses where another could go; so the least certain numbers are followed one
-# by one, and so are those that act similarly. A number such as a largest force acts nowhere beyond some value: a
-# plateau, to which no way leads; so each end of each range is tried by itself, with all others following there.
+# Ridges: how far numbers that compensate for each other go together before the tracks are explained
+# worse. The numbers of a braking curve lie on a ridge that bends. The curvature at the fit knows
+# its first steps only, and a fit repeated from beside its end does not follow it. So the ridge is
+# followed: one number is moved step by step, all others follow, and the points on the way bound
+# each of them. Where numbers compensate in more than one way the ridge is a surface, and the way of
+# one number misses where another could go; so the least certain numbers are followed one by one,
+# and so are those that act similarly. A number such as a largest force acts nowhere beyond some
+# value: a plateau, to which no way leads; so each end of each range is tried by itself, with all
+# others following there.
 WORST, WALKED = 4, 8  # least certain numbers, and numbers that are walked, at most
 TIED = 0.9  # correlation of the slopes of two numbers, from which both are walked, however certain they seem
-# The number that acts most like the moved one follows first. With all at once the way lost a ridge on which the
-# likelihood does not fall (gain 1.6 to 19 1/s of a wall).
+# The number that acts most like the moved one follows first. With all at once the way lost a ridge
+# on which the likelihood does not fall (gain 1.6 to 19 1/s of a wall).
 NESTED = 3  # numbers that act most like the moved one, which follow before all do
 WINDOW, LINE_STEPS = (
     0.05,
@@ -222,8 +229,8 @@ FASTER = 1.6  # each step is so much longer than the one before, while the likel
 PLACES = 16  # that are looked at, on each side of a ridge
 FOLLOWS = 4  # steps of the climb by which the others follow
 SHORTER = 3.0  # a step is so much shorter where the likelihood has fallen too far: the others could not follow
-# log-likelihood by which a place must be better than the fit, to begin again from there: climbs that begin beside each
-# other end several units apart, and from the top of a spike every way falls
+# log-likelihood by which a place must be better than the fit, to begin again from there: climbs
+# that begin beside each other end several units apart, and from the top of a spike every way falls
 HIGHER = 6.0
 AGAIN = 2  # times
 UNLIKELY_END = 20.0  # fall at the end of a range, the others where they are, beyond which they are not asked to follow
@@ -239,7 +246,8 @@ class Ridges:
         """Return the least and largest points of all numbers where the log-likelihood has fallen by at most `drop`."""
         low, high = point.copy(), point.copy()
         for way in self.paths:
-            # Between two points the drop is taken as a parabola, so its root is linear in the distance.
+            # Between two points the drop is taken as a parabola, so its root is linear in the
+            # distance.
             for (inner, less), (outer, more) in zip(way[:-1], way[1:], strict=True):
                 if less > drop:
                     break
@@ -261,8 +269,8 @@ def profile_ridges(
     """
     ways: list[RidgePath] = []
     met = list(fit.others)
-    # A way may lead to a better fit than the one it began at; then everything begins again there, at most AGAIN
-    # times.
+    # A way may lead to a better fit than the one it began at; then everything begins again there,
+    # at most AGAIN times.
     for turn in range(AGAIN + 1):
         ways, better = _ways(model, fit, spans, drop, turn < AGAIN)
         on_progress()
@@ -391,7 +399,8 @@ def _walk(
     best: tuple[Array | None, float] = (None, -HIGHER)
     step = float(np.clip(step, MIN_FINE_STEP, STRIDE[1]))
     least = min(step, STRIDE[0])
-    # Predictor and corrector: a step along the slope of the way so far, then the others climb back to the ridge.
+    # Predictor and corrector: a step along the slope of the way so far, then the others climb back
+    # to the ridge.
     for _ in range(PLACES):
         last = way[-1][0]
         start = np.clip(last + step * slope, 0.0, 1.0)
@@ -412,7 +421,8 @@ def _walk(
         moved = abs(found.place[number] - last[number])
         if moved == 0.0:
             break
-        # The likelihood has fallen too far at once: the others could not follow, so repeat with a shorter step.
+        # The likelihood has fallen too far at once: the others could not follow, so repeat with a
+        # shorter step.
         if fell - way[-1][1] > 0.5 * drop and step > least:
             step = max(step / SHORTER, least)
             continue
@@ -426,8 +436,8 @@ def _walk(
     return tuple(way), best[0]
 
 
-# Dropped numbers: if their defaults explain the tracks as well, the intervals of the others must still allow for
-# them.
+# Dropped numbers: if their defaults explain the tracks as well, the intervals of the others must
+# still allow for them.
 AWAY = 0.2  # of a range: move of a number of which is asked whether the others make up for it exactly
 DROP = 12.0  # fall of the log-likelihood at which a walk ends that looks for a higher place
 EXACT = 0.05  # change of the log-likelihood by such a move, below which they do
@@ -442,8 +452,8 @@ def restore_parameters(
 
     law : with all its numbers
     """
-    # A default that explains the tracks as well may lie on a ridge: the true point was 34 units higher and no climb
-    # found it.
+    # A default that explains the tracks as well may lie on a ridge: the true point was 34 units
+    # higher and no climb found it.
     for number in model.dropped_parameters(law):
         fuller, i = model.with_parameter(law, number)
         view = _view(fuller, fit, i, number.place(number.default), spans, DROP)
@@ -454,7 +464,8 @@ def restore_parameters(
             on_progress()
             if better is not None:
                 higher = climb_to_maximum(fuller, better, view.fit.free, spans, slopes=(FINE_SLOPES, CENTRAL_SLOPES))
-                # One restored number may make another one useful: begin again with the fuller model.
+                # One restored number may make another one useful: begin again with the fuller
+                # model.
                 return restore_parameters(law, fuller, higher, spans, on_progress)
     return model, fit
 

@@ -21,10 +21,11 @@ from airflock.estimate.inference.observed_tracks import (
 )
 
 Array = NDArray[np.float64]
-# The filter. This is the innovation form of a Kalman filter in steady state. A step of the compiled flight predicts
-# position and velocity of each individual; the difference to the observation corrects both by gains, one pair along
-# the heading and one across. Gains are numbers of the fit, so the noise of the tracks and that of the motion need not
-# be known: the state is never one noisy frame, and never contains the future.
+# The filter. This is the innovation form of a Kalman filter in steady state. A step of the compiled
+# flight predicts position and velocity of each individual; the difference to the observation
+# corrects both by gains, one pair along the heading and one across. Gains are numbers of the fit,
+# so the noise of the tracks and that of the motion need not be known: the state is never one noisy
+# frame, and never contains the future.
 AWAY = 1e9  # m; beyond every range
 GAPS = 12  # frames unseen, beyond which gains grow no more
 
@@ -53,8 +54,8 @@ def _growing(into_position: float, into_velocity: float, period: float) -> Array
     vv = max(kp * kp - 2.0 * period * (1.0 - kp) * kv, 0.0) / period**2 + kv * kv
     pp, pv, noise = kp, kv, 1.0 - kp
     found = np.zeros((2, GAPS))
-    # While an individual is unseen nothing corrects it, so its variances grow, and the first new observation counts
-    # more.
+    # While an individual is unseen nothing corrects it, so its variances grow, and the first new
+    # observation counts more.
     for unseen in range(GAPS):
         found[:, unseen] = pp / (pp + noise), pv / (pp + noise)
         pp, pv, vv = pp + 2.0 * period * pv + period**2 * vv, pv + period * vv, vv + kv * kv
@@ -66,7 +67,8 @@ def apply_own_speed(rows, before, i, axes, half, pace, mean_speed, keep):  # typ
     was = 0.0
     for a in range(axes):
         was += before[axes + a, i] ** 2
-    # A law of headings moves all at one speed; the step of each individual is scaled to its own, which relaxes.
+    # A law of headings moves all at one speed; the step of each individual is scaled to its own,
+    # which relaxes.
     k = (mean_speed + keep * (math.sqrt(was) - mean_speed)) / pace
     for a in range(axes):
         step = rows[a, i] - before[a, i]
@@ -79,7 +81,8 @@ def apply_own_speed(rows, before, i, axes, half, pace, mean_speed, keep):  # typ
 def correct_state(rows, i, axes, half, seen, gains, h, e, out, counted):  # type: ignore[no-untyped-def]
     """Compare individual i with its observation, and correct its state by a share; h, e: memory of 3 numbers."""
     size, along = 1e-30, 0.0
-    # Speed and heading first: errors along and across the heading have different variances and gains.
+    # Speed and heading first: errors along and across the heading have different variances and
+    # gains.
     for a in range(axes):
         size += rows[axes + a, i] ** 2
     size = math.sqrt(size)
@@ -111,8 +114,9 @@ def _kernel() -> Any:
     @njit
     def kernel(rows, before, unseen, seen, state, speed, gains, out, axes, half, pace, usual, keep):  # type: ignore[no-untyped-def]
         h, e = np.zeros(3), np.zeros(3)
-        # One individual after another; those who enter take the observed state, and absent ones wait beyond every
-        # range, each at a place of its own, so that no law meets them or divides by zero.
+        # One individual after another; those who enter take the observed state, and absent ones
+        # wait beyond every range, each at a place of its own, so that no law meets them or divides
+        # by zero.
         for i in range(state.shape[0]):
             what = state[i]
             if what in (ABSENT, ENTERS):
@@ -136,8 +140,8 @@ def _kernel() -> Any:
     return kernel
 
 
-# A smoother of both sides contains the future, one of the past lags and flattens slopes. The step is the compiled
-# driver itself, so no law is implemented twice.
+# A smoother of both sides contains the future, one of the past lags and flattens slopes. The step
+# is the compiled driver itself, so no law is implemented twice.
 class InnovationFilter:
     """Flights of one candidate law, or of straight motion, that are corrected by one record.
 
@@ -184,8 +188,8 @@ class InnovationFilter:
         law = self.law
         pace = mean_speed if law is None or law.commands_heading else 0.0
         self.out[:] = 0.0
-        # Spans are independent: each begins with a clean memory of the driver, so any subset gives the same
-        # differences.
+        # Spans are independent: each begins with a clean memory of the driver, so any subset gives
+        # the same differences.
         for number in range(len(tracks.spans)) if spans is None else spans:
             begin, end = tracks.spans[number]
             self.begin(numbers)
@@ -209,8 +213,8 @@ class InnovationFilter:
                     mean_speed,
                     gains.keep,
                 )
-                # Delayed or averaged percepts need states before the first frame; the first observed ones stand for
-                # them.
+                # Delayed or averaged percepts need states before the first frame; the first
+                # observed ones stand for them.
                 if k == begin:
                     self.fill_past_states(self.previous_states)
                 if kept_states is not None:
@@ -264,9 +268,10 @@ class InnovationFilter:
         self.rows[:axes] += self.rows[axes:] * self.tracks.period
 
 
-# The likelihood: surprise at the next frames under a law with its numbers and the gains of the filter. Differences
-# along and across the heading are normal; their two variances are the likeliest ones. Large differences count less:
-# four of 20,908 steps near an edge of the law were 69 of the 100 units by which the truth lost against the fit.
+# The likelihood: surprise at the next frames under a law with its numbers and the gains of the
+# filter. Differences along and across the heading are normal; their two variances are the likeliest
+# ones. Large differences count less: four of 20,908 steps near an edge of the law were 69 of the
+# 100 units by which the truth lost against the fit.
 SOFT = 1.345  # of a standard deviation: where nothing is wild, estimates are 0.95 as efficient (Huber 1964)
 LOST, TINY = 1e6, 1e-15  # m; somebody who flew off, and less than any difference
 LOOKS = 100  # at most, for a standard deviation; about six do
@@ -311,7 +316,8 @@ def robust_deviation(e: Array) -> float:
     sizes = np.sort(np.abs(e)) + TINY
     square, linear = np.cumsum(sizes * sizes), np.cumsum(sizes)
     last, found = -1, float(np.sqrt(square[-1] / len(sizes)))
-    # Fixed point: the set of small differences fixes the deviation by a quadratic equation, which fixes the set.
+    # Fixed point: the set of small differences fixes the deviation by a quadratic equation, which
+    # fixes the set.
     for _ in range(LOOKS):
         near = int(np.searchsorted(sizes, SOFT * found))
         if near == last:

@@ -109,7 +109,8 @@ def _cells(
 SURE = 2.0  # standard errors by which a law must predict better than going straight on, and
 MOST = 0.75  # share of the spans in which it must
 APART = 2.0  # standard errors by which the best law must be ahead of the second
-# The one-standard-error rule of Breiman et al. (1984): eight numbers won by 12.7 units with an error of 28.3.
+# The one-standard-error rule of Breiman et al. (1984): eight numbers won by 12.7 units with an
+# error of 28.3.
 SIMPLER = 1.0  # standard errors within which a law of fewer numbers is the better explanation
 EDGE = 0.01  # of a range: an end nearer to the end of the range counts as no limit
 
@@ -319,8 +320,8 @@ def _short(value: float) -> float:
     return float(f"{value:.4g}") if math.isfinite(value) else value
 
 
-# One set of points ended in the wrong mode (238 units below a climb from the truth); of three others two found the
-# right one.
+# One set of points ended in the wrong mode (238 units below a climb from the truth); of three
+# others two found the right one.
 RACES = 3  # from places drawn anew, of a law that is searched deeper
 LAWS = ("couzin_2002", "reynolds_1987", "vicsek_1995", "vasarhelyi_2018")
 

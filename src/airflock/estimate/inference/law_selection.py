@@ -39,8 +39,8 @@ LONG = 20  # steps of a climb to the end
 ELSEWHERE = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of a number that was given up, beside its default, from which is climbed
 REGAIN = 8  # steps of such a climb
 AGAIN = 3  # steps of a climb without the part that is held out
-# One prediction that lost somebody cost 869 units and hid the gain of nine spans of ten; at ten standard deviations a
-# normal density is 1e-22, which nobody believes of a tracker.
+# One prediction that lost somebody cost 869 units and hid the gain of nine spans of ten; at ten
+# standard deviations a normal density is 1e-22, which nobody believes of a tracker.
 WILD = (1e-3, 20.0)  # share of held-out differences that are wild, and how many times their standard deviation is
 WITHIN = 1.959964  # standard deviations that hold 95 %
 

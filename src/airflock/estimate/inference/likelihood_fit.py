@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from airflock.estimate.inference.innovation_filter import FitModel, SpanScore
 
 Array = NDArray[np.float64]
-# Wide steps cut the corners of ridges ten times narrower; fine steps from their end gained 8 and 15 units more.
+# Wide steps cut the corners of ridges ten times narrower; fine steps from their end gained 8 and 15
+# units more.
 PROBE = 0.02  # of a range: step by which slopes are taken at first; wider than what the tracks' noise blurs
 SHOWN = 1.5  # standard errors, were all others known: steps by which slopes are taken then, and
 MIN_FINE_STEP = 3e-4  # of a range: their least
@@ -24,8 +25,8 @@ MAX_CLIMB_STEPS = 8  # Gauss-Newton steps
 LONGEST = 0.2  # of a range: largest move of a number in one step
 GAINED = 0.05  # loss; a step that gains less is the last
 SHORTER = 6  # times that a step which gains nothing is tried again, shorter
-# A radius takes a pair in or leaves it out: the likelihood has steps that no slope sees, so single numbers are moved
-# by strides, too.
+# A radius takes a pair in or leaves it out: the likelihood has steps that no slope sees, so single
+# numbers are moved by strides, too.
 STRIDES = (0.03, 0.01, 0.003)  # of a range: moves of one number at a time
 CHI2_HALF_95 = 1.92  # loss that a number is worth: what 95 % of numbers that are not needed bring at most (Wilks 1938)
 HALVED = 10  # times that the way to an end is halved
@@ -88,7 +89,8 @@ def jacobian(
     columns = []
     for k, step in zip(free, np.broadcast_to(steps, len(free)).tolist(), strict=True):
         low, high = u.copy(), u.copy()
-        # One-sided slopes cost half; towards the middle of the range, so that the step stays inside it.
+        # One-sided slopes cost half; towards the middle of the range, so that the step stays inside
+        # it.
         if here is not None:
             high[k] += step if u[k] < 0.5 else -step
             columns.append((model.differences(high, spans)[0] - here) / (high[k] - u[k]))
@@ -115,7 +117,8 @@ def climb_to_maximum(
     e, owner = model.differences(start, spans)
     score = model.score_differences(e, owner)
     fit, damping = Fit(start.copy(), free, score, score.loss() + log_prior(start, free)), 1e-3
-    # Marquardt: each gained step trusts the curvature more, each failed one less. The prior adds 4 to the diagonal.
+    # Marquardt: each gained step trusts the curvature more, each failed one less. The prior adds 4
+    # to the diagonal.
     for _ in range(steps):
         hessian, gradient = _normal(
             model, fit, spans, e, PROBE if way == WIDE_SLOPES else probes, way != CENTRAL_SLOPES
@@ -151,7 +154,8 @@ def settle_fit(model: FitModel, fit: Fit, spans: Sequence[int] | None) -> Fit:
     """
     place, lowest = fit.place.copy(), fit.loss
     for stride in STRIDES:
-        # The gains of the filter come after the named numbers; they make nobody a neighbour, so they need no strides.
+        # The gains of the filter come after the named numbers; they make nobody a neighbour, so
+        # they need no strides.
         for k in [k for k in fit.free if k < model.named]:
             for move in (stride, -stride):
                 while True:
@@ -225,7 +229,8 @@ def curvature(model: FitModel, fit: Fit, spans: Sequence[int] | None, slopes: in
     return curvature + 4.0 * np.eye(len(fit.free))
 
 
-# A step of one standard error compromises between the rounding of fine steps and the bends of coarse ones.
+# A step of one standard error compromises between the rounding of fine steps and the bends of
+# coarse ones.
 def _probes(hessian: Array) -> Array:
     """Return fine steps for slopes: those that change the log-likelihood by a little more than 1."""
     return np.asarray(np.clip(SHOWN / np.sqrt(np.diag(hessian) + 4.0), MIN_FINE_STEP, PROBE))
@@ -285,19 +290,21 @@ def _normal(
     along, across = fit.score.variances()
     weights = 1.0 / np.array([along, *[across] * (model.axes - 1)])
     j = jacobian(model, fit.place, fit.free, spans, steps, e if one else None)
-    # Gauss-Newton: second derivatives of the predictions are neglected, since differences are small at the fit.
+    # Gauss-Newton: second derivatives of the predictions are neglected, since differences are small
+    # at the fit.
     hessian = np.einsum("scf,c,scg->fg", j, weights, j, optimize=True)
     gradient = np.einsum("sc,c,scf->f", e, weights, j, optimize=True)
     return hessian, gradient
 
 
-# Search: points from which to climb. Laws have thresholds: if no neighbour is within a radius, the radius has no
-# slope, and a climb from there ends at once. So points are drawn evenly over the whole range (Sobol) and raced: all
-# climb a few steps, the better half goes on. The simpler law comes first: a number whose default switches a part of
-# the law off (a field of view of 360 degrees) stays there until the rest is fitted. Last, each number is moved along
-# its whole range while the others follow (a profile of the likelihood), which leaves modes that lie a valley apart.
-# CMA-ES with 1,600 evaluations was lost among switches that close a part of the law; Sobol points with a race were
-# not.
+# Search: points from which to climb. Laws have thresholds: if no neighbour is within a radius, the
+# radius has no slope, and a climb from there ends at once. So points are drawn evenly over the
+# whole range (Sobol) and raced: all climb a few steps, the better half goes on. The simpler law
+# comes first: a number whose default switches a part of the law off (a field of view of 360
+# degrees) stays there until the rest is fitted. Last, each number is moved along its whole range
+# while the others follow (a profile of the likelihood), which leaves modes that lie a valley apart.
+# CMA-ES with 1,600 evaluations was lost among switches that close a part of the law; Sobol points
+# with a race were not.
 DRAWN = 9  # two to the power of this: places that are looked at
 RACE = ((16, 4), (8, 4), (4, 8))  # how many climb, and by how many steps
 SCAN = 10  # places along the range of one number
@@ -326,8 +333,8 @@ def draw_points(model: FitModel, start: Array, spans: Sequence[int], seed: int) 
 
     named = list(range(model.named))
     found = np.vstack([start[named], qmc.Sobol(len(named), seed=seed).random_base2(DRAWN)])
-    # Drawn values would switch a part on that the simpler law does without; these numbers wait until the rest is
-    # fitted.
+    # Drawn values would switch a part on that the simpler law does without; these numbers wait
+    # until the rest is fitted.
     found[:, default_is_off(model)] = start[default_is_off(model)]
     places = np.tile(start, (len(found), 1))
     places[:, named] = found
@@ -349,7 +356,8 @@ def race_from_points(
     simple = [k for k in free if k not in default_is_off(model)]
     places = [start, *(np.concatenate([x, start[model.named :]]) for x in start_points[: RACE[0][0] - 1])]
     fits: list[Fit] = []
-    # Successive halving: most points are clearly worse after a few steps, so the effort goes to the rest.
+    # Successive halving: most points are clearly worse after a few steps, so the effort goes to the
+    # rest.
     for count, steps in RACE:
         fits = [climb_to_maximum(model, u, simple, spans, steps, slopes=(WIDE_SLOPES,)) for u in places[:count]]
         fits.sort(key=lambda each: each.loss)
@@ -379,18 +387,20 @@ def profile_ranges(model: FitModel, fit: Fit, spans: Sequence[int], on_progress:
     best, curved = fit, curvature(model, fit, spans)
     for _ in range(SWEEPS):
         before = best.loss
-        # Each number visits the middle of every cell of its range; the curvature says where the others go meanwhile.
+        # Each number visits the middle of every cell of its range; the curvature says where the
+        # others go meanwhile.
         for k in [k for k in fit.free if k < model.named]:
             others = [f for f in fit.free if f != k]
             for x in (np.arange(PROFILE) + 0.5) / PROFILE:
                 if abs(x - best.place[k]) < 0.5 / PROFILE:
                     continue
-                # The curvature is only local: where it points to a worse place, the climb begins with the others
-                # unmoved.
+                # The curvature is only local: where it points to a worse place, the climb begins
+                # with the others unmoved.
                 found = _lower(
                     model, (conditional_point(best, curved, k, x), with_coordinate(best.place, k, x)), others, spans
                 )
-                # The move gained: free all numbers from there, and take the curvature of the new place.
+                # The move gained: free all numbers from there, and take the curvature of the new
+                # place.
                 if found.loss < best.loss - BETTER:
                     best = climb_to_maximum(model, found.place, fit.free, spans, 2 * FOLLOW, slopes=(WIDE_SLOPES,))
                     curved = curvature(model, best, spans)
@@ -407,20 +417,22 @@ def _lower(model: FitModel, places: Sequence[Array], free: Sequence[int], spans:
     )
 
 
-# Modes: numbers that act together, such as those of a wall, are searched again over their whole ranges. They have
-# several modes, and long narrow ridges that bend between them: no single number leads along one, and a climb ends
-# wherever on the ridge it arrives. So many climbs are made: some with the numbers of the group alone first, others in
-# a race with all numbers, since beside a wrong rest the group alone climbs back to its old place. Where ends lie
-# apart, the way from one to the better one is continued beyond it.
+# Modes: numbers that act together, such as those of a wall, are searched again over their whole
+# ranges. They have several modes, and long narrow ridges that bend between them: no single number
+# leads along one, and a climb ends wherever on the ridge it arrives. So many climbs are made: some
+# with the numbers of the group alone first, others in a race with all numbers, since beside a wrong
+# rest the group alone climbs back to its old place. Where ends lie apart, the way from one to the
+# better one is continued beyond it.
 TOGETHER = 4  # numbers that are drawn anew together, at most
-# Bhattacharyya's overlap, of roots: in squares a few steps at an edge outweigh all others, and a wall's range and
-# gain (overlap 0.84 to 0.96) were never drawn together.
+# Bhattacharyya's overlap, of roots: in squares a few steps at an edge outweigh all others, and a
+# wall's range and gain (overlap 0.84 to 0.96) were never drawn together.
 ALIKE = 0.8  # overlap of where two numbers act, from which they are
 GROUPS = 3  # of them, the least certain first
 SHARED = 0.5  # of a group: where more of it stands in an earlier one, other groups come first
 REDRAWN = 8  # two to the power of this: places of a group that are looked at
 ALONE, ALL, WHOLE = (16, 10), (6, 16), (4, 12)  # how many climb, by how many steps: the group, all, and on all frames
-# Beside a wrong rest a group climbs back to its old place, because the rest was fitted to it: all numbers must race.
+# Beside a wrong rest a group climbs back to its old place, because the rest was fitted to it: all
+# numbers must race.
 MODE_RACE = ((24, 4), (8, 8))  # the same of a race with all numbers
 KEPT = 4  # of its ends
 SAME = 0.1  # of a range: places whose numbers of a group are all nearer than this are of one hill
@@ -438,7 +450,8 @@ def search_modes(
     few, spans : on which is looked, and on which is fitted
     """
     met: list[Fit] = []
-    # Few frames are enough to find modes, all frames are needed to compare them: the expensive climbs come last.
+    # Few frames are enough to find modes, all frames are needed to compare them: the expensive
+    # climbs come last.
     for group in parameter_groups(model, fit, few_spans):
         apart = redraw_group(model, fit, group, few_spans)
         on_progress()
@@ -473,7 +486,8 @@ def redraw_group(model: FitModel, fit: Fit, group: Sequence[int], few_spans: Seq
         for u in places[: ALONE[0]]
     )
     alone = [end.place for end in sorted(ends, key=lambda end: end.loss)]
-    # each hill once, and not that of the fit: beside the rest of this fit, a higher hill may seem lower
+    # each hill once, and not that of the fit: beside the rest of this fit, a higher hill may seem
+    # lower
     return [*raced, *distinct_points(alone, group, [fit.place, *raced])][: ALL[0]]
 
 
@@ -538,7 +552,8 @@ def parameter_groups(model: FitModel, fit: Fit, spans: Sequence[int]) -> list[li
     overlap = (flat.T @ flat) / np.outer(sizes, sizes)
     errors = np.diag(np.linalg.inv(curvature(model, fit, spans)))[[fit.free.index(k) for k in named]]
     found: list[list[int]] = []
-    # The least certain number founds a group of the numbers that act most like it, unless it is in one already.
+    # The least certain number founds a group of the numbers that act most like it, unless it is in
+    # one already.
     for k in np.argsort(-errors).tolist():
         near = [f for f in np.argsort(-overlap[k]).tolist() if f != k and overlap[k, f] > ALIKE][: TOGETHER - 1]
         group = sorted(named[f] for f in (k, *near))
@@ -553,7 +568,8 @@ def sort_groups(groups: Sequence[list[int]]) -> list[list[int]]:
     Else the numbers of friction, the least certain, would come three times in other company, and those of a wall never.
     """
     first: list[list[int]] = []
-    # A group that repeats more than half of an earlier one waits, so that other numbers have their turn.
+    # A group that repeats more than half of an earlier one waits, so that other numbers have their
+    # turn.
     for group in groups:
         if all(len({*group} & {*other}) <= SHARED * len(group) for other in first):
             first.append(group)

@@ -88,7 +88,8 @@ class NoisyFlight:
         """
         walk, axes = self.walk, self.walk.axes
         was = walk.now().copy()
-        # Three kinds of noise: pushes of the velocity, errors of perceived positions, or a number of the law itself.
+        # Three kinds of noise: pushes of the velocity, errors of perceived positions, or a number
+        # of the law itself.
         if self.noise.column == PUSHED:
             walk.now()[axes:] += self.generator.normal(0.0, self.noise.law, self.shape)
         if self.error is None:
@@ -131,7 +132,8 @@ def fly_tracks(
             state = tracks.state[k]
             if k > begin:
                 flight.step()
-            # Who enters or is absent follows the record, so that the flight has the gaps of the tracks.
+            # Who enters or is absent follows the record, so that the flight has the gaps of the
+            # tracks.
             enters = (state == ENTERS) | (state == ABSENT)
             walk.now()[:, enters] = filtered_states[k][:, enters]
             if k == begin:
@@ -173,7 +175,8 @@ def noise_statistics(model: FitModel, u: Array, spans: Sequence[int]) -> Array:
         rows = np.concatenate([np.arange(*walk.tracks.spans[s]) for s in own])
         found.append(e[rows])
     parts = []
-    # Variances mix noise of the flight and of the tracks; correlations from frame to frame help to separate them.
+    # Variances mix noise of the flight and of the tracks; correlations from frame to frame help to
+    # separate them.
     for c in range(2):
         x = np.concatenate([e[:, c].ravel() for e in found])
         pairs = np.concatenate([(e[1:, c] * e[:-1, c]).ravel() for e in found])
@@ -255,9 +258,10 @@ def first_noise(model: FitModel, point: Array, spans: Sequence[int]) -> list[Fit
     return [found, replace(found, column=BLURRED, law=BLUR * model.scale.near)]
 
 
-# Noise of the law. Small noise hardly shows beside that of the tracks: one flight differs from the next by as much as
-# half of the noise. So the law is flown with noise over a wide range, and curves through all these flights relate the
-# statistics to the noise. The scatter about the curves gives the uncertainty (a synthetic likelihood: Wood 2010).
+# Noise of the law. Small noise hardly shows beside that of the tracks: one flight differs from the
+# next by as much as half of the noise. So the law is flown with noise over a wide range, and curves
+# through all these flights relate the statistics to the noise. The scatter about the curves gives
+# the uncertainty (a synthetic likelihood: Wood 2010).
 FLOWN = 40  # flights of each look
 RANGE = 1.6  # of the logarithm of noise, to each side, at the first look
 NARROW = 0.15  # at the second, at least
@@ -319,8 +323,8 @@ def _look(
     named = flights.model.named
     speeds = flights.model.own_speed
     design, rows = [], []
-    # Stratified draws of the noise along the window; numbers of the law are drawn within their errors, which widens
-    # the interval as it should.
+    # Stratified draws of the noise along the window; numbers of the law are drawn within their
+    # errors, which widens the interval as it should.
     for number in range(FLOWN):
         x = 2.0 * (number + generator.random()) / FLOWN - 1.0
         speed, seen = generator.uniform(-1.0, 1.0, 2) * (1.0 if speeds else 0.0, 1.0)
@@ -360,9 +364,10 @@ MOST = 6  # rounds
 LONGEST = 0.1  # of a range: move of a number that is put right, in one round
 MATCHED = 0.005  # sum of squares by which statistics of flights may differ from those of the tracks in the last round
 STEPS = 6  # of a climb
-# Relative standard deviations of what flights leave out, of numbers and of noise, such as where steps of the motion
-# fall between frames. Measured on tracks of known laws (tests/nightly/infer.py).
-# Our choices, made on tracks of known laws: flights only have noise of the known kinds.
+# Relative standard deviations of what flights leave out, of numbers and of noise, such as where
+# steps of the motion fall between frames. Measured on tracks of known laws
+# (tests/nightly/infer.py). Our choices, made on tracks of known laws: flights only have noise of
+# the known kinds.
 BEYOND = (0.0075, 0.05)
 DOUBT = 0.5  # share of a correction that is not trusted
 ONE = 1.96  # standard errors that hold one number in 95 %
@@ -425,7 +430,8 @@ def correct_fit(
         z = float(normal.ppf(share))
         wide = float(student.ppf(share, count - 1)) * np.sqrt(1.0 + 1.0 / count)
         scatter = np.maximum(wide * deviations, z * curved)
-        # half of what was put right is doubt about the noise, which is simpler in flights than in animals
+        # half of what was put right is doubt about the noise, which is simpler in flights than in
+        # animals
         doubt = np.hypot(DOUBT * (place - fitted), z * BEYOND[0] / np.maximum(slopes, 1e-9))
         down, up = ways.ends(fitted, 0.5 * wider * z**2)
         low = place - np.hypot(np.maximum(scatter, fitted - down), doubt)
@@ -467,9 +473,11 @@ def _put_right(
     for turns in range(MOST):
         matched = [flights.noise(place, each, fitted) for each in kinds]
         kinds = [noise for noise, _ in matched]
-        # noise and numbers go together, as that of a heading and the limit of its turns: each is put right in turn
+        # noise and numbers go together, as that of a heading and the limit of its turns: each is
+        # put right in turn
         last = turns == MOST - 1 or (turns > 0 and min(off for _, off in matched) < MATCHED)
-        # how far fits miss depends on the law: the last flights are of laws as far apart as the first fits were
+        # how far fits miss depends on the law: the last flights are of laws as far apart as the
+        # first fits were
         apart = np.minimum(np.maximum(curved, misses.std(axis=0)), APART) if len(misses) > 1 else np.zeros(len(fitted))
         found = []
         for turn in range(ROUNDS[last]):

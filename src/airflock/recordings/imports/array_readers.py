@@ -159,7 +159,8 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
         raise RecordingError("\n".join(faults))
     rows = np.arange(len(seconds))
     tracks = []
-    # Variables of unknown unit are ignored rather than guessed; velocities are then differentiated from positions.
+    # Variables of unknown unit are ignored rather than guessed; velocities are then differentiated
+    # from positions.
     for number, name in enumerate(found["individual"].values):
         own = found.isel(individual=number)
         position = own["position"].transpose("time", "space").values.astype(float) * scale

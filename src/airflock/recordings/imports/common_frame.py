@@ -15,7 +15,8 @@ from airflock.recordings.imports.track import (
     ImportReport,
 )
 
-# Geodesy: exact, by earth-centred coordinates (WGS84), since a flat earth is 8 cm off at 1 km in height.
+# Geodesy: exact, by earth-centred coordinates (WGS84), since a flat earth is 8 cm off at 1 km in
+# height.
 SEMI_MAJOR = 6378137.0  # m, WGS84 (NIMA TR8350.2)
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)
@@ -142,8 +143,8 @@ def _move(track: ImportedTrack, origin: tuple[float, float, float]) -> None:
     track.origin = origin
 
 
-# Clocks of several devices come to one time by GNSS time, or are refused: a second between two drones is metres of
-# distance.
+# Clocks of several devices come to one time by GNSS time, or are refused: a second between two
+# drones is metres of distance.
 def align_clocks(tracks: list[ImportedTrack], same_clock: bool, findings: ImportReport) -> bool:
     """Put all times on one clock, in place; returns whether quantities between individuals mean something.
 
@@ -178,7 +179,8 @@ def to_utc(track: ImportedTrack) -> float:
     offset = utc - own
     ahead = offset - offset.mean()
     spread = float(((own - centre) ** 2).sum())
-    # a drift can only be told over minutes: quartz drifts by 1e-5, a packet of the receiver is late by 0.1 s
+    # a drift can only be told over minutes: quartz drifts by 1e-5, a packet of the receiver is late
+    # by 0.1 s
     drift = float((ahead * (own - centre)).sum() / spread) if own.max() - own.min() > 60.0 else 0.0
     residual = ahead - drift * (own - centre)
     track.time = track.time + offset.mean() + drift * (track.time - centre)

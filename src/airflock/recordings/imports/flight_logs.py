@@ -20,8 +20,8 @@ from airflock.recordings.imports.track import (
 from airflock.recordings.reader_process import Contents, OnShare, ReaderProcess
 from airflock.support import LinkError, RecordingError
 
-# PX4 ULog files, by pyulog (BSD-3, an extra): topics by name, north-east-down to east-north-up, resets and clock of
-# the file.
+# PX4 ULog files, by pyulog (BSD-3, an extra): topics by name, north-east-down to east-north-up,
+# resets and clock of the file.
 LOCAL, SETPOINT = "vehicle_local_position", "trajectory_setpoint"
 TOPICS = [LOCAL, SETPOINT, "vehicle_gps_position", "vehicle_land_detected"]
 NED = (("x", "y", "z"), ("vx", "vy", "vz"))
@@ -107,9 +107,9 @@ def _air(topic: Any, time: Any) -> Any:
     return ~topic["landed"].astype(bool)[np.maximum(at, 0)] & (at >= 0)
 
 
-# ArduPilot DataFlash logs (.bin) and telemetry logs (.tlog), by pymavlink (LGPL-3, an extra that is only imported).
-# Fields are read by name, because their sets change between releases. Both are read in a process of its own
-# (`reader_process`): pymavlink loops without end in some damaged logs.
+# ArduPilot DataFlash logs (.bin) and telemetry logs (.tlog), by pymavlink (LGPL-3, an extra that is
+# only imported). Fields are read by name, because their sets change between releases. Both are read
+# in a process of its own (`reader_process`): pymavlink loops without end in some damaged logs.
 PARTS = ("PSCN", "PSCE", "PSCD")  # position control: north, east, down
 PACE = 1e5  # bytes per second; read by Python, row by row
 HEAD = b"\xa3\x95"  # of each message; source: ArduPilot, AP_Logger/LogStructure.h
@@ -151,7 +151,8 @@ def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
     north, east, down = rows["PSCN"], rows["PSCE"], rows.get("PSCD")
     time = north[:, 0] * 1e-6
 
-    # States are interpolated to the times of the north axis; a command is constant until the next one.
+    # States are interpolated to the times of the north axis; a command is constant until the next
+    # one.
     def at(table: Any, column: int) -> Any:
         return np.interp(north[:, 0], table[:, 0], table[:, column])
 
@@ -261,7 +262,8 @@ def _need_pymavlink(path: Path) -> None:
         raise RecordingError(f"{path}: ArduPilot logs need pymavlink (LGPL-3): pip install 'airflock[logs]'")
 
 
-# Logs that nodes write on board: place and velocity from the autopilot, and the commands of the node.
+# Logs that nodes write on board: place and velocity from the autopilot, and the commands of the
+# node.
 OTHERS = "of ArduPilot give the .bin that it was made from"  # whose text logs end in .log, too
 
 

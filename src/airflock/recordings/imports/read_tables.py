@@ -39,7 +39,8 @@ def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list
         with path.open("rb") as file:
             wanted = None if columns is None else lambda c: c.strip() in columns
             try:
-                # In chunks, and only the needed columns: an hour of thirty drones does not fit as text.
+                # In chunks, and only the needed columns: an hour of thirty drones does not fit as
+                # text.
                 for part in pd.read_csv(file, usecols=wanted, chunksize=CHUNK, low_memory=False, **text):
                     part.columns = [str(c).strip() for c in part.columns]
                     yield at, part
@@ -66,7 +67,8 @@ def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> 
 
     def parts(columns: list[str] | None) -> Iterator[tuple[int, pd.DataFrame]]:
         at = 1
-        # Arrow decodes a column in each of its threads, and keeps what it has freed: a third of an hour's memory
+        # Arrow decodes a column in each of its threads, and keeps what it has freed: a third of an
+        # hour's memory
         for batch in file.iter_batches(batch_size=CHUNK // 4, columns=columns, use_threads=False):
             yield at, batch.to_pandas()
             at += batch.num_rows
@@ -111,7 +113,8 @@ def tracks_from_parts(
     gathered: dict[str, list[Any]] = {}
     nameless: list[Any] = [np.empty(0, int)]
     columns = None if wide else how.used
-    # Parts are split by individual at once and joined at the end, so that only numbers stay in memory.
+    # Parts are split by individual at once and joined at the end, so that only numbers stay in
+    # memory.
     for at, part in parts(columns):
         rows = np.arange(at, at + len(part))
         for name, piece in split_by_individual(part, wide, how, stem):
@@ -260,7 +263,8 @@ def read_head(path: Path, options: ImportOptions) -> TableHead:
     names = _cells(lines[above], delimiter)
     if len(names) > MAX_COLUMNS:
         column_layout(str(path), names, options)
-    # Some trackers write the names in a comment above the numbers; they are used if their count fits.
+    # Some trackers write the names in a comment above the numbers; they are used if their count
+    # fits.
     hidden = False
     if all(_numeric(name) for name in names):
         over = _cells(lines[above - 1].strip().lstrip(REMARK), delimiter) if above else []
@@ -315,7 +319,8 @@ def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: 
     """Refuse decimal commas that nobody has announced; at: number of the first row."""
     if options.decimal != ".":
         return
-    # A decimal comma beside a comma as delimiter cannot be read: the cells of a row are then too many.
+    # A decimal comma beside a comma as delimiter cannot be read: the cells of a row are then too
+    # many.
     for number, line in enumerate(body, at):
         cells = line.split() if delimiter == BLANKS else line.split(delimiter)
         comma = [cell.strip() for cell in cells if re.fullmatch(r'\s*"?[-+]?\d+,\d+"?\s*', cell)]

@@ -53,8 +53,8 @@ def grid_tolerance(period: float, *instants: float) -> float:
     return 1e-6 * period + 2.0 * float(np.spacing(max(abs(instant) for instant in instants)))
 
 
-# At 30 Hz a step of 0.03333 s drifts past every frame after ten: positions were interpolated, which smooths their
-# noise, and 10,000 frames became 10,001.
+# At 30 Hz a step of 0.03333 s drifts past every frame after ten: positions were interpolated, which
+# smooths their noise, and 10,000 frames became 10,001.
 def _round(period: float) -> float:
     """Round a period (s) to a rate of four digits, such as 30 or 29.97 Hz, else to four digits of itself.
 
@@ -78,7 +78,8 @@ def needed_bits(tracks: list[ImportedTrack], min_bits: int) -> tuple[int, float]
             f"{track.source}: {track.name}: a position of {farthest:.3g} m; at most {FARTHEST:g} m from the origin; "
             "check the unit and which columns are read"
         )
-    # Single precision at 100 km resolves 8 mm; farther away noise of rounding would look like motion.
+    # Single precision at 100 km resolves 8 mm; farther away noise of rounding would look like
+    # motion.
     step = float(np.spacing(np.float32(farthest)))
     return (64 if step > COARSE else min_bits), step
 
@@ -125,7 +126,8 @@ def _fill(
     own, usual = track.time, median_period(track) or period
     rows = track.stack(POSITION_TARGETS, axes)
     late = grid_tolerance(period, times[0], times[-1])
-    # For each time of the grid the row before it; the last row has no row after it, so the pair before is used.
+    # For each time of the grid the row before it; the last row has no row after it, so the pair
+    # before is used.
     at = np.searchsorted(own, times + late, side="right") - 1
     inside = (at >= 0) & (times <= own[-1] + late)
     before = np.clip(at, 0, max(len(own) - 2, 0))
@@ -137,7 +139,8 @@ def _fill(
     broken = np.isin(after, track.breaks)
     normal = inside & (step <= NORMAL * usual) & ~broken
     bridged = inside & (step <= max(bridge, NORMAL * usual)) & ~broken
-    # Good frames are on a row, between two normal rows, or in a gap that may be bridged, but never across a reset.
+    # Good frames are on a row, between two normal rows, or in a gap that may be bridged, but never
+    # across a reset.
     good = on_row | bridged
     if track.in_air is not None:
         good &= track.in_air[before] & track.in_air[after]

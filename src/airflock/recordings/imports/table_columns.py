@@ -148,9 +148,11 @@ def unit_in_metres(unit: str, where: str, subject: str, options: ImportOptions) 
     raise RecordingError(f"{where}: {subject} has no unit; {UNIT_HINT}")
 
 
-# Tables with the fields of PX4: x is north, z is down and times are microseconds, although no header says so.
+# Tables with the fields of PX4: x is north, z is down and times are microseconds, although no
+# header says so.
 FIELDS = {"timestamp", *POSITION_TARGETS, *VELOCITY_TARGETS}
-# fields of vehicle_local_position that no other table has; source: PX4, msg/VehicleLocalPosition.msg
+# fields of vehicle_local_position that no other table has; source: PX4,
+# msg/VehicleLocalPosition.msg
 MARKS = {"ref_timestamp", "xy_valid", "z_valid", "v_xy_valid", "xy_reset_counter", "vxy_reset_counter", "z_deriv"}
 ORIGIN = ("ref_lat", "ref_lon", "ref_alt")
 VALID = ("xy_valid", "v_xy_valid")
@@ -215,8 +217,8 @@ def px4_origin(local: Mapping[str, Any]) -> tuple[float, float, float] | None:
     return None if not len(known) else (float(known[-1, 0]), float(known[-1, 1]), float(known[-1, 2]))
 
 
-# A list of allowed ast nodes, walked by us: eval with a cleaned namespace still reaches the interpreter by
-# attributes.
+# A list of allowed ast nodes, walked by us: eval with a cleaned namespace still reaches the
+# interpreter by attributes.
 LONGEST = 300  # characters; nothing that a column needs is longer
 OPERATIONS = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
 ALLOWED = "column names, numbers, + - * / and parentheses; a name with blanks stands in quotes"
@@ -334,7 +336,8 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
         _recognised(found, [column for column in columns if column not in other], options)
     if other:
         found.notes.append(f"{where}: {', '.join(other)}: no commanded velocity: left out")
-    # Missing targets are only reported if all columns could be read: they may be the unreadable ones.
+    # Missing targets are only reported if all columns could be read: they may be the unreadable
+    # ones.
     whole = not faults
     _frames(found, options, faults)
     if whole:
@@ -418,8 +421,8 @@ def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOpti
         _drop(found, "z")
     if faults:
         raise RecordingError("\n".join(faults))
-    # Lengths without a unit are metres in logs of robots, but pixels in files of trackers and cameras: there they are
-    # refused.
+    # Lengths without a unit are metres in logs of robots, but pixels in files of trackers and
+    # cameras: there they are refused.
     if unsaid:
         tells = [f"{c} comes from a tracker" for c in columns if split_header(c)[0] in OF_A_TRACKER]
         if "t" not in found.expressions and "frame" in found.expressions:

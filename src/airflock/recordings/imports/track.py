@@ -112,8 +112,8 @@ class ImportedTrack:
         self.in_air = None if self.in_air is None else self.in_air[chosen]
 
 
-# Checks see tracks and know no format; errors that may be intended have a kind that `--accept` names. There is no
-# "all".
+# Checks see tracks and know no format; errors that may be intended have a kind that `--accept`
+# names. There is no "all".
 @dataclass
 class ImportReport:
     """Errors and notes of an import, collected to be reported together."""

@@ -200,7 +200,8 @@ def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> 
         place = track.stack(POSITION_TARGETS, 2)
         apart = np.hypot(*(place[same + 1] - place[same]).T)
         other = np.flatnonzero(apart > 1e-9)
-        # Mostly at different places: two individuals share an id. Otherwise the logger repeated rows.
+        # Mostly at different places: two individuals share an id. Otherwise the logger repeated
+        # rows.
         if len(other) > 0.5 * len(same):
             findings.fault(
                 f"{source}: column {track.label('t')}: {track.name} is at two places at once, first row "
@@ -325,7 +326,8 @@ def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 Array = NDArray[np.float64]
-# Displacements against summed velocities decide axes, signs and units together; names of columns cannot.
+# Displacements against summed velocities decide axes, signs and units together; names of columns
+# cannot.
 LAG = 0.5  # s over which velocities are summed up, so that resolution does not hide the slope
 TOLERANCE = 0.1  # of a slope that should be 1
 SIGMAS, WILD = 8.0, 20.0  # of a jump, with and without a velocity to predict it
@@ -549,8 +551,8 @@ def prediction_errors(track: ImportedTrack) -> tuple[NDArray[np.float64], float]
     moved, steps = np.diff(place, axis=0), np.diff(track.time)
     if len(moved) < 20:
         return np.empty((0, 2)), 0.0
-    # The logged velocity predicts best; without one the last step is continued, which is noisier: hence the wider
-    # limit WILD.
+    # The logged velocity predicts best; without one the last step is continued, which is noisier:
+    # hence the wider limit WILD.
     if track.has(VELOCITY_TARGETS):
         speed = track.stack(VELOCITY_TARGETS, 2)
         predicted = 0.5 * (speed[1:] + speed[:-1]) * steps[:, None]

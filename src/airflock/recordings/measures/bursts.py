@@ -57,7 +57,8 @@ def _rises(speed: NDArray[np.float64], least: float) -> list[tuple[int, int, int
     turns: list[tuple[int, int]] = []
     low = top = 0
     rising = False
-    # A small state machine with hysteresis: a rise or fall counts once it exceeds `least`, so noise makes no burst.
+    # A small state machine with hysteresis: a rise or fall counts once it exceeds `least`, so noise
+    # makes no burst.
     for k in range(1, len(speed)):
         if rising:
             if speed[k] > speed[top]:

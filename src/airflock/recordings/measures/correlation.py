@@ -39,8 +39,8 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
         raise ParameterError(f"width = {width:g} m must be above 0")
     sums: dict[int, list[float]] = {}
     alone, whole, count = 0.0, 0.0, 0
-    # The mean velocity is removed at each instant; the sums of all instants are divided once, so crowded instants
-    # weigh more.
+    # The mean velocity is removed at each instant; the sums of all instants are divided once, so
+    # crowded instants weigh more.
     for place, speed, there in zip(found.position, found.velocity, found.present, strict=True):
         if there.sum() < 2:
             continue
@@ -57,7 +57,8 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
             entry = sums.setdefault(int(b), [0.0, 0.0])
             entry[0] += total[b]
             entry[1] += number[b]
-    # If nobody differs from the mean by more than rounding, the ratio would be noise divided by noise.
+    # If nobody differs from the mean by more than rounding, the ratio would be noise divided by
+    # noise.
     scale = alone / count if alone > NOTHING**2 * whole else np.nan
     last = max(sums, default=0) if farthest is None else int(farthest / width)
     kept = [b for b in sorted(sums) if b <= last]

@@ -7,7 +7,8 @@ import xarray as xr
 from airflock.recordings.measures.states import check_numbers, headings, track_arrays
 from airflock.support import ParameterError
 
-# Of equal delays the shortest counts. Two that fly straight had "led" by the longest delay, through rounding.
+# Of equal delays the shortest counts. Two that fly straight had "led" by the longest delay, through
+# rounding.
 ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordings have single precision
 
 
@@ -40,7 +41,8 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
     shifts = shifts[np.abs(shifts) < len(h)]
     n = h.shape[2]
     table = np.full((n, n, len(shifts)), np.nan)
-    # One shift at a time, all pairs by a matrix product: all shifts at once would need their number times the memory.
+    # One shift at a time, all pairs by a matrix product: all shifts at once would need their number
+    # times the memory.
     for k, shift in enumerate(shifts):
         first, later = (h[: len(h) - shift], h[shift:]) if shift >= 0 else (h[-shift:], h[:shift])
         there = np.isfinite(first).all(axis=1).astype(float), np.isfinite(later).all(axis=1).astype(float)
@@ -87,7 +89,8 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
             course = table.values[i, j]
             if not np.isfinite(course).any():
                 continue
-            # Correlations within rounding are equal; among these the shortest delay is the simplest explanation.
+            # Correlations within rounding are equal; among these the shortest delay is the simplest
+            # explanation.
             top = np.flatnonzero(course >= np.nanmax(course) - ALIKE)
             k = int(top[np.abs(shifts[top]).argmin()])
             if course[k] >= least:

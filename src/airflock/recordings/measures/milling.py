@@ -37,7 +37,8 @@ def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
             continue
         out = found.position[k][:, moves] - found.position[k][:, there].mean(axis=1, keepdims=True)
         out = out / np.maximum(np.linalg.norm(out, axis=0), 1e-12)
-        # In the plane the third component is zero, so that one cross product serves plane and space.
+        # In the plane the third component is zero, so that one cross product serves plane and
+        # space.
         flat = np.zeros((2, 3, int(moves.sum())))
         flat[0, : len(out)], flat[1, : len(out)] = out, h[k][:, moves]
         course[k] = float(np.linalg.norm(np.cross(flat[0].T, flat[1].T).mean(axis=0)))

@@ -37,7 +37,8 @@ def group_shape(recording: xr.Dataset) -> pd.DataFrame:
     for place, speed, there, moves in zip(found.position, found.velocity, found.placed, found.present, strict=True):
         x, count = place[:, there], int(there.sum())
         hull = length = width = np.nan
-        # A hull needs one point more than there are axes; fewer have none, and points on a line have a hull of 0.
+        # A hull needs one point more than there are axes; fewer have none, and points on a line
+        # have a hull of 0.
         if count > axes:
             try:
                 hull = float(ConvexHull(x.T).volume)  # in the plane `volume` is the area

@@ -30,7 +30,8 @@ def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
     found = track_arrays(recording)
     h = headings(found.velocity[:, :2], slowest)
     sine = h[:-1, 0] * h[1:, 1] - h[:-1, 1] * h[1:, 0]
-    # The angle by arctan2 of sine and cosine is exact for any turn below half a circle between two frames.
+    # The angle by arctan2 of sine and cosine is exact for any turn below half a circle between two
+    # frames.
     rate = np.arctan2(sine, (h[:-1] * h[1:]).sum(axis=1)) / np.diff(found.time)[:, None]
     if len(h) > 1:
         before, after = np.vstack([rate[:1], rate]), np.vstack([rate, rate[-1:]])
