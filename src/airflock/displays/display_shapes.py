@@ -28,7 +28,8 @@ ROUNDS = 40  # of Lloyd's iteration
 
 
 def shape_points(shape: str, count: int, spacing: float = 3.0, height: float = 15.0, seed: int = 0) -> Points:
-    """Points (count, 3) of a shape, m: at least spacing (m) apart, all above height (m), centred over the origin.
+    """Return points (count, 3) of a shape, m: at least spacing (m) apart, all above height (m), centred over the
+    origin.
 
     shape : the path of an image or mesh, or any other text, which is written
 
@@ -66,7 +67,7 @@ def shape_points(shape: str, count: int, spacing: float = 3.0, height: float = 1
 
 
 def _pixels_of_text(text: str) -> NDArray[np.bool_]:
-    """Pixels of a text, upright."""
+    """Return the pixels of a text, upright."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -78,7 +79,7 @@ def _pixels_of_text(text: str) -> NDArray[np.bool_]:
 
 
 def _pixels_of_image(path: Path) -> NDArray[np.bool_]:
-    """Opaque or, without transparency, dark pixels."""
+    """Return opaque or, without transparency, dark pixels."""
     import imageio.v3 as iio
 
     try:
@@ -98,14 +99,16 @@ def _pixels_of_image(path: Path) -> NDArray[np.bool_]:
 
 
 def _evenly(filled: NDArray[np.bool_], count: int, rng: np.random.Generator) -> Points:
-    """Points (count, 2) right and up, at the centres of equal shares of the filled pixels."""
+    """Return points (count, 2) right and up, at the centres of equal shares of the filled pixels."""
     rows, columns = np.nonzero(filled)
     pixels = np.column_stack([columns, -rows]).astype(float)
     if len(pixels) < count:
         raise AirflockError(f"{len(pixels)} filled pixels are fewer than {count} points; give a larger picture")
+    # Every round visits all pixels: a sample bounds the time.
     if len(pixels) > 40_000:
         pixels = pixels[rng.choice(len(pixels), 40_000, replace=False)]
     centres = pixels[rng.choice(len(pixels), count, replace=False)]
+    # Lloyd (1982): each centre moves to the mean of its pixels; one without pixels is drawn again.
     for _ in range(ROUNDS):
         owner = cKDTree(centres).query(pixels)[1]
         share = np.bincount(owner, minlength=count)[:, None]
@@ -115,7 +118,7 @@ def _evenly(filled: NDArray[np.bool_], count: int, rng: np.random.Generator) -> 
 
 
 def _spread_over_mesh(path: Path, count: int, rng: np.random.Generator) -> Points:
-    """Points on the surface, each as far as can be from those before."""
+    """Return points on the surface, each as far as possible from those before."""
     from airflock.world import read_mesh
 
     try:
@@ -126,11 +129,14 @@ def _spread_over_mesh(path: Path, count: int, rng: np.random.Generator) -> Point
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     if area.sum() <= 0.0:
         raise AirflockError(f"{path}: the mesh has no area")
+    # Uniform on the surface: faces by area, then points in a triangle by the root of a uniform
+    # number.
     face = rng.choice(len(corners), 40 * count, p=area / area.sum())
     u, v = np.sqrt(rng.uniform(size=(1, len(face), 1))), rng.uniform(size=(1, len(face), 1))
     a, b, c = corners[face].transpose(1, 0, 2)
     cloud = ((1.0 - u) * a + u * (1.0 - v) * b + u * v * c)[0]
     chosen, gap = [0], np.linalg.norm(cloud - cloud[0], axis=1)
+    # Farthest points first: greedy, at most a factor of two worse than the best spacing.
     while len(chosen) < count:
         chosen.append(int(gap.argmax()))
         gap = np.minimum(gap, np.linalg.norm(cloud - cloud[chosen[-1]], axis=1))

@@ -19,10 +19,12 @@ Positions = NDArray[np.float64]  # (drone, 3) or (point, 3), m
 ExtraLengths = NDArray[np.float64] | float  # (drone, point), m
 
 
+# Least squared ways: straight lines flown in equal time then keep the spacing over the root of 2
+# (Turpin et al. 2014).
 def assign_points(
     drones: Positions, points: Positions, blocked: NDArray[np.bool_], extra_lengths: ExtraLengths = 0.0
 ) -> NDArray[np.int64]:
-    """Number of the point of each drone: positions (drone, 3) and points (point, 3) in m; optimal (scipy).
+    """Assign a point to each drone: positions (drone, 3) and points (point, 3) in m; optimal (scipy).
 
     blocked : of each point, whether something stands in its place
     longer  : how much longer (drone, point) a way is than the straight one, m
@@ -42,18 +44,22 @@ def is_better_assignment(
     proposed: NDArray[np.int64],
     extra_lengths: ExtraLengths = 0.0,
 ) -> bool:
-    """Whether another assignment saves more than a tenth, and more than 1 m², of the squared ways of what is flown."""
+    """Return True if another assignment saves more than a tenth, and more than 1 m², of the squared ways."""
     squares, who = _squares(drones, points, extra_lengths), np.arange(len(drones))
     old, new = (float(squares[who, each].sum()) for each in (current, proposed))
     return new < 0.9 * old and old - new > 1.0
 
 
 def _squares(drones: Positions, points: Positions, longer: ExtraLengths) -> Positions:
-    """Squares (drone, point) of the lengths of all ways, m²."""
+    """Return squares (drone, point) of the lengths of all ways, m²."""
     straight = ((drones[:, None, :] - points[None, :, :]) ** 2).sum(axis=2)
     return straight if isinstance(longer, float) else np.asarray((np.sqrt(straight) + longer) ** 2)
 
 
+# Detours past drones that hover. A drone flies straight for its point and is repelled by what it
+# comes near. Where pull and push balance it stays: a side of a box across the way stops it for
+# good. The control sees that it makes no progress, and first sends it to a point beside the
+# obstacle.
 CLEARANCE = 1.6  # m; a point, or a way, that comes nearer than this to a drone that hovers is not free
 BESIDE = 3.0  # m from a drone that hovers: there its push has ended
 ROOM = 2.4  # m; nearer to others a drone is pushed (`formation.r0_rep`)
@@ -63,7 +69,9 @@ STEP = 1.0  # m; who has moved less meanwhile, with a goal farther ahead than th
 
 
 def hulls_in_the_way(positions: Positions, points: Positions, hulls: Positions) -> NDArray[np.bool_]:
-    """Which hulls stand near ways from places to points (both (n, 3)): (n, hull); not those that a way leads off."""
+    """Return which hulls stand near ways from places to points (both (n, 3)): (n, hull); not those that a way leads
+    off.
+    """
     way = points - positions
     length2 = np.maximum((way**2).sum(axis=1), 1e-12)[:, None]
     off = hulls[None, :, :] - positions[:, None, :]
@@ -73,8 +81,9 @@ def hulls_in_the_way(positions: Positions, points: Positions, hulls: Positions) 
 
 
 def detour_lengths(positions: Positions, points: Positions, hulls: Positions) -> ExtraLengths:
-    """How much longer (drone, point) ways are that lead around a drone that hovers, m."""
+    """Return the extra length (drone, point) of ways that lead around a drone that hovers, m."""
     found = np.zeros((len(positions), len(points)))
+    # One point after another: all pairs of drones, points and hulls at once would be a large table.
     for number, point in enumerate(points):
         found[:, number] = hulls_in_the_way(positions, np.broadcast_to(point, positions.shape), hulls).any(axis=1)
     return 2.0 * BESIDE * found
@@ -83,7 +92,8 @@ def detour_lengths(positions: Positions, points: Positions, hulls: Positions) ->
 def detour_point(
     position: Positions, point: Positions, hulls: Positions, other_positions: Positions, tried_points: Positions
 ) -> Positions:
-    """A point (3,) beside the first hull on the way from a place to a point (both (3,)), level with that or above it.
+    """Return a point (3,) beside the first hull on the way from a place to a point (both (3,)), level with that or
+    above it.
 
     others : places (n, 3) of drones that fly, beside most of which there is room; tried : points (n, 3) of no avail
     """
@@ -92,9 +102,12 @@ def detour_point(
     along = (point - position) / max(float(np.linalg.norm(point - position)), 1e-9)
     side = np.cross(along, (0.0, 0.0, 1.0))
     side = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([1.0, 0.0, 0.0])
+    # Points of the upper half of a circle across the way, from one side over the top to the other.
     turn = np.linspace(0.0, np.pi, SIDES)[:, None]
     found = first + BESIDE * (np.cos(turn) * side + np.sin(turn) * np.cross(side, along))
     from_here, onwards = np.broadcast_to(position, found.shape), np.broadcast_to(point, found.shape)
+    # Weights are ordered, not tuned: a tried point is worse than a blocked one, that worse than a
+    # crowded one, that than any length.
     bad = 1e3 * _nearer(found, tried_points, 1.0) + 1e2 * _nearer(found, hulls, CLEARANCE)
     bad += 1e2 * (
         hulls_in_the_way(from_here, found, hulls).sum(axis=1) + hulls_in_the_way(found, onwards, hulls).sum(axis=1)
@@ -105,12 +118,12 @@ def detour_point(
 
 
 def _nearer(points: Positions, others: Positions, distance: float) -> NDArray[np.int64]:
-    """How many of the others lie nearer than a distance (m) to each point."""
+    """Count the others that lie nearer than a distance (m) to each point."""
     return np.asarray((np.linalg.norm(points[:, None] - others[None], axis=2) < distance).sum(axis=1))
 
 
 class StuckDetector:
-    """Who makes none: looks at places and at goals that are under way, one after another.
+    """Detector of drones without progress: compares places and current goals over a window of time.
 
     period : between two looks, s
     """
@@ -119,11 +132,11 @@ class StuckDetector:
         self.period, self.seen = period, list[tuple[Positions, NDArray[np.bool_]]]()
 
     def begin(self) -> None:
-        """Forget what was seen: everybody sets out."""
+        """Forget all observations: everybody sets out."""
         self.seen = []
 
     def look(self, positions: Positions, goals: Positions) -> NDArray[np.bool_]:
-        """Who is held up: places and goals (drone, 3), m; nan for who is not there."""
+        """Return which drones are stuck: places and goals (drone, 3), m; nan for an absent one."""
         behind = np.linalg.norm(goals - positions, axis=1) > STEP
         self.seen = [*self.seen, (positions.copy(), behind)][-1 - round(STUCK / self.period) :]
         if len(self.seen) <= round(STUCK / self.period):
@@ -132,13 +145,16 @@ class StuckDetector:
         return np.asarray(np.all([each for _, each in self.seen], axis=0) & (moved < STEP))
 
     def standing(self, positions: Positions) -> NDArray[np.bool_]:
-        """Who has hardly moved since the first of the looks."""
+        """Return which drones have hardly moved since the first observation."""
         return np.asarray(np.linalg.norm(positions - self.seen[0][0], axis=1) < STEP)
 
 
+# The control assigns points to the drones, again when some fail, are pushed away or are stuck.
 NEAR = 1.0  # m; a drone is placed within
 CHECK = 5.0  # s; how often the master looks once all should be there
 LOOK = 1.0  # s; how often it looks for drones that make no progress
+# On the flat side of a box the pull to the goal and the push off it balance stably: one shape of 25
+# was never completed.
 PATIENCE = 60.0  # s; how long it waits for a shape at most
 HALF = 0.35  # m; half side of the box that stands for a drone that hovers
 
@@ -147,7 +163,7 @@ FrameArray = NDArray[np.float64]
 
 @dataclass
 class ShapeReport:
-    """How one shape was formed.
+    """Report on how one shape was formed.
 
     time     : until every surviving drone was within 1 m of its point, s; nan if never
     error, worst : mean and largest distance of a surviving drone from its point at the end, m
@@ -167,7 +183,7 @@ class ShapeReport:
 
 
 class ShowControl:
-    """Who gives the drones their points, and sees what becomes of them.
+    """Controller that assigns points to the drones, and supervises their progress.
 
     flight  : of all drones, from the first shape to the last
     target  : of each drone the number of its point, also of those that have failed
@@ -257,7 +273,7 @@ class ShowControl:
         return anew
 
     def _tell(self) -> None:
-        """Tell the drones where to fly, and what stands in the way."""
+        """Send each drone its goal, and the hulls that stand in the way."""
         boxes = [[*(hull - HALF), *(hull + HALF), 0.0] for hull in self.hulls]
         self.flight.change({"goals.points": self._aims(), "scene.boxes": boxes})
         self._set_out()
@@ -289,6 +305,8 @@ class ShowControl:
         standing = self.progress.standing(places)
         self.tried = {int(who): [] for who in held} | self.tried
         self._assign()
+        # Another point may be the simplest way out, so points are assigned again before detours are
+        # planned.
         for who in held:
             met = np.array([*self.hulls, *places[standing & (np.arange(len(places)) != who)]]).reshape(-1, 3)
             point = self.points[self.target[who]]
@@ -303,12 +321,12 @@ class ShowControl:
         self._tell()
 
     def _aims(self) -> list[list[float]]:
-        """Where each drone shall fly: to its point, or past what stands in its way."""
+        """Return the goal of each drone: its point, or a detour round what stands in its way."""
         aims = [self.around.get(who, self.points[k]) for who, k in enumerate(self.target)]
         return [list(map(float, aim)) for aim in aims]
 
     def _under_way(self) -> float:
-        """How long all are under way to their points, s."""
+        """Return the time (s) that all have to reach their points."""
         return 1.5 * float(self._distances().max()) / self.scenario.goals.speed + 4.0
 
     def _distances(self) -> FrameArray:
@@ -335,6 +353,7 @@ class ShowControl:
         samples = round(seconds / self.period)
         if flight.time + samples * self.period > flight.scenario.flight.duration:
             flight.change({"duration": flight.time + samples * self.period + PATIENCE})
+        # The flight runs sample by sample, because assignments react to what has just happened.
         for _ in range(samples):
             flight.advance(self.period)
             if flight.time > self.last_look_time + LOOK - 0.5 * self.period:
@@ -349,6 +368,7 @@ class ShowControl:
     def _drop(self, places: FrameArray) -> None:
         """Move the drones that fall, and count those that they strike; places (3, drone) of those that fly."""
         reach, left = self.scenario.metrics.r_coll, []
+        # A failed drone has left the flock, so its fall is integrated here.
         for body in self.falling_drones:
             touching = np.zeros(places.shape[1], bool)
             for _ in range(10):  # a fall of 10 m/s takes 10 cm in a tenth of a frame

@@ -37,18 +37,18 @@ class Show:
 
 
 def recording_of(show: Show) -> xr.Dataset:
-    """A show as a recording with its events; drones that failed are missing from then on."""
+    """Make a recording of a show with its events; failed drones are missing from then on."""
     return recorded(show.flight)
 
 
 def display_scenario(drones: int, settings: dict[str, Any] | None = None) -> Scenario:
-    """Scenario of a display, with keys changed."""
+    """Return the scenario of a display, with keys changed."""
     there = [[3.0 * i, 0.0, 10.0] for i in range(drones)]
     return load(FILE, {"agents": drones, "goals.points": there, **(settings or {})})
 
 
 def waiting_points(count: int, spacing: float = 3.0, height: float = 10.0) -> FrameArray:
-    """Where drones wait before the first shape: points (count, 3) of a level square, m."""
+    """Return the points (count, 3) of a level square where drones wait before the first shape, m."""
     side = int(np.ceil(np.sqrt(count)))
     number = np.arange(count)
     x, y = (number % side - 0.5 * (side - 1)) * spacing, (number // side - 0.5 * (side - 1)) * spacing
@@ -160,7 +160,9 @@ def plan_shapes(
     settings: Mapping[str, Any] | None,
     name_prefix: str = "",
 ) -> list[NDArray[np.float64]]:
-    """Points (point, 3) of each shape, m; raises ScenarioError with all faults. `dash` goes before names in faults."""
+    """Return the points (point, 3) of each shape, m; raise ScenarioError with all errors. `dash` goes before names in
+    errors.
+    """
     faults = []
     if not 0.0 <= failing <= 0.9:
         faults.append(f"{name_prefix}failing = {failing:g} lies outside [0, 0.9]")

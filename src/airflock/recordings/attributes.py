@@ -17,6 +17,8 @@ from airflock.recordings.dataset import EAST_NORTH_UP, FRAME_ATTRIBUTE, check_da
 from airflock.scenarios import MODELS
 from airflock.support import RecordingError, as_error, parse_json_object, shortened
 
+# A file is data from outside: every attribute is read as text and checked, and none of it is
+# executed.
 RECORDING_FORMAT = 2
 FORMAT_ATTRIBUTE, CHECKSUM_ATTRIBUTE, LAW_ATTRIBUTE = "airflock_format", "airflock_checksum", "airflock_law"
 EVENTS, FAULTS_ATTRIBUTE = "airflock_events", "airflock_faults"
@@ -31,7 +33,7 @@ def check_format(recording: xr.Dataset, where: str = "recording") -> None:
 
 
 def read_integer(recording: xr.Dataset, name: str, default: int | None = None, where: str = "recording") -> int:
-    """A whole number of the attributes; `usual` where it is missing. Raises RecordingError for anything else."""
+    """Return a whole number of the attributes, or `default`; raise RecordingError for anything else."""
     value: Any = recording.attrs.get(name, default)
     if isinstance(value, (float, np.floating)) and np.isfinite(value) and value == int(value):
         value = int(value)
@@ -42,7 +44,7 @@ def read_integer(recording: xr.Dataset, name: str, default: int | None = None, w
 
 
 def scenario_document(recording: xr.Dataset) -> dict[str, Any] | None:
-    """The scenario that a recording was flown with; None for tracks; RecordingError if damaged."""
+    """Return the scenario of a recording as plain values, None for tracks; raise RecordingError if damaged."""
     found = _object(recording, "airflock_scenario")
     if found is not None and not isinstance(found.get("model", {}), Mapping):
         raise RecordingError("recording: attribute airflock_scenario is damaged: model is not a table")
@@ -50,7 +52,7 @@ def scenario_document(recording: xr.Dataset) -> dict[str, Any] | None:
 
 
 def recording_name(recording: xr.Dataset) -> str:
-    """What to call a recording: its scenario's name, or that of the file that its tracks came from."""
+    """Return a name for a recording: that of its scenario, or of the file that its tracks came from."""
     files = str(recording.attrs.get("source_file") or "").split(", ")
     first = files[0].rpartition("/")[2].rpartition(".")[0] or files[0]
     more = f" and {len(files) - 1} more" if len(files) > 1 else ""
@@ -58,13 +60,13 @@ def recording_name(recording: xr.Dataset) -> str:
 
 
 def axis_names(recording: xr.Dataset) -> tuple[str, str, str]:
-    """What to call the axes: east, north, up of flights and of tracks on the ground; else x, y, z, as of a tank."""
+    """Return names of the axes: east, north, up of flights and of tracks on the ground; else x, y, z, as in a tank."""
     known = recording.attrs.get("airflock_scenario") or recording.attrs.get(FRAME_ATTRIBUTE) == EAST_NORTH_UP
     return ("east", "north", "up") if known else ("x", "y", "z")
 
 
 def metrics_settings(recording: xr.Dataset) -> dict[str, Any]:
-    """What a flight was measured by: the section [metrics] with all its values."""
+    """Return the section [metrics] that a flight was measured by, with all its values."""
     return _object(recording, "airflock_metrics") or {}
 
 
@@ -77,7 +79,7 @@ def _object(recording: xr.Dataset, name: str) -> dict[str, Any] | None:
 
 
 def recorded_events(recording: xr.Dataset) -> list[Any]:
-    """What was done to the flight on its way, as `simulate(..., events=...)` takes it."""
+    """Return the events of a flight as `simulate(..., events=...)` takes them."""
     found = (_object(recording, EVENTS) or {}).get("events", [])
     if not isinstance(found, list):
         raise RecordingError(f"recording: attribute {EVENTS} is damaged: it holds no list of events")
@@ -85,7 +87,7 @@ def recorded_events(recording: xr.Dataset) -> list[Any]:
 
 
 def recorded_faults(recording: xr.Dataset) -> list[dict[str, Any]]:
-    """Faults that befell agents in flight: kind, agent, and when they began and ended (s; None: they did not end)."""
+    """Return the faults of a flight: kind, agent, begin and end (s; None: it did not end)."""
     found = (_object(recording, FAULTS_ATTRIBUTE) or {}).get("faults", [])
     sound = isinstance(found, list) and all(
         isinstance(entry, Mapping) and {"kind", "agent", "begin", "end"} <= set(entry) and _instant(entry["begin"])
@@ -97,7 +99,7 @@ def recorded_faults(recording: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def faults_line(faults: list[dict[str, Any]], max_faults: int = 6) -> str:
-    """Faults in one line for a person: what, who and when."""
+    """Return the faults in one line for a person: kind, agent and time."""
     lines = [f"{each['kind']} of agent {each['agent']} at {each['begin']:g} s" for each in faults[:max_faults]]
     more = f", and {len(faults) - max_faults} more" if len(faults) > max_faults else ""
     return f"{len(faults)} fault{'s' if len(faults) > 1 else ''}: {', '.join(lines)}{more}"
@@ -108,7 +110,7 @@ def _instant(value: Any) -> bool:
 
 
 def uses_user_law(recording: xr.Dataset) -> bool:
-    """Whether the law, that of a group, or a kind of fault was the user's own, which is not in the recording."""
+    """Return True if a law or a kind of fault was the user's own, whose code is not in the recording."""
     document = scenario_document(recording)
     if document is None:
         return False
@@ -119,23 +121,26 @@ def uses_user_law(recording: xr.Dataset) -> bool:
 
 
 def user_group_laws(document: Mapping[str, Any]) -> list[str]:
-    """Names of laws of groups that were the user's own."""
+    """Return the names of laws of groups that were the user's own."""
     laws = [law for group in tables_under_key(document, "groups") for law in tables_under_key(group, "model")]
     return [kind for kind in (str(law["kind"]) for law in laws if "kind" in law) if kind not in MODELS]
 
 
 def tables_under_key(document: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
-    """Tables under a key of a scenario that nobody has checked yet: one, those of a list, or none."""
+    """Return the tables under a key of an unchecked scenario: one, those of a list, or none."""
     found = document.get(key)
     entries = found if isinstance(found, list) else [found]
     return [entry for entry in entries if isinstance(entry, Mapping)]
 
 
 def recording_checksum(recording: xr.Dataset) -> str:
-    """Hash of all arrays and attributes but itself, the same before saving and after loading."""
+    """Return the hash of all arrays and attributes but itself; saving and loading do not change it."""
     found = hashlib.sha256()
+    # Sorted, and with shapes: the order of variables in a file may change when other tools copy it.
     for name in sorted(map(str, recording.variables)):
         values = recording[name].values
+        # Texts are hashed as JSON, because their type (fixed width or objects) changes between
+        # saving and loading.
         plain = values.astype(str) if values.dtype.kind in "OSU" else values
         content = json.dumps(plain.tolist()).encode() if plain.dtype.kind == "U" else np.ascontiguousarray(plain).data
         found.update(f"{name} {recording[name].dims} {plain.shape}\n".encode())

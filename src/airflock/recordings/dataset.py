@@ -34,7 +34,7 @@ def make_dataset(
     command: str,
     groups: Sequence[str] = (),
 ) -> xr.Dataset:
-    """Dataset from frames (time, component, agent): position, velocity and command components.
+    """Make a dataset of frames (time, component, agent), whose components are position, velocity and command.
 
     times   : time of each frame, or the constant time between two, s
     command : what the model commands: velocity (m/s), acceleration (m/s²) or heading
@@ -60,6 +60,8 @@ def make_dataset(
         name: (DIMENSIONS, frames[:, c * dimensions : (c + 1) * dimensions, None, :], {"units": units[name]})
         for c, name in enumerate(names)
     }
+    # Absent agents have nan in the frames; `movement` expects a confidence besides, which is 0 for
+    # them.
     there = np.isfinite(frames[:, None, :dimensions]).all(axis=2).astype(np.float32)  # 0 of those who are absent
     variables["confidence"] = (("time", "keypoint", "individual"), there)
     fixed = {"source_software": "airflock", "ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds"}
@@ -87,6 +89,7 @@ def check_recording(recording: xr.Dataset, where: str = "recording") -> None:
         missing = [name for name in DIMENSIONS if name not in recording["position"].dims]
         if missing:
             faults.append(f"position lacks the dimension{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
+    # Without all dimensions the other checks would fail by themselves, and hide the first error.
     if not faults:
         sizes = recording["position"].sizes
         if sizes["time"] < 1 or sizes["individual"] < 1:
@@ -108,7 +111,7 @@ def check_recording(recording: xr.Dataset, where: str = "recording") -> None:
 
 
 def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any], float, NDArray[np.bool_]]:
-    """Frames (time, component, agent) of position and velocity, the time between frames (s), and who is there.
+    """Return frames (time, component, agent) of position and velocity, the time between frames (s), and presence.
 
     An agent of which a number is missing (nan) at an instant is not there then: (time, agent). Velocity is
     differentiated from position, within stretches in which the agent is there, where it is not recorded.
@@ -121,6 +124,8 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
     period = float(np.median(steps)) if steps.size else 1.0
     if not SHORTEST <= period < np.inf:
         raise RecordingError(f"{where}: frames are {period:g} s apart, less than {SHORTEST:g} s or more than any time")
+    # A law and its metrics assume a constant step; deviations of up to 1 % are taken as rounding of
+    # times.
     if steps.size and np.abs(steps - period).max() > 0.01 * period + 1e-9:
         raise RecordingError(
             f"{where}: frames are {steps.min():g} to {steps.max():g} s apart; resample to a constant rate"
@@ -132,6 +137,7 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
     else:
         raise RecordingError(f"{where}: one frame without velocity has no speed to score")
     frames = np.concatenate([position, velocity], axis=1)
+    # nan means absent, infinity is an error: it would turn every mean into infinity.
     endless = np.argwhere(np.isinf(frames))
     if len(endless):
         time, component, agent = endless[0]
@@ -148,8 +154,10 @@ def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[N
 Array = NDArray[Any]
 
 
+# numpy.gradient weighs three equal positions with weights that do not cancel: a group at rest then
+# had a heading.
 def central_difference(position: Array, times: Array) -> Array:
-    """Velocity (time, ...), m/s, from positions in m at times in s: central differences, one-sided at both ends.
+    """Compute velocity (time, ...), m/s, of positions in m at times in s: central differences, one-sided at both ends.
 
     Exactly 0 where a position stays the same over the frames that it is taken from: `numpy.gradient` leaves a rounding
     error there, which is a velocity of 1e-15 m/s with a heading.
@@ -161,7 +169,9 @@ def central_difference(position: Array, times: Array) -> Array:
 
 
 def differentiated_velocity(position: Array, times: Array) -> Array:
-    """Velocity (time, axis, individual), m/s, within the stretches in which each individual is there; else nan."""
+    """Compute velocity (time, axis, individual), m/s, within the stretches in which each individual is present; else
+    nan.
+    """
     there = np.asarray(~np.isnan(position).any(axis=1))
     if there.all():
         return central_difference(position, times)
@@ -176,12 +186,13 @@ def differentiated_velocity(position: Array, times: Array) -> Array:
 
 
 def box_sides(world: arena.Parameters, dimensions: int) -> Array | None:
-    """Sides of a periodic world, (axis,) m; None of any other."""
+    """Return the sides of a periodic world, (axis,) m; None of any other world."""
     return 2.0 * np.array(half_sizes(world)[:dimensions]) if world.edges == "periodic" else None
 
 
+# In a periodic world the shortest way between two places may lead across the border.
 def nearest_image(offset: Array, box: Array | None, axis: int = 0) -> Array:
-    """Offsets (m) to the nearest images; `axis` is that of coordinates, `box` what `box_sides` returns."""
+    """Return offsets (m) to the nearest images; `axis` is that of the coordinates, `box` is from `box_sides`."""
     if box is None:
         return offset
     side = box.reshape([-1 if a == axis else 1 for a in range(offset.ndim)])

@@ -11,6 +11,7 @@ import xarray as xr
 from airflock.recordings.dataset import DIMENSIONS, check_recording
 from airflock.support import RecordingError, atomic, suffix_error, to_path
 
+# Exports: the ending of the name decides the format, `layout` the names inside.
 SUFFIXES = (".csv", ".parquet", ".nc")
 LAYOUTS = ("movement", "movement-0.16", "px4")
 
@@ -60,11 +61,12 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
     return write_parquet(recording, target)
 
 
+# Long tables: one row per instant and individual that is present.
 COLUMNS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "command": ("cx", "cy", "cz")}
 
 
 def to_table(recording: xr.Dataset) -> pd.DataFrame:
-    """Long table: id, t [s], x [m], ..., vx [m/s], ..., cx [m/s], ...; no rows where one is absent."""
+    """Make a long table: id, t [s], x [m], ..., vx [m/s], ..., cx [m/s], ...; absent individuals have no rows."""
     check_recording(recording)
     order = ("individual", "time", "space", "keypoint")
     count, times = recording.sizes["individual"], recording["time"].values.astype(float)
@@ -86,7 +88,7 @@ def to_table(recording: xr.Dataset) -> pd.DataFrame:
 
 
 def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
-    """The table as a log of PX4 has it: `timestamp` in whole microseconds, x north, y east, z down (a plane has z = 0).
+    """Make the table of a PX4 log: `timestamp` in whole microseconds, x north, y east, z down (a plane has z = 0).
 
     The fields are those of `vehicle_local_position`; commanded velocities are cx, cy, cz in the same axes.
     """
@@ -101,6 +103,8 @@ def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
             continue
         unit = headers[x].partition(" ")[2]
         up = table[headers[z]] if z in headers else 0.0 * table[headers[x]]
+        # East-north-up to north-east-down: x and y change places, z its sign; 0.0 - up writes 0 and
+        # not -0.
         for name, values in ((x, table[headers[y]]), (y, table[headers[x]]), (z, 0.0 - up)):
             found[f"{name} {unit}".strip()] = values
     return pd.DataFrame(found)
@@ -125,12 +129,13 @@ def write_parquet(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
+# Datasets of `movement`, in the layout of today and of releases until 0.16.
 STATES = ("position", "velocity", "command")
 PLURAL = {"keypoint": "keypoints", "individual": "individuals"}
 
 
 def to_movement(recording: xr.Dataset, *, plural_dimensions: bool = False) -> xr.Dataset:
-    """Dataset with position, confidence and the attributes of poses; velocity and command beside, where there are any.
+    """Make a dataset of poses with position and confidence, and with velocity and command where there are any.
 
     plural_dimensions : the dimensions keypoints and individuals, as `movement` up to 0.16 asks for
     """
@@ -149,7 +154,7 @@ def to_movement(recording: xr.Dataset, *, plural_dimensions: bool = False) -> xr
 
 
 def write_movement(recording: xr.Dataset, path: str | os.PathLike[str], *, plural_dimensions: bool = False) -> Path:
-    """Write such a dataset as netCDF."""
+    """Write a dataset of `movement` as netCDF."""
     atomic.write_file(
         path, to_movement(recording, plural_dimensions=plural_dimensions).to_netcdf(None, engine="h5netcdf")
     )

@@ -29,7 +29,7 @@ UNKNOWN = Model(name="unknown", Parameters=_Nothing, command="velocity", decide=
 
 
 def power_settings(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Settings that measure the power of a recording's geometry; `changed` goes before them.
+    """Return settings that measure the power which a recording's geometry saves; `changed` has priority.
 
     A law that solves for the wings of the flock flies in a frame that moves with the air; elsewhere forward is the
     flock's mean heading.
@@ -43,7 +43,7 @@ def power_settings(recording: xr.Dataset, settings: Mapping[str, Any] | None = N
 def scenario_of_recording(
     recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False
 ) -> Scenario:
-    """Scenario that a recording was flown with, or for a flight log one that only says how to score it.
+    """Rebuild the scenario of a recording; for a flight log, build one that only defines the metrics.
 
     A law, a body or a metric set of the user's own is not in the file: the law is unknown then, and the others are the
     usual ones, unless settings give a file ({"metrics.kind": "mine.py"}), which runs with `trust`. A log brings no
@@ -55,6 +55,7 @@ def scenario_of_recording(
     if document is not None:
         with as_error(str(recording.attrs.get("airflock_name", "recording")), RecordingError):
             return _flown(document, settings, recording, trust)
+    # A log has no scenario: one agent with the recorded speed carries the metrics.
     frames, period, _ = recording_frames(recording)
     dims = frames.shape[1] // 2
     speed = float(np.nanmean(np.linalg.norm(frames[:, dims:], axis=1)))
@@ -70,12 +71,14 @@ def scenario_of_recording(
 
 
 def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dataset, trust: bool) -> Scenario:
-    """Scenario of a simulated recording, with stand-ins for what the file does not hold and nobody gave."""
+    """Rebuild the scenario of a simulated recording, with stand-ins for the user's own code that is not at hand."""
     name = str(recording.attrs.get("airflock_name", "recording"))
     missing = missing_user_parts(document, given)
     document, settings = with_user_files(document, given)
     if "metrics" in missing:
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
+    # A missing part is replaced by the usual one: recordings are measured here, not flown, so its
+    # physics does not matter.
     if "body" in missing:
         document = {**{key: value for key, value in document.items() if key != "groups"}, "body": {}}
     if "sensors" in missing:
@@ -97,18 +100,20 @@ def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dat
             {key: group[key] for key in ("name", "agents") if key in group} if isinstance(group, Mapping) else group
             for group in document["groups"]
         ]
+    # Numbers of the unknown law cannot be checked, and no metric reads them.
     others = {key: value for key, value in settings.items() if not key.startswith("model.")}
     return build_scenario(stand_in, name, others, caller_parts=CallerParts(law=UNKNOWN), trust=trust)
 
 
 def _usual_metrics(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of a section metrics that every set has."""
+    """Return the keys of a section [metrics] that every set has."""
     known = {key for key, _, _ in declarations(SECTIONS["metrics"])} - {"kind"}
     return {key: value for key, value in table.items() if key in known}
 
 
+# A recording names the user's own kinds of parts, but never contains their code.
 def user_parts(document: Mapping[str, Any]) -> dict[str, str]:
-    """Section → name of what the user's own was there, of the scenario that a recording was flown with."""
+    """Return section → name of each kind of part that was the user's own in the recorded scenario."""
     found = {}
     for family in PART_KINDS:
         table = document.get(family.section)
@@ -119,12 +124,12 @@ def user_parts(document: Mapping[str, Any]) -> dict[str, str]:
 
 
 def missing_user_parts(document: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, str]:
-    """Those of them for which settings give no file."""
+    """Return those of the user's own kinds of parts for which the settings name no file."""
     return {s: kind for s, kind in user_parts(document).items() if not str(settings.get(f"{s}.kind")).endswith(".py")}
 
 
 def with_user_files(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The document with the files that settings give for such kinds, whose numbers stay; and all other settings."""
+    """Return the document with the files that settings name for the user's own kinds, and the other settings."""
     found, rest = dict(document), dict(settings)
     for section in user_parts(document).keys() - missing_user_parts(document, settings).keys():
         found[section] = {**found[section], "kind": rest.pop(f"{section}.kind")}

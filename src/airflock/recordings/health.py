@@ -1,4 +1,4 @@
-"""Whether this machine can fly: versions, processor, GPUs, and the same short flight on each device."""
+"""Self-check of this machine: versions, processor, GPUs, and the same short flight on each device."""
 
 import platform
 import shutil
@@ -24,7 +24,7 @@ EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  
 
 
 def doctor() -> dict[str, Any]:
-    """Versions, processor, GPUs and cache of this machine, and a ten-second self-check on each device.
+    """Report versions, processor, GPUs and cache of this machine, and run a ten-second self-check on each device.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def doctor() -> dict[str, Any]:
 
 
 def _gpu(scenario: Scenario, known: dict[str, float]) -> dict[str, Any]:
-    """What GPUs there are, or why none can be used; and the same flight on the first of them."""
+    """Report the GPUs, or why none can be used, and the same flight on the first of them."""
     fault = gpu.unavailable_reason()
     if fault is not None:
         return {"gpu": fault}

@@ -1,4 +1,4 @@
-"""Reception: how old what agents have of each other is, by distance (Vásárhelyi et al. 2018, Fig. 8)."""
+"""Age of the knowledge that agents have of each other, by distance (Vásárhelyi et al. 2018, Fig. 8)."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ HOW = (
 
 
 def packet_age(heard: xr.Dataset | pd.DataFrame, bins: int = BINS) -> pd.DataFrame:
-    """Age of what is known of another agent by the distance to it, over all pairs and instants.
+    """Compute the age of the knowledge about another agent by the distance to it, over all pairs and instants.
 
     heard : a recording with `age` (time, receiver, sender), s; or a table of packets, one row for each decision and
             pair: receiver, sender, t (s), stamp (s), distance (m), got (0 or 1)
@@ -41,6 +41,7 @@ def packet_age(heard: xr.Dataset | pd.DataFrame, bins: int = BINS) -> pd.DataFra
     edges = np.linspace(0.0, max(float(distance.max()), 1e-6), bins + 1)
     place = np.clip(np.searchsorted(edges, distance, side="right") - 1, 0, bins - 1)
     rows = []
+    # Quantiles per bin: ages have long tails under loss, for which means would be misleading.
     for number in range(bins):
         ages = age[place == number]
         known = ages[np.isfinite(ages)]
@@ -51,7 +52,7 @@ def packet_age(heard: xr.Dataset | pd.DataFrame, bins: int = BINS) -> pd.DataFra
 
 
 def _of_recording(recording: xr.Dataset) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Distance (m) and age (s) of every pair at every instant at which both are there."""
+    """Return distance (m) and age (s) of every pair at every instant at which both are present."""
     if "age" not in recording:
         raise RecordingError(f"recording: does not hold the age of received data; {HOW}")
     frames, _, present = recording_frames(recording)
@@ -72,10 +73,13 @@ def _of_recording(recording: xr.Dataset) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def _of_table(heard: pd.DataFrame) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Distance (m) and age (s) of every row: since the stamp of the last packet of the pair that arrived."""
+    """Return distance (m) and age (s) of every row: time since the stamp of the last packet that arrived from this
+    sender.
+    """
     lacking = [name for name in COLUMNS if name not in heard]
     if lacking:
         raise RecordingError(f"heard: no column {', '.join(lacking)}; give {', '.join(COLUMNS)}")
     rows = heard.sort_values("t", kind="stable")
+    # Between two packets the last one is what the receiver knows, so its stamp is carried forward.
     stamp = rows["stamp"].where(rows["got"] > 0).groupby([rows["receiver"], rows["sender"]]).ffill()
     return rows["distance"].to_numpy(float), (rows["t"] - stamp).to_numpy(float)

@@ -1,4 +1,4 @@
-"""What a number of flights can say of rare events, and which flight was the worst."""
+"""Bounds of the probability of rare events from a number of flights, and the worst flight."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,7 +7,7 @@ CONFIDENCE = 0.95
 
 
 def upper_probability_bound(events: int, flights: int, confidence: float = CONFIDENCE) -> float:
-    """Largest probability of an event per flight that so few events allow (Clopper and Pearson 1934, one-sided).
+    """Return the largest probability per flight that so few events allow (Clopper and Pearson 1934, one-sided).
 
     events : flights in which it happened, out of `flights`. Returns 0 to 1; for no event 1 - (1 - confidence)^(1/n).
     """
@@ -17,10 +17,11 @@ def upper_probability_bound(events: int, flights: int, confidence: float = CONFI
 
 
 def rare_event_notes(scores: Sequence[Mapping[str, Any]], seeds: Sequence[int]) -> list[str]:
-    """Sentences under a table of several flights: how often there were collisions at most, and the worst seed."""
+    """Return notes on several flights: the upper bound of the share with collisions, and the worst seed."""
     if len(scores) < 2:
         return []
     said = []
+    # No collision in ten flights is weak evidence: the bound says how weak.
     if all("n_coll" in row for row in scores):
         hit = sum(row["n_coll"] > 0.0 for row in scores)
         bound = upper_probability_bound(hit, len(scores))

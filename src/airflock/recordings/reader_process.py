@@ -24,6 +24,8 @@ from typing import Any
 
 from airflock.support import RecordingError, as_error, is_file, to_path
 
+# Archives, compressed files and pickles are no recordings, whatever their names say; one line names
+# the remedy.
 ARCHIVES = (".zip", ".gz", ".7z", ".tar", ".rar", ".xz", ".bz2")
 STARTS = {b"PK\x03\x04": "a zip archive; unpack it first: unzip", b"\x1f\x8b": "compressed; unpack it first: gunzip"}
 PICKLES = (".pkl", ".pickle")
@@ -49,6 +51,8 @@ def refuse_pickle_file(path: Path) -> None:
         )
 
 
+# A file of 34 kB with 350 zeroed bytes keeps HDF5 busy for ever, beyond Ctrl-C. Not a fork: a
+# process with threads may fork while a lock is taken.
 LEAST_TIME = 15.0  # s of a processor that a file of any size may take
 WAIT = 4.0  # time by the clock over that of a processor, for machines that are busy with other things
 MOST_HEADER = 200_000_000  # bytes of names and attributes
@@ -121,7 +125,8 @@ class ReaderProcess:
             "paths": [path for path in sys.path if os.path.isabs(path)], "file": str(self.path.absolute()),
             "read": [read.__module__, read.__name__], "room": memory // 4, "seconds": math.ceil(self.limit),
         }  # fmt: skip
-        # isolated (-I, -S): neither the folder of the recording nor a start-up file decides what is imported
+        # isolated (-I, -S): neither the folder of the recording nor a start-up file decides what is
+        # imported
         command = [sys.executable or "", "-I", "-S", "-c", START]
         # one thread, and no filter of HDF5 from outside its own library
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::"}
@@ -162,6 +167,8 @@ class ReaderProcess:
 
         with self, as_error(self.path, RecordingError):
             header: dict[str, Any] = {"share": 0.0}
+            # Reports of progress come first, any number of them; the header of the arrays ends
+            # them.
             while "share" in header:
                 if on_progress is not None:
                     on_progress(min(0.99, header["share"]))
@@ -173,6 +180,7 @@ class ReaderProcess:
                 raise RecordingError(f"{self.path}: is not {self.kind} that can be read: {header['error']}")
             variables = {}
             for name, dims, attributes, dtype, shape in header["variables"]:
+                # Arrays arrive as plain bytes behind the header: no pickle, and no copy.
                 values = np.empty(shape, dtype)
                 if self.stdout.readinto(_bytes_of(values)) < values.nbytes:
                     raise self._ended()
@@ -181,7 +189,7 @@ class ReaderProcess:
             return xr.decode_cf(dataset) if self.decoded else dataset
 
     def _ended(self) -> RecordingError:
-        """Say why the process ended before its answer was complete."""
+        """Return the error that says why the process ended before its answer was complete."""
         code = self.process.wait(timeout=10.0)
         if code in ENDED_LATE or time.monotonic() >= self.deadline:
             return RecordingError(f"{self.path}: could not be opened within {self.limit:.0f} s; it may be damaged")
@@ -213,6 +221,7 @@ def run_reader(request: Mapping[str, Any]) -> None:
                 entries.append([name, dims, own, array.dtype.str, list(array.shape)])
                 arrays.append(array)
             send({"attributes": attributes, "variables": entries})
+        # The process must answer with one line, whatever a damaged file makes a library raise.
         except Exception as error:  # a damaged file may raise anything
             send({"error": (str(error).splitlines() or [""])[0] or type(error).__name__})
             return
@@ -221,11 +230,12 @@ def run_reader(request: Mapping[str, Any]) -> None:
 
 
 def _limit(room: int, seconds: int) -> None:
-    """Allow no core file, no file written, no more memory than the arrays may need, so many seconds of a processor."""
+    """Limit this process: no core file, no file written, memory for the arrays, and seconds of a processor."""
     try:
         import resource
     except ImportError:  # Windows has no such limits
         return
+    # Three times the arrays: decoding and copying need more memory than the result.
     limits = {"CORE": 0, "FSIZE": 0, "AS": 3 * room + SPARE, "CPU": seconds}
     for kind, value in ((getattr(resource, f"RLIMIT_{name}"), value) for name, value in limits.items()):
         with suppress(ValueError):  # a hard limit below this one stays
@@ -238,6 +248,7 @@ def _refuse_outside(path: str, room: int) -> None:
 
     total = 0.0
     with h5py.File(path, "r") as file:
+        # A link or a virtual dataset could read any file of this user into the recording.
         for name in file:
             if isinstance(file.get(name, getlink=True), h5py.ExternalLink):
                 raise ValueError(f"{name} is a link to another file")

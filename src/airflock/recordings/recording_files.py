@@ -1,4 +1,4 @@
-"""Recordings on disk: netCDF that other tools open, complete or not there at all."""
+"""Recordings on disk: netCDF that other tools open. A file is complete, or is not there."""
 
 import os
 import warnings
@@ -105,6 +105,8 @@ def load_recording(path: str | os.PathLike[str] | ReaderProcess) -> xr.Dataset:
     with as_error(where, RecordingError):
         check_recording(recording, where)
         attributes.check_format(recording, where)
+        # A changed recording is still readable; it only can no longer be trusted to be the flight
+        # of its attributes.
         noted = recording.attrs.get(attributes.CHECKSUM_ATTRIBUTE)
         if noted is not None and noted != attributes.recording_checksum(recording):
             warnings.warn(f"{where}: was changed since Airflock wrote it", stacklevel=2)
@@ -126,6 +128,7 @@ def replay_recording(
         raise RecordingError("recording: was not flown from a scenario and a seed, so it cannot be flown again")
     own = law_from_caller(law) if law is not None else None
     _refuse_missing_laws(recording, document, own)
+    # A flight is replayed exactly or not at all, so stand-ins for missing code are refused here.
     require_user_files(document, settings or {})
     document, _ = with_user_files(document, settings or {})
     name = str(recording.attrs.get("airflock_name", "recording"))
@@ -161,7 +164,7 @@ def _refuse_missing_laws(recording: xr.Dataset, document: Mapping[str, Any], own
 
 
 def _differences(recording: xr.Dataset, scenario: Scenario, now: Mapping[str, Any]) -> list[str]:
-    """What could explain other bits than those of a recording; now : provenance of the flight that is compared."""
+    """Return the differences that could explain other bits; now : provenance of the flight that is compared."""
     words = {
         "airflock_version": "version of Airflock",
         "airflock_sources": "rules and driver",

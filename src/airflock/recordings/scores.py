@@ -43,7 +43,7 @@ def score(
     body_length: float | None = None,
     trust: bool = False,
 ) -> pd.DataFrame:
-    """Order parameters and fitness as a table: one row per seed of a scenario, or one row for a recording.
+    """Score a scenario, one row of order parameters per seed, or a recording, one row.
 
     Parameters
     ----------
@@ -130,8 +130,9 @@ def _of_recording(
     body_length: float | None,
     trust: bool,
 ) -> pd.DataFrame:
-    """The table of a recording."""
+    """Return the table of a recording."""
     settings = settings_dict(given, "recording")
+    # Explicit settings have priority over what follows from the length of a body.
     settings = body_length_settings(body_length) | settings if body_length is not None else settings
     settings = power_settings(recording, settings) if aero else settings
     scenario = scenario_of_recording(recording, settings, trust=trust)
@@ -148,7 +149,7 @@ def _of_recording(
 def undefined_metrics_of(
     recording: xr.Dataset, scenario: Scenario, settings: Mapping[str, Any] | None = None
 ) -> dict[str, tuple[str, ...]]:
-    """Order parameters that a recording without a scenario does not have for want of a length, with the keys missing.
+    """Return the order parameters that tracks lack because nobody gave a length, with the missing keys.
 
     scenario : `scenario_of` the recording with these settings
     """
@@ -160,7 +161,7 @@ def undefined_metrics_of(
 
 
 def between_frames_note(recording: xr.Dataset, scenario: Scenario) -> str:
-    """What a simulated recording cannot tell as its flight did, which looked between its frames; empty if nothing.
+    """Return a note on order parameters that the flight measured between the recorded frames; empty if there are none.
 
     scenario : `scenario_of` the recording
     """
@@ -178,13 +179,13 @@ def between_frames_note(recording: xr.Dataset, scenario: Scenario) -> str:
 
 
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
-    """A table with units and meanings of its columns among its attributes."""
+    """Add units and meanings of the columns to the attributes of a table."""
     of_courses = {name: about for each in scenario.measures.metrics for name, about in each.courses.items()}
     return with_units(table, of_courses | dict(reported_values(scenario.measures)))
 
 
 def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> pd.DataFrame:
-    """Order parameters at every instant of a recording.
+    """Compute order parameters at every instant of a recording.
 
     Parameters
     ----------
@@ -221,14 +222,14 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, 
 
 
 def time_series_names(scenario: Scenario) -> list[str]:
-    """Names of the order parameters that have a value at every instant of a flight: the columns of `over_time`."""
+    """Return the names of the order parameters with a value at every instant: the columns of `over_time`."""
     return [name for metric in plan_of(scenario.alike()).metrics for name in metric.Sample._fields]
 
 
 def measure_recording(
     recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False
 ) -> tuple[dict[str, Any], pd.DataFrame]:
-    """Order parameters of a recording, and their course over time.
+    """Measure the order parameters of a recording, and their course over time.
 
     Frames are taken every metrics.period, or each one if they are farther apart; collisions every
     metrics.collision_period. Where a number is missing (nan) the individual is not there: an instant counts with those
@@ -240,7 +241,10 @@ def measure_recording(
     scenario = scenario_of_recording(recording, settings, trust=trust)
     precision = 64 if frames.dtype == np.float64 else 32
     q = scenario.resolved_metrics()
+    # Frames farther apart than the metrics' period are used one by one; they are never
+    # interpolated.
     every = max(1, round(q.period / period)), max(1, round((q.collision_period or period) / period))
+    # The very stages of a flight measure, so a score never depends on where it was computed.
     values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times)
@@ -254,6 +258,7 @@ def measure_recording(
     return kept, course[[name for name in course if name not in untold]]
 
 
+# Groups: order parameters of each group of a recording, and between each two of them.
 PAIR_METRICS = {
     "r_centres": ("m", "mean distance between the centres of two groups; nan in a periodic world"),
     "r_between": ("m", "smallest distance between agents of the two groups"),
@@ -265,7 +270,7 @@ PART = 200  # instants at once
 def group_scores(
     recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False
 ) -> pd.DataFrame:
-    """Order parameters as a table: a row for all agents, one for each group, and one for each two groups.
+    """Score groups: a row for all agents, one for each group, and one for each two groups.
 
     A group is measured as if the others were not there. What is between two groups, `PAIR_METRICS`, stands in rows
     named "one to other"; an instant counts where both have somebody there. Of a group that is never there all but
@@ -297,11 +302,13 @@ def _between(
     dims: int,
     box: NDArray[Any] | None,
 ) -> dict[str, float]:
-    """What is between two groups of agents; box : sides of a periodic world, m."""
+    """Measure two groups of agents against each other; box : sides of a periodic world, m."""
     x, v = frames[:, :dims].astype(float), frames[:, dims : 2 * dims].astype(float)
     heading = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12)
     both = np.logical_and(np.any(present[:, pair[0]], axis=1), np.any(present[:, pair[1]], axis=1))
     apart, nearest, cosines = [], np.inf, []
+    # In parts of 200 instants: all pairs of two large groups at all instants would not fit in
+    # memory.
     for first in range(0, len(x), PART):
         part = np.flatnonzero(both[first : first + PART]) + first
         if not len(part):
@@ -320,6 +327,10 @@ def _between(
     }
 
 
+# Lengths: without one that fits, some order parameters of tracks say nothing. Fish of 4 cm were
+# scored with lengths of drones: all in collision at 3 m. A recording without a scenario gets no
+# order parameter whose length, centre or wanted speed nobody gave. Excursions and rotations are
+# left out, too: the origin may be a corner of a picture.
 FITNESS = "r_cluster", "r_coll", "r_comm", "v_flock"
 # Order parameter: keys of `metrics` that it depends on.
 NEEDS: dict[str, tuple[str, ...]] = {
@@ -344,7 +355,7 @@ IN_BODIES = {"r_coll": 0.5, "r_body": 0.5, "r_b": 0.5, "r_safe": 1.0, "r_cluster
 
 
 def body_length_settings(length: float) -> dict[str, float]:
-    """Settings that measure in lengths of a body.
+    """Return settings that measure distances in lengths of a body.
 
     Two bodies touch where their centres are half a length apart, and belong together up to five lengths: our choice,
     since nothing that is published fits all animals. Say `metrics.r_cluster` and the like where you know better.
@@ -374,7 +385,7 @@ def body_length_settings(length: float) -> dict[str, float]:
 def undefined_metrics(
     names: Iterable[str], kind: str, settings: Mapping[str, Any], *, arena: bool
 ) -> dict[str, tuple[str, ...]]:
-    """Order parameters of a metric set that depend on keys which settings do not give, and these keys.
+    """Return the order parameters of a set that depend on keys which the settings lack, and these keys.
 
     arena : whether settings give one, without which nobody is ever outside
     """
@@ -385,7 +396,7 @@ def undefined_metrics(
 
 
 def missing_lengths_note(undefined: Mapping[str, tuple[str, ...]]) -> str:
-    """One line that names what is not told and what to give."""
+    """Return one line that names the missing order parameters and the keys that they need."""
     keys = sorted({key for needed in undefined.values() for key in needed})
     lengths = " or ".join(filter(None, (
         "--body-length 0.04" if set(keys) & IN_BODIES.keys() else "",
@@ -394,8 +405,9 @@ def missing_lengths_note(undefined: Mapping[str, tuple[str, ...]]) -> str:
     return f"not shown, as tracks do not say what is near, fast or the centre: {', '.join(undefined)}; give {lengths}"
 
 
+# A subclass and no wrapper: everything that takes a DataFrame takes it.
 class ScoreTable(pd.DataFrame):  # type: ignore[misc]  # pandas has no types here
-    """Order parameters, a column each; `attrs["units"]` and `attrs["meanings"]` say what they are.
+    """Table of order parameters, a column each; `attrs["units"]` and `attrs["meanings"]` describe them.
 
     It is a DataFrame in all but its heads in a notebook: below each name stands the unit, and pointing at a name shows
     the meaning. What pandas makes of it is such a table, too, as long as it keeps the attributes.
@@ -406,7 +418,7 @@ class ScoreTable(pd.DataFrame):  # type: ignore[misc]  # pandas has no types her
         return ScoreTable
 
     def _repr_html_(self) -> str | None:
-        """As pandas writes it, with units and meanings in the heads."""
+        """Return the table as pandas writes it, with units and meanings in the column headers."""
         page: Any = super()._repr_html_()
         if page is None:  # pandas was told to show text
             return None
@@ -420,7 +432,7 @@ class ScoreTable(pd.DataFrame):  # type: ignore[misc]  # pandas has no types her
 
 
 def with_units(table: pd.DataFrame, descriptions: dict[str, tuple[str, str]]) -> ScoreTable:
-    """A table with the units and meanings of those of its columns that are known: name → unit, meaning."""
+    """Return a table with the units and meanings of its known columns; descriptions : name → unit, meaning."""
     made = ScoreTable(table)
     made.attrs |= table.attrs
     for place, about in (("units", 0), ("meanings", 1)):

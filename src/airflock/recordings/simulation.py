@@ -83,6 +83,7 @@ def simulate(
     scenario = load_if_named(scenario).with_drawn_scene(seed)
     check_keep(keep, events, scenario)
     device = pick_device([scenario], device, precision=precision, record=True, notify=say)
+    # Open flights exist on these devices only; others fly the whole flight in one launch.
     if device in Flight.DEVICES:
         flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events, device=device)
         perceived = finish_keeping(flight, keep) if keep else {}
@@ -107,7 +108,7 @@ def simulate(
 
 
 def recording_of(flight: Flight) -> xr.Dataset:
-    """Recording of what an open flight has flown so far.
+    """Make a recording of an open flight up to now.
 
     Parameters
     ----------
@@ -151,7 +152,7 @@ def recording_of(flight: Flight) -> xr.Dataset:
 
 
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
-    """Everything that decides the bits of a flight, as plain attributes."""
+    """Return everything that decides the bits of a flight, as plain attributes."""
     text = driver_text(scenario, precision=precision)
     own = scenario.document.get("model", {}).get("kind") not in MODELS
     return {
@@ -169,7 +170,7 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
 
 
 def bare_document(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain values, of which code of the user's own is its bare name: no file, and no place of one."""
+    """Return the scenario as plain values; code of the user's own is its bare name, without a file."""
     document: dict[str, Any] = to_plain_values(scenario.document)
     for section in ("model", "body", "sensors", "metrics"):
         table = document.get(section, {})
@@ -184,7 +185,7 @@ def bare_document(scenario: Scenario) -> dict[str, Any]:
 
 
 def to_plain_values(value: Any) -> Any:
-    """A nested dict of plain Python values, for JSON."""
+    """Convert nested values to plain Python values, for JSON."""
     if isinstance(value, dict) or hasattr(value, "items"):
         return {str(key): to_plain_values(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
@@ -192,6 +193,9 @@ def to_plain_values(value: Any) -> Any:
     return value
 
 
+# What agents measured and received, beside a recording. The flight is the closed one, bit for bit:
+# it is cut at its decisions, where an open flight may be cut. Measured states are read from it;
+# packets of a plain radio are drawn again from the same counters as in the driver.
 Array = NDArray[Any]
 KINDS = ("measured", "heard")
 FARTHEST = 1e8  # m; the limit of any range in a driver
@@ -224,6 +228,7 @@ def finish_keeping(flight: Flight, keep: Sequence[str]) -> dict[str, xr.Variable
     measured: list[Array] = []
     ages: list[Array] = []
     following = 0  # frame
+    # One turn per decision: sense, note what the frames until the next decision see, then fly on.
     while not flight.over:
         flight.sense()
         now = flight.step * dt
@@ -263,7 +268,11 @@ def _variables(measured: list[Array], ages: list[Array], dimensions: int) -> dic
 
 
 def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
-    """Uniform number of each pair (receiver, sender) in a decision: `core.random.pair_uniform` for a whole flock."""
+    """Draw the uniform number of each pair (receiver, sender) in a decision: `core.random.pair_uniform` of a whole
+    flock.
+    """
+    # The driver draws for four receivers by one Philox call; the same grouping here gives the same
+    # numbers.
     fours, senders = -(-agents // 4), np.arange(agents, dtype=np.uint64)
     first = random.pair_number(4 * np.arange(fours, dtype=np.uint64)[:, None], senders, agents)
     zero = np.zeros_like(first)
@@ -274,8 +283,11 @@ def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
 
 
 def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float) -> Array:
-    """When what each agent knows of each other one was sent, s, after a decision; nan: never heard."""
+    """Return the time stamps (s) of the states that each agent knows of each other one after a decision; nan: never
+    heard.
+    """
     k, n = flight.scenario.radio, flight.agents
+    # Such a radio keeps the stamps in the flight itself; only a plain one must be drawn again.
     if flight.scenario.transceiver.keeps_packets:
         return np.where(np.eye(n, dtype=bool), np.nan, flight.sent)
     place = flight.state[: flight.scenario.dimensions].astype(float)
@@ -286,6 +298,7 @@ def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float)
             d -= 2.0 * half * np.round(d / (2.0 * half))
     apart = np.sqrt((offset**2).sum(axis=0))
     heard = (apart <= min(k.range, FARTHEST)) & ~np.eye(n, dtype=bool)
+    # Probabilities only for pairs in range: the rule is a Python call for each pair.
     if k.loss > 0.0:
         i, j = np.nonzero(heard)
         lost = np.array([radio.lost(float(d), k) for d in apart[i, j]])

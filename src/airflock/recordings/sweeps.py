@@ -89,7 +89,7 @@ def sweep(
 
 
 def grid_points(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    """All combinations of the values of several keys; raises a ScenarioError that names keys without a list of them."""
+    """Return all combinations of the values of several keys; raise ScenarioError for keys without a list of values."""
     if not isinstance(over, Mapping):
         raise ScenarioError([f"over = {over!r}: give keys with lists of values, such as {{'radio.delay': [0.0, 1.0]}}"])
     lacking = [key for key, values in over.items() if isinstance(values, str) or not isinstance(values, Iterable)]
@@ -106,9 +106,10 @@ def scenarios_at(
     *,
     trust: bool = False,
 ) -> list[Scenario]:
-    """The scenario at each point of a grid; raises ScenarioError with the faults of all."""
+    """Build the scenario at each point of a grid; raise ScenarioError with the errors of all points."""
     faults: list[str] = []
     found = []
+    # All points are built before any flies, so that an error in the last one costs no flights.
     for point in points:
         with collect_errors(faults):
             changed = {**(settings or {}), **point}
@@ -120,7 +121,7 @@ def scenarios_at(
 
 
 def _columns_given_twice(points: Sequence[Mapping[str, Any]], scenarios: Sequence[Scenario]) -> list[str]:
-    """Keys by their last word that the table has as another column: the seed of a flight, or an order parameter."""
+    """Return errors for swept keys whose last word is another column of the table: the seed, or an order parameter."""
     faults: list[str] = []
     for key in points[0] if points and scenarios else ():
         if key == "seed" or any(key in reported_values(found.measures) for found in scenarios):
@@ -132,7 +133,8 @@ def _columns_given_twice(points: Sequence[Mapping[str, Any]], scenarios: Sequenc
 def fly_points(
     points: Sequence[Mapping[str, Any]], scenarios: Sequence[Scenario], seeds: Sequence[int], **options: Any
 ) -> pd.DataFrame:
-    """Tidy table of the flights of all seeds at all points; options as of `sweep`."""
+    """Fly all seeds at all points and return a tidy table; options as in `sweep`."""
+    # One list of all flights: workers are busy until the end of the sweep, not of each point.
     jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in seeds]
     flights = [found for _, found, _ in jobs]
     rows = score_scenarios(flights, [seed for _, _, seed in jobs], **options)
@@ -142,7 +144,9 @@ def fly_points(
 
 
 def metric_to_show(metric: str | None, scenarios: Sequence[Scenario]) -> str:
-    """The order parameter to show: the one asked for, or what the flights are usually judged by; all must report it."""
+    """Choose the order parameter to show: `metric`, or the usual one; raise ScenarioError if a flight does not report
+    it.
+    """
     each = [scalar_names(found.measures, found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
     known = [name for name in (each[0] if each else ()) if all(name in names for names in each)]
     if metric is None:

@@ -17,15 +17,19 @@ from airflock.recordings import packet_uniforms, simulate
 from airflock.scenarios import Scenario, build_scenario
 
 Array = NDArray[np.float64]
+# Flights of the identified scenario against the log, by the same measures.
 PERIOD = 0.2  # s between frames of the check
 LONGEST = 600.0  # s that are flown
 SETTLED = 30.0  # s at the start of a flight that are left out
+# Tuning uses small seeds; a check on the same flights would be no check.
 FIRST_SEED = 1_000_000  # beyond the seeds that people tune with
 
 
 @dataclass
 class LogCheck:
-    """By measure: the log's value and the 2.5 and 97.5 % ends of the flights; polarisation over time with its band."""
+    """Check by measure: the log's value and the 2.5 and 97.5 % ends of the flights; polarisation over time with its
+    band.
+    """
 
     found: dict[str, tuple[float, float, float]]
     times: Array
@@ -33,12 +37,12 @@ class LogCheck:
     band: Array
 
     def outside(self) -> list[str]:
-        """Measures of the log that the flights do not explain."""
+        """Return the measures of the log that the flights do not explain."""
         return [name for name, (own, low, high) in self.found.items() if not low <= own <= high]
 
 
 def log_measures(positions: Array, velocities: Array) -> tuple[dict[str, float], Array]:
-    """Mean speed, polarisation, mean and least distance to the nearest, over those present; polarisation over time.
+    """Measure mean speed, polarisation, mean and least distance to the nearest neighbour; also polarisation over time.
 
     place, speed : (time, axis, individual), nan where one is absent
     """
@@ -62,12 +66,13 @@ def log_measures(positions: Array, velocities: Array) -> tuple[dict[str, float],
 
 
 def frames_of_logs(logs: FlightLogs) -> tuple[Array, Array, Array]:
-    """Times, positions and velocities (time, axis, individual) on a common grid; nan across gaps beyond 1 s."""
+    """Return times, positions and velocities (time, axis, individual) on a common grid; nan across gaps beyond 1 s."""
     flying = logs.select_rows(~logs.standing & np.isfinite(logs.velocity).all(axis=1))
     times = np.arange(flying.time.min(), flying.time.max(), PERIOD)
     axes = flying.position.shape[1]
     place = np.full((len(times), axes, logs.drones), np.nan)
     speed = place.copy()
+    # Each drone has its own times; interpolation stops at gaps, so that nothing is invented.
     for who in range(logs.drones):
         rows = flying.of(who)
         if len(rows) < 2:
@@ -106,6 +111,7 @@ def check_against_logs(
     ready = build_scenario(document, scenario.name, settings)
     rows: list[dict[str, float]] = []
     courses = []
+    # Only measures are kept: a hundred flights of ten minutes would not fit in memory.
     for number in range(flights):
         values, order = log_measures(*_flown(ready, FIRST_SEED + number, absent))
         rows.append(values)
@@ -122,7 +128,7 @@ def check_against_logs(
 
 
 def _flown(scenario: Scenario, seed: int, absent: Any) -> list[Array]:
-    """Positions and velocities (time, axis, individual) of a flight once it has settled; nan where the log has none.
+    """Fly, and return positions and velocities (time, axis, individual) after settling; nan where the log has none.
 
     absent : (time, individual) of the log
     """
@@ -140,7 +146,7 @@ def _flown(scenario: Scenario, seed: int, absent: Any) -> list[Array]:
 
 
 def _band(courses: Sequence[Array]) -> Array:
-    """2.5 and 97.5 % ends (2, time) of courses over time; nan where none has a value."""
+    """Return the 2.5 and 97.5 % ends (2, time) of courses over time; nan where none has a value."""
     drawn = np.array(courses)
     some = np.isfinite(drawn).any(axis=0)
     band = np.full((2, drawn.shape[1]), np.nan)
@@ -148,12 +154,15 @@ def _band(courses: Sequence[Array]) -> Array:
     return band
 
 
+# Synthetic logs: the material that estimators are tested with. A recording keeps true states. The
+# measurements of each drone and its received packets are drawn again from the counters (seed,
+# stream, step, agent), so that nothing in the engine changes.
 WARM = 8.0  # times of decay that receivers have been on before they are logged
 
 
 @dataclass(frozen=True)
 class LogDisturbance:
-    """What a logger does to a log.
+    """Disturbances of a log by its logger.
 
     offset, drift : SD of the clocks' offsets (s) and rates (1); jitter: SD of single stamps, s
     lost          : share of rows that are missing; bursts of `burst_seconds` s each are missing besides
@@ -173,7 +182,7 @@ class LogDisturbance:
 
 
 def normal_pair(a: Any, b: Any) -> tuple[Array, Array]:
-    """`core.random.normal_pair` for arrays of words."""
+    """Draw as `core.random.normal_pair` does, for arrays of words."""
     radius = np.sqrt(-2.0 * np.log(random.uniform(a)))
     word = ((b << 2) & random.MASK).astype(np.int64)
     angle = (word ^ 0x80000000) - 0x80000000
@@ -187,16 +196,17 @@ def normal_pair(a: Any, b: Any) -> tuple[Array, Array]:
 
 
 def agent_words(seed: int, stream: int, step: int, agent: Any) -> Any:
-    """`core.random.words` for an array of agents."""
+    """Draw as `core.random.words` does, for an array of agents."""
     counters = np.asarray(agent, np.uint64)
     zero = np.zeros_like(counters)
     return random.philox(counters, zero + np.uint64(step), zero + np.uint64(stream), zero, seed, seed >> 32)
 
 
 def own_state_errors(seed: int, decisions: int, agents: int, period: float, s: Any) -> Array:
-    """Errors of own position and velocity (decision, 4, agent), m and m/s, as a flight in the plane draws them."""
+    """Draw errors of own position and velocity (decision, 4, agent), m and m/s, as a flight in the plane does."""
     found = np.zeros((decisions, 4, agents))
     q, u = np.zeros((2, agents)), np.zeros((2, agents))
+    # The error is a process with memory, so decisions follow one another; agents are side by side.
     for k in range(decisions):
         w = agent_words(seed, random.SENSOR, k, np.arange(agents))
         drawn = normal_pair(w[0], w[1])
@@ -209,7 +219,7 @@ def own_state_errors(seed: int, decisions: int, agents: int, period: float, s: A
 def fly_logs(
     scenario: Scenario, seed: int, disturbed: LogDisturbance, generator: np.random.Generator
 ) -> tuple[FlightLogs, pd.DataFrame, Any]:
-    """Logs of one flight in the plane, its packets, and the recording.
+    """Fly in the plane; return the logs, the packets, and the recording.
 
     The scenario's metrics.period is the period of the log. Packets: receiver, sender, t (receiver's clock), stamp
     (sender's clock), distance (m), got (0 or 1), fast and slow (packets due on each link).
@@ -224,6 +234,8 @@ def fly_logs(
     errors = own_state_errors(seed, int(at[-1]) + 1, n, period, scenario.sensors)[at]
     clocks = np.stack([generator.normal(0.0, disturbed.offset, n), generator.normal(0.0, disturbed.drift, n)], axis=1)
     rows: list[list[Any]] = []
+    # Per drone: noise, rounding, missing rows and bursts, then its own clock; a row whose clock
+    # runs backwards is lost.
     for i in range(n):
         measured = speed[:, :, i] + errors[:, 2:, i] + generator.normal(0.0, disturbed.white, (len(times), 2))
         where = np.round((place[:, :, i] + errors[:, :2, i]) / disturbed.resolution) * disturbed.resolution
@@ -249,12 +261,14 @@ def fly_logs(
 def _packets(
     scenario: Scenario, seed: int, times: Array, place: Array, clocks: Array, disturbed: LogDisturbance, generator: Any
 ) -> pd.DataFrame:
-    """Rows of every pair and decision of a radio of two lossy links."""
+    """Return rows of every pair and decision of a radio of two lossy links."""
     k_, period, n = curve_parameters(scenario.radio), scenario.sensors.period, place.shape[2]
     every = max(1, round(period / (times[1] - times[0])))
     i, j = np.nonzero(~np.eye(n, dtype=bool))
     arrives = np.vectorize(links.received, otypes=[float], excluded=[1, 2])
     parts = []
+    # The number of the flight's own draw decides, so that these are the packets that the flight
+    # had.
     for step, points in enumerate(place[::every]):
         d = np.hypot(*(points[:, i] - points[:, j]))
         fast, slow = (radio.packets(step, rate, period) for rate in (k_.fast_rate, k_.slow_rate))
@@ -277,7 +291,7 @@ def _packets(
 def standing_logs(
     seed: int, agents: int, seconds: float, s: Any, disturbed: LogDisturbance, generator: np.random.Generator
 ) -> FlightLogs:
-    """Logs of drones that stand on the ground: only their sensors' errors move, and have done so for a while."""
+    """Simulate logs of drones that stand on the ground, whose sensors' errors have settled."""
     count, before = round(seconds / s.period), round(WARM / s.damping / s.period)
     errors = own_state_errors(seed, before + count, agents, s.period, s)[before:]
     rows = []

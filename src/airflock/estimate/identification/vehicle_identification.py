@@ -45,7 +45,7 @@ UNIDENTIFIABLE = {  # by a flight, and why
 
 @dataclass(frozen=True)
 class IdentifiedParameter:
-    """One number of a scenario: value and 95 % interval where the logs tell it, else the reason why not."""
+    """One number of a scenario: value and 95 % interval if the logs identify it, else the reason why not."""
 
     key: str
     value: float
@@ -57,19 +57,21 @@ class IdentifiedParameter:
 
     @property
     def told(self) -> bool:
-        """Whether the logs tell it."""
+        """Return True if the logs identify it."""
         return not self.reason and bool(np.isfinite(self.value))
 
     def pessimistic_end(self, level: float) -> float:
-        """The end of the interval at which flying is harder, for a confidence level of both ends."""
+        """Return the end of the interval at which flying is harder, for a confidence level of both ends."""
         end = self.high if HARDER[self.key] else self.low
+        # The interval is symmetric in the logarithm, so other levels scale the ratio by quantiles
+        # of the normal distribution.
         ratio = max(end, 1e-12) / self.value
         value = float(self.value * ratio ** (norm.ppf(0.5 + 0.5 * level) / norm.ppf(0.975)))
         return min(value, 1.0) if KEY_UNITS[self.key] == "1" else value
 
 
 class IdentifiedParameters:
-    """Numbers as they are identified, each beside that of the scenario that is flown by the same law."""
+    """Identified numbers, each beside that of the scenario that is flown by the same law."""
 
     def __init__(self, like: Scenario):
         self.like, self.by_key = like, dict[str, IdentifiedParameter]()
@@ -82,7 +84,7 @@ class IdentifiedParameters:
         )
 
     def reference_value(self, key: str) -> float | None:
-        """The scenario's own number; None where it has none."""
+        """Return the scenario's own number; None where it has none."""
         section, _, name = key.partition(".")
         record = self.like.parameters if section == "model" else getattr(self.like, section)
         value = getattr(record, name, None)
@@ -101,13 +103,14 @@ class IdentifiedParameters:
                 self.by_key[key] = replace(number, reason=reason)
 
 
+# A share of 0 has no logarithm.
 LEAST = 1e-6  # share of packets; what nothing was heard of
 WIDE = 0.2  # half of an interval of a share of packets, beyond which it says too little
 
 
 @dataclass
 class IdentifyResult:
-    """What identify found: numbers by key, notes, and the fits behind them for pictures."""
+    """Result of `identify`: numbers by key, notes, and the fits for pictures."""
 
     like: Scenario
     numbers: dict[str, IdentifiedParameter]
@@ -120,7 +123,7 @@ class IdentifyResult:
     sources: list[str] = field(default_factory=list)
 
     def settings(self, level: float | None = None) -> dict[str, float]:
-        """Keys and values that replace those of `like`: what was told, or its pessimistic end at a level."""
+        """Return keys and values that replace those of `like`: identified values, or their pessimistic ends."""
         return {
             key: number.value if level is None else number.pessimistic_end(level)
             for key, number in self.numbers.items()
@@ -128,12 +131,12 @@ class IdentifyResult:
         }
 
     def scenario(self, level: float | None = None) -> Scenario:
-        """The scenario `like` with these numbers; `published` is left out, for it speaks of other numbers."""
+        """Return the scenario `like` with these numbers; without `published`, which describes other numbers."""
         document = {key: value for key, value in self.like.document.items() if key != "published"}
         return build_scenario(document, self.like.name, self.settings(level))
 
     def document(self, level: float | None = None, *, uncertain: bool = False) -> dict[str, Any]:
-        """A scenario file's content: each number with unit and source, on request with its interval."""
+        """Return a scenario file's content: each number with unit and source, on request with its interval."""
         document = _copied(self.like.document)
         document.pop("published", None)
         document["title"] = f"{self.like.name} with the numbers of {len(self.sources) or self.logs.drones} logs"
@@ -165,7 +168,7 @@ def identify(
     begin: float | None = None,
     end: float | None = None,
 ) -> IdentifyResult:
-    """Numbers of a scenario from flight logs, with 95 % intervals, and reasons where logs cannot tell.
+    """Identify numbers of a scenario from flight logs, with 95 % intervals, and reasons where logs do not suffice.
 
     Parameters
     ----------
@@ -223,6 +226,7 @@ def identify(
         findings.notes += ["clocks of the drones aligned by the ages of their packets"] * aligned
     notes = list(findings.notes)
     numbers = IdentifiedParameters(scenario)
+    # The sensor first: its noise is part of what the body seems to do.
     still = body_and_sensor.fit_sensors(logs, scenario.sensors.period)
     for name in ("noise", "damping", "scale"):
         origin = f"{still.seconds:.0f} s of standing"
@@ -268,7 +272,7 @@ def _logs(
 
 
 def _on_one_clock(logs: FlightLogs, heard: pd.DataFrame) -> tuple[FlightLogs, bool]:
-    """Logs on one clock, by packets in both directions, if these name the drones as the logs do."""
+    """Put logs on one clock, by packets in both directions, if these name the drones as the logs do."""
     ahead = radio_links.fit_delay(heard).ahead
     if not set(logs.names) <= set(ahead):
         return logs, False
@@ -277,7 +281,7 @@ def _on_one_clock(logs: FlightLogs, heard: pd.DataFrame) -> tuple[FlightLogs, bo
 
 
 def _radio(heard: pd.DataFrame | None, numbers: IdentifiedParameters) -> radio_links.RadioFit | None:
-    """Add the numbers of the radio, or why there is none; its fit, for pictures."""
+    """Add the numbers of the radio, or why there are none; return its fit, for pictures."""
     nan, scenario = float("nan"), numbers.like
     if heard is None:
         reason = "no table of packets (--heard): neither PX4 nor ArduPilot logs them, the companion computer must"
@@ -338,7 +342,7 @@ def read_heard(path: Any) -> pd.DataFrame:
 
 
 class Flight(NamedTuple):
-    """One part of the card: what to fly, for how long (s), and which keys it tells."""
+    """One part of the flight card: the flight, its duration (s), and the keys that it identifies."""
 
     title: str
     seconds: float
@@ -347,7 +351,7 @@ class Flight(NamedTuple):
 
 
 def flight_card(like: Scenario) -> list[Flight]:
-    """Parts of the card, sized by the numbers of a scenario that is thought to be near."""
+    """Return the parts of the card, sized by the numbers of a scenario that is thought to be near."""
     tau, a_max = like.body.tau, like.body.a_max
     step = 3.0 * tau * a_max  # a step of this size is at the limit for two thirds of its way
     hold = max(4.0 * tau + step / a_max, 2.0)

@@ -11,6 +11,8 @@ from airflock.recordings import COMMAND_TARGETS, POSITION_TARGETS, VELOCITY_TARG
 from airflock.support import RecordingError
 
 Array = NDArray[np.float64]
+# Logs as estimators need them: rows of one drone after another, at their own times, without
+# interpolation.
 MAX_STEP_RATIO = 1.5  # usual steps between rows: beyond, a command may have come and gone unseen
 
 
@@ -34,31 +36,31 @@ class FlightLogs:
 
     @property
     def step(self) -> float:
-        """Usual time between rows, s."""
+        """Return the usual time between rows, s."""
         return float(np.median(np.diff(self.time)[~self.is_new[1:]]))
 
     @property
     def drones(self) -> int:
-        """Number of drones."""
+        """Return the number of drones."""
         return len(self.names)
 
     def of(self, drone: int) -> NDArray[np.int64]:
-        """Rows of one drone."""
+        """Return the rows of one drone."""
         return np.flatnonzero(self.who == drone)
 
     def flying(self) -> "FlightLogs":
-        """Rows in flight that have a command; new where something was left out."""
+        """Return the rows in flight that have a command; a row after a left-out one is new."""
         keep = np.isfinite(self.command).all(axis=1) & np.isfinite(self.velocity).all(axis=1) & ~self.standing
         return self.select_rows(keep)
 
     def grounded_rows(self) -> "FlightLogs":
-        """Rows on the ground, in stretches without a gap of more than 1 s: a log may be slower there."""
+        """Return the rows on the ground, in stretches without a gap of more than 1 s: a log may be slower there."""
         found = self.select_rows(self.standing)
         apart = np.concatenate([[True], (np.diff(found.time) > 1.0) | (np.diff(found.who) != 0)])[: len(found.time)]
         return replace(found, is_new=apart)
 
     def select_rows(self, mask: NDArray[np.bool_]) -> "FlightLogs":
-        """Some of the rows; a row that follows one left out is new."""
+        """Select rows; a row that follows a left-out one is new."""
         left_out = np.concatenate([[False], ~mask[:-1]])
         new = (self.is_new | left_out)[mask]
         return FlightLogs(
@@ -68,7 +70,7 @@ class FlightLogs:
 
 
 def logs_from_tracks(tracks: list[ImportedTrack], standing: tuple[float, float] | None = None) -> FlightLogs:
-    """Logs from imported tracks; raises RecordingError where velocities are missing.
+    """Make logs of imported tracks; raise RecordingError where velocities are missing.
 
     standing : first and last time (s after each drone's first row) on the ground, unless the log tells it itself
     """
@@ -85,6 +87,7 @@ def logs_from_tracks(tracks: list[ImportedTrack], standing: tuple[float, float] 
         time = track.time
         step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
         new = np.concatenate([[True], np.diff(time) > MAX_STEP_RATIO * step])
+        # A reset of the estimator moves the velocity without any force: no increment may cross it.
         new[track.breaks] = True
         wish = track.stack(COMMAND_TARGETS, axes) if track.has(COMMAND_TARGETS) else np.full((len(time), axes), np.nan)
         on_ground = ~track.in_air if track.in_air is not None else np.zeros(len(time), bool)
@@ -98,7 +101,7 @@ def logs_from_tracks(tracks: list[ImportedTrack], standing: tuple[float, float] 
 
 
 def logs_from_recording(recording: xr.Dataset) -> FlightLogs:
-    """Logs from a recording, simulated or imported; rows that were bridged or are absent are left out."""
+    """Make logs of a recording, simulated or imported; leave out rows that are bridged or absent."""
     if "velocity" not in recording or "command" not in recording:
         raise RecordingError("recording: has no velocity or no command, which identify compares")
     order = ("individual", "time", "space", "keypoint")
@@ -118,6 +121,7 @@ def logs_from_recording(recording: xr.Dataset) -> FlightLogs:
     return FlightLogs(time[keep], place, speed, wish, who[keep], left_out[keep], names, np.zeros(int(keep.sum()), bool))
 
 
+# Decision period and largest commanded speed, from the commands alone.
 FEW = 30  # fewest changes of a command for an estimate of the period
 PLATEAU = 0.01  # share of rows within half a per cent of the largest command that make a limit
 
@@ -142,6 +146,8 @@ def decision_period(logs: FlightLogs) -> tuple[float, tuple[float, float], str]:
             (nan, nan),
             f"commands change in every row: the log ({flying.step:.3g} s) is no faster than decisions",
         )
+    # Commands may stay equal for a decision or two, so intervals are whole multiples of the period;
+    # fit a line through them.
     usual = float(np.median(between))
     between = between[(between > 0.5 * usual) & (between < 4.5 * usual)]
     times = np.maximum(np.round(between / usual), 1.0)
@@ -160,6 +166,7 @@ def largest_command(logs: FlightLogs, v_flock: float | None = None) -> tuple[flo
         return float("nan"), "no commands"
     most = float(speed.max())
     share = float((speed > 0.995 * most).mean())
+    # A limit shows as many equal largest commands; a single peak is only a lower bound.
     if share < PLATEAU:
         return (
             most,

@@ -1,4 +1,4 @@
-"""Identifiability: which numbers of a law tracks can identify, and for which of them other numbers make up."""
+"""Identifiability: numbers of a law that tracks can identify, ridges of the likelihood, and dropped numbers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -28,6 +28,8 @@ from airflock.estimate.inference.likelihood_fit import (
 )
 
 Array = NDArray[np.float64]
+# Numbers that tracks can identify. Of two numbers of which either explains the tracks, the first
+# declared is reported: authors declare important ones first.
 DEPENDENT = 0.2  # share of a slope that other numbers do not explain; below it a number is not identifiable
 EFFECT_POINTS = 6  # best places at which the effect of a number is looked for
 ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where the effect of a number is looked for
@@ -38,13 +40,14 @@ UNLIKELY = 20.0  # loss above the fit, beyond which no climb begins where anothe
 
 
 def identifiable_indices(model: FitModel, start: Array, start_points: Array, spans: Sequence[int]) -> list[int]:
-    """Indices of the named numbers that tracks can identify, in their order; the others stay at their defaults.
+    """Return indices of the named numbers that tracks can identify, in order; the others stay at their defaults.
 
     A number is not identifiable if it changes nothing anywhere along its range, such as the limit of a law that has
     none; or if the earlier numbers explain its slope at the best of many places taken together, such as a mass beside
     all weights. A radius within which nobody is at these places has no slope, but an effect along its range: kept.
     """
     places = []
+    # Slopes at several good points: one point may lie where a part of the law is switched off.
     for x in start_points[:EFFECT_POINTS]:
         u = start.copy()
         u[: model.named] = x
@@ -53,6 +56,8 @@ def identifiable_indices(model: FitModel, start: Array, start_points: Array, spa
     flat = np.concatenate([_slopes(model, u, alive, spans) for u in places])
     kept: list[int] = []
     basis = np.zeros((len(flat), 0))
+    # Gram-Schmidt in the order of declaration: a column that earlier ones explain is a number that
+    # they replace.
     for column, number in zip(flat.T, alive, strict=True):
         size = float(np.linalg.norm(column))
         rest = column - basis @ (basis.T @ column)
@@ -66,7 +71,9 @@ def identifiable_indices(model: FitModel, start: Array, start_points: Array, spa
 
 
 def has_effect(model: FitModel, points: Sequence[Array], index: int, spans: Sequence[int]) -> bool:
-    """Whether a number changes the loss anywhere along its range."""
+    """Return True if a number changes the loss anywhere along its range."""
+    # A threshold beyond all that happens has no slope but an effect, so values along the range are
+    # tried.
     for u in points:
         here = model.score(u, spans).loss()
         for x in ALONG:
@@ -78,7 +85,7 @@ def has_effect(model: FitModel, points: Sequence[Array], index: int, spans: Sequ
 
 
 def _slopes(model: FitModel, u: Array, numbers: Sequence[int], spans: Sequence[int]) -> Array:
-    """Slopes of all differences in units of their standard deviations, (difference, number)."""
+    """Return the slopes of all differences in units of their standard deviations, (difference, number)."""
     weights = 1.0 / np.sqrt(np.maximum((model.differences(u, spans)[0] ** 2).mean(axis=0), 1e-30))
     found: Array = (jacobian(model, u, numbers, spans, FINE) * weights[None, :, None]).reshape(-1, len(numbers))
     return found
@@ -87,7 +94,7 @@ def _slopes(model: FitModel, u: Array, numbers: Sequence[int], spans: Sequence[i
 def canonical_model(
     law: LawCandidate, model: FitModel, fit: Fit, on_progress: Callable[[], None]
 ) -> tuple[FitModel, Array]:
-    """The model in terms of the numbers that are declared first, and its place; the same model where nothing changes.
+    """Express a model in the numbers that are declared first; return it and its point, unchanged if nothing is gained.
 
     A number that was given up before the search may come back under the name of a later one: the weight of one force as
     the unit of all forces, a radius as another within which its neighbours act, too. Where either of two numbers
@@ -97,6 +104,8 @@ def canonical_model(
     """
     few = model.few()
     place, lowest = fit.place, climb_to_maximum(model, fit.place, fit.free, few, slopes=(WIDE_SLOPES,)).loss
+    # Bring back each dropped number that is declared earlier, and try to drop a later one in its
+    # place.
     for earlier in law.numbers:
         assert model.law is not None
         if earlier in model.law.numbers:
@@ -104,11 +113,14 @@ def canonical_model(
         fuller, i = model.with_parameter(law, earlier)
         full = fit_with_parameter(fuller, replace(fit, place=place), i, earlier.place(earlier.default), few)
         curved = curvature(fuller, full, few, WIDE_CENTRAL_SLOPES)
+        # The last declared goes first, since it matters least to the authors.
         for k in reversed(range(i + 1, fuller.named)):
             if not (_may_go(fuller, k) and _away(fuller, full, k)):
                 continue
             without, rest = fuller.with_fixed([k]), [f for f in full.free if f != k]
             start = _given_up(without, full, curved, k, few)
+            # Where the start is hopeless, or the earlier number has not moved, a climb would only
+            # cost time.
             if loss_at(without, start, rest, few) > full.loss + UNLIKELY or abs(start[i] - full.place[i]) < APART:
                 continue
             found = climb_to_maximum(
@@ -126,26 +138,26 @@ def canonical_model(
 
 
 def _may_go(model: FitModel, number: int) -> bool:
-    """Whether a number may be given up: any of the law; one of the body only if its default is 0."""
+    """Return True if a number may be dropped: any of the law; one of the body only if its default is 0."""
     one = model.numbers[number]
     return number != model.speed_index and (one.key.startswith("model.") or one.default == 0.0)
 
 
 def _away(model: FitModel, fit: Fit, number: int) -> bool:
-    """Whether a number stands away from its default, or its default lies outside the range that is searched."""
+    """Return True if a number is away from its default, or its default lies outside the searched range."""
     one = model.numbers[number]
     return not one.low <= one.default <= one.high or abs(one.place(one.default) - fit.place[number]) >= APART
 
 
 def _anywhere(model: FitModel, fit: Fit, curved: Array, number: int, spans: Sequence[int]) -> bool:
-    """Whether the tracks are explained as well with a number elsewhere, the others moved by whole powers of it."""
+    """Return True if the tracks are explained as well elsewhere, the others moved by whole powers of a number."""
     x = float(fit.place[number])
     moved = conditional_point(fit, curved, number, x + (ELSEWHERE if x < 0.5 else -ELSEWHERE))
     return loss_at(model, power_law_point(model, fit, moved, number, spans), fit.free, spans) < fit.loss + CHI2_HALF_95
 
 
 def droppable_parameters(model: FitModel, fit: Fit, on_progress: Callable[[], None]) -> tuple[list[int], Array, Array]:
-    """Named numbers without which the tracks are explained as well, and two places of the rest without them.
+    """Return the named numbers without which the tracks are explained as well, and two points of the rest without each.
 
     Each number that stands away from its default, or whose default lies outside the range that was searched, is put
     there in turn, the last declared first, and the rest is fitted again: from where the others make up for it, and from
@@ -157,6 +169,8 @@ def droppable_parameters(model: FitModel, fit: Fit, on_progress: Callable[[], No
     few = model.few()
     best = climb_to_maximum(model, fit.place, fit.free, few, slopes=(WIDE_SLOPES,))
     carried, lowest, gone = fit.place, best.loss, list[int]()
+    # Backward elimination: every drop is final, and the next number is judged without the dropped
+    # ones.
     for k in reversed(range(model.named)):
         if not _may_go(model, k):
             continue
@@ -175,7 +189,7 @@ def droppable_parameters(model: FitModel, fit: Fit, on_progress: Callable[[], No
 
 
 def _given_up(model: FitModel, fit: Fit, curved: Array, number: int, spans: Sequence[int]) -> Array:
-    """The likeliest place with a number at its default: the others make up for it, or one of its unit takes its part.
+    """Return the likeliest point with a number at its default: the others, or one of its unit, compensate for it.
 
     model : one in which this number is fixed
     """
@@ -189,8 +203,19 @@ def _given_up(model: FitModel, fit: Fit, curved: Array, number: int, spans: Sequ
 
 
 RidgePath = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
+# Ridges: how far numbers that compensate for each other go together before the tracks are explained
+# worse. The numbers of a braking curve lie on a ridge that bends. The curvature at the fit knows
+# its first steps only, and a fit repeated from beside its end does not follow it. So the ridge is
+# followed: one number is moved step by step, all others follow, and the points on the way bound
+# each of them. Where numbers compensate in more than one way the ridge is a surface, and the way of
+# one number misses where another could go; so the least certain numbers are followed one by one,
+# and so are those that act similarly. A number such as a largest force acts nowhere beyond some
+# value: a plateau, to which no way leads; so each end of each range is tried by itself, with all
+# others following there.
 WORST, WALKED = 4, 8  # least certain numbers, and numbers that are walked, at most
 TIED = 0.9  # correlation of the slopes of two numbers, from which both are walked, however certain they seem
+# The number that acts most like the moved one follows first. With all at once the way lost a ridge
+# on which the likelihood does not fall (gain 1.6 to 19 1/s of a wall).
 NESTED = 3  # numbers that act most like the moved one, which follow before all do
 WINDOW, LINE_STEPS = (
     0.05,
@@ -204,8 +229,8 @@ FASTER = 1.6  # each step is so much longer than the one before, while the likel
 PLACES = 16  # that are looked at, on each side of a ridge
 FOLLOWS = 4  # steps of the climb by which the others follow
 SHORTER = 3.0  # a step is so much shorter where the likelihood has fallen too far: the others could not follow
-# log-likelihood by which a place must be better than the fit, to begin again from there: climbs that begin beside each
-# other end several units apart, and from the top of a spike every way falls
+# log-likelihood by which a place must be better than the fit, to begin again from there: climbs
+# that begin beside each other end several units apart, and from the top of a spike every way falls
 HIGHER = 6.0
 AGAIN = 2  # times
 UNLIKELY_END = 20.0  # fall at the end of a range, the others where they are, beyond which they are not asked to follow
@@ -213,14 +238,16 @@ UNLIKELY_END = 20.0  # fall at the end of a range, the others where they are, be
 
 @dataclass(frozen=True)
 class Ridges:
-    """Places along ridges, each way from the fit, and by how much the log-likelihood has fallen there."""
+    """Points along ridges, each way from the fit, and the drop of the log-likelihood there."""
 
     paths: tuple[RidgePath, ...]
 
     def ends(self, point: Array, drop: float) -> tuple[Array, Array]:
-        """Least and largest places of all numbers where the log-likelihood has fallen by at most `drop`."""
+        """Return the least and largest points of all numbers where the log-likelihood has fallen by at most `drop`."""
         low, high = point.copy(), point.copy()
         for way in self.paths:
+            # Between two points the drop is taken as a parabola, so its root is linear in the
+            # distance.
             for (inner, less), (outer, more) in zip(way[:-1], way[1:], strict=True):
                 if less > drop:
                     break
@@ -235,13 +262,15 @@ class Ridges:
 def profile_ridges(
     model: FitModel, fit: Fit, spans: Sequence[int], drop: float, on_progress: Callable[[], None] = lambda: None
 ) -> tuple[Fit, Ridges]:
-    """Ridges through a fit, or through a better one that was met on the way, down to a fall of the likelihood.
+    """Follow ridges from a fit, or from a better one on the way, down to a drop of the likelihood.
 
     Other ends that the search has met, and places on the way to a better fit, are added where they are as likely: each
     by itself, for a valley may lie between.
     """
     ways: list[RidgePath] = []
     met = list(fit.others)
+    # A way may lead to a better fit than the one it began at; then everything begins again there,
+    # at most AGAIN times.
     for turn in range(AGAIN + 1):
         ways, better = _ways(model, fit, spans, drop, turn < AGAIN)
         on_progress()
@@ -257,12 +286,14 @@ def profile_ridges(
 def _ways(
     model: FitModel, fit: Fit, spans: Sequence[int], drop: float, leave: bool
 ) -> tuple[list[RidgePath], Array | None]:
-    """Ways along all ridges; and, where it may be left for it, a better place."""
+    """Return the ways along all ridges; and a better point, where a ridge may be left for it."""
     view = CurvatureView(model, fit, spans, drop)
     named = [k for k, f in enumerate(fit.free) if f < model.named]
+    # Following a ridge costs tens of climbs, so only uncertain or tied numbers are followed.
     worst = [k for k in sorted(named, key=lambda k: -view.reach[k]) if view.reach[k] >= SHORTEST][:WORST]
     tied = [k for k in sorted(named, key=lambda k: -view.alike[k, named].max()) if view.alike[k, named].max() > TIED]
     ways: list[RidgePath] = []
+    # The ends of all ranges: a plateau shows there, and nowhere on a ridge.
     for k, end in ((fit.free[k], end) for k in named for end in (0.0, 1.0)):
         found, fell = fit_at_end(model, fit, spans, k, end)
         if leave and fell < -HIGHER:
@@ -279,7 +310,7 @@ def _ways(
 
 
 class CurvatureView:
-    """What the curvature about a fit says of the ways along its numbers, by their places among the free.
+    """Prediction by the curvature at a fit of the ways along its numbers, by their places among the free.
 
     reach : how far each goes by the curvature until the likelihood has fallen by `drop`
     alike : how much any two act alike
@@ -293,7 +324,9 @@ class CurvatureView:
         self.reach: Array = np.sqrt(2.0 * drop * np.maximum(*(np.diag(each) for each in covariances)))
 
     def walk(self, k: int, side: float, leave: bool) -> tuple[RidgePath, Array | None]:
-        """One way along the ridge of a number, down (-1) or up (1); and a better place, where it may be left for it."""
+        """Follow the ridge of a number down (-1) or up (1); return the way, and a better point if it may be left for
+        one.
+        """
         fit, covariance = self.fit, self.covariance
         slope = np.zeros(len(fit.place))
         slope[fit.free] = covariance[k] / covariance[k, k]
@@ -304,7 +337,9 @@ class CurvatureView:
 
 
 def fit_at_end(model: FitModel, fit: Fit, spans: Sequence[int], index: int, end: float) -> tuple[Array, float]:
-    """The fit with one number at an end of its range, the others following; and the fall of the log-likelihood."""
+    """Fit with one number at an end of its range, the others following; return the point and the drop of the
+    log-likelihood.
+    """
     u = with_coordinate(fit.place, index, end)
     fell = model.score(u, spans).loss() - fit.score.loss()
     if fell > UNLIKELY_END:
@@ -315,7 +350,8 @@ def fit_at_end(model: FitModel, fit: Fit, spans: Sequence[int], index: int, end:
 
 
 def _slid(model: FitModel, u: Array, number: int, spans: Sequence[int], far: float) -> tuple[Array, float]:
-    """A place with one number where the tracks are explained best, as far again as it has come; and the loss.
+    """Move one number to where the tracks are explained best, at most as far again as it has come; return point and
+    loss.
 
     Where single individuals are lost, the likelihood has edges, at which slopes lead nowhere.
     """
@@ -333,7 +369,7 @@ def _slid(model: FitModel, u: Array, number: int, spans: Sequence[int], far: flo
 
 
 def _alike(curved: Array) -> Array:
-    """How much any two numbers act alike: correlations of their slopes, 0 of each with itself."""
+    """Return the similarity of any two numbers: correlations of their slopes, 0 of each with itself."""
     sizes = np.sqrt(np.diag(curved))
     found: Array = np.abs(curved) / np.outer(sizes, sizes)
     np.fill_diagonal(found, 0.0)
@@ -351,7 +387,7 @@ def _walk(
     drop: float,
     leave: bool,
 ) -> tuple[RidgePath, Array | None]:
-    """One way along a ridge; and, where it may be left for it, the best place that was met, if it is a better one.
+    """Follow one way along a ridge; return it, and the best point on the way if it may be left for a better one.
 
     Where the way leads higher it is gone on: what leads along a ridge is a walk, not a climb.
 
@@ -363,6 +399,8 @@ def _walk(
     best: tuple[Array | None, float] = (None, -HIGHER)
     step = float(np.clip(step, MIN_FINE_STEP, STRIDE[1]))
     least = min(step, STRIDE[0])
+    # Predictor and corrector: a step along the slope of the way so far, then the others climb back
+    # to the ridge.
     for _ in range(PLACES):
         last = way[-1][0]
         start = np.clip(last + step * slope, 0.0, 1.0)
@@ -383,6 +421,8 @@ def _walk(
         moved = abs(found.place[number] - last[number])
         if moved == 0.0:
             break
+        # The likelihood has fallen too far at once: the others could not follow, so repeat with a
+        # shorter step.
         if fell - way[-1][1] > 0.5 * drop and step > least:
             step = max(step / SHORTER, least)
             continue
@@ -390,11 +430,14 @@ def _walk(
         if fell >= drop or not 0.0 < found.place[number] < 1.0:
             break
         slope = (found.place - last) / moved
+        # On flat ridges steps grow, so that a plateau over the whole range takes few climbs.
         if fell - way[-2][1] < 0.1 * drop:
             step = min(FASTER * step, STRIDE[1])
     return tuple(way), best[0]
 
 
+# Dropped numbers: if their defaults explain the tracks as well, the intervals of the others must
+# still allow for them.
 AWAY = 0.2  # of a range: move of a number of which is asked whether the others make up for it exactly
 DROP = 12.0  # fall of the log-likelihood at which a walk ends that looks for a higher place
 EXACT = 0.05  # change of the log-likelihood by such a move, below which they do
@@ -403,12 +446,14 @@ EXACT = 0.05  # change of the log-likelihood by such a move, below which they do
 def restore_parameters(
     law: LawCandidate, model: FitModel, fit: Fit, spans: Sequence[int], on_progress: Callable[[], None]
 ) -> tuple[FitModel, Fit]:
-    """The model with those numbers again that explain something far from their defaults, the others elsewhere.
+    """Restore dropped numbers that explain something far from their defaults, with the others elsewhere.
 
     A number is given up where no climb from the fit says anything for it. A walk may lead higher all the same.
 
     law : with all its numbers
     """
+    # A default that explains the tracks as well may lie on a ridge: the true point was 34 units
+    # higher and no climb found it.
     for number in model.dropped_parameters(law):
         fuller, i = model.with_parameter(law, number)
         view = _view(fuller, fit, i, number.place(number.default), spans, DROP)
@@ -419,6 +464,8 @@ def restore_parameters(
             on_progress()
             if better is not None:
                 higher = climb_to_maximum(fuller, better, view.fit.free, spans, slopes=(FINE_SLOPES, CENTRAL_SLOPES))
+                # One restored number may make another one useful: begin again with the fuller
+                # model.
                 return restore_parameters(law, fuller, higher, spans, on_progress)
     return model, fit
 
@@ -426,7 +473,7 @@ def restore_parameters(
 def ridges_of_dropped(
     law: LawCandidate, model: FitModel, fit: Fit, spans: Sequence[int], drop: float, on_progress: Callable[[], None]
 ) -> tuple[RidgePath, ...]:
-    """Ways of a fit's numbers on which one that was given up leaves its default, and all others follow.
+    """Follow ways of a fit's numbers on which a dropped number leaves its default, and all others follow.
 
     law : with all its numbers; drop : fall of the log-likelihood at which a way ends
     """
@@ -442,7 +489,7 @@ def ridges_of_dropped(
 def ridges_from_point(
     model: FitModel, fit: Fit, index: int, coordinate: float, spans: Sequence[int], drop: float
 ) -> list[RidgePath]:
-    """Ways on which a number leaves a place; none where that would say nothing about the others.
+    """Follow ways on which a number leaves a point; none where that would not concern the others.
 
     They say nothing of a number that changes nothing; nor of one that the others make up for exactly, such as the unit
     of all weights: no tracks could identify it, and its default is the unit of the others.
@@ -456,7 +503,7 @@ def ridges_from_point(
 def _view(
     model: FitModel, fit: Fit, number: int, place: float, spans: Sequence[int], drop: float
 ) -> CurvatureView | None:
-    """The view from a fit along a number that it does without; None where that would say nothing about the others."""
+    """Return the view from a fit along a number that it does without; None where that would not concern the others."""
     full = fit_with_parameter(model, fit, number, place, spans)
     far = full.score.loss() > fit.score.loss() + drop  # its default lies beyond what is sought
     if far or not has_effect(model, [full.place], number, spans) or is_compensated(model, full, number, spans):
@@ -465,7 +512,7 @@ def _view(
 
 
 def is_compensated(model: FitModel, fit: Fit, index: int, spans: Sequence[int]) -> bool:
-    """Whether the others make up for a number exactly, by powers of it or along a line."""
+    """Return True if the others compensate for a number exactly, by powers of it or along a line."""
     x = float(fit.place[index])
     moved = conditional_point(
         fit, curvature(model, fit, spans, CENTRAL_SLOPES), index, x + (AWAY if x < 0.5 else -AWAY)

@@ -1,4 +1,4 @@
-"""Candidates: laws as quiet scenarios, and the numbers of each that tracks may tell."""
+"""Candidates: laws as scenarios without noise, and the numbers of each that tracks may identify."""
 
 import math
 from collections import Counter
@@ -26,7 +26,7 @@ QUIET = {"sensors.kind": "perfect", "wind.gust": 0.0, "radio.loss": 0.0}
 
 @dataclass(frozen=True)
 class FitParameter:
-    """A number of a law or its body: where it stands, its range, and the scale on which it is sought.
+    """A number of a law or its body: its column, its range, and the scale on which it is searched.
 
     key : section and name; column : in a driver's row; unit; low, high : range that is sought; log : by its logarithm
     """
@@ -40,20 +40,20 @@ class FitParameter:
     default: float
 
     def value(self, u: float) -> float:
-        """Number at a place from 0 to 1 in its range."""
+        """Return the number at a place from 0 to 1 in its range."""
         if self.log:
             return float(self.low * (self.high / self.low) ** u)
         return float(self.low + (self.high - self.low) * u)
 
     def place(self, value: float) -> float:
-        """Place from 0 to 1 of a number in its range."""
+        """Return the place from 0 to 1 of a number in its range."""
         inside = min(max(value, self.low), self.high)
         if self.log:
             return math.log(inside / self.low) / math.log(self.high / self.low)
         return (inside - self.low) / (self.high - self.low)
 
     def slope(self, u: float) -> float:
-        """How fast the number changes with its place."""
+        """Return the derivative of the number by its place."""
         return float(self.value(u) * math.log(self.high / self.low)) if self.log else self.high - self.low
 
 
@@ -77,18 +77,18 @@ class LawCandidate:
 
     @property
     def commands_heading(self) -> bool:
-        """Whether the law commands a direction only."""
+        """Return True if the law commands a direction only."""
         return self.scenario.model.command == "heading"
 
     def state(self, tracks: SpanTracks) -> DriverState:
-        """Memory of a flight of as many agents as there are individuals."""
+        """Make the memory of a flight of as many agents as there are individuals."""
         flown = replace(self.scenario, flight=replace(self.scenario.flight, agents=float(tracks.individual_count)))
         start = np.zeros((2 * self.plan.dimensions, tracks.individual_count))
         return DriverState.of(self.plan, flown, start=start)
 
 
 def make_candidate(base: Scenario, scale: TrackScale, axes: int) -> LawCandidate:
-    """A candidate from a scenario of its law."""
+    """Make a candidate of a scenario of its law."""
     name = base.name
     scenario = without_noise(base, scale, axes)
     if scenario.model.flock is not None:
@@ -112,7 +112,7 @@ def make_candidate(base: Scenario, scale: TrackScale, axes: int) -> LawCandidate
 def law_scenarios(
     models: Iterable[str | Scenario], settings: Mapping[str, Any], *, trust: bool = False
 ) -> tuple[list[Scenario], tuple[float, ...]]:
-    """Scenarios of the laws, and half sides (m) of the periodic box in which all of them live; 0 along an open axis.
+    """Return scenarios of the laws, and half sides (m) of the periodic box common to all; 0 along an open axis.
 
     models : names of laws, presets, scenario files, files with a law, or Scenarios
     Raises ScenarioError with every fault.
@@ -138,7 +138,7 @@ def law_scenarios(
 
 
 def _base(what: str | Scenario, settings: Mapping[str, Any], trust: bool) -> Scenario:
-    """Scenario of a law; one that is given already knows its place."""
+    """Load the scenario of a law; a scenario has its folder already."""
     if isinstance(what, Scenario):
         return what
     if not isinstance(what, (str, Path)):
@@ -154,7 +154,7 @@ def _base(what: str | Scenario, settings: Mapping[str, Any], trust: bool) -> Sce
 
 
 def without_noise(scenario: Scenario, scale: TrackScale, axes: int) -> Scenario:
-    """The scenario without noise, with steps that fit into the frames of the tracks."""
+    """Return the scenario without noise, with steps that fit into the frames of the tracks."""
     document = {key: value for key, value in scenario.document.items() if key not in ("published", "metrics")}
     steps = max(1, math.ceil(scale.period / STEP - 1e-9))
     dt = scale.period / steps
@@ -173,7 +173,7 @@ def without_noise(scenario: Scenario, scale: TrackScale, axes: int) -> Scenario:
 
 
 def _unusual(scenario: Scenario) -> Any:
-    """Parameters of which none is a usual number, so that all stay numbers in the driver."""
+    """Return parameters none of which has its usual value, so that all stay numbers in the driver."""
     moved = {
         name: number * 0.9 if number else 0.1
         for name, number in scenario.model.usual.items()
@@ -183,7 +183,7 @@ def _unusual(scenario: Scenario) -> Any:
 
 
 def _numbers(scenario: Scenario, plan: Plan, scale: TrackScale) -> tuple[FitParameter, ...]:
-    """Numbers of the law and of its body, with the ranges in which they are sought."""
+    """Return numbers of the law and of its body, with the ranges of the search."""
     found = []
     for letter, section, record in (("p", "model", scenario.parameters), ("b", "body", scenario.body)):
         names = plan.records[letter]
@@ -204,13 +204,13 @@ def _numbers(scenario: Scenario, plan: Plan, scale: TrackScale) -> tuple[FitPara
 
 
 def _first(plan: Plan, letter: str) -> int:
-    """Column of the first number of a record."""
+    """Return the column of the first number of a record."""
     letters = [name for name, _ in plan.numbers]
     return sum(len(fields) for _, fields in plan.numbers[: letters.index(letter)])
 
 
 def _range(declared: Quantity, default: float, scale: TrackScale) -> tuple[float, float, bool]:
-    """Declared range, cut to the lengths, speeds and times that were seen; and whether it is sought by logarithm."""
+    """Return the declared range, cut to observed lengths, speeds and times; and True for a logarithmic scale."""
     by_unit = {
         "m": (0.05 * scale.near, 1.2 * scale.far),
         "m/s": (0.02 * scale.speed, 5.0 * scale.max_speed),  # a law may speak of speeds that nobody flies
@@ -228,7 +228,7 @@ def _range(declared: Quantity, default: float, scale: TrackScale) -> tuple[float
 
 
 def _noises(scenario: Scenario, plan: Plan, numbers: tuple[FitParameter, ...]) -> tuple[FitParameter, ...]:
-    """Numbers of the law with which its noise goes: at 0, two worlds command alike."""
+    """Return the numbers that are the noise of the law: at 0, two worlds command the same."""
     agents = 8  # about as far apart as those that were seen
     flown = replace(scenario, flight=replace(scenario.flight, agents=float(agents)))
     generator = np.random.default_rng(0)

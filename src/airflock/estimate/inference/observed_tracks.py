@@ -1,4 +1,4 @@
-"""Tracks as the filter walks through them: positions in spans of time, and who is there, seen and counted when."""
+"""Observed tracks: positions in spans of time, and who is present, seen and counted at each frame."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -43,27 +43,27 @@ class SpanTracks:
 
     @property
     def axes(self) -> int:
-        """2 in a plane, 3 in space."""
+        """Return 2 in a plane, 3 in space."""
         return int(self.seen.shape[1])
 
     @property
     def individual_count(self) -> int:
-        """How many there are, at one time or another."""
+        """Return the number of individuals that are present at any time."""
         return int(self.seen.shape[2])
 
     def nearest(self, offset: Array) -> Array:
-        """Offsets (axis, individual), m, to the nearest image of the box."""
+        """Return offsets (axis, individual), m, to the nearest image of the box."""
         return nearest_image(offset, self.box, 0)
 
     @property
     def counted(self) -> int:
-        """Steps that are scored."""
+        """Return the steps that are scored."""
         return int((self.state == COUNTED).sum())
 
 
 @dataclass(frozen=True)
 class TrackScale:
-    """Lengths and speeds that were seen: nearest and farthest pair (m), median and largest speed (m/s), period (s)."""
+    """Observed lengths and speeds: nearest and farthest pair (m), median and largest speed (m/s), period (s)."""
 
     near: float
     far: float
@@ -75,7 +75,7 @@ class TrackScale:
 def tracks_from_recording(
     recording: xr.Dataset, name: str = "tracks", span: float = SPAN, box: tuple[float, ...] = (0.0, 0.0, 0.0)
 ) -> SpanTracks:
-    """Tracks of a recording whose frames are evenly spaced.
+    """Cut a recording with evenly spaced frames into spans.
 
     span : length of a span, s; less where the recording is short
     box  : as in `SpanTracks`
@@ -112,7 +112,7 @@ def tracks_from_recording(
 
 
 def with_positions(tracks: SpanTracks, positions: Array) -> SpanTracks:
-    """The same tracks with other positions: who is there and who enters is found anew."""
+    """Return the tracks with other positions; presence and entries are computed from them."""
     sure: Any = np.isfinite(positions).all(axis=1)
     state, speed = np.zeros(sure.shape, np.int8), np.zeros_like(positions)
     gap = max(2, round(LONGEST_GAP / tracks.period))
@@ -126,7 +126,7 @@ def with_positions(tracks: SpanTracks, positions: Array) -> SpanTracks:
 
 
 def nearest_image(offset: Array, box: tuple[float, ...], axis: int) -> Array:
-    """Offsets (m) to the nearest image of a periodic box; `axis` is that of coordinates."""
+    """Return offsets (m) to the nearest image of a periodic box; `axis` is that of coordinates."""
     found = offset.copy()
     for a, half in enumerate(box[: offset.shape[axis]]):
         if half > 0.0:
@@ -161,7 +161,7 @@ def _walk(
 
 
 def tracks_scale(all_tracks: list[SpanTracks]) -> TrackScale:
-    """Lengths and speeds in several tracks of one kind."""
+    """Measure lengths and speeds in several tracks of one kind."""
     near, far, speeds = [], [], []
     for tracks in all_tracks:
         lag = max(1, round(0.2 / tracks.period))

@@ -28,6 +28,7 @@ from airflock.estimate.inference.observed_tracks import (
 )
 
 Array = NDArray[np.float64]
+# Flights of a fitted law from the beginnings of its tracks, observed with the same gaps and noise.
 FREE = 1e-9  # m²: least variance
 PUSHED, BLURRED = -1, -2  # noise that is no number of the law or its body
 LASTING = 1.0  # s; correlation time of errors of what is perceived
@@ -51,7 +52,7 @@ class FitNoise:
     seen: float
 
     def shifted(self, steps: Array) -> "FitNoise":
-        """The noise with logarithms changed."""
+        """Return the noise with its logarithms changed."""
         law, speed, seen = (
             value * float(np.exp(step)) for value, step in zip((self.law, self.speed, self.seen), steps, strict=True)
         )
@@ -75,7 +76,7 @@ class NoisyFlight:
         self.error: Array | None = None  # of everybody's position as it is perceived, m
 
     def begin(self, world: int) -> None:
-        """Forget the flight before. world : which random numbers the law draws."""
+        """Forget the flight before. world : number of the random world of the law."""
         if self.noise.column == BLURRED:
             self.error = self.generator.normal(0.0, self.noise.law, self.shape)
         self.walk.begin(self.columns, world=world)
@@ -87,6 +88,8 @@ class NoisyFlight:
         """
         walk, axes = self.walk, self.walk.axes
         was = walk.now().copy()
+        # Three kinds of noise: pushes of the velocity, errors of perceived positions, or a number
+        # of the law itself.
         if self.noise.column == PUSHED:
             walk.now()[axes:] += self.generator.normal(0.0, self.noise.law, self.shape)
         if self.error is None:
@@ -114,13 +117,14 @@ def fly_tracks(
     spans: Sequence[int],
     seed: int,
 ) -> SpanTracks:
-    """Tracks of the law flown again from the beginning of each span.
+    """Fly the law from the beginning of each span, and return tracks of these flights.
 
     place : numbers by column, gains, usual speed (`Model.split`); kept : where individuals were (`Walk.errors`)
     """
     tracks, axes = walk.tracks, walk.axes
     flight = NoisyFlight(walk, fitted, noise, seed)
     seen = np.full_like(tracks.seen, np.nan)
+    # Each span has a world of its own; 1009 is prime, so that seeds and spans do not meet.
     for s in spans:
         begin, end = tracks.spans[s]
         flight.begin((seed * 1009 + s + 1) % 2**31)
@@ -128,6 +132,8 @@ def fly_tracks(
             state = tracks.state[k]
             if k > begin:
                 flight.step()
+            # Who enters or is absent follows the record, so that the flight has the gaps of the
+            # tracks.
             enters = (state == ENTERS) | (state == ABSENT)
             walk.now()[:, enters] = filtered_states[k][:, enters]
             if k == begin:
@@ -141,7 +147,7 @@ def fly_tracks(
 def next_speed(
     speed: Array, persistence: float, mean_speed: float, noise: float, generator: np.random.Generator
 ) -> Array:
-    """Own speeds (individual,) a period later, m/s: they return to the usual one, and wander.
+    """Return own speeds (individual,) a period later, m/s: they relax to the usual one, and wander.
 
     persistence : share of a difference from the usual speed that is left; noise : standard deviation of a period's
                   change
@@ -161,7 +167,7 @@ def stretch_last_step(walk: InnovationFilter, previous: Array, factor: Array) ->
 
 
 def noise_statistics(model: FitModel, u: Array, spans: Sequence[int]) -> Array:
-    """What noise shows in: logarithms of the variances along and across, and correlations from frame to frame."""
+    """Return statistics of noise: logarithms of the variances along and across, and correlations between frames."""
     found = []
     for walk, own in model.parts(spans):
         by_column, gains, usual = model.split(u)
@@ -169,6 +175,8 @@ def noise_statistics(model: FitModel, u: Array, spans: Sequence[int]) -> Array:
         rows = np.concatenate([np.arange(*walk.tracks.spans[s]) for s in own])
         found.append(e[rows])
     parts = []
+    # Variances mix noise of the flight and of the tracks; correlations from frame to frame help to
+    # separate them.
     for c in range(2):
         x = np.concatenate([e[:, c].ravel() for e in found])
         pairs = np.concatenate([(e[1:, c] * e[:-1, c]).ravel() for e in found])
@@ -189,7 +197,7 @@ class FittedFlights:
             self.kept.append(kept)
 
     def tracks(self, point: Array, noise: FitNoise, seed: int) -> list[SpanTracks]:
-        """Tracks of one flight of all spans."""
+        """Return the tracks of one flight of all spans."""
         found = []
         by_walk = dict(self.model.parts(self.spans))
         for t, walk in enumerate(self.model.filters):
@@ -198,13 +206,13 @@ class FittedFlights:
         return found
 
     def model_on(self, tracks: list[SpanTracks]) -> FitModel:
-        """The same model on other tracks."""
+        """Return the model on other tracks."""
         twin = FitModel(self.model.law, tracks, self.model.scale)
         twin = twin.with_fixed(sorted(self.model.held))
         return twin.robust() if self.model.soft else twin
 
     def noise(self, point: Array, first_noise: FitNoise, fitted: Array) -> tuple[FitNoise, float]:
-        """Noise with which the flights' statistics are those of the tracks, and the misfit.
+        """Return the noise whose flights have the statistics of the tracks, and the misfit.
 
         fitted : place at which statistics are taken, that of the fit to the tracks
         """
@@ -212,6 +220,7 @@ class FittedFlights:
 
         active = [0, 2] if not self.model.own_speed else [0, 1, 2]
 
+        # The same seed for all noises: differences between flights then come from the noise alone.
         def off(z: Array, base: FitNoise = first_noise) -> Array:
             steps = np.zeros(3)
             steps[active] = z
@@ -227,7 +236,7 @@ class FittedFlights:
 
 
 def first_noise(model: FitModel, point: Array, spans: Sequence[int]) -> list[FitNoise]:
-    """Noise to begin with, of each kind that there may be.
+    """Return the noise to begin with, of each possible kind.
 
     What the gains say of the noise of the tracks, and a guess of that of the flight.
     """
@@ -249,6 +258,10 @@ def first_noise(model: FitModel, point: Array, spans: Sequence[int]) -> list[Fit
     return [found, replace(found, column=BLURRED, law=BLUR * model.scale.near)]
 
 
+# Noise of the law. Small noise hardly shows beside that of the tracks: one flight differs from the
+# next by as much as half of the noise. So the law is flown with noise over a wide range, and curves
+# through all these flights relate the statistics to the noise. The scatter about the curves gives
+# the uncertainty (a synthetic likelihood: Wood 2010).
 FLOWN = 40  # flights of each look
 RANGE = 1.6  # of the logarithm of noise, to each side, at the first look
 NARROW = 0.15  # at the second, at least
@@ -269,13 +282,14 @@ def estimate_law_noise(
     levels: Sequence[float],
     seed: int,
 ) -> tuple[FitNoise, list[IntervalEnds]]:
-    """The likeliest noise, and the ends of an interval for each level; None where the tracks set no limit.
+    """Estimate the noise of a law, and the ends of an interval for each level; None where the tracks set no limit.
 
     place, scatter : numbers of the law, as places, and their standard errors; fitted: where statistics are taken
     levels         : shares of Student's distribution below an upper end, such as 0.975
     """
     generator = np.random.default_rng(seed)
     centre, half, widest = 0.0, RANGE, int(np.argmax(levels))
+    # Shift the window until the ends of the interval lie inside it.
     for _ in range(MOVED):
         steps, first = _look(flights, point, scatter, noise, fitted, levels, centre, half, generator)
         low, high = first[widest]
@@ -303,12 +317,14 @@ def _look(
     flights: FittedFlights, place: Array, scatter: Array, noise: FitNoise, fitted: Array, levels: Sequence[float],
     centre: float, half: float, generator: np.random.Generator,
 ) -> tuple[Array, list[IntervalEnds]]:  # fmt: skip
-    """Logarithms by which noises are the likeliest, and ends of that of the law, by flights over a range."""
+    """Fly over a range of noise; return the logarithms of the likeliest noises, and the ends of that of the law."""
     from scipy.stats import t as student
 
     named = flights.model.named
     speeds = flights.model.own_speed
     design, rows = [], []
+    # Stratified draws of the noise along the window; numbers of the law are drawn within their
+    # errors, which widens the interval as it should.
     for number in range(FLOWN):
         x = 2.0 * (number + generator.random()) / FLOWN - 1.0
         speed, seen = generator.uniform(-1.0, 1.0, 2) * (1.0 if speeds else 0.0, 1.0)
@@ -319,6 +335,7 @@ def _look(
         rows.append(np.nan_to_num(noise_statistics(twin, fitted, flights.spans) - flights.wanted, nan=10.0))
         design.append([*(x**power for power in range(POWERS + 1)), seen, *([speed] if speeds else [])])
     matrix, found = np.array(design), np.array(rows)
+    # Cubic curves in the logarithm of the noise, and lines in the two nuisance noises.
     curves = np.linalg.lstsq(matrix, found, rcond=None)[0]
     left = found - matrix @ curves
     freedom = FLOWN - matrix.shape[1]
@@ -347,8 +364,10 @@ MOST = 6  # rounds
 LONGEST = 0.1  # of a range: move of a number that is put right, in one round
 MATCHED = 0.005  # sum of squares by which statistics of flights may differ from those of the tracks in the last round
 STEPS = 6  # of a climb
-# Relative standard deviations of what flights leave out, of numbers and of noise, such as where steps of the motion
-# fall between frames. Measured on tracks of known laws (tests/nightly/infer.py).
+# Relative standard deviations of what flights leave out, of numbers and of noise, such as where
+# steps of the motion fall between frames. Measured on tracks of known laws
+# (tests/nightly/infer.py). Our choices, made on tracks of known laws: flights only have noise of
+# the known kinds.
 BEYOND = (0.0075, 0.05)
 DOUBT = 0.5  # share of a correction that is not trusted
 ONE = 1.96  # standard errors that hold one number in 95 %
@@ -360,7 +379,7 @@ WIDER = (1.0, 3.0)  # least and largest variance of refitted numbers, in units o
 
 @dataclass
 class CorrectedFit:
-    """A fit corrected by flights of its own law, and how sure it is.
+    """A fit corrected by flights of its own law, with intervals.
 
     place  : of all numbers, corrected
     alone  : ends of 95 % intervals of each number by itself, as places; low and high
@@ -377,7 +396,7 @@ class CorrectedFit:
 
 
 def interval_levels(numbers: int) -> tuple[float, float]:
-    """Shares below the upper end of an interval: of one number, and of so many that hold together (Šidák 1967)."""
+    """Return shares below the upper end of an interval: of one number, and of so many jointly (Šidák 1967)."""
     return 0.5 + 0.5 * SURE, 0.5 + 0.5 * SURE ** (1.0 / max(numbers, 1))
 
 
@@ -411,7 +430,8 @@ def correct_fit(
         z = float(normal.ppf(share))
         wide = float(student.ppf(share, count - 1)) * np.sqrt(1.0 + 1.0 / count)
         scatter = np.maximum(wide * deviations, z * curved)
-        # half of what was put right is doubt about the noise, which is simpler in flights than in animals
+        # half of what was put right is doubt about the noise, which is simpler in flights than in
+        # animals
         doubt = np.hypot(DOUBT * (place - fitted), z * BEYOND[0] / np.maximum(slopes, 1e-9))
         down, up = ways.ends(fitted, 0.5 * wider * z**2)
         low = place - np.hypot(np.maximum(scatter, fitted - down), doubt)
@@ -427,7 +447,9 @@ def correct_fit(
 
 
 def _softened(model: FitModel, fit: Fit, spans: Sequence[int]) -> tuple[FitModel, Fit]:
-    """The model in which large differences count less, and its fit, from that of all differences or another end."""
+    """Refit with less weight of large differences, from the fit of all differences or another end; return model and
+    fit.
+    """
     model = model.robust()
     here = model.score(fit.place, spans).loss()
     near = [u for u in fit.others if model.score(u, spans).loss() < here + UNLIKELY]
@@ -441,7 +463,9 @@ def _softened(model: FitModel, fit: Fit, spans: Sequence[int]) -> tuple[FitModel
 def _put_right(
     flights: FittedFlights, fit: Fit, kinds: list[FitNoise], curved: Array, say: Callable[[], None]
 ) -> tuple[Array, list[FitNoise], Array]:
-    """The place put right, the noise of each kind that goes with it, and the misses of the last flights."""
+    """Correct the bias; return the point, the noise of each kind that belongs to it, and the misses of the last
+    flights.
+    """
     model, spans, fitted = flights.model, flights.spans, fit.place
     named = [k for k in fit.free if k < model.named]
     place, number, misses = fitted.copy(), 1, np.zeros((1, len(fitted)))
@@ -449,9 +473,11 @@ def _put_right(
     for turns in range(MOST):
         matched = [flights.noise(place, each, fitted) for each in kinds]
         kinds = [noise for noise, _ in matched]
-        # noise and numbers go together, as that of a heading and the limit of its turns: each is put right in turn
+        # noise and numbers go together, as that of a heading and the limit of its turns: each is
+        # put right in turn
         last = turns == MOST - 1 or (turns > 0 and min(off for _, off in matched) < MATCHED)
-        # how far fits miss depends on the law: the last flights are of laws as far apart as the first fits were
+        # how far fits miss depends on the law: the last flights are of laws as far apart as the
+        # first fits were
         apart = np.minimum(np.maximum(curved, misses.std(axis=0)), APART) if len(misses) > 1 else np.zeros(len(fitted))
         found = []
         for turn in range(ROUNDS[last]):
@@ -480,7 +506,7 @@ def _put_right(
 def _noise(
     flights: FittedFlights, place: Array, scatter: Array, noise: FitNoise, fitted: Array, shares: tuple[float, float]
 ) -> tuple[FitNoise, list[IntervalEnds]]:
-    """The number of noise, and its ends alone and together, with what flights leave out."""
+    """Return the noise, and its ends alone and jointly, widened by what flights leave out."""
     from scipy.stats import norm as normal
 
     noise, ends = estimate_law_noise(flights, place, scatter, noise, fitted, shares, len(flights.spans))
@@ -492,7 +518,7 @@ def _noise(
 
 
 def _farther(value: float, end: float | None, more: float) -> float | None:
-    """An end whose logarithm lies further off, by what flights leave out."""
+    """Move an end outwards on a logarithmic scale, by what flights leave out."""
     if end is None:
         return None
     away = float(np.log(end / value))

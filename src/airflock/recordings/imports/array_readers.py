@@ -19,6 +19,7 @@ from airflock.recordings.imports.track import (
 from airflock.recordings.reader_process import ReaderProcess, read_hdf5_arrays, read_netcdf_arrays
 from airflock.support import RecordingError, collect_errors
 
+# NumPy arrays are never unpickled: a pickle runs code when it is read.
 PLAIN = "idtrackerai_format SESSION --formats h5 writes plain numbers; or, if you trust the file, python -c "
 COMMAND = "\"import numpy as np; np.save('plain.npy', np.load('FILE', allow_pickle=True).item()['trajectories'])\""
 
@@ -26,7 +27,7 @@ COMMAND = "\"import numpy as np; np.save('plain.npy', np.load('FILE', allow_pick
 def read_array(
     array: Any, options: ImportOptions, where: str = "array", names: list[str] | None = None, fps: float | None = None
 ) -> list[ImportedTrack]:
-    """Tracks of an array (frame, individual, 2 or 3); nan where an individual is not there."""
+    """Read tracks of an array (frame, individual, 2 or 3); nan where an individual is absent."""
     values = _numbers(array, where)
     if values.ndim == 2 and values.shape[1] in (2, 3):
         values = values[:, None, :]
@@ -49,7 +50,7 @@ def read_array(
 
 
 def _numbers(array: Any, where: str) -> Any:
-    """An array of numbers; nan where it is masked."""
+    """Return an array of numbers; nan where it is masked."""
     hidden = np.ma.getmaskarray(array) if np.ma.isMaskedArray(array) else None
     values = np.asarray(array)
     if values.dtype.kind not in "fiuO":
@@ -62,7 +63,7 @@ def _numbers(array: Any, where: str) -> Any:
 
 
 def read_npy(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a .npy or .npz file of plain numbers."""
+    """Read tracks of a .npy or .npz file of plain numbers."""
     refuse_pickled_arrays(path)
     with path.open("rb") as file:
         start = file.read(6)
@@ -101,7 +102,7 @@ def _pickled(path: Path) -> str:
 
 
 def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of trajectories.h5 of idtracker.ai (its documented keys), or of any HDF5 file with such a dataset.
+    """Read trajectories.h5 of idtracker.ai (its documented keys), or any HDF5 file with such a dataset.
 
     file : its arrays and attributes, as `recordings.reader_process` hands them over
     """
@@ -122,11 +123,12 @@ def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, finding
     return read_array(values, options, str(path), names, fps)
 
 
+# Datasets of `movement`, and Airflock's own.
 OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
 
 
 def read_netcdf(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a netCDF file of `movement`, or of trajectories.h5 of idtracker.ai."""
+    """Read tracks of a netCDF file of `movement`, or of trajectories.h5 of idtracker.ai."""
     if path.suffix.lower() in (".h5", ".hdf5"):
         plain = ReaderProcess(path, read_hdf5_arrays, "a HDF5 file").answer()
         if "position" not in plain:
@@ -135,7 +137,7 @@ def read_netcdf(path: Path, options: ImportOptions, findings: ImportReport) -> l
 
 
 def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "dataset") -> list[ImportedTrack]:
-    """Tracks of a dataset with a variable position (time, space, [keypoint,] individual), either generation's names."""
+    """Read a dataset with the variable position (time, space, [keypoint,] individual), old or new dimension names."""
     found = dataset.rename({old: new for old, new in OLD.items() if old in dataset.dims})
     if "position" not in found:
         raise RecordingError(f"{where}: has no variable position; it has {', '.join(map(str, found.data_vars))}")
@@ -157,6 +159,8 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
         raise RecordingError("\n".join(faults))
     rows = np.arange(len(seconds))
     tracks = []
+    # Variables of unknown unit are ignored rather than guessed; velocities are then differentiated
+    # from positions.
     for number, name in enumerate(found["individual"].values):
         own = found.isel(individual=number)
         position = own["position"].transpose("time", "space").values.astype(float) * scale

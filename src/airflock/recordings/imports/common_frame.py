@@ -15,13 +15,15 @@ from airflock.recordings.imports.track import (
     ImportReport,
 )
 
+# Geodesy: exact, by earth-centred coordinates (WGS84), since a flat earth is 8 cm off at 1 km in
+# height.
 SEMI_MAJOR = 6378137.0  # m, WGS84 (NIMA TR8350.2)
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)
 
 
 def to_ecef(lat: Any, lon: Any, height: Any) -> NDArray[np.float64]:
-    """Earth-centred, earth-fixed coordinates (..., 3), m, of latitude and longitude (degrees) and height (m)."""
+    """Convert latitude, longitude (degrees) and height (m) to earth-centred, earth-fixed coordinates (..., 3), m."""
     phi, lam, h = np.radians(lat), np.radians(lon), np.asarray(height, float)
     normal = SEMI_MAJOR / np.sqrt(1.0 - ECCENTRICITY2 * np.sin(phi) ** 2)
     across = (normal + h) * np.cos(phi)
@@ -30,7 +32,7 @@ def to_ecef(lat: Any, lon: Any, height: Any) -> NDArray[np.float64]:
 
 
 def enu_axes(lat: float, lon: float) -> NDArray[np.float64]:
-    """Unit vectors east, north and up at a place, as rows, in earth-centred coordinates."""
+    """Return unit vectors east, north and up at a place, as rows, in earth-centred coordinates."""
     phi, lam = np.radians(lat), np.radians(lon)
     east = [-np.sin(lam), np.cos(lam), 0.0]
     north = [-np.sin(phi) * np.cos(lam), -np.sin(phi) * np.sin(lam), np.cos(phi)]
@@ -38,7 +40,7 @@ def enu_axes(lat: float, lon: float) -> NDArray[np.float64]:
 
 
 def to_enu(lat: Any, lon: Any, height: Any, origin: tuple[float, float, float]) -> NDArray[np.float64]:
-    """East, north, up (..., 3), m, about an origin of latitude, longitude (degrees) and height (m)."""
+    """Convert to east, north, up (..., 3), m, about an origin of latitude, longitude (degrees) and height (m)."""
     offset: NDArray[np.float64] = (to_ecef(lat, lon, height) - to_ecef(*origin)) @ enu_axes(*origin[:2]).T
     return offset
 
@@ -46,7 +48,7 @@ def to_enu(lat: Any, lon: Any, height: Any, origin: tuple[float, float, float]) 
 def points_to_origin(
     local: NDArray[np.float64], from_origin: tuple[float, float, float], to_origin: tuple[float, float, float]
 ) -> NDArray[np.float64]:
-    """Points (row, 3) of the frame about one origin in the frame about another, m."""
+    """Convert points (row, 3), m, from the frame about one origin to the frame about another."""
     centred = local @ enu_axes(*from_origin[:2]) + (to_ecef(*from_origin) - to_ecef(*to_origin))
     return centred @ enu_axes(*to_origin[:2]).T
 
@@ -54,18 +56,19 @@ def points_to_origin(
 def vectors_to_origin(
     vectors: NDArray[np.float64], from_origin: tuple[float, float, float], to_origin: tuple[float, float, float]
 ) -> NDArray[np.float64]:
-    """Vectors (row, 3), such as velocities, from the axes at one origin to those at another."""
+    """Rotate vectors (row, 3), such as velocities, from the axes at one origin to those at another."""
     rotated: NDArray[np.float64] = vectors @ enu_axes(*from_origin[:2]) @ enu_axes(*to_origin[:2]).T
     return rotated
 
 
+# Local frame: latitudes and longitudes become metres, and tracks of several frames get one origin.
 DEGREES = {"lat": 90.0, "lon": 360.0}  # the largest that there are
 
 
 def to_local_frame(
     tracks: list[ImportedTrack], origin: tuple[float, float, float] | None, findings: ImportReport
 ) -> None:
-    """Rule 3: latitude and longitude to local metres, and all frames about one origin."""
+    """Rule 3: convert latitude and longitude to local metres, and all frames to one origin."""
     geodetic = [t for t in tracks if "x" not in t.columns]
     placed = [t for t in tracks if "x" in t.columns and t.origin is not None]
     free = [t for t in tracks if "x" in t.columns and t.origin is None]
@@ -93,7 +96,7 @@ def to_local_frame(
 
 
 def _degrees_fault(track: ImportedTrack) -> str:
-    """The first row that is no latitude and longitude, and what to write; empty if all are."""
+    """Return the error of the first row that is no latitude and longitude; empty if all are."""
     lat, lon = track.columns["lat"], track.columns["lon"]
     beyond = {name: np.abs(track.columns[name]) > most for name, most in DEGREES.items()}
     bad = np.flatnonzero(beyond["lat"] | beyond["lon"])
@@ -108,7 +111,7 @@ def _degrees_fault(track: ImportedTrack) -> str:
 
 
 def _first_fix(track: ImportedTrack) -> tuple[float, float, float]:
-    """Latitude, longitude (degrees) and height (m) of a track's first row; 0 m where no height is logged."""
+    """Return latitude, longitude (degrees) and height (m) of a track's first row; 0 m where no height is logged."""
     height = track.columns["alt"][0] if "alt" in track.columns else 0.0
     return float(track.columns["lat"][0]), float(track.columns["lon"][0]), float(height)
 
@@ -125,7 +128,7 @@ def _project(track: ImportedTrack, origin: tuple[float, float, float]) -> None:
 
 
 def _move(track: ImportedTrack, origin: tuple[float, float, float]) -> None:
-    """Carry a track in local metres over to the frame about another origin."""
+    """Move a track in local metres to the frame about another origin."""
     assert track.origin is not None
     if track.origin == origin:
         return
@@ -140,6 +143,8 @@ def _move(track: ImportedTrack, origin: tuple[float, float, float]) -> None:
     track.origin = origin
 
 
+# Clocks of several devices come to one time by GNSS time, or are refused: a second between two
+# drones is metres of distance.
 def align_clocks(tracks: list[ImportedTrack], same_clock: bool, findings: ImportReport) -> bool:
     """Put all times on one clock, in place; returns whether quantities between individuals mean something.
 
@@ -174,7 +179,8 @@ def to_utc(track: ImportedTrack) -> float:
     offset = utc - own
     ahead = offset - offset.mean()
     spread = float(((own - centre) ** 2).sum())
-    # a drift can only be told over minutes: quartz drifts by 1e-5, a packet of the receiver is late by 0.1 s
+    # a drift can only be told over minutes: quartz drifts by 1e-5, a packet of the receiver is late
+    # by 0.1 s
     drift = float((ahead * (own - centre)).sum() / spread) if own.max() - own.min() > 60.0 else 0.0
     residual = ahead - drift * (own - centre)
     track.time = track.time + offset.mean() + drift * (track.time - centre)

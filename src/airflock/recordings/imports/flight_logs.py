@@ -20,13 +20,15 @@ from airflock.recordings.imports.track import (
 from airflock.recordings.reader_process import Contents, OnShare, ReaderProcess
 from airflock.support import LinkError, RecordingError
 
+# PX4 ULog files, by pyulog (BSD-3, an extra): topics by name, north-east-down to east-north-up,
+# resets and clock of the file.
 LOCAL, SETPOINT = "vehicle_local_position", "trajectory_setpoint"
 TOPICS = [LOCAL, SETPOINT, "vehicle_gps_position", "vehicle_land_detected"]
 NED = (("x", "y", "z"), ("vx", "vy", "vz"))
 
 
 def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Track of a PX4 log: vehicle_local_position, and trajectory_setpoint as the command in force.
+    """Read a PX4 log: vehicle_local_position, and trajectory_setpoint as the command in force.
 
     The set-point is what the companion asked for; vehicle_local_position_setpoint is the controller's own output and
     is not read. Rows where the estimator calls its position invalid are left out.
@@ -75,7 +77,7 @@ def _enu(ned: dict[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _command(topic: Any, time: Any, path: Path, findings: ImportReport) -> dict[str, Any]:
-    """Velocity set-point held until the next one; nan where the position was controlled instead."""
+    """Return the velocity set-point, constant until the next one; nan where the position was controlled instead."""
     if topic is None:
         findings.notes.append(f"{path}: has no {SETPOINT}: no commands")
         return {}
@@ -105,6 +107,9 @@ def _air(topic: Any, time: Any) -> Any:
     return ~topic["landed"].astype(bool)[np.maximum(at, 0)] & (at >= 0)
 
 
+# ArduPilot DataFlash logs (.bin) and telemetry logs (.tlog), by pymavlink (LGPL-3, an extra that is
+# only imported). Fields are read by name, because their sets change between releases. Both are read
+# in a process of its own (`reader_process`): pymavlink loops without end in some damaged logs.
 PARTS = ("PSCN", "PSCE", "PSCD")  # position control: north, east, down
 PACE = 1e5  # bytes per second; read by Python, row by row
 HEAD = b"\xa3\x95"  # of each message; source: ArduPilot, AP_Logger/LogStructure.h
@@ -113,7 +118,7 @@ LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so 
 
 
 def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Track of a DataFlash log: PSCN, PSCE, PSCD (position, velocity, commanded velocity), ORGN and GPS."""
+    """Read a DataFlash log: PSCN, PSCE, PSCD (position, velocity, commanded velocity), ORGN and GPS."""
     _need_pymavlink(path)
     with path.open("rb") as file:
         if file.read(len(HEAD)) != HEAD:
@@ -135,17 +140,19 @@ def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -
 
 
 def _gps_times(table: Any) -> Any:
-    """Times since the start and since 1970 (row, 2), s, where the first receiver knows the week; None below two."""
+    """Return times since the start and since 1970 (row, 2), s, by the first receiver; None below two."""
     known = table[(table[:, 1] > 0.0) & (table[:, 3] == 0.0)]
     utc = GPS_EPOCH - LEAP_SECONDS + known[:, 1] * 604800.0 + known[:, 2] * 1e-3
     return np.stack([known[:, 0] * 1e-6, utc], axis=1) if len(known) >= 2 else None
 
 
 def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
-    """One table on the times of the north axis; the other axes are written within the same loop."""
+    """Join the axes in one table at the times of the north axis; the autopilot writes all axes in one loop."""
     north, east, down = rows["PSCN"], rows["PSCE"], rows.get("PSCD")
     time = north[:, 0] * 1e-6
 
+    # States are interpolated to the times of the north axis; a command is constant until the next
+    # one.
     def at(table: Any, column: int) -> Any:
         return np.interp(north[:, 0], table[:, 0], table[:, column])
 
@@ -167,7 +174,7 @@ def _joined(rows: dict[str, Any], path: Path) -> ImportedTrack:
 
 
 def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a telemetry log: LOCAL_POSITION_NED of each vehicle, POSITION_TARGET_LOCAL_NED as its command.
+    """Read a telemetry log: LOCAL_POSITION_NED of each vehicle, POSITION_TARGET_LOCAL_NED as its command.
 
     All vehicles are stamped by the receiver's clock, so they share it; their positions are about their own origins.
     """
@@ -198,7 +205,7 @@ def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
 
 
 def _by_vehicle(told: Any, kind: str, columns: tuple[int, ...], factors: tuple[float, ...]) -> dict[int, Any]:
-    """Rows of each vehicle, of these columns (0: the time) times factors, in their order in the log."""
+    """Return rows of each vehicle, of these columns (0: the time) times factors, in their order in the log."""
     if kind not in told:
         return {}
     table = told[kind].values
@@ -238,6 +245,7 @@ def _tables(
     """Read one table of float64 for each kind of message, a row each: its source, then its fields."""
     rows: dict[str, list[list[float]]] = {kind: [] for kind in fields}
     percent = 0.0
+    # Message by message: pymavlink has no arrays. Only what is needed is kept, as rows of floats.
     while (message := log.recv_match(type=[*fields])) is not None:
         kind = message.get_type()
         # a log without I is of a vehicle with one GPS receiver, number 0
@@ -254,11 +262,13 @@ def _need_pymavlink(path: Path) -> None:
         raise RecordingError(f"{path}: ArduPilot logs need pymavlink (LGPL-3): pip install 'airflock[logs]'")
 
 
+# Logs that nodes write on board: place and velocity from the autopilot, and the commands of the
+# node.
 OTHERS = "of ArduPilot give the .bin that it was made from"  # whose text logs end in .log, too
 
 
 def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Track of the drone on which a node flew: local east-north-up of its mission, by the clock of its computer.
+    """Read the log of a node on board: local east-north-up of its mission, by the clock of its computer.
 
     A row is a tick at which the own state was another than at the tick before; between such rows the autopilot had said
     nothing new. Commands are those of phases in which the node flies; their clock is told UTC by the log's first line.

@@ -58,7 +58,7 @@ def load_tracks(
     say: Callable[[str], None] | None = None,
     done: Callable[[float], None] = ignore_progress,
 ) -> xr.Dataset:
-    """Recording made of tracks of others: flight logs and animals.
+    """Make a recording of tracks from other programs and vehicles: flight logs and animals.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def load_tracks(
 
 
 def _on_ground(tracks: list[ImportedTrack], options: ImportOptions) -> bool:
-    """Whether the axes are known to point east and north: of a site or an autopilot, or because the user says so."""
+    """Return True if the axes are known to point east and north, by the site, the autopilot or the user."""
     first = tracks[0]
     autopilot = Path(first.source).suffix.lower() in AUTOPILOT_SUFFIXES
     return first.origin is not None or first.ground or bool(options.axes) or autopilot
@@ -185,7 +185,8 @@ def read_tracks(
     begin: float | None = None,
     end: float | None = None,
 ) -> tuple[list[ImportedTrack], bool]:
-    """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault.
+    """Read and check tracks at their own times; return them, and True if their clocks agree. Raise RecordingError with
+    all errors.
 
     begin, end : window of time, s; what lies outside is not checked for jumps
     """
@@ -201,6 +202,7 @@ def read_tracks(
     findings.raise_errors()
     track_checks.check_axes(tracks, findings)
     findings.raise_errors()
+    # Axes first: jumps are judged by velocities, which must belong to the same axes as positions.
     comparable = common_frame.align_clocks(tracks, same_clock, findings)
     if begin is not None or end is not None:
         tracks = cut_window(tracks, begin, end)
@@ -212,8 +214,9 @@ def read_tracks(
 
 
 def cut_window(tracks: list[ImportedTrack], begin: float | None, end: float | None) -> list[ImportedTrack]:
-    """Tracks between two times, s; those that have none of it are left out."""
+    """Cut tracks to a window of time, s; leave out those without a row in it."""
     low, high = -np.inf if begin is None else begin, np.inf if end is None else end
+    # The tolerance of the grid, so that a frame exactly on the border is not lost by rounding.
     for track in tracks:
         late = resampling.grid_tolerance(track_checks.median_period(track), *track.time[[0, -1]])
         track.keep((track.time >= low - late) & (track.time <= high + late))
@@ -260,6 +263,7 @@ def _placed(path: Path, tracks: list[ImportedTrack]) -> list[ImportedTrack]:
     return tracks
 
 
+# All options are checked together, so that a user corrects them in one go.
 def check_options(
     options: ImportOptions, findings: ImportReport, numbers: Mapping[str, Any], precision: Any, accept: Any, origin: Any
 ) -> None:
@@ -306,12 +310,13 @@ def _shown(value: Any) -> str:
 
 
 def _is_origin(given: Any) -> bool:
-    """Whether something is a latitude, a longitude and a height."""
+    """Return True for a latitude, a longitude and a height."""
     numbers = list(given) if isinstance(given, Iterable) else []
     sound = len(numbers) == 3 and all(is_number(number) and np.isfinite(number) for number in numbers)
     return sound and abs(numbers[0]) <= 90.0 and abs(numbers[1]) <= 360.0
 
 
+# Formats by the ending of a file: to add one, write a reader and name it here.
 Reader = Callable[[Path, ImportOptions, ImportReport], list[ImportedTrack]]
 READERS: dict[str, tuple[str, Reader]] = {
     ".csv": ("table", read_tables.read_csv),
@@ -333,7 +338,7 @@ AUTOPILOT_SUFFIXES = (".ulg", ".bin", ".tlog", ".log")  # their axes are those o
 
 
 def read_file(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a file; raises RecordingError for what is no known format."""
+    """Read the tracks of a file; raise RecordingError for an unknown format."""
     if path.is_dir():
         raise RecordingError(f"{path}: is a folder; name the files in it")
     if not path.is_file():

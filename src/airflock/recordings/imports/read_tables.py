@@ -26,7 +26,7 @@ CHUNK = 250_000  # rows that are read at a time, so that an hour of thirty drone
 
 
 def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a text table; raises RecordingError that names column and row."""
+    """Read the tracks of a text table; raise a RecordingError that names column and row."""
     head = read_head(path, options)
     if head.above:
         findings.notes.append(f"{path}: line{'s' * (head.above > 1)} above the table left out: {head.above}")
@@ -39,6 +39,8 @@ def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list
         with path.open("rb") as file:
             wanted = None if columns is None else lambda c: c.strip() in columns
             try:
+                # In chunks, and only the needed columns: an hour of thirty drones does not fit as
+                # text.
                 for part in pd.read_csv(file, usecols=wanted, chunksize=CHUNK, low_memory=False, **text):
                     part.columns = [str(c).strip() for c in part.columns]
                     yield at, part
@@ -51,7 +53,7 @@ def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list
 
 
 def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a Parquet table."""
+    """Read the tracks of a Parquet table."""
     try:
         import pyarrow
         import pyarrow.parquet as parquet
@@ -65,7 +67,8 @@ def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> 
 
     def parts(columns: list[str] | None) -> Iterator[tuple[int, pd.DataFrame]]:
         at = 1
-        # Arrow decodes a column in each of its threads, and keeps what it has freed: a third of an hour's memory
+        # Arrow decodes a column in each of its threads, and keeps what it has freed: a third of an
+        # hour's memory
         for batch in file.iter_batches(batch_size=CHUNK // 4, columns=columns, use_threads=False):
             yield at, batch.to_pandas()
             at += batch.num_rows
@@ -76,7 +79,7 @@ def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> 
 
 
 def table_from_columns(columns: Mapping[str, Any]) -> pd.DataFrame:
-    """Columns by name as a table, one value for all rows where a column is no list; raises RecordingError."""
+    """Make a table of columns by name; a column that is no list has one value for all rows. Raise RecordingError."""
     lists = {str(k): list(v) for k, v in columns.items() if np.iterable(v) and not isinstance(v, str)}
     if len({len(column) for column in lists.values()}) != 1:
         told = ", ".join(f"{name} has {len(column)}" for name, column in lists.items()) or "there are none"
@@ -85,7 +88,7 @@ def table_from_columns(columns: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def read_frame(table: pd.DataFrame, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks of a pandas DataFrame; its index is a column too, where it has a name."""
+    """Read the tracks of a pandas DataFrame; a named index is a column, too."""
     flat = table.reset_index() if any(name is not None for name in table.index.names) else table
     flat = flat.set_axis([str(c) for c in flat.columns], axis=1)
     return tracks_from_parts(
@@ -96,7 +99,7 @@ def read_frame(table: pd.DataFrame, options: ImportOptions, findings: ImportRepo
 def tracks_from_parts(
     where: str, stem: str, names: list[str], parts: Any, options: ImportOptions, findings: ImportReport
 ) -> list[ImportedTrack]:
-    """Tracks of a table that comes in parts, by the layout of its columns."""
+    """Read the tracks of a table that comes in parts, by the layout of its columns."""
     wide = (
         wide_columns(names)
         if not any(target in options.map for target in (*POSITION_TARGETS, *GEODETIC_TARGETS))
@@ -110,6 +113,8 @@ def tracks_from_parts(
     gathered: dict[str, list[Any]] = {}
     nameless: list[Any] = [np.empty(0, int)]
     columns = None if wide else how.used
+    # Parts are split by individual at once and joined at the end, so that only numbers stay in
+    # memory.
     for at, part in parts(columns):
         rows = np.arange(at, at + len(part))
         for name, piece in split_by_individual(part, wide, how, stem):
@@ -136,7 +141,8 @@ def tracks_from_parts(
 
 
 def _numbers(column: Any, where: str, name: str, at: int, *, time: bool) -> Any:
-    """A column as float64; dates become seconds since 1970, durations seconds; texts of neither are faults.
+    """Return a column as float64: dates as seconds since 1970, durations as seconds; raise RecordingError for other
+    texts.
 
     time : whether it tells times, which may be written as dates or as hours:minutes:seconds
     """
@@ -162,7 +168,7 @@ def _numbers(column: Any, where: str, name: str, at: int, *, time: bool) -> Any:
 
 
 def _no_number(text: str, time: bool) -> str:
-    """What is wrong with a cell that is no number, and what to write instead."""
+    """Return the error of a cell that is no number, and its remedy."""
     if re.fullmatch(r"\s*[-+]?\d+,\d+\s*", text):
         return f"{text} has a decimal comma; write --decimal ,"
     if table_columns.is_unit(text):
@@ -195,7 +201,7 @@ def _taken(values: dict[str, Any], rows: Any, chosen: Any) -> tuple[dict[str, An
 def _track(
     name: str, where: str, parts: list[Any], how: ColumnLayout, shared: bool, findings: ImportReport
 ) -> ImportedTrack:
-    """One individual of its pieces; shared: whether others have the same column of times."""
+    """Join the pieces of one individual; shared: True if others have the same column of times."""
     columns = {target: np.concatenate([p[0][target] for p in parts]) for target in parts[0][0]}
     rows = np.concatenate([p[1] for p in parts])
     origin, valid = table_columns.pop_origin_and_validity(columns)
@@ -205,6 +211,7 @@ def _track(
     utc = columns.pop("utc", None)
     time = columns.pop("t") if "t" in columns else utc
     assert time is not None
+    # More than 1e9 s: a clock since 1970, and no time since a start, which would be 31 years.
     of_day = bool((time[np.isfinite(time)][:1] > 1e9).any())  # seconds since 1970
     clock = "utc" if of_day or (utc is not None and utc is time) else ("shared" if shared else "own")
     pair = None
@@ -217,6 +224,7 @@ def _track(
     return found
 
 
+# The beginning of a text table: its encoding, lines above it, its delimiter, and names of columns.
 DELIMITERS = (",", ";", "\t", "|")
 BLANKS = r"\s+"  # where nothing else separates columns, as NumPy writes tables
 MOST = 1 << 20  # bytes that are looked at
@@ -239,12 +247,12 @@ class TableHead(NamedTuple):
 
     @property
     def first(self) -> int:
-        """Number of the first row of data, as an editor counts."""
+        """Return the number of the first row of data, as an editor counts."""
         return self.above + (1 if self.hidden else 2)
 
 
 def read_head(path: Path, options: ImportOptions) -> TableHead:
-    """How a text table begins; raises RecordingError for what is none, and where columns have no names."""
+    """Read the beginning of a text table; raise RecordingError for other files, and for columns without names."""
     encoding, lines = _lines(path)
     above = next((i for i, line in enumerate(lines) if line.strip() and not _remark(line)), len(lines))
     if above == len(lines):
@@ -255,6 +263,8 @@ def read_head(path: Path, options: ImportOptions) -> TableHead:
     names = _cells(lines[above], delimiter)
     if len(names) > MAX_COLUMNS:
         column_layout(str(path), names, options)
+    # Some trackers write the names in a comment above the numbers; they are used if their count
+    # fits.
     hidden = False
     if all(_numeric(name) for name in names):
         over = _cells(lines[above - 1].strip().lstrip(REMARK), delimiter) if above else []
@@ -266,7 +276,7 @@ def read_head(path: Path, options: ImportOptions) -> TableHead:
 
 
 def _lines(path: Path) -> tuple[str, list[str]]:
-    """Encoding and first lines of a text."""
+    """Return the encoding and the first lines of a text."""
     with path.open("rb") as file:
         start = file.read(MOST)
     if not start.strip():
@@ -288,7 +298,7 @@ def _remark(line: str) -> bool:
 
 
 def _delimiter(first: str, body: list[str]) -> str:
-    """What separates columns: the sign that the first line has most of, or blanks where it has none of them."""
+    """Return the delimiter of columns: the most frequent sign of the first line, or blanks."""
     likely = max(DELIMITERS, key=lambda d: (first.count(d), d == ","))
     if likely in first:
         return likely
@@ -309,6 +319,8 @@ def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: 
     """Refuse decimal commas that nobody has announced; at: number of the first row."""
     if options.decimal != ".":
         return
+    # A decimal comma beside a comma as delimiter cannot be read: the cells of a row are then too
+    # many.
     for number, line in enumerate(body, at):
         cells = line.split() if delimiter == BLANKS else line.split(delimiter)
         comma = [cell.strip() for cell in cells if re.fullmatch(r'\s*"?[-+]?\d+,\d+"?\s*', cell)]
@@ -321,12 +333,13 @@ def _decimals(path: Path, body: list[str], count: int, delimiter: str, options: 
             )
 
 
+# Wide tables: columns for each individual, as x1, y1, x2, y2 or fish1_x, fish1_y, fish2_x, fish2_y.
 AXIS_FIRST = re.compile(r"([xyz])_?(\d+)")
 NAME_FIRST = re.compile(r"([a-z][a-z_]*?_?\d+)_([xyz])")  # a number: head_x, tail_x are places on one individual
 
 
 def wide_columns(names: list[str]) -> dict[str, dict[str, str]]:
-    """Individual → component → column, of a table such as time, x1, y1, x2, y2; empty if it is none."""
+    """Return individual → component → column, of a table such as time, x1, y1, x2, y2; empty for a long table."""
     found: dict[str, dict[str, str]] = {}
     plain = [table_columns.split_header(name)[0] for name in names]
     if any(name in table_columns.ALIASES["x"] for name in plain):
@@ -341,7 +354,7 @@ def wide_columns(names: list[str]) -> dict[str, dict[str, str]]:
 
 
 def first_individual_columns(names: list[str], wide: dict[str, dict[str, str]]) -> list[str]:
-    """Columns of the first individual of a wide table, under the names of a long one."""
+    """Return the columns of the first individual of a wide table, by the names of a long one."""
     taken = {column for parts in wide.values() for column in parts.values()}
     first = next(iter(wide.values()))
     unit = {part: table_columns.split_header(column)[1] for part, column in first.items()}
@@ -351,7 +364,7 @@ def first_individual_columns(names: list[str], wide: dict[str, dict[str, str]]) 
 def split_by_individual(
     table: pd.DataFrame, wide: dict[str, dict[str, str]], layout: ColumnLayout, stem: str
 ) -> Iterable[tuple[str, pd.DataFrame]]:
-    """Rows of a table by individual, each under the names of a long one; all of them as `stem` where it is not wide."""
+    """Yield the rows of each individual by the names of a long table; all rows as `stem` if the table is not wide."""
     if not wide:
         return [(stem, table)]
     taken = [column for parts in wide.values() for column in parts.values()]

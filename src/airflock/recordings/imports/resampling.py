@@ -1,4 +1,4 @@
-"""Tracks on one grid of times: gaps bridged up to a stated length, otherwise absent (nan)."""
+"""Resample tracks to one grid of times: gaps are bridged up to a stated length, otherwise the individual is absent."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ COARSE = 0.01  # m; where places are farther apart in single precision, they are
 def time_grid(
     tracks: list[ImportedTrack], rate: float | None, begin: float | None, end: float | None
 ) -> tuple[Any, float]:
-    """Times (s) from the first to the last row, and their distance; the tracks' own rate unless one is given.
+    """Return times (s) from the first to the last row, and their distance: the tracks' own rate by default.
 
     A window that begins between two rows of the tracks' own rate begins at the later one, so that its times are theirs.
     """
@@ -46,15 +46,17 @@ def time_grid(
 
 
 def grid_tolerance(period: float, *instants: float) -> float:
-    """Time (s) by which rows may miss the grid: 1e-6 of a period, and what doubles of these instants do not tell.
+    """Return the time (s) by which rows may miss the grid: 1e-6 of a period, and the resolution of these instants.
 
     Seconds since 1970 are told to 2.4e-7 s.
     """
     return 1e-6 * period + 2.0 * float(np.spacing(max(abs(instant) for instant in instants)))
 
 
+# At 30 Hz a step of 0.03333 s drifts past every frame after ten: positions were interpolated, which
+# smooths their noise, and 10,000 frames became 10,001.
 def _round(period: float) -> float:
-    """A period (s) as it was meant: that of a rate of four digits, as of 30 or 29.97 Hz; else four digits of itself.
+    """Round a period (s) to a rate of four digits, such as 30 or 29.97 Hz, else to four digits of itself.
 
     Frames of a video are met then, rather than drifted past: with 0.03333 s one is lost in each 10,000 of 30 Hz.
     """
@@ -64,7 +66,7 @@ def _round(period: float) -> float:
 
 
 def needed_bits(tracks: list[ImportedTrack], min_bits: int) -> tuple[int, float]:
-    """Bits per number that tracks need, at least those asked for; and the step of places in single precision, m.
+    """Return the bits per number that tracks need, at least `min_bits`, and the step of places in single precision, m.
 
     Raises RecordingError for places that nobody flies at.
     """
@@ -76,6 +78,8 @@ def needed_bits(tracks: list[ImportedTrack], min_bits: int) -> tuple[int, float]
             f"{track.source}: {track.name}: a position of {farthest:.3g} m; at most {FARTHEST:g} m from the origin; "
             "check the unit and which columns are read"
         )
+    # Single precision at 100 km resolves 8 mm; farther away noise of rounding would look like
+    # motion.
     step = float(np.spacing(np.float32(farthest)))
     return (64 if step > COARSE else min_bits), step
 
@@ -83,7 +87,7 @@ def needed_bits(tracks: list[ImportedTrack], min_bits: int) -> tuple[int, float]
 def resample(
     tracks: list[ImportedTrack], times: NDArray[np.float64], period: float, bridge: float, precision: int
 ) -> tuple[xr.Dataset, dict[str, float]]:
-    """Dataset of the tracks at the given times, and shares: presence, bridged.
+    """Resample tracks to the given times; return the dataset, and the shares that are present and bridged.
 
     bridge : longest gap (s) that is bridged, by cubic Hermite with the velocities at its ends
     """
@@ -122,16 +126,21 @@ def _fill(
     own, usual = track.time, median_period(track) or period
     rows = track.stack(POSITION_TARGETS, axes)
     late = grid_tolerance(period, times[0], times[-1])
+    # For each time of the grid the row before it; the last row has no row after it, so the pair
+    # before is used.
     at = np.searchsorted(own, times + late, side="right") - 1
     inside = (at >= 0) & (times <= own[-1] + late)
     before = np.clip(at, 0, max(len(own) - 2, 0))
     after = np.minimum(before + 1, len(own) - 1)
     step = own[after] - own[before]
     part = np.where(step > 0.0, (times - own[before]) / np.where(step > 0.0, step, 1.0), 0.0)
+    # A frame that meets a row takes the row itself, without any interpolation.
     on_row = (np.abs(times - own[np.clip(at, 0, None)]) < 1e-3 * min(period, usual)) & inside
     broken = np.isin(after, track.breaks)
     normal = inside & (step <= NORMAL * usual) & ~broken
     bridged = inside & (step <= max(bridge, NORMAL * usual)) & ~broken
+    # Good frames are on a row, between two normal rows, or in a gap that may be bridged, but never
+    # across a reset.
     good = on_row | bridged
     if track.in_air is not None:
         good &= track.in_air[before] & track.in_air[after]
@@ -156,10 +165,11 @@ def _fill(
 
 
 def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:
-    """Velocities from positions: central differences within each unbroken stretch."""
+    """Differentiate positions: central differences within each unbroken stretch."""
     found = np.zeros_like(rows)
     gaps = np.flatnonzero(np.diff(times) > 5.0 * usual) + 1
     edges = np.unique(np.concatenate([[0], breaks, gaps, [len(times)]])).astype(int)
+    # Gaps and resets end a stretch: a difference across them would be a velocity that nobody had.
     for begin, end in zip(edges[:-1], edges[1:], strict=True):
         if end - begin > 1:
             found[begin:end] = central_difference(rows[begin:end], times[begin:end])
@@ -169,7 +179,7 @@ def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:
 
 
 def _hermite(rows: Any, slopes: Any, before: Any, after: Any, step: Any, part: Any) -> tuple[Any, Any]:
-    """Cubic through two points with given slopes: position and velocity."""
+    """Interpolate with a cubic through two points with known slopes; return position and velocity."""
     s, h = part[:, None], step[:, None]
     p0, p1, m0, m1 = rows[before], rows[after], slopes[before] * h, slopes[after] * h
     place = (

@@ -19,6 +19,7 @@ from airflock.recordings.imports.track import (
 )
 from airflock.support import RecordingError, collect_errors, suggest
 
+# Headers: the quantity in a column, and its unit.
 LENGTH_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048, "in": 0.0254}
 TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 SPEED_UNITS = {"m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 1e-3, "km/h": 1 / 3.6, "kmh": 1 / 3.6,
@@ -61,7 +62,7 @@ _SUFFIXES = sorted({*LENGTH_UNITS, *TIME_UNITS, *SPEED_UNITS, *ANGLES, *PIXEL_UN
 
 
 class HeaderMeaning(NamedTuple):
-    """What a header says: target, its unit (empty: not said), sign (-1 for down), and the level of a height."""
+    """Meaning of a header: target, its unit (empty: unknown), sign (-1 for down), and the level of a height."""
 
     target: str
     unit: str
@@ -78,6 +79,7 @@ def split_header(header: str) -> tuple[str, str]:
     plain = _plain(text)
     if plain == "timeus":  # as ArduPilot writes it
         return "time", "us"
+    # Known names first: a name that ends like a unit, such as pos_m, may be a column of its own.
     if plain not in _TARGET:
         for unit in _SUFFIXES:
             if plain.endswith(f"_{unit}") and len(plain) > len(unit) + 1:
@@ -86,7 +88,7 @@ def split_header(header: str) -> tuple[str, str]:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is nothing but a unit, also in brackets."""
+    """Return True if a text is nothing but a unit, also in brackets."""
     plain = text.strip().strip("[]()").strip().lower()
     return plain in {*LENGTH_UNITS, *TIME_UNITS, *SPEED_UNITS, *ANGLES, *PIXEL_UNITS}
 
@@ -96,7 +98,7 @@ def _plain(text: str) -> str:
 
 
 def header_meaning(header: str) -> HeaderMeaning | None:
-    """What a column holds, or None if its name tells nothing."""
+    """Return the quantity in a column, or None for an unknown name."""
     name, unit = split_header(header)
     if name in DOWN:
         return HeaderMeaning(DOWN[name], unit, -1.0, "")
@@ -105,7 +107,7 @@ def header_meaning(header: str) -> HeaderMeaning | None:
 
 
 def column_factor(target: str, unit: str, where: str, options: ImportOptions) -> float:
-    """Number that turns a column into SI; raises RecordingError for a unit of something else.
+    """Return the factor that converts a column to SI; raise RecordingError for a unit of something else.
 
     unit : of the header; if empty, that of the options
     """
@@ -124,6 +126,7 @@ def column_factor(target: str, unit: str, where: str, options: ImportOptions) ->
         unit = options.time_unit if options.time_unit != "frames" else ""
     if not unit and target in POSITION_TARGETS:
         unit = options.unit
+    # A length unit on the command line means the same unit per second for velocities.
     if not unit and target in (*VELOCITY_TARGETS, *COMMAND_TARGETS) and options.unit not in ("", *PIXEL_UNITS):
         return LENGTH_UNITS[options.unit]
     if unit in PIXEL_UNITS and target in POSITION_TARGETS:
@@ -136,7 +139,7 @@ def column_factor(target: str, unit: str, where: str, options: ImportOptions) ->
 
 
 def unit_in_metres(unit: str, where: str, subject: str, options: ImportOptions) -> float:
-    """Metres in one unit of what has no header; raises RecordingError where neither it nor the options tell the unit.
+    """Return the metres in one unit of an array without a header; raise RecordingError if nothing names the unit.
 
     unit : that the file tells, if any; where, what : file and variable, for the message
     """
@@ -145,15 +148,18 @@ def unit_in_metres(unit: str, where: str, subject: str, options: ImportOptions) 
     raise RecordingError(f"{where}: {subject} has no unit; {UNIT_HINT}")
 
 
+# Tables with the fields of PX4: x is north, z is down and times are microseconds, although no
+# header says so.
 FIELDS = {"timestamp", *POSITION_TARGETS, *VELOCITY_TARGETS}
-# fields of vehicle_local_position that no other table has; source: PX4, msg/VehicleLocalPosition.msg
+# fields of vehicle_local_position that no other table has; source: PX4,
+# msg/VehicleLocalPosition.msg
 MARKS = {"ref_timestamp", "xy_valid", "z_valid", "v_xy_valid", "xy_reset_counter", "vxy_reset_counter", "z_deriv"}
 ORIGIN = ("ref_lat", "ref_lon", "ref_alt")
 VALID = ("xy_valid", "v_xy_valid")
 
 
 def px4_options(where: str, columns: Sequence[str], options: ImportOptions) -> tuple[ImportOptions, list[str]]:
-    """Options for a table of these columns, and notes: axes and times of PX4 where its fields are there.
+    """Return options for a table of these columns, and notes: axes and times of PX4 where its fields are there.
 
     Raises RecordingError where they may be those of PX4 and nobody has said which axes they are.
     """
@@ -175,13 +181,13 @@ def px4_options(where: str, columns: Sequence[str], options: ImportOptions) -> t
 
 
 def is_px4_log(columns: Sequence[str]) -> bool:
-    """Whether a table of these columns can only be PX4's vehicle_local_position."""
+    """Return True if a table of these columns can only be PX4's vehicle_local_position."""
     names = {split_header(column)[0] for column in columns}
     return names >= FIELDS and bool(names & MARKS)
 
 
 def extra_columns(columns: Sequence[str], options: ImportOptions) -> list[str]:
-    """Further columns of such a table that are read: where its origin is, and whether a row is valid."""
+    """Return further columns of such a table that are read: its origin, and the validity of rows."""
     if options.axes != "ned" or not is_px4_log(columns):
         return []
     return [*(ORIGIN if set(columns) >= set(ORIGIN) else ()), *(name for name in VALID if name in columns)]
@@ -197,13 +203,13 @@ def pop_origin_and_validity(columns: dict[str, Any]) -> tuple[tuple[float, float
 
 
 def invalid_note(where: str, name: str, valid: Any, row_numbers: Any) -> str:
-    """What is told of rows that the estimator calls invalid."""
+    """Return the note on rows that the estimator calls invalid."""
     bad = row_numbers[~valid]
     return f"{where}: {name}: {len(bad)} rows that the estimator calls invalid left out, first row {bad[0]}"
 
 
 def px4_origin(local: Mapping[str, Any]) -> tuple[float, float, float] | None:
-    """Latitude, longitude (degrees) and height (m) of x = y = z = 0, which the estimator tells once it knows them."""
+    """Return latitude, longitude (degrees) and height (m) of x = y = z = 0, once the estimator knows them."""
     if not all(name in local for name in ORIGIN):
         return None
     place = np.stack([np.asarray(local[f"ref_{name}"], float) for name in ("lat", "lon", "alt")], axis=1)
@@ -211,13 +217,15 @@ def px4_origin(local: Mapping[str, Any]) -> tuple[float, float, float] | None:
     return None if not len(known) else (float(known[-1, 0]), float(known[-1, 1]), float(known[-1, 2]))
 
 
+# A list of allowed ast nodes, walked by us: eval with a cleaned namespace still reaches the
+# interpreter by attributes.
 LONGEST = 300  # characters; nothing that a column needs is longer
 OPERATIONS = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
 ALLOWED = "column names, numbers, + - * / and parentheses; a name with blanks stands in quotes"
 
 
 def parse_expression(text: str, target: str) -> ast.expr:
-    """Tree of an expression; raises RecordingError for anything but arithmetic of columns."""
+    """Parse an expression; raise RecordingError for anything but arithmetic of columns."""
     if len(text) > LONGEST:
         raise RecordingError(f"--map {target}:=...: has {len(text)} characters, more than {LONGEST}")
     try:
@@ -234,13 +242,13 @@ def parse_expression(text: str, target: str) -> ast.expr:
 
 
 def column_names(tree: ast.expr) -> list[str]:
-    """Columns that an expression asks for."""
+    """Return the columns that an expression uses."""
     found = [node.id for node in ast.walk(tree) if isinstance(node, ast.Name)]
     return found + [n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
 
 
 def single_column(tree: ast.expr) -> str:
-    """The column, if an expression is nothing but one; else empty."""
+    """Return the column of an expression that is nothing but one column; else empty."""
     return column_names(tree)[0] if isinstance(tree, ast.Name) or _text(tree) else ""
 
 
@@ -258,7 +266,7 @@ def check_columns(tree: ast.expr, columns: Any, where: str, target: str) -> None
 
 
 def evaluate(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
-    """An expression with arrays in the place of names."""
+    """Evaluate an expression with arrays in the place of names."""
     if isinstance(tree, ast.BinOp):
         with np.errstate(divide="ignore", invalid="ignore"):
             return OPERATIONS[type(tree.op)](evaluate(tree.left, columns), evaluate(tree.right, columns))
@@ -272,17 +280,18 @@ def evaluate(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
 
 
 def quote_column(column: str) -> str:
-    """A column as it stands in an expression of --map."""
+    """Return a column as it is written in an expression of --map."""
     return column if column.isidentifier() else f"'{column}'"
 
 
+# Layout: the column of each quantity, by --map or by the headers; and the values in SI units.
 MAX_COLUMNS = 2000
 OF_A_TRACKER = ("probability", "likelihood", "score", "confidence")
 
 
 @dataclass
 class ColumnLayout:
-    """How a table is read: target → tree and factor; the column of names; what to tell the user."""
+    """Layout of a table: target → expression and factor; the column of names; notes for the user."""
 
     where: str
     expressions: dict[str, Any] = field(default_factory=dict)
@@ -295,12 +304,12 @@ class ColumnLayout:
 
     @property
     def used(self) -> list[str]:
-        """Columns that are needed."""
+        """Return the columns that are needed."""
         found = [name for tree in self.expressions.values() for name in column_names(tree)]
         return list(dict.fromkeys(found + ([self.id] if self.id else [])))
 
     def values(self, table: Mapping[str, NDArray[np.float64]], count: int) -> dict[str, NDArray[np.float64]]:
-        """Targets in SI units."""
+        """Return the targets in SI units."""
         return {
             target: np.broadcast_to(self.factors[target] * evaluate(tree, table), count).astype(float)
             for target, tree in self.expressions.items()
@@ -308,7 +317,7 @@ class ColumnLayout:
 
 
 def column_layout(where: str, columns: Sequence[str], options: ImportOptions) -> ColumnLayout:
-    """Layout of a table with these columns; raises RecordingError with every fault."""
+    """Find the layout of a table with these columns; raise RecordingError with all errors."""
     if len(columns) > MAX_COLUMNS:
         raise RecordingError(
             f"{where}: {len(columns)} columns are more than {MAX_COLUMNS}; "
@@ -327,6 +336,8 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
         _recognised(found, [column for column in columns if column not in other], options)
     if other:
         found.notes.append(f"{where}: {', '.join(other)}: no commanded velocity: left out")
+    # Missing targets are only reported if all columns could be read: they may be the unreadable
+    # ones.
     whole = not faults
     _frames(found, options, faults)
     if whole:
@@ -345,7 +356,7 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
 
 
 def _commands_no_velocity(column: str) -> bool:
-    """Whether a column holds a heading or an acceleration that was commanded."""
+    """Return True if a column is a commanded heading or acceleration."""
     told = header_meaning(column)
     return told is not None and told.target in COMMAND_TARGETS and told.unit in OTHER_COMMAND_UNITS
 
@@ -410,6 +421,8 @@ def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOpti
         _drop(found, "z")
     if faults:
         raise RecordingError("\n".join(faults))
+    # Lengths without a unit are metres in logs of robots, but pixels in files of trackers and
+    # cameras: there they are refused.
     if unsaid:
         tells = [f"{c} comes from a tracker" for c in columns if split_header(c)[0] in OF_A_TRACKER]
         if "t" not in found.expressions and "frame" in found.expressions:
@@ -422,7 +435,7 @@ def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOpti
 
 
 def _frames(found: ColumnLayout, options: ImportOptions, faults: list[str]) -> None:
-    """Time from numbers of frames, where there is no other."""
+    """Use frame numbers as time where there is no other time."""
     counted = options.time_unit == "frames" and "t" in found.expressions
     if "t" not in found.expressions and "frame" in found.expressions:
         _copy(found, "frame", "t")
@@ -455,9 +468,10 @@ def _complete(found: ColumnLayout, columns: Sequence[str], faults: list[str]) ->
 
 
 def _ned(found: ColumnLayout, options: ImportOptions) -> None:
-    """Swap north and east and turn z over, where the user says that x is north."""
+    """Swap north and east and turn z over, if the user declares that x is north."""
     if options.axes != "ned":
         return
+    # Swapped by way of an empty name, for positions, velocities and commands.
     for first, second, third in (POSITION_TARGETS, VELOCITY_TARGETS, COMMAND_TARGETS):
         if first in found.expressions and second in found.expressions:
             _copy(found, first, "")

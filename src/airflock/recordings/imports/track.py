@@ -1,4 +1,4 @@
-"""What a reader hands on: one individual as its file tells it, in SI units, with names for messages."""
+"""Tracks between a reader and the checks: one individual in SI units, options, and the report of errors."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ def ignore_progress(_: float) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class ImportOptions:
-    """What the user says about files that do not say it themselves.
+    """Options of the user for files that do not contain this themselves.
 
     map        : target (t, x, vx, cx, id, lat, ...) → expression of column names
     unit       : of lengths: m, cm, mm, km, ft, or px with `scale`
@@ -57,8 +57,8 @@ class ImportOptions:
 
 @dataclass
 class ImportedTrack:
-    """One individual. Arrays have one entry per row of the file. Readers keep rows without a
-    time or a place (nan); `absent.drop_incomplete_rows` tells of them and takes them out.
+    """One individual. Arrays have one entry per row of the file. Readers keep rows without a time or a place (nan);
+    `track_checks.drop_incomplete_rows` reports and removes them.
 
     name, source : the individual and its file, for messages
     time    : (row,) s, of the clock that `clock` names
@@ -89,20 +89,21 @@ class ImportedTrack:
     breaks: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     def has(self, names: tuple[str, ...]) -> bool:
-        """Whether the first two of three components are there."""
+        """Return True if the first two of three components are there."""
         return all(name in self.columns for name in names[:2])
 
     def stack(self, names: tuple[str, ...], dimensions: int) -> NDArray[np.float64]:
-        """Components side by side, (row, dimensions); 0 for a height that is not there."""
+        """Stack components side by side, (row, dimensions); 0 for a missing height."""
         empty = np.zeros(len(self.time))
         return np.stack([self.columns.get(name, empty) for name in names[:dimensions]], axis=1)
 
     def label(self, target: str) -> str:
-        """The user's own word for a target."""
+        """Return the user's own word for a target."""
         return self.user_labels.get(target, target)
 
     def keep(self, chosen: NDArray[Any]) -> None:
         """Keep only the chosen rows (a mask or an order)."""
+        # Breaks are row numbers: after rows are dropped each break belongs to the next kept row.
         last = np.arange(len(self.time))[chosen]
         place = np.searchsorted(last, self.breaks) if last.size and (np.diff(last) > 0).all() else self.breaks
         self.breaks = np.unique(place[place < len(last)]).astype(np.int64)
@@ -111,16 +112,18 @@ class ImportedTrack:
         self.in_air = None if self.in_air is None else self.in_air[chosen]
 
 
+# Checks see tracks and know no format; errors that may be intended have a kind that `--accept`
+# names. There is no "all".
 @dataclass
 class ImportReport:
-    """Faults and notes of an import, gathered to be reported together."""
+    """Errors and notes of an import, collected to be reported together."""
 
     accepted_kinds: frozenset[str] = frozenset()
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def fault(self, line: str, kind: str = "") -> bool:
-        """Note a fault; one of a kind that the user accepts is a note. Returns whether it was accepted."""
+        """Add an error; one of a kind that the user accepts becomes a note. Return True if it was accepted."""
         if kind in self.accepted_kinds:
             self.notes.append(f"accepted ({kind}): {line}")
             return True

@@ -24,6 +24,7 @@ from airflock.recordings.imports.track import (
 )
 from airflock.support import RecordingError
 
+# Rows without a time, a place or a speed: each is reported with file, column, number and first row.
 PLACE_TARGETS = (*POSITION_TARGETS[:2], *GEODETIC_TARGETS[:2])
 MissingRows = dict[
     str, list[tuple[NDArray[np.int64], int]]
@@ -31,11 +32,12 @@ MissingRows = dict[
 
 
 def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) -> list[ImportedTrack]:
-    """Tracks without the rows that have no time or no place; raises RecordingError for a file with no others.
+    """Drop the rows without a time or a place; raise RecordingError for a file with no others.
 
     An individual is absent where its place is nan or inf; one that has no place at any time is left out.
     """
     kept = []
+    # By file: a thousand individuals with the same gap give one note.
     for source, own in tracks_by_source(tracks).items():
         whole = [_timed(track) & _placed(track) for track in own]
         there = [track for track, sound in zip(own, whole, strict=True) if sound.any()]
@@ -54,7 +56,7 @@ def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) ->
 
 
 def note_missing_velocities(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """Tell where a velocity or a command is nan or inf; an infinite one is none."""
+    """Note where a velocity or a command is nan or inf; an infinite one becomes nan."""
     for source, own in tracks_by_source(tracks).items():
         _tell(
             findings, source, _lacking(own, VELOCITY_TARGETS), "without a number: differentiated from positions there"
@@ -69,7 +71,7 @@ def note_missing_velocities(tracks: list[ImportedTrack], findings: ImportReport)
 
 
 def tracks_by_source(tracks: Iterable[ImportedTrack]) -> dict[str, list[ImportedTrack]]:
-    """Tracks by the file that they were read from."""
+    """Group tracks by the file that they were read from."""
     found: dict[str, list[ImportedTrack]] = {}
     for track in tracks:
         found.setdefault(track.source, []).append(track)
@@ -89,7 +91,7 @@ def _placed(track: ImportedTrack) -> NDArray[np.bool_]:
 
 
 def _lacking(tracks: list[ImportedTrack], names: Iterable[str]) -> MissingRows:
-    """Rows with a time but no number, by column, under the user's own word for it."""
+    """Return the rows with a time but no number, by column, under the user's own word for it."""
     found: MissingRows = {}
     for track in tracks:
         for name in names:
@@ -101,7 +103,7 @@ def _lacking(tracks: list[ImportedTrack], names: Iterable[str]) -> MissingRows:
 
 
 def _tell(findings: ImportReport, source: str, lacking: MissingRows, what: str) -> None:
-    """One note for columns that lack a number in the same rows."""
+    """Add one note for columns that lack a number in the same rows."""
     lines: dict[tuple[bytes, str], list[str]] = {}
     for column, parts in lacking.items():
         rows = np.concatenate([rows for rows, _ in parts])
@@ -115,6 +117,7 @@ def _tell(findings: ImportReport, source: str, lacking: MissingRows, what: str) 
         findings.notes.append(f"{source}: {named}{line}")
 
 
+# Times, individuals and heights: rules 1, 4, 7 and presence. Each error is one line.
 STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
 SLOW = 5.0  # s between rows: a unit of thousandths would be odd for so slow a log
 SINCE_1970 = 1e8  # s; times beyond are dates, and their unit is plain
@@ -122,13 +125,13 @@ LEAST = 0.2  # share of the common span below which an individual is worth a que
 
 
 def median_period(track: ImportedTrack) -> float:
-    """Usual time between rows, s; 0 for a single row."""
+    """Return the usual time between rows, s; 0 for a single row."""
     steps = np.diff(track.time)
     return float(np.median(steps)) if steps.size else 0.0
 
 
 def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """Rule 1: sort by time, tell of repeated instants and of steps that no log has, each once for a file."""
+    """Rule 1: sort by time, and report repeated instants and impossible steps, each once a file."""
     for source, own in tracks_by_source(tracks).items():
         late = [_sorted(track) for track in own]
         _tell_order(source, [rows for rows in late if rows.size], findings)
@@ -141,7 +144,7 @@ def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 def _sorted(track: ImportedTrack) -> NDArray[np.int64]:
-    """Sort a track by time; the rows that came before an earlier one."""
+    """Sort a track by time; return the rows that came before an earlier one."""
     late = np.flatnonzero(np.diff(track.time) < 0.0) + 1
     rows = track.rows[late]
     if late.size:
@@ -156,7 +159,7 @@ def _tell_order(source: str, late: list[NDArray[np.int64]], findings: ImportRepo
 
 
 def _wrong_step(track: ImportedTrack) -> str:
-    """What is wrong with the time between rows; empty if nothing is."""
+    """Return the error of the time between rows; empty if there is none."""
     step, name = median_period(track), track.label("t")
     where = f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}"
     if step and not STEPS[0] <= step <= STEPS[1]:
@@ -171,7 +174,7 @@ def _wrong_step(track: ImportedTrack) -> str:
 
 
 def _unsaid_step(track: ImportedTrack) -> str:
-    """What is told of times without a unit that would be far apart in seconds; empty if there are none."""
+    """Return the error of times without a unit that would be far apart in seconds; empty if there is none."""
     step, name = median_period(track), track.user_labels.get("t", "")
     if (
         not name.isidentifier()
@@ -188,7 +191,7 @@ def _unsaid_step(track: ImportedTrack) -> str:
 
 
 def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> None:
-    """Rows with the time of the row before: the same row again, or another individual. The first of them is kept."""
+    """Check rows with the time of the row before: the same row again, or another individual. Keep the first."""
     again: list[tuple[ImportedTrack, NDArray[np.int64]]] = []
     for track in own:
         same = np.flatnonzero(np.diff(track.time) == 0.0)
@@ -197,6 +200,8 @@ def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> 
         place = track.stack(POSITION_TARGETS, 2)
         apart = np.hypot(*(place[same + 1] - place[same]).T)
         other = np.flatnonzero(apart > 1e-9)
+        # Mostly at different places: two individuals share an id. Otherwise the logger repeated
+        # rows.
         if len(other) > 0.5 * len(same):
             findings.fault(
                 f"{source}: column {track.label('t')}: {track.name} is at two places at once, first row "
@@ -218,7 +223,7 @@ def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> 
 
 
 def check_names(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """No two individuals with one name."""
+    """Refuse two individuals with one name."""
     known: dict[str, ImportedTrack] = {}
     for track in tracks:
         if track.name in known:
@@ -229,7 +234,7 @@ def check_names(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """A column without a number says nothing, so it is none; a row without a height that others have is no place."""
+    """Drop columns without any number, and rows without a height that other rows have."""
     for track in tracks:
         for name in (*VELOCITY_TARGETS, *COMMAND_TARGETS):
             if name in track.columns and not np.isfinite(track.columns[name]).any():
@@ -257,7 +262,7 @@ def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport) -> None:
-    """Rule 4: heights of all individuals are above the same level; z points up, if `axes` (enu, ned) are the file's."""
+    """Rule 4: require that all heights are above the same level; z points up, if `axes` (enu, ned) are the file's."""
     levels = {track.datum: track for track in tracks if "z" in track.columns or "alt" in track.columns}
     if len(levels) > 1:
         told = ", ".join(f"{t.name}: {level or 'not said'}" for level, t in levels.items())
@@ -266,6 +271,7 @@ def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport
         heights = [(track, track.columns["z"]) for track in own if "z" in track.columns]
         rows = sum(len(z) for _, z in heights)
         deep = [(track, np.flatnonzero(z < -1.0)) for track, z in heights]
+        # Heights above the start scatter about 0 on the ground, so a few below -1 m are no error.
         if not rows or sum(len(low) for _, low in deep) <= 0.9 * rows:  # around 0 some are always below
             continue
         track, low = next((track, low) for track, low in deep if len(low))
@@ -283,11 +289,12 @@ def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport
 
 
 def note_resolution(track: ImportedTrack, findings: ImportReport) -> None:
-    """Rule 7: resolution of positions that repeat, the floor of their noise."""
+    """Rule 7: note the resolution of positions that repeat, the floor of their noise."""
     for axis in POSITION_TARGETS[:2]:
         values = track.columns[axis]
         steps = np.abs(np.diff(values))
         moved = steps[steps > 0.0]
+        # Positions that change in most rows have no visible resolution.
         if len(steps) < 20 or not len(moved) or len(moved) > 0.8 * len(steps):
             continue
         least = float(moved.min())
@@ -300,7 +307,7 @@ def note_resolution(track: ImportedTrack, findings: ImportReport) -> None:
 
 
 def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
-    """Individuals that are hardly there: kept only if that is meant."""
+    """Refuse individuals that are hardly present, unless the user accepts them."""
     first, last = min(t.time[0] for t in tracks), max(t.time[-1] for t in tracks)
     if last <= first:
         return
@@ -319,6 +326,8 @@ def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 
 Array = NDArray[np.float64]
+# Displacements against summed velocities decide axes, signs and units together; names of columns
+# cannot.
 LAG = 0.5  # s over which velocities are summed up, so that resolution does not hide the slope
 TOLERANCE = 0.1  # of a slope that should be 1
 SIGMAS, WILD = 8.0, 20.0  # of a jump, with and without a velocity to predict it
@@ -335,12 +344,13 @@ REASONS = {  # how many times too fast → why, and what to write: targets and t
 
 
 def check_axes(tracks: Iterable[ImportedTrack], findings: ImportReport) -> None:
-    """Rule 2: along each axis positions change as the velocities say; else name what is swapped, turned or scaled."""
+    """Rule 2: along each axis positions change as the velocities say; else name the swap, the sign or the scale."""
     by_file: dict[str, list[ImportedTrack]] = {}
     for track in tracks:
         if track.has(VELOCITY_TARGETS):
             by_file.setdefault(track.source, []).append(track)
     for source, own in by_file.items():
+        # A group is compared as a whole: one individual may fly straight, and show one axis only.
         axes = 3 if all("z" in t.columns and "vz" in t.columns for t in own) else 2
         pairs = [_displacements(track, axes) for track in own]
         moved = np.concatenate([p[0] for p in pairs])
@@ -352,13 +362,14 @@ def check_axes(tracks: Iterable[ImportedTrack], findings: ImportReport) -> None:
 
 
 def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Displacements over about LAG, and the same from the velocities, (pair, axis), m."""
+    """Return displacements over about LAG, and the same from the velocities, (pair, axis), m."""
     step = median_period(track)
     place, speed = track.stack(POSITION_TARGETS, axes), track.stack(VELOCITY_TARGETS, axes)
     steps = np.diff(track.time)
     if not step:
         return np.empty((0, axes)), np.empty((0, axes))
     whole = (steps < 3.0 * step) & np.isfinite(speed[1:]).all(axis=1) & np.isfinite(speed[:-1]).all(axis=1)
+    # Trapezoids of the velocity; rows across a gap count as broken, so that no pair spans one.
     path = np.cumsum(np.where(whole[:, None], 0.5 * (speed[1:] + speed[:-1]) * steps[:, None], 0.0), axis=0)
     path = np.concatenate([np.zeros((1, axes)), path])
     broken = np.concatenate([[0], np.cumsum(~whole)])
@@ -370,7 +381,7 @@ def _displacements(track: ImportedTrack, axes: int) -> tuple[NDArray[np.float64]
 
 
 class AxisCorrelation(NamedTuple):
-    """How displacements (rows) go with velocities (columns), by axis.
+    """Correlation of displacements (rows) with velocities (columns), by axis.
 
     lively : (axis,) whether the velocity along it varies enough to compare
     r      : (axis, axis) correlation
@@ -383,7 +394,7 @@ class AxisCorrelation(NamedTuple):
 
 
 def _likeness(moved: Array, summed: Array) -> AxisCorrelation:
-    """Compare displacements with the same from velocities, both (pair, axis), m; some velocity must vary."""
+    """Correlate displacements with the same from velocities, both (pair, axis), m; some velocity must vary."""
     strength, spread = summed.std(axis=0), moved.std(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         cross = (moved - moved.mean(0)).T @ (summed - summed.mean(0)) / len(moved)
@@ -417,6 +428,7 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
             f'write --map "{VELOCITY_TARGETS[i]}:=-{quote_column(speed)}"',
             "axes",
         )
+    # A sign is reported before a scale: a turned axis has a slope of -1, which is no wrong unit.
     wrong = [i for i in axes if lively[i] and i not in turned and abs(slopes[i] - 1.0) > TOLERANCE]
     wrong = [i for i in wrong if abs(r[i, i]) > 0.5]
     if wrong:
@@ -429,7 +441,9 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
 
 
 def _swap_fault(source: str, track: ImportedTrack, likeness: AxisCorrelation) -> str:
-    """The first axis of the positions that goes with another axis of the velocities; empty if none does."""
+    """Return the error of the first axis of positions that goes with another axis of velocities; empty if there is
+    none.
+    """
     for i, row in enumerate(likeness.r):
         j = int(np.abs(row).argmax())
         if likeness.lively[i] and i != j and abs(row[i]) < 0.5 and abs(row[j]) > 0.8:
@@ -443,7 +457,7 @@ def _swap_fault(source: str, track: ImportedTrack, likeness: AxisCorrelation) ->
 
 
 def _scale_reason(track: ImportedTrack, slope: float) -> str:
-    """Why positions change so many times as fast as velocities say, and what to write."""
+    """Return the error and remedy for positions that change a multiple as fast as the velocities say."""
     near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
     if abs(np.log(near / slope)) >= 0.1:
         return "units differ"
@@ -452,7 +466,7 @@ def _scale_reason(track: ImportedTrack, slope: float) -> str:
 
 
 def _unswapped(track: ImportedTrack, i: int, j: int) -> str:
-    """What to write where axis i of the positions is axis j of the velocities."""
+    """Return the remedy where axis i of the positions is axis j of the velocities."""
     own = [quote_column(track.label(POSITION_TARGETS[k])) for k in (i, j)]
     told = [header_meaning(track.label(POSITION_TARGETS[k])) for k in (i, j)]
     if [None if one is None else one.target for one in told] == [
@@ -471,7 +485,7 @@ def _unswapped(track: ImportedTrack, i: int, j: int) -> str:
 
 
 def _mapped(track: ImportedTrack, target: str, wrong: float) -> str:
-    """What to write so that a target is `wrong` times what it is now; an expression loses the unit of its header."""
+    """Return the option that multiplies a target by 1 / `wrong`; an expression loses the unit of its header."""
     label = track.label(target)
     name, unit = split_header(label)
     own = {**TIME_UNITS, **LENGTH_UNITS, **SPEED_UNITS}.get(unit, 1.0) if name else 1.0
@@ -479,12 +493,13 @@ def _mapped(track: ImportedTrack, target: str, wrong: float) -> str:
 
 
 def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
-    """Rules 5 and 6: a row off its track is left out; a track that goes on elsewhere was reset, and is split there."""
+    """Rules 5 and 6: drop a row off its track; split a track that continues elsewhere after a reset."""
     surprise, scale = prediction_errors(track)
     if not len(surprise):
         return
     place = track.stack(POSITION_TARGETS, 2)
     next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
+    # Every second row is near, the next one far: two individuals alternate.
     if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
         findings.fault(
             f"{track.source}: {track.name} jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on: "
@@ -504,6 +519,7 @@ def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
             "jumps",
         )
         return
+    # A row off its track is followed by a jump back; a reset is not.
     away = [int(k) for k in jumps if k + 1 < len(size) and _returns(surprise[k], surprise[k + 1])]
     back = {k + 1 for k in away}
     resets = [int(k) for k in jumps if k not in away and k not in back]
@@ -529,12 +545,14 @@ def _returns(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
 
 
 def prediction_errors(track: ImportedTrack) -> tuple[NDArray[np.float64], float]:
-    """What each step is beyond its prediction (row - 1, 2), m, and a robust scale of it; zero across gaps."""
+    """Return the error of each predicted step (row - 1, 2), m, and a robust scale of it; zero across gaps."""
     step = median_period(track)
     place = track.stack(POSITION_TARGETS, 2)
     moved, steps = np.diff(place, axis=0), np.diff(track.time)
     if len(moved) < 20:
         return np.empty((0, 2)), 0.0
+    # The logged velocity predicts best; without one the last step is continued, which is noisier:
+    # hence the wider limit WILD.
     if track.has(VELOCITY_TARGETS):
         speed = track.stack(VELOCITY_TARGETS, 2)
         predicted = 0.5 * (speed[1:] + speed[:-1]) * steps[:, None]

@@ -1,6 +1,6 @@
-"""Measures of tracks that the study of animal groups asks for: functions of a recording, nan where one is absent.
+"""Measures of tracks from the study of animal groups: functions of a recording, nan for an absent individual.
 
-delays: who leads, by delay of directions · correlation: how far fluctuations of velocity are alike · neighbours:
+delays: leadership, by delay of headings · correlation: of velocity fluctuations, by distance · neighbours:
 nearest distances and pairs · surroundings: where neighbours are, front-back and left-right · shape: area and form ·
 milling · turning · bursts: burst and coast · contacts: with walls, obstacles and the scene. Order parameters of a
 flight, by the compiled rules, are in `scores`. Units stand in `attrs["units"]`, of a table by column.

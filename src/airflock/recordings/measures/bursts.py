@@ -10,7 +10,8 @@ from airflock.support import ParameterError
 
 
 def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
-    """One row per burst and its coast: individual, begin (s), burst (s), coast (s), speed before and at its top (m/s).
+    """Find bursts and their coasts, a row each: individual, begin (s), burst (s), coast (s), speed before and at its
+    top (m/s).
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     least     : rise of speed, m/s, below which it is noise of the tracker
@@ -52,10 +53,12 @@ def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
 
 
 def _rises(speed: NDArray[np.float64], least: float) -> list[tuple[int, int, int]]:
-    """Frames of minimum, maximum and the end of the coast, of each rise by `least`."""
+    """Return frames of minimum, maximum and the end of the coast, of each rise by `least`."""
     turns: list[tuple[int, int]] = []
     low = top = 0
     rising = False
+    # A small state machine with hysteresis: a rise or fall counts once it exceeds `least`, so noise
+    # makes no burst.
     for k in range(1, len(speed)):
         if rising:
             if speed[k] > speed[top]:

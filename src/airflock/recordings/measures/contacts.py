@@ -1,4 +1,4 @@
-"""Contacts with walls, obstacles and the scene: when, where, who, and with what."""
+"""Contacts of individuals with walls, obstacles and the scene."""
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ from airflock.world import Shapes, WorldMap
 
 
 def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame:
-    """One row per contact: individual, what, begin (s), end (s), and where it began: east, north, up (m).
+    """Find contacts, a row each: individual, what, begin (s), end (s), and the place at the begin: east, north, up (m).
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     radius    : of an individual, m; by default metrics.r_body of its scenario
@@ -41,6 +41,7 @@ def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame
     found, rows = track_arrays(recording), []
     for i, name in enumerate(found.names):
         begun: dict[str, int] = {}
+        # One frame more than there is, in which nobody is present, ends all contacts.
         for k in range(len(found.time) + 1):
             there = k < len(found.time) and found.placed[k, i]
             now = set()

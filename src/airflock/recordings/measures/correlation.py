@@ -1,4 +1,4 @@
-"""How far fluctuations of velocity are alike: correlation by distance and its first zero (Cavagna et al. 2010)."""
+"""Correlation of velocity fluctuations by distance, and its first zero (Cavagna et al. 2010)."""
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of record
 
 
 def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | None = None) -> pd.Series:
-    """Correlation of velocities about the group's mean, by distance (m); 1 at distance 0.
+    """Compute the correlation of velocities about the group's mean, by distance (m); 1 at distance 0.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     width     : of a bin of distances, m: about a tenth of the group
@@ -39,6 +39,8 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
         raise ParameterError(f"width = {width:g} m must be above 0")
     sums: dict[int, list[float]] = {}
     alone, whole, count = 0.0, 0.0, 0
+    # The mean velocity is removed at each instant; the sums of all instants are divided once, so
+    # crowded instants weigh more.
     for place, speed, there in zip(found.position, found.velocity, found.present, strict=True):
         if there.sum() < 2:
             continue
@@ -55,6 +57,8 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
             entry = sums.setdefault(int(b), [0.0, 0.0])
             entry[0] += total[b]
             entry[1] += number[b]
+    # If nobody differs from the mean by more than rounding, the ratio would be noise divided by
+    # noise.
     scale = alone / count if alone > NOTHING**2 * whole else np.nan
     last = max(sums, default=0) if farthest is None else int(farthest / width)
     kept = [b for b in sorted(sums) if b <= last]
@@ -66,7 +70,7 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
 
 
 def correlation_length(recording: xr.Dataset, width: float) -> float:
-    """Distance at which the correlation of velocities first falls to zero, m; nan if it does not.
+    """Return the distance at which the correlation of velocities first falls to zero, m; nan if it does not.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     width     : of a bin of distances, m

@@ -1,4 +1,4 @@
-"""Who leads: the delay at which one's direction is most like another's before (Nagy et al. 2010)."""
+"""Leadership: the delay at which one heading resembles an earlier one of another individual (Nagy et al. 2010)."""
 
 import numpy as np
 import pandas as pd
@@ -7,11 +7,13 @@ import xarray as xr
 from airflock.recordings.measures.states import check_numbers, headings, track_arrays
 from airflock.support import ParameterError
 
+# Of equal delays the shortest counts. Two that fly straight had "led" by the longest delay, through
+# rounding.
 ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordings have single precision
 
 
 def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: float = 0.0) -> xr.DataArray:
-    """Mean of heading i at t times heading j at t + delay, (leader, follower, delay), -1 to 1.
+    """Compute the mean of heading i at t times heading j at t + delay, (leader, follower, delay), -1 to 1.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     longest   : largest delay, s; slowest: headings at this speed (m/s) or less do not count
@@ -39,6 +41,8 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
     shifts = shifts[np.abs(shifts) < len(h)]
     n = h.shape[2]
     table = np.full((n, n, len(shifts)), np.nan)
+    # One shift at a time, all pairs by a matrix product: all shifts at once would need their number
+    # times the memory.
     for k, shift in enumerate(shifts):
         first, later = (h[: len(h) - shift], h[shift:]) if shift >= 0 else (h[-shift:], h[:shift])
         there = np.isfinite(first).all(axis=1).astype(float), np.isfinite(later).all(axis=1).astype(float)
@@ -51,7 +55,8 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
 
 
 def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, slowest: float = 0.0) -> pd.DataFrame:
-    """One row for each ordered pair: leader, follower, delay (s) and correlation (-1 to 1) where that is largest.
+    """Find who leads, a row for each ordered pair: leader, follower, and the delay (s) of the largest correlation (-1
+    to 1).
 
     A positive delay says that the leader is first; each pair stands there twice, with both signs. Where several delays
     are as good, such as of two that fly straight, it is the shortest of them.
@@ -84,6 +89,8 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
             course = table.values[i, j]
             if not np.isfinite(course).any():
                 continue
+            # Correlations within rounding are equal; among these the shortest delay is the simplest
+            # explanation.
             top = np.flatnonzero(course >= np.nanmax(course) - ALIKE)
             k = int(top[np.abs(shifts[top]).argmin()])
             if course[k] >= least:

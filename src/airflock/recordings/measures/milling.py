@@ -8,7 +8,7 @@ from airflock.recordings.measures.states import check_numbers, headings, track_a
 
 
 def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
-    """Length of the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone.
+    """Compute the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     slowest   : speed (m/s) at or below which one has no heading; it still counts for the centre
@@ -37,6 +37,8 @@ def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
             continue
         out = found.position[k][:, moves] - found.position[k][:, there].mean(axis=1, keepdims=True)
         out = out / np.maximum(np.linalg.norm(out, axis=0), 1e-12)
+        # In the plane the third component is zero, so that one cross product serves plane and
+        # space.
         flat = np.zeros((2, 3, int(moves.sum())))
         flat[0, : len(out)], flat[1, : len(out)] = out, h[k][:, moves]
         course[k] = float(np.linalg.norm(np.cross(flat[0].T, flat[1].T).mean(axis=0)))

@@ -10,7 +10,7 @@ from airflock.support import ParameterError
 
 
 def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
-    """Distance of each individual to its nearest neighbour, (time, individual), m; nan for one absent or alone.
+    """Compute the distance to the nearest neighbour, (time, individual), m; nan for an individual absent or alone.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     Geometry, of no publication.
@@ -39,7 +39,7 @@ def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
 
 
 def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.Series:
-    """Share of pairs by distance, per m, over all frames: a histogram whose sum times the width of a bin is at most 1.
+    """Compute the share of pairs by distance, per m, over all frames: its sum times the width of a bin is at most 1.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     width     : of a bin, m; where it does not divide `farthest`, the nearest width that does: `attrs["width"]`
@@ -66,6 +66,7 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
     edges = np.linspace(0.0, farthest, round(farthest / width) + 1)
     width = farthest / (len(edges) - 1)
     counts, pairs = np.zeros(len(edges) - 1), 0
+    # Frame by frame: positions of all frames at once would need pairs times frames.
     for place, there in zip(found.position, found.placed, strict=True):
         x = place[:, there]
         i, j = np.triu_indices(x.shape[1], 1)

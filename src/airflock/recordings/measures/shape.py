@@ -8,7 +8,8 @@ from airflock.recordings.measures.states import track_arrays
 
 
 def group_shape(recording: xr.Dataset) -> pd.DataFrame:
-    """By time: number present, hull (m², in space m³), length and width (m), elongation (length / width).
+    """Measure the group by time: number present, hull (m², in space m³), length and width (m), elongation (length /
+    width).
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
 
@@ -36,6 +37,8 @@ def group_shape(recording: xr.Dataset) -> pd.DataFrame:
     for place, speed, there, moves in zip(found.position, found.velocity, found.placed, found.present, strict=True):
         x, count = place[:, there], int(there.sum())
         hull = length = width = np.nan
+        # A hull needs one point more than there are axes; fewer have none, and points on a line
+        # have a hull of 0.
         if count > axes:
             try:
                 hull = float(ConvexHull(x.T).volume)  # in the plane `volume` is the area

@@ -16,7 +16,8 @@ Array = NDArray[Any]
 
 
 class TrackArrays(NamedTuple):
-    """time (frame,) s, position m and velocity m/s (frame, axis, individual); placed and present (frame, individual).
+    """Arrays: time (frame,) s, position m and velocity m/s (frame, axis, individual); placed and present (frame,
+    individual).
 
     placed: its position is known; present: its velocity, too. What needs no motion counts all who are placed.
     box: sides of the periodic world that a simulation flew in, m; else None.
@@ -31,17 +32,17 @@ class TrackArrays(NamedTuple):
     box: Array | None = None
 
     def offsets(self, positions: Array) -> Array:
-        """Offsets (axis, from, to), m, between all of some places (axis, individual), to the nearest images."""
+        """Return offsets (axis, from, to), m, between all of some places (axis, individual), to the nearest images."""
         return dataset.nearest_image(positions[:, None, :] - positions[:, :, None], self.box)
 
     @property
     def period(self) -> float:
-        """Time between frames, s; 1 where there is one frame."""
+        """Return the time between frames, s; 1 where there is one frame."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 1.0
 
 
 def track_arrays(recording: xr.Dataset, keypoint: str | None = None) -> TrackArrays:
-    """Arrays of a recording; where it has no velocities they are differentiated, unknown in a single frame.
+    """Return the arrays of a recording; missing velocities are differentiated, and unknown in a single frame.
 
     keypoint : which one, where there are several
     """
@@ -70,14 +71,14 @@ def track_arrays(recording: xr.Dataset, keypoint: str | None = None) -> TrackArr
 
 
 def check_numbers(**values: Any) -> None:
-    """Refuse what is given as a number of a measure and is none, all at once. Raises ParameterError."""
+    """Refuse values that are not numbers, all at once. Raise ParameterError."""
     faults = [f"{name} = {value!r} is not a number" for name, value in values.items() if not is_number(value)]
     if faults:
         raise ParameterError("\n".join(faults))
 
 
 def headings(velocity: Array, slowest: float = 0.0) -> Array:
-    """Unit vectors along velocities (frame, axis, individual); nan at speeds of `slowest` (m/s) or less."""
+    """Return unit vectors along velocities (frame, axis, individual); nan at speeds of `slowest` (m/s) or less."""
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     found: Array = velocity / np.where(speed > slowest, speed, np.nan)
     return found

@@ -1,4 +1,4 @@
-"""Where neighbours are as seen by each one: density front-back and left-right, and how uneven it is."""
+"""Density of neighbours in the frame of each individual, front-back and left-right, and its anisotropy."""
 
 import numpy as np
 import xarray as xr
@@ -9,7 +9,7 @@ from airflock.support import ParameterError
 
 
 def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: float = 0.0) -> xr.DataArray:
-    """Neighbours per m² around an individual that moves along `front`, (left, front); mean over all and all frames.
+    """Map neighbours per m² around an individual that moves along `front`, (left, front); mean over all and all frames.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     reach     : half the side of the map, m; cells: along each side
@@ -61,7 +61,8 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
 
 
 def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> float:
-    """Mean of cos 2 angle to the nearest neighbour within reach (m): 1 ahead or behind, -1 at the sides, 0 anywhere.
+    """Compute the mean of cos 2 angle to the nearest neighbour within reach (m): 1 ahead or behind, -1 at the sides, 0
+    anywhere.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     reach     : distance beyond which nobody counts as a neighbour, m

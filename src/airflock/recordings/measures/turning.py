@@ -1,4 +1,4 @@
-"""Turning speed: how fast headings turn, counter-clockwise positive."""
+"""Turning speed: rate of turn of headings, counter-clockwise positive."""
 
 import numpy as np
 import xarray as xr
@@ -7,7 +7,7 @@ from airflock.recordings.measures.states import check_numbers, headings, track_a
 
 
 def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
-    """Rate of turn of the horizontal heading, (time, individual), rad/s; nan across absences.
+    """Compute the rate of turn of the horizontal heading, (time, individual), rad/s; nan across absences.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     slowest   : speed (m/s) at or below which one has no heading
@@ -30,6 +30,8 @@ def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
     found = track_arrays(recording)
     h = headings(found.velocity[:, :2], slowest)
     sine = h[:-1, 0] * h[1:, 1] - h[:-1, 1] * h[1:, 0]
+    # The angle by arctan2 of sine and cosine is exact for any turn below half a circle between two
+    # frames.
     rate = np.arctan2(sine, (h[:-1] * h[1:]).sum(axis=1)) / np.diff(found.time)[:, None]
     if len(h) > 1:
         before, after = np.vstack([rate[:1], rate]), np.vstack([rate, rate[-1:]])
