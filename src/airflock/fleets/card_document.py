@@ -1,4 +1,4 @@
-"""From a scenario to a flight card: the law, its world and its limits as the numbers that a drone carries."""
+"""From a scenario to a flight card: the law, its world and its limits as numbers that a drone carries."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,11 +18,11 @@ from airflock.world import arena, inward_plane
 
 
 def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tuple[Any, Any]]:
-    """Numbers of law and body of each of the first `count` agents.
+    """Return the numbers of law and body of each of the first `count` agents.
 
-    seed : with tolerances of manufacture as this seed draws them; None: without, for real drones have their own
+    seed : of the tolerances of manufacture; None: without tolerances, for real drones have their own
 
-    Raises ScenarioError where groups are of fewer agents.
+    Raises ScenarioError where groups have fewer agents.
     """
     if not scenario.varied and len(scenario.laws) == 1:
         return [(scenario.parameters, scenario.body)] * count
@@ -45,7 +45,7 @@ def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tupl
 
 
 def agent_sensors(scenario: Scenario, count: int, seed: int) -> list[Any]:
-    """Numbers of the sensor of each of the first `count` agents, with tolerances as a seed draws them."""
+    """Return the numbers of the sensor of each of the first `count` agents, with the tolerances of a seed."""
     columns = {name: scenario.agent_values("s", name, seed) for of, name in scenario.varied if of == "s"}
     own = [{name: column[agent] for name, column in columns.items()} for agent in range(count)]
     return [replace(scenario.sensors, **numbers) for numbers in own]
@@ -65,19 +65,19 @@ def make_card_document(
     as_simulated: bool = False, seed: int | None = None, safety: Mapping[str, Any] | None = None,
     stop_for_lost: bool | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Document of a flight card, without its hash.
+    """Return the document of a flight card, without its hash.
 
-    site         : latitude and longitude (degrees), altitude (m) of the arena's centre on the ground
-    height       : at which the flock flies, m above the site; in space, of the arena's centre
-    margin       : of the fence around the law's walls, m
-    as_simulated : treat neighbours' data as the scenario's radio does; else they are carried forward and kept for 5 s
-    seed         : of the tolerances of manufacture that groups have; None: real drones bring their own
-    safety       : limits that differ from those that follow from the scenario
-    silent       : whether the rule of silence stops a drone, whatever the scenario says; by default it does, and as
-                   simulated where the scenario says so
+    site          : latitude and longitude (degrees), altitude (m) of the arena's centre on the ground
+    height        : of the flock, m above the site; in space, of the arena's centre
+    margin        : of the fence around the law's walls, m
+    as_simulated  : use neighbours' data as the scenario's radio does; else they are carried forward and kept for 5 s
+    seed          : of the tolerances of manufacture that groups have; None: real drones bring their own
+    safety        : limits that differ from those that follow from the scenario
+    stop_for_lost : whether the rule of silence stops a drone, whatever the scenario says; None: it does, and with
+                    as_simulated only where the scenario says so
 
-    Raises CardError where the scenario has no walls, or where neighbours are seen instead of heard, or where its law
-    or its topology is not in the package.
+    Raises CardError where the scenario has no walls, where neighbours are seen instead of heard, or where its law or its
+    topology is not in the package.
     """
     _check_flyable(scenario)
     limits = replace(default_safety(scenario), **(safety or {}))
@@ -126,7 +126,7 @@ def make_card_document(
 
 
 def omission_notes(scenario: Scenario) -> list[str]:
-    """What of a scenario no card holds, in a line for each: real drones bring their own."""
+    """Return one line for each part of a scenario that no card holds: real drones bring their own."""
     kinds = ", ".join(dict.fromkeys(entry.fault.name for entry in scenario.faults))
     spread = ", ".join(dict.fromkeys(key for group in scenario.groups for _, key in group.spread))
     said = {"faults": kinds, "tolerances of groups": spread}
@@ -134,7 +134,7 @@ def omission_notes(scenario: Scenario) -> list[str]:
 
 
 def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> list[str]:
-    """What of a card the scenario did not fly, in a line for each: its scores and certificates do not speak of it."""
+    """Return one line for each part of a card that the scenario did not fly: its scores do not cover it."""
     told = []
     if members != scenario.agents:
         told.append(
@@ -157,7 +157,7 @@ def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> l
 
 
 def _check_flyable(scenario: Scenario) -> None:
-    """Raise a CardError where a scenario has what no card can hold."""
+    """Raise CardError where a scenario has a part that no card can hold."""
     fault = ""
     others = [
         law.model.name for law in scenario.laws if not law.model.decide.__module__.startswith("airflock.parts.laws.")
@@ -178,7 +178,7 @@ def _check_flyable(scenario: Scenario) -> None:
 
 
 def _member_differences(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:
-    """Of each member the numbers of law and body in which it differs from the flock; none where all are alike."""
+    """Return the numbers of law and body in which each member differs; empty where all are alike."""
     base = {"law": to_json_table(scenario.parameters), "body": to_json_table(scenario.body)}
     if not scenario.varied and len(scenario.laws) == 1:
         return []
@@ -197,13 +197,13 @@ def _member_differences(scenario: Scenario, records: Sequence[tuple[Any, Any]]) 
 
 
 def _group_numbers(scenario: Scenario, count: int) -> dict[str, list[int]]:
-    """Of each member the number of its group, where a law asks for it."""
+    """Return the number of each member's group, where a law needs it."""
     asked = scenario.groups and any(law.uses_groups for law in scenario.laws)
     return {"groups": list(scenario.group_indices[:count])} if asked else {}
 
 
 def default_safety(scenario: Scenario) -> SafetyLimits:
-    """Limits that follow from a scenario: half as fast again as its law prefers, as agile as its body."""
+    """Return the limits that follow from a scenario: 1.5 times the preferred speed, as agile as its body."""
     body = scenario.body if isinstance(scenario.body, Multirotor) else Multirotor()
     return SafetyLimits(
         speed_max=min(1.5 * _preferred_speed(scenario), 60.0),
@@ -219,7 +219,7 @@ def _preferred_speed(scenario: Scenario) -> float:
 
 
 def fence_corners(world: arena.Parameters, margin: float) -> list[list[float]]:
-    """Corners of a fence around an arena, margin (m) outside its walls."""
+    """Return the corners of a fence around an arena, margin (m) outside its walls."""
     if world.arena == "circle":
         reach = (world.radius + margin) / math.cos(math.pi / CIRCLE_SIDES)
         angles = [2.0 * math.pi * k / CIRCLE_SIDES for k in range(CIRCLE_SIDES)]
@@ -241,7 +241,7 @@ def fence_corners(world: arena.Parameters, margin: float) -> list[list[float]]:
 
 
 def to_json_table(record: Parameters) -> dict[str, Any]:
-    """A record as a table for JSON; numbers that were left to the scenario are left out."""
+    """Return a record as a table for JSON, without numbers that were left to the scenario."""
     return {key: _listed(value) for key, value in asdict(record).items() if value is not None}
 
 

@@ -1,7 +1,7 @@
-"""The ether: every datagram on its way, by the radio rules of the simulator and with faults. Pure: virtual time.
+"""The radio channel: datagrams on their way, by the radio rules of the simulator and with faults. Pure: virtual time.
 
-The dice are those of the simulator: the same streams with the number of the arrival period and the pair, so that a
-fleet whose packets arrive once per decision loses the very packets that the simulated flock loses.
+Packets are lost by the random numbers of the simulator: the same streams with the number of the arrival period and the
+pair, so that a fleet whose packets arrive once per decision loses exactly the packets that the simulated flock loses.
 """
 
 import hashlib
@@ -36,9 +36,10 @@ PERIODS_PER_BLOCK = 16  # periods of the radio that are drawn together
 
 
 class PacketNumbers:
-    """Uniform random numbers by which packets are lost, of every pair in every period, to be asked in order of time.
+    """Uniform random numbers for the loss of packets, of every pair in every period, to be drawn in the order of time.
 
-    seed : of the flight; count: of drones
+    seed  : of the flight
+    count : of drones
     """
 
     def __init__(self, seed: int, count: int):
@@ -46,7 +47,7 @@ class PacketNumbers:
         self._first_period, self._tables = -PERIODS_PER_BLOCK, []  # type: ignore[var-annotated]
 
     def __call__(self, period: int, receiver: int, sender: int) -> float:
-        """Number between 0 and 1 of a period, a receiver and a sender, by their places among the drones."""
+        """Return the number between 0 and 1 of a period, a receiver and a sender, by their indices."""
         if not self._first_period <= period < self._first_period + PERIODS_PER_BLOCK:
             self._first_period = period - period % PERIODS_PER_BLOCK
             self._tables = self._drawn(self._first_period)
@@ -54,7 +55,7 @@ class PacketNumbers:
         return drawn
 
     def _drawn(self, first: int) -> list[list[list[float]]]:
-        """A table of receivers and senders for each of PERIODS periods."""
+        """Draw a table of receivers and senders for each of PERIODS_PER_BLOCK periods."""
         periods = np.arange(first, first + PERIODS_PER_BLOCK, dtype=np.uint64)[:, None, None]
         to = np.arange(0, self._count, 4, dtype=np.uint64)[None, :, None]  # four receivers share their words
         who = np.arange(self._count, dtype=np.uint64)[None, None, :]
@@ -73,9 +74,10 @@ STAMP_FORMAT = struct.Struct("<Q")
 
 
 def forge_packet(genuine: bytes, site: FlightSite, *, east: float, with_key: bool) -> bytes:
-    """A packet that says that the sender of a genuine one is elsewhere.
+    """Return a packet that puts the sender of a genuine one at another position.
 
-    east : how far east of where it is, m; with_key: signed as its sender would, one stamp later
+    east     : distance east of the true position, m
+    with_key : signed as its sender would, one stamp later
     """
     told, stamp = _status_and_stamp(genuine, site)
     x, y, z = told.position
@@ -85,7 +87,7 @@ def forge_packet(genuine: bytes, site: FlightSite, *, east: float, with_key: boo
 
 
 def falsify_packet(genuine: bytes, site: FlightSite, tell: Callable[[State], State]) -> bytes:
-    """What a drone sends in place of a genuine packet of its own: another state of the same time, signed as that is."""
+    """Return a genuine packet with another state of the same time, signed with the same stamp."""
     told, stamp = _status_and_stamp(genuine, site)
     false = tell(State(*told.position, *told.velocity))
     if false == (*told.position, *told.velocity):
@@ -95,7 +97,7 @@ def falsify_packet(genuine: bytes, site: FlightSite, tell: Callable[[State], Sta
 
 
 def _status_and_stamp(genuine: bytes, site: FlightSite) -> tuple[DroneStatus, int]:
-    """What a packet of a node of this fleet says, and its stamp."""
+    """Return the status in a packet of a node of this fleet, and its stamp."""
     told = parse_status(message_fields(STATUS_MESSAGE, genuine[HEADER_LENGTH : HEADER_LENGTH + genuine[1]]), site)
     assert told is not None, "what a node of this fleet sent"
     return told, STAMP_FORMAT.unpack(genuine[-12:-6] + b"\0\0")[0]
@@ -110,10 +112,12 @@ Position = tuple[float, float, float]
 class RadioChannel:
     """Datagrams between the members of a fleet.
 
-    radio, k : kind of radio and its numbers; members: system ids; period: s between two packets of a drone
-    clear : whether nothing stands between two places, m; None: nothing stands anywhere
-    site : of the flight, by which forged packets tell places
-    reach : how far (m) faults let the first of two drones, by their places, be heard by the second at a time, s
+    radio, k    : kind of radio and its numbers
+    members     : system ids
+    period      : s between two packets of a drone
+    radio_range : range (m) that faults leave between two drones, by their indices, at a time (s)
+    is_clear    : function that returns True if no obstacle stands between two positions, m; None: there are no obstacles
+    site        : of the flight, for positions in forged packets
     """
 
     def __init__(
@@ -150,7 +154,7 @@ class RadioChannel:
         self.sent = self.arrived_count = 0
 
     def send(self, now: float, sender: int, datagram: bytes, positions: Sequence[Position] = ()) -> None:
-        """A drone, by its place in the list of members, sends a datagram to all; at: true positions, m."""
+        """Send a datagram of a drone, by its index, to all; at: true positions, m."""
         if self._reaches_all_at_once:
             self._queue_packet(now + self._k.delay, sender, self._others[sender], datagram)
         else:
@@ -166,14 +170,14 @@ class RadioChannel:
                 self._queue_packet(now + self._k.delay, sender, range(len(self._members)), false)
 
     def _rule_delay(self, now: float, sender: int, receiver: int, at: Sequence[Position]) -> float:
-        """How much later a packet comes by the rule of the radio, s."""
+        """Return the delay of a packet by the rule of the radio, s."""
         if self._radio.late is None or not at:
             return 0.0
         known = self._pair_arguments(sender, receiver, at, math.dist(at[receiver], at[sender]))
         return self._reception.late(receiver, sender, round((now + self._k.delay) / self._period), known)
 
     def _pair_arguments(self, sender: int, receiver: int, at: Sequence[Position], distance: float) -> dict[str, float]:
-        """What rules of the radio may ask for of a pair."""
+        """Return the arguments of a pair for rules of the radio."""
         known = {"distance": distance}
         if not self._asked_arguments:
             return known
@@ -198,7 +202,7 @@ class RadioChannel:
         return found and [f for f in found if f.holds(self._members[to], now)]
 
     def deliver(self, now: float, positions: Sequence[Position]) -> Iterator[tuple[int, bytes]]:
-        """Datagrams that arrive by now, each with the place of its receiver; at: true positions, m."""
+        """Yield datagrams that arrive by now, each with the index of its receiver; at: true positions, m."""
         number = max(round(now / self._period), 0)
         while self._queue and self._queue[0][0] <= now + TIME_TOLERANCE:
             _, _, who, whom, datagram = heapq.heappop(self._queue)
@@ -215,7 +219,7 @@ class RadioChannel:
                     yield to, datagram
 
     def _packet_arrives(self, now: float, number: int, sender: int, receiver: int, at: Sequence[Position]) -> bool:
-        """Whether a packet gets through between two drones at these places, m."""
+        """Return True if a packet gets through between two drones at these positions, m."""
         distance = math.dist(at[receiver], at[sender])
         if distance > self._k.range or (
             self._radio_range is not None and distance > self._radio_range(sender, receiver, now)
@@ -255,13 +259,13 @@ class RadioChannel:
 
 
 class FaultyNode:
-    """A node with the faults that befall it, used like the node itself.
+    """A node with faults of the scenario, used like the node itself.
 
-    It sends what they tell, and its clock is as far ahead as they say; all else is left to the node.
+    Its packets carry the false state and its clock the error that the faults say; all else is left to the node.
 
-    node  : gives the node; asked each time, so that it may be exchanged for one that keeps a log
-    place : of the drone among the members
-    time  : of the flight (s) at a time of the node's own clock
+    node        : function that returns the node, called each time: a logging one may take its place
+    index       : of the drone among the members
+    flight_time : function from a time of the node's own clock to the time of the flight, s
     """
 
     def __init__(
@@ -288,7 +292,7 @@ class FaultyNode:
         at = self._flight_time(now)
         self.update_clock(at)
         out = self._node().tick(now)
-        radios = tuple([self.told(datagram, at) for datagram in sent] for sent in out.radios)
+        radios = tuple([self.falsified(datagram, at) for datagram in sent] for sent in out.radios)
         return out._replace(radios=radios)
 
     def update_clock(self, time: float) -> None:
@@ -298,8 +302,8 @@ class FaultyNode:
             self._node().shift_clock(ahead - self._clock_offset)
             self._clock_offset = ahead
 
-    def told(self, datagram: bytes, time: float) -> bytes:
-        """What is sent in place of a packet of the node at a time of the flight, s."""
+    def falsified(self, datagram: bytes, time: float) -> bytes:
+        """Return the datagram that replaces a packet of the node at a time of the flight, s."""
         if not self._faults.can_falsify:
             return datagram
-        return falsify_packet(datagram, self._site, lambda state: self._faults.told(self._index, time, state))
+        return falsify_packet(datagram, self._site, lambda state: self._faults.sent_state(self._index, time, state))

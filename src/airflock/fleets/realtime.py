@@ -1,7 +1,7 @@
 """Fleets on the real clock: as tasks of one process, or as processes that fork from a warm parent.
 
-Processes wait behind a ready barrier: each says that it is there, and only when all have does the clock start. There
-is no time-out: a process that ends before is named in one line, and ends the fleet.
+Processes wait at a barrier: each reports that it is ready, and the clock starts when all have. There is no time-out: a
+process that ends early is named in one line, and ends the fleet.
 """
 
 import asyncio
@@ -67,8 +67,8 @@ ABSENT_VEHICLE_ROW = (math.nan,) * 6  # a row of a vehicle that has dropped out
 
 
 class FleetPorts(NamedTuple):
-    """Sockets of a fleet: of each node to its autopilot and of its radio, of each vehicle to its node and to clients,
-    of the ether, and of who gives orders.
+    """Sockets: of each node to its autopilot and of its radio, of each vehicle to its node and to clients, of the channel
+    and of the operator.
     """
 
     nodes: list[UdpPort]
@@ -80,7 +80,7 @@ class FleetPorts(NamedTuple):
 
     @classmethod
     def open(cls, count: int, first_client: tuple[str, int]) -> "FleetPorts":
-        """Ports for so many drones; vehicle i calls clients at the port `join` + i."""
+        """Open ports for this many drones; vehicle i calls clients at the port `join` + i."""
         nodes, radios, vehicles, clients = ([_port() for _ in range(count)] for _ in range(4))
         found = cls(nodes, radios, vehicles, clients, _port(), _port())
         for i in range(count):
@@ -91,7 +91,7 @@ class FleetPorts(NamedTuple):
         return found
 
     def close(self) -> None:
-        """Close all."""
+        """Close all ports."""
         for port in (*self.nodes, *self.radios, *self.vehicles, *self.clients, self.channel, self.station):
             port.close()
 
@@ -102,14 +102,14 @@ def _port() -> UdpPort:
 
 @dataclass(frozen=True)
 class RealtimePlan:
-    """What all lives of a fleet know.
+    """Data that all tasks of a fleet share.
 
-    start : states of drones that begin in the air; None: on the ground
-    clock : time.monotonic of the flight's time 0, and of its end, s; then for each node 1 once it has heard its
-            vehicle; shared by all
-    seen  : of each vehicle its position (m) and whether it is armed, four numbers; shared by all
-    epoch : Unix time at which time.monotonic was 0, µs
-    watcher : address at which somebody hears all packets, and what the ether tells; None: nobody does
+    start   : states of drones that begin in the air; None: on the ground
+    clock   : time.monotonic of the flight's time 0, and of its end, s; then for each node 1 once it has heard its
+              vehicle; shared memory
+    seen    : position (m) of each vehicle and whether it is armed, four numbers; shared memory
+    epoch   : Unix time at which time.monotonic was 0, µs
+    watcher : address that gets all packets and the reports of the channel; None: no such address
     """
 
     scenario: Scenario
@@ -125,39 +125,41 @@ class RealtimePlan:
 
     @property
     def now(self) -> float:
-        """Time of the flight, s; negative while all hover."""
+        """Return the time of the flight, s; negative while all hover."""
         return time.monotonic() - self.clock[0]
 
     @property
     def ready(self) -> bool:
-        """Whether every node has heard its vehicle."""
+        """Return True if every node has heard its vehicle."""
         return all(self.clock[2 + i] > 0.5 for i in range(len(self.card.members)))
 
     @property
     def places(self) -> list[tuple[float, float, float]]:
-        """Where the vehicles are, m."""
+        """Return the positions of the vehicles, m."""
         return list(zip(self.seen[0::4], self.seen[1::4], self.seen[2::4], strict=True))
 
     @property
     def armed(self) -> list[bool]:
-        """Which vehicles are armed."""
+        """Return which vehicles are armed."""
         return [armed > 0.5 for armed in self.seen[3::4]]
 
     @property
     def over(self) -> bool:
-        """Whether the flight has ended."""
+        """Return True if the flight has ended."""
         return time.monotonic() >= self.clock[1]
 
     def utc(self, now: float) -> int:
-        """Unix time (µs) at a time of `time.monotonic`, s."""
+        """Return the Unix time (µs) at a time of `time.monotonic`, s."""
         return self.epoch + round(now * 1e6)
 
 
 class TaskResult(NamedTuple):
-    """What is left of one node or vehicle when it ends.
+    """Result of one node or vehicle.
 
-    rows   : one per period: true state of a vehicle; command, own state and times of peers' states of a node
-    notes  : time.monotonic (s), member and text; ticks: of a node, of a vehicle its looks; processor: s
+    rows      : one per period: true state of a vehicle; command, own state and times of peers' states of a node
+    notes     : time.monotonic (s), member and text
+    ticks     : ticks of a node, looks of a vehicle
+    processor : processor time, s
     """
 
     rows: list[Any]
@@ -168,7 +170,7 @@ class TaskResult(NamedTuple):
 
 
 def node_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResult]:
-    """Life of a node, from now until the end of the flight or its own."""
+    """Run a node until the end of the flight or its own."""
     card, began = plan.card, time.process_time()
     member = card.members[i]
     dies = min([fault.begin for fault in plan.faults if fault.kind == "node" and fault.affects(member)], default=1e9)
@@ -228,11 +230,11 @@ class RealtimeVehicle:
 
     @property
     def period(self) -> float:
-        """Time between two looks, s: as often as it tells what it tells most often."""
+        """Return the time between two looks, s: the period of its most frequent message."""
         return max(MIN_LOOK_PERIOD, 1.0 / max(self.vehicle.rates.values()))
 
     def look(self) -> None:
-        """Read what came, move up to now, and tell."""
+        """Read what came, move up to now, and send what is due."""
         vehicle, plan, zero = self.vehicle, self.plan, self.plan.clock[0]  # once: the clock may be set meanwhile
         now = time.monotonic() - zero
         vehicle.start_time, vehicle.booted_at = plan.utc(zero), self._booted - zero
@@ -252,14 +254,14 @@ class RealtimeVehicle:
         self._publish_position()
 
     def _send(self, data: bytes, client: tuple[str, int] | None = None) -> None:
-        """Tell the node or a client, if there is anything to tell: an empty datagram would wake them as well."""
+        """Send bytes to the node or a client; no empty datagram, which would wake them as well."""
         if data and client is not None:
             self._client_port.send(data, client)
         elif data:
             self._node_port.write(data)
 
     def _publish_position(self) -> None:
-        """Write down where it is, for the ether and for who watches."""
+        """Publish its position, for the channel and for observers."""
         at = 4 * self.place
         self.plan.seen[at : at + 4] = (*self.vehicle.state[:3], float(self.vehicle.armed))
 
@@ -285,7 +287,7 @@ class RealtimeVehicle:
 
 
 def vehicle_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResult]:
-    """Life of a vehicle until the end of the flight."""
+    """Run a vehicle until the end of the flight."""
     began, craft = time.process_time(), RealtimeVehicle(plan, i)
     count, late, worst, due = 0, 0, 0.0, time.monotonic()
     while not plan.over:
@@ -300,7 +302,7 @@ def vehicle_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskRe
 
 
 def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
-    """Life of the ether: packets of nodes reach those whom the radio lets them reach, orders reach all at once."""
+    """Run the radio channel: packets reach the nodes that the radio allows, orders reach all at once."""
     began, card, ports = time.process_time(), plan.card, plan.ports
     flown, period = plan.scenario, card.safety.status_period
     befalls = DroneFaults(flown, plan.seed)
@@ -352,11 +354,12 @@ ABSENT_ROW = (math.nan,) * 15  # a row of a drone that has dropped out
 
 
 class ComputerLoad(NamedTuple):
-    """What a fleet on the real clock cost, and how late it was.
+    """Cost and lateness of a fleet on the real clock.
 
-    cores : processor time of all per second; nodes, vehicles: of these (with the ether), where they are processes
-    ticks, late, worst : of all nodes: how many, how many late by more than half a period, by how much at most (s)
-    others : load of this computer (processes that want a processor, one minute) when the flight ended
+    cores             : processor time of all per second
+    nodes, vehicles   : of these (with the channel), where they are processes
+    ticks, late, worst: of all nodes: total, late by more than half a period, largest delay (s)
+    others            : load of this computer (processes that want a processor, one minute) at the end of the flight
     """
 
     cores: float
@@ -380,16 +383,16 @@ class RealtimeFleet:
 
     @property
     def law_zero_height(self) -> float:
-        """Height (m) above the site at which the law counts zero."""
+        """Return the height (m) above the site of the law's zero."""
         return law_zero_height(self.card)
 
     def _frame_count(self) -> int:
         return min(len(life.rows) for life in self._vehicles)
 
     def array(self) -> NDArray[np.float64]:
-        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them.
+        """Return (time, agent, 15): true position and velocity, setpoint, own position and velocity of the node.
 
-        Of drones that have dropped out nan, as in the recording of a simulation.
+        Rows of drones that have dropped out are nan, as in the recording of a simulation.
         """
         frames = [
             [
@@ -403,7 +406,7 @@ class RealtimeFleet:
         return np.array(frames, float)
 
     def packet_ages(self) -> NDArray[np.float64]:
-        """(time, receiver, sender): s since the state that a node has of another one held; nan: it has none."""
+        """Return (time, receiver, sender): age (s) of the state that a node has of another one; nan: none."""
         never = [NEVER_HEARD] * len(self.card.members)
         stamps = np.array(
             [
@@ -421,21 +424,21 @@ class RealtimeFleet:
         return zip(self._vehicles, self._nodes, strict=True)
 
     def digest(self) -> str:
-        """SHA-256 of all that was flown."""
+        """Return the SHA-256 of the flight."""
         return hashlib.sha256(self.array().tobytes()).hexdigest()
 
     def phases(self) -> list[MissionPhase]:
-        """Phase in which every node ended."""
+        """Return the last phase of every node."""
         return [life.phase for life in self._nodes]
 
 
 def _row_part_at(rows: Sequence[Any], k: int, part: int, none: Any) -> Any:
-    """What a node said at period k; where it has died, what it said last."""
+    """Return the entries of a node at period k; after its end, the last ones."""
     return rows[min(k, len(rows) - 1)][part] if rows else none
 
 
 def _has_dropped_out(craft: TaskResult, k: int) -> bool:
-    """Whether a vehicle has dropped out by period k."""
+    """Return True if a vehicle has dropped out by period k."""
     return bool(math.isnan(craft.rows[k][0]))
 
 
@@ -455,7 +458,7 @@ CHANNEL_TASK = 0  # place of the ether among the lives
 
 
 def lockstep_only_errors(faults: Sequence[InjectedFault]) -> list[str]:
-    """What flies in lock-step only, one line each."""
+    """Return one line for each fault that only a fleet in lock-step can fly."""
     gone = [f for f in faults if f.kind == "node" and f.end < 1e9]
     return ["fault node: on the real clock a node that died stays dead; leave out end"] * bool(gone)
 
@@ -467,12 +470,12 @@ def fly_in_realtime(
 ) -> RealtimeFleet:  # fmt: skip
     """Fly one fleet for the scenario's duration on the real clock, in the mode "tasks" or "processes".
 
-    start : states in the air; None: from the ground by orders of the operator, and back
-    join  : where vehicle 1 calls for a client that joins; vehicle 2 calls at the next port
-    done  : called once for each second flown
-    watcher : address that gets every packet, and what the ether tells (`fleets.teller`)
+    start        : states in the air; None: from the ground by orders of the operator, and back
+    first_client : address at which vehicle 1 calls a client; vehicle 2 calls at the next port
+    on_done      : called once for each second flown
+    watcher      : address that gets every packet and the reports of the channel (`TelemetryBroadcast`)
 
-    Raises ScenarioError for what flies in lock-step only, LinkError where a process ends before its time.
+    Raises ScenarioError for faults that need lock-step, LinkError where a process ends before its time.
     """
     wrong = lockstep_only_errors(faults)
     if wrong:
@@ -503,7 +506,7 @@ def fly_in_realtime(
 
 
 async def _tasks(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[list[TaskResult], float]:
-    """All lives in one event loop; what is left of each, and the processor time of all, s."""
+    """Run all tasks in one event loop; return their results and the processor time of all, s."""
     began = time.process_time()
     async with asyncio.TaskGroup() as group:
         tasks = [group.create_task(run_in_event_loop(life())) for life in lives]
@@ -512,7 +515,7 @@ async def _tasks(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> t
 
 
 async def run_in_event_loop(life: Task) -> TaskResult:
-    """Live a life among others in one event loop, as `alone` does in a process of its own."""
+    """Run a task among others in one event loop, as `run_alone` does in a process of its own."""
     loop, hears = asyncio.get_running_loop(), TaskRest(0.0).handlers
     try:
         while True:
@@ -532,7 +535,7 @@ async def run_in_event_loop(life: Task) -> TaskResult:
 
 
 def _forked(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[list[TaskResult], float]:
-    """Each life in a process of its own; what is left of each, and the processor time of all, s."""
+    """Run each task in a process of its own; return their results and the processor time of all, s."""
     if not hasattr(os, "fork"):
         raise LinkError("mode = 'processes' forks, which this system does not do; give mode = 'tasks'")
     context, began = multiprocessing.get_context("fork"), time.process_time()
@@ -562,7 +565,7 @@ def _forked(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[
 
 
 def _all(pipes: Sequence[Any], processes: Sequence[Any]) -> list[Any]:
-    """One message of each process; LinkError if one ends without it."""
+    """Return one message of each process; raise LinkError if one ends without it."""
     received: dict[int, Any] = {}
     while len(received) < len(pipes):
         waiting = {pipe: i for i, pipe in enumerate(pipes) if i not in received}
@@ -584,7 +587,7 @@ def _alive(processes: Sequence[Any]) -> None:
 
 
 def _process_main(life: Callable[[], Task], pipe: Any) -> None:
-    """A process: says that it is ready, waits for all others, lives, and hands over what is left."""
+    """Report that the process is ready, wait for all others, run the task, and send its result."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the fleet, and says why
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     pipe.send("ready")
@@ -595,7 +598,7 @@ def _process_main(life: Callable[[], Task], pipe: Any) -> None:
 async def _watch(
     plan: RealtimePlan, operator: bytes, on_done: Callable[[], None] | None, check: Callable[[], None]
 ) -> None:
-    """Give the orders of a flight from the ground, end the flight, and tell how far it is; check raises what failed."""
+    """Give the orders of a flight from the ground, end the flight, and report progress; check raises failures."""
     seconds = plan.scenario.flight.duration
     told = 0
 
@@ -618,7 +621,7 @@ async def _watch(
 
 
 async def _from_the_ground(plan: RealtimePlan, station: OperatorStation, until: Callable[..., Any]) -> None:
-    """Order a start, a return when the time is over, and wait until all stand on the ground again."""
+    """Order a start, a return when the time is over, and wait until all have landed."""
 
     def order(do: OrderKind) -> None:
         utc = plan.utc(time.monotonic())

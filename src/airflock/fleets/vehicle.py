@@ -1,10 +1,12 @@
 """A vehicle in software: a body of the simulator behind MAVLink, as PX4 or as ArduPilot. Pure: no sockets, no clock.
 
-receive(bytes) takes frames and gives answers; telemetry(now) gives what is due; step(now, dt) moves it. Inside
+receive(bytes) takes frames and returns answers; due_telemetry(now) returns what is due; step(now, dt) moves it. Inside
 east-north-up, north-east-down only in frames. It keeps the autopilots' rules that matter to a node: PX4 enters
 OFFBOARD only after a second of setpoints and leaves it COM_OF_LOSS_T after the last; ArduPilot takes off by command,
 brakes GUID_TIMEOUT after the last setpoint, and acts FS_GCS_TIMEOUT after the last heartbeat of SYSID_MYGCS. Both hold
 their place where they hover or land by themselves.
+
+Sources: PX4 user guide, Parameter Reference; ArduPilot Copter, pages Flight Modes and GCS Failsafe.
 """
 
 import math
@@ -48,19 +50,19 @@ MAX_RETURN_SPEED = 1.0  # m/s; our choice
 
 
 class HoldPosition:
-    """The place that is held, from when the drone has come to stand there."""
+    """A position that is held, from the moment at which the drone has stopped there."""
 
     def __init__(self) -> None:
         self._held_position: tuple[float, float] | None = None
 
     def release(self) -> None:
-        """Hold no place any more."""
+        """Stop holding a position."""
         self._held_position = None
 
     def velocity(self, at: State | None, up: float) -> tuple[float, float, float]:
-        """Velocity (m/s) that brakes, and then goes back to the place; `up` is kept.
+        """Return the velocity (m/s) that brakes, and then goes back to the position; `up` is kept.
 
-        at : where the drone is by its own navigation; None where that stands still: then it only brakes
+        at : own state by its own navigation; None where that is frozen: then it only brakes
         """
         if at is not None and self._held_position is None and math.hypot(at.vx, at.vy) < STANDING_SPEED:
             self._held_position = at.x, at.y
@@ -199,8 +201,12 @@ NO_VELOCITY: Velocity = (0.0, 0.0, 0.0)
 class SoftwareVehicle:
     """One drone and its autopilot.
 
-    kind : px4 or ardupilot; system: its MAVLink id; site: where the local origin of the flight is
-    at   : where it stands, m; body, b: of the simulator; draw: normal random numbers of a motion step
+    kind    : px4 or ardupilot
+    system  : its MAVLink id
+    site    : local origin of the flight
+    at      : position at the start, m
+    body, b : body of the simulator and its numbers
+    draw    : function that returns the normal random numbers of a motion step
     """
 
     def __init__(
@@ -240,39 +246,39 @@ class SoftwareVehicle:
         self.frozen_state: State | None = None  # what a navigation that stands still tells, if it does
 
     def frame(self, message: Any) -> bytes:
-        """Bytes of a message of the dialect."""
+        """Return the bytes of a message of the dialect."""
         return self._packer(message)
 
     @property
     def measured(self) -> State:
-        """Own state as its navigation tells it."""
+        """Return the own state by its navigation, with faults."""
         known = self.frozen_state or self.controller_state
         return known if self.faults is None else self.faults.measured_state(self.place, self.now, known)
 
     @property
     def controller_state(self) -> State:
-        """Own state with the error of its navigation, by which its controller flies.
+        """Return the own state with the error of its navigation, by which its controller flies.
 
-        Where the navigation stands still, the controller keeps the velocity of its inertial sensors.
+        Where the navigation is frozen, the controller keeps the velocity of its inertial sensors.
         """
         (x, y, z, vx, vy, vz), (ex, ey, ez, eu, ev, ew) = self.state, self.error
         return State(x + ex, y + ey, z + ez, vx + eu, vy + ev, vz + ew)
 
     def origin_frame(self) -> bytes:
-        """GPS_GLOBAL_ORIGIN, as it is sent on request."""
+        """Return GPS_GLOBAL_ORIGIN, as it is sent on request."""
         return self.frame(MESSAGE_MAKERS["origin"](self))
 
     def state_frames(self) -> bytes:
-        """LOCAL_POSITION_NED and what else a node needs, now."""
+        """Return LOCAL_POSITION_NED and all other frames that a node needs, now."""
         return b"".join(self.frame(MESSAGE_MAKERS[name](self)) for name in ("heartbeat", "gps", "landed", "local"))
 
     @property
     def flying(self) -> bool:
-        """Whether it is off the ground."""
+        """Return True if it is off the ground."""
         return self.state.z > LANDED_HEIGHT
 
     def due_telemetry(self, now: float) -> bytes:
-        """Bytes that are due now."""
+        """Return the bytes that are due now."""
         self.now = now
         out = b""
         for name, rate in self.rates.items():
@@ -285,7 +291,7 @@ class SoftwareVehicle:
     # -------------------------------------------------------------------------------------------------- frames in
 
     def receive(self, data: bytes, now: float) -> bytes:
-        """Take bytes; gives the answers."""
+        """Take bytes and return the answers."""
         self.now = now
         out = b""
         for frame in self._stream(data):
@@ -360,7 +366,7 @@ class SoftwareVehicle:
         return [ack, *more]
 
     def run_command(self, number: int, v: dict[str, Any]) -> tuple[int, list[Any]]:
-        """Result of a command, and messages that it asked for."""
+        """Run a command; return its result, and messages that it requested."""
         if number == 400:
             return self._arm(v["param1"] > 0.5, v["param2"] > 21195.0), []
         if number == 22:
@@ -400,7 +406,7 @@ class SoftwareVehicle:
         return RESULT_ACCEPTED
 
     def set_mode(self, custom: int) -> bool:
-        """Change the mode by its number; False if it is not known or, in PX4, the setpoints do not stream yet."""
+        """Change the mode by its number; False if unknown, or if setpoints do not stream yet (PX4)."""
         name = next((name for name, number in self.mode_numbers.items() if number == custom), "")
         if name == GUIDED and self.kind == "px4":
             stream = self.now - self.setpoint_at < MAX_SETPOINT_GAP and self.now - self.stream_since >= 1.0
@@ -419,7 +425,7 @@ class SoftwareVehicle:
     # ----------------------------------------------------------------------------------------------------- motion
 
     def apply_faults(self, faults: Sequence[InjectedFault], now: float, dt: float) -> None:
-        """Let faults act that befall it in the step from now on: motors, navigation, battery, a pilot's hand."""
+        """Apply faults to the step from now on: motors, navigation, battery, a pilot's take-over."""
         kinds = {f.kind for f in faults if f.holds(self.system, now)}
         self.motor = "motor" not in kinds
         frozen = "gnss" in kinds
@@ -431,7 +437,7 @@ class SoftwareVehicle:
                 self.mode = PILOT_MODE
 
     def autopilot_velocity(self) -> Velocity:
-        """Velocity that the autopilot makes for now, m/s."""
+        """Return the velocity that the autopilot commands now, m/s."""
         late = self.now - self.setpoint_at
         if self.mode == GUIDED and self.kind == "px4" and late > self.parameters["COM_OF_LOSS_T"]:
             self.mode = LOST_SETPOINT_MODES.get(int(self.parameters["COM_OBL_RC_ACT"]), HOLD_MODE)

@@ -1,10 +1,8 @@
-"""Signed packets between drones: MAVLink 2 signatures with one secret per mission, sent and strictly received.
+"""Signed packets between drones: MAVLink 2 signatures with one secret per mission, and their strict reception.
 
 A signature is the first six bytes of SHA-256 over secret, frame, link and stamp; a stamp counts 10 µs since 2015. The
-receiver checks in an order in which nothing that is wrong can change its state: header, length, sender, signature,
-then the stamp against the own clock and against the last one of this sender, and only then is the stamp kept. Of a
-packet that comes by two radios the second has the bytes of the first, whose signature has been found right.
-pymavlink's check keeps the stamp first, so that one forged datagram locks a neighbour out.
+receiver checks header, length, sender and signature, then the stamp against the own clock and against the last one of
+this sender. Only then does it keep the stamp, so that nothing invalid can change its state.
 """
 
 import hashlib
@@ -48,7 +46,7 @@ def write_key(path: Path, key: bytes) -> None:
 
 
 def read_key(path: Path) -> bytes:
-    """Key from its file; refused if others can read it."""
+    """Read a key from its file; refuse a file that others can read."""
     try:
         mode, text = path.stat().st_mode, path.read_text(encoding="ascii").strip()
     except OSError as fault:
@@ -75,15 +73,15 @@ PACKET_REFUSALS = ("short", "header", "length", "own", "stranger", "signature", 
 
 
 def stamp_of_time(utc: int) -> int:
-    """Stamp of a time (µs of Unix time)."""
+    """Return the stamp of a time (µs of Unix time)."""
     return (utc - SIGNING_EPOCH) // 10
 
 
 class PacketSigner:
-    """Packs and signs messages of one sender.
+    """Packs and signs the messages of one sender.
 
-    last   : stamp that was used last, also before a restart; stamps only grow, and no time is taken from others
-    recent : the stamps that were used last, by which an echo of an own frame is known
+    last          : last used stamp, also from before a restart; stamps only grow, and no time is taken from others
+    recent_stamps : the latest stamps, by which an echo of an own frame is recognised
     """
 
     def __init__(self, key: bytes, system: int, component: int = 191, last: int = 0):
@@ -94,7 +92,7 @@ class PacketSigner:
         self.recent_stamps: deque[int] = deque(maxlen=256)
 
     def __call__(self, message: Any, utc: int) -> bytes:
-        """Signed bytes of a message of the dialect, sent at utc (µs of Unix time)."""
+        """Return the signed bytes of a message of the dialect, sent at utc (µs of Unix time)."""
         self.last = max(stamp_of_time(utc), self.last + 1)
         self.recent_stamps.append(self.last)
         self._mav.signing.timestamp = self.last
@@ -104,7 +102,7 @@ class PacketSigner:
 
 
 class ReceivedMessage(NamedTuple):
-    """A genuine message: sender, its stamp, number of the message, and its payload without trailing zeros."""
+    """A genuine message: sender, stamp, message number, and payload without trailing zeros."""
 
     system: int
     stamp: int
@@ -113,20 +111,20 @@ class ReceivedMessage(NamedTuple):
 
     @property
     def values(self) -> dict[str, Any]:
-        """Its fields by name."""
+        """Return the fields by name."""
         return message_fields(self.message, self.payload)
 
 
 class PacketReceiver:
     """Accepts signed frames of known senders, each once, and near the own time.
 
-    key     : secret of the mission
-    own     : own system id, from which nothing is accepted
-    senders : number of a message → the systems that may send it
-    started : own time when the receiver was made, µs of Unix time: nothing that was sent before is accepted, so that a
-              restart accepts no replay
-    heard   : system → last stamp, kept from before a restart
-    spread  : how far a sender's clock may be from the own, s
+    key                  : secret of the mission
+    own_id               : own system id, from which nothing is accepted
+    senders              : system ids that may send a message, by its number
+    started              : own time at the start, µs of Unix time: older packets are refused, so that a restart
+                           accepts no replay
+    last_stamps          : last stamp of each system, kept from before a restart
+    max_clock_difference : largest difference between a sender's clock and the own one, s
     """
 
     def __init__(
@@ -152,7 +150,7 @@ class PacketReceiver:
         self.own_id_stamp: int | None = None  # stamp of the last genuine, fresh frame that bears our own system id
 
     def __call__(self, datagram: bytes, utc: int) -> ReceivedMessage | None:
-        """The message of a datagram that arrived at utc (µs of Unix time); None if it is refused."""
+        """Return the message of a datagram that arrived at utc (µs of Unix time); None if it is refused."""
         fault = self._refusal_reason(datagram, utc)
         if fault:
             self.refused[fault] += 1
@@ -167,7 +165,7 @@ class PacketReceiver:
         return ReceivedMessage(system, stamp, message, payload)
 
     def _refusal_reason(self, data: bytes, utc: int) -> str:
-        """Why a datagram is refused; empty if it is not. Changes nothing."""
+        """Return the reason to refuse a datagram, or an empty text. Changes nothing."""
         if len(data) < HEADER_LENGTH + CHECKSUM_LENGTH + SIGNATURE_LENGTH + 1:
             return "short"
         message = message_number(data)

@@ -1,6 +1,6 @@
 """The node: what a drone runs beside its autopilot. Bytes in, bytes out, the clock passed in; no sockets, no files.
 
-autopilot(bytes, now) and radio(datagram, now) take what arrives; tick(now) gives what is to be sent. The same inputs
+autopilot(bytes, now) and radio(datagram, now) take what arrives; tick(now) returns what is to be sent. The same inputs
 give the same outputs to the bit, so that a log can be flown again.
 """
 
@@ -25,7 +25,7 @@ UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, a
 
 
 def requests(commands: AutopilotCommands, autopilot: Autopilot, link: AutopilotLink) -> list[bytes]:
-    """What is still to be asked of the autopilot: parameters, origin, streams."""
+    """Return requests to the autopilot for missing parameters, origin and streams."""
     asked = [
         commands.request_parameter(guard.name)
         for guard in autopilot.parameter_checks
@@ -41,7 +41,7 @@ def requests(commands: AutopilotCommands, autopilot: Autopilot, link: AutopilotL
 def own_status(
     card: FlightCard, link: AutopilotLink, own: State, time: int, phase: MissionPhase, *, peers: int
 ) -> DroneStatus:
-    """The own status at a time (µs of Unix time), with how many peers are heard."""
+    """Return the own status at a time (µs of Unix time), with the number of peers that are heard."""
     offset = link.clock_offset()
     return DroneStatus(
         time=time,
@@ -66,7 +66,7 @@ PREFLIGHT_PHASES = frozenset({MissionPhase.BOOT, MissionPhase.READY, MissionPhas
 
 
 class NodeMemory(NamedTuple):
-    """What outlives a restart: own last stamp, last stamp of each member, when the last order was given (µs)."""
+    """State that survives a restart: own last stamp, last stamp of each member, time of the last order (µs)."""
 
     sent: int = 0
     heard: dict[int, int] = {}  # never changed in place
@@ -74,7 +74,7 @@ class NodeMemory(NamedTuple):
 
 
 class NodeOutput(NamedTuple):
-    """What one tick gives: bytes for the autopilot, datagrams for each radio, lines for a person to read."""
+    """Output of one tick: bytes for the autopilot, datagrams for each radio, lines for a person to read."""
 
     autopilot: list[bytes]
     radios: tuple[list[bytes], ...]
@@ -85,10 +85,10 @@ class Node:
     """One member of a flock.
 
     card, member, key : flight card, own system id, secret of the mission
-    now, utc : the own clock (s) and Unix time (µs) at the start; both run alike from then on
-    memory   : what outlived a restart
+    now, utc : own clock (s) and Unix time (µs) at the start; both run alike from then on
+    memory   : state from before a restart
     radios   : periods (s) at which each radio sends the same packet
-    since    : µs of Unix time; nothing that was sent before is accepted. By default the start, so that no replay is
+    since    : µs of Unix time; older packets are refused. The default is the start, so that no replay is accepted
     """
 
     def __init__(
@@ -128,11 +128,11 @@ class Node:
     # ------------------------------------------------------------------------------------------------------ in
 
     def utc(self, now: float) -> int:
-        """Unix time (µs) at a time of the own clock (s)."""
+        """Return the Unix time (µs) at a time of the own clock (s)."""
         return self._clock_zero + round(now * 1e6)
 
     def shift_clock(self, ahead: int) -> None:
-        """Set the own clock forward by so much, µs: it stamps packets by it, and tells how old those of others are."""
+        """Set the own clock forward (µs): it stamps own packets and gives the age of others."""
         self._clock_zero += ahead
         self.peers.shift_clock(1e-6 * ahead)
         self.pilot.shift_clock(1e-6 * ahead)
@@ -170,17 +170,17 @@ class Node:
 
     @property
     def memory(self) -> NodeMemory:
-        """What must outlive a restart."""
+        """Return the state that must survive a restart."""
         return NodeMemory(self._signer.last, dict(self._receiver.heard), self.operator.last_order_time)
 
     @property
     def stands(self) -> bool:
-        """Whether it stands because somebody whom it has lost could be near."""
+        """Return True if it stands because a lost neighbour could be near."""
         return self._standing_velocity is not None
 
     @property
     def refused(self) -> dict[str, int]:
-        """Datagrams and orders that were refused, by reason."""
+        """Return the counts of refused datagrams and orders, by reason."""
         return (
             self._receiver.refused | self.peers.refused | {f"order: {k}": n for k, n in self.operator.refused.items()}
         )
@@ -188,7 +188,7 @@ class Node:
     # ----------------------------------------------------------------------------------------------------- out
 
     def tick(self, now: float) -> NodeOutput:
-        """Look at the mission and say what is to be sent; to be called every `safety.tick` seconds."""
+        """Decide by the mission table, and return what is to be sent; call it every `safety.tick` seconds."""
         late = now - self._last_tick > self.card.safety.late
         self._last_tick = now
         out = NodeOutput([], tuple([] for _ in self._radio_periods), [])
@@ -250,7 +250,7 @@ class Node:
         return goal is None or self.card.outside(*goal) > 0.0 or goal[2] < self.card.low
 
     def _enter(self, to: MissionPhase, event: str, now: float, out: NodeOutput) -> None:
-        """Change the phase, and do what belongs to it once."""
+        """Change the phase, and do once what belongs to it."""
         was = self.phase
         self._notes.append(f"{was.name} → {to.name}: {event}")
         if to == MissionPhase.HOLD and was in FLYING_PHASES:
@@ -273,7 +273,7 @@ class Node:
         self.phase, self._phase_since, self._command_at = to, now, -1e9
 
     def _report_missing(self, mission_facts: MissionFacts) -> None:
-        """Tell a person what is missing, when it changes."""
+        """Note for a person what is missing, whenever it changes."""
         told = (
             (mission_facts.fault,)
             if self.phase == MissionPhase.FAULT
@@ -288,7 +288,7 @@ class Node:
     # ------------------------------------------------------------------------------------------------- steering
 
     def _steer(self, now: float, mission_facts: MissionFacts, out: NodeOutput) -> None:
-        """Say to the autopilot what the phase asks for: a setpoint, a mode, or nothing."""
+        """Send the autopilot the setpoint or the mode of the phase, or nothing."""
         phase, say = self.phase, self._speaker
         if phase == MissionPhase.DONE and self.operator.kill_confirmed:
             if (mission_facts.armed or now == self._phase_since) and self._may_retry(now):
@@ -329,7 +329,7 @@ class Node:
         out.autopilot.append(say.velocity(self.command, round(now * 1e3)))
 
     def _climb_height(self) -> float:
-        """How far above the ground the own layer lies, m."""
+        """Return the height of the own layer above the ground, m."""
         ground = 0.0 if self.autopilot_link.state is None else min(self.autopilot_link.state.z, self.card.safety.base)
         return self.card.layer(self.member) - (ground if self.autopilot_link.is_landed else 0.0)
 
@@ -342,7 +342,7 @@ class Node:
     # ------------------------------------------------------------------------------------------------- speaking
 
     def _speak(self, now: float, out: NodeOutput) -> None:
-        """Heartbeat, questions to the autopilot, and the own status on every radio that is due."""
+        """Send heartbeat, requests to the autopilot, and the own status on every radio that is due."""
         if now - self._heartbeat_at >= RETRY_PERIOD - TIME_TOLERANCE:
             self._heartbeat_at = now
             out.autopilot.append(self._speaker.heartbeat())
@@ -358,7 +358,7 @@ class Node:
                 out.radios[k].append(datagram)
 
     def status_datagrams(self, now: float) -> list[bytes]:
-        """The own status as a signed datagram; nothing while no own position is known."""
+        """Return the own status as a signed datagram; nothing while the own position is unknown."""
         own = self.autopilot_link.state
         if own is None:
             return []
