@@ -31,12 +31,12 @@ def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tupl
             [f"groups are of {scenario.agents} agents, and {count} drones are to fly; set agents = {count}"]
         )
     groups = tuple(replace(group, spread={}) for group in scenario.groups) if seed is None else scenario.groups
-    told = replace(scenario, groups=groups)
-    varied = dict.fromkeys([*told.varied, *(each for law in told.laws for each in law.varied)])
-    columns = {(of, name): told.agent_values(of, name, seed or 0) for of, name in varied}
+    resolved = replace(scenario, groups=groups)
+    varied = dict.fromkeys([*resolved.varied, *(each for law in resolved.laws for each in law.varied)])
+    columns = {(of, name): resolved.agent_values(of, name, seed or 0) for of, name in varied}
 
     def own(agent: int) -> tuple[Any, Any]:
-        law = told.law_of(agent)
+        law = resolved.law_of(agent)
         p = {name: columns["p", name][agent] for _, name in law.varied}
         b = {name: column[agent] for (of, name), column in columns.items() if of == "b"}
         return replace(law.parameters, **p), replace(scenario.body, **b)
@@ -76,8 +76,8 @@ def make_card_document(
     stop_for_lost : whether the rule of silence stops a drone, whatever the scenario says; None: it does, and with
                     as_simulated only where the scenario says so
 
-    Raises CardError where the scenario has no walls, where neighbours are seen instead of heard, or where its law or its
-    topology is not in the package.
+    Raises CardError where the scenario has no walls, where neighbours are seen instead of heard, or where its law or
+    its topology is not in the package.
     """
     _check_flyable(scenario)
     limits = replace(default_safety(scenario), **(safety or {}))
@@ -135,25 +135,25 @@ def omission_notes(scenario: Scenario) -> list[str]:
 
 def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> list[str]:
     """Return one line for each part of a card that the scenario did not fly: its scores do not cover it."""
-    told = []
+    notes = []
     if members != scenario.agents:
-        told.append(
+        notes.append(
             f"the card is for {members} drones, the scenario flies {scenario.agents}: scores and certificates of it do "
             f"not speak of {members}"
         )
     likely = default_safety(scenario)
     if safety.response < likely.response:
-        told.append(
+        notes.append(
             f"response = {safety.response:g} s is shorter than what the scenario gives a card, {likely.response:g} s: "
-            "distances to stop are told too short, unless the drones are as quick"
+            "distances to stop are notes too short, unless the drones are as quick"
         )
     for name in ("accel", "brake"):
         if getattr(safety, name) > likely.accel:
-            told.append(
+            notes.append(
                 f"{name} = {getattr(safety, name):g} m/s^2 is more than what the scenario gives a card, "
-                f"{likely.accel:g} m/s^2: distances to stop are told too short, unless the drones are as quick"
+                f"{likely.accel:g} m/s^2: distances to stop are notes too short, unless the drones are as quick"
             )
-    return told
+    return notes
 
 
 def _check_flyable(scenario: Scenario) -> None:
@@ -178,7 +178,7 @@ def _check_flyable(scenario: Scenario) -> None:
 
 
 def _member_differences(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:
-    """Return the numbers of law and body in which each member differs; empty where all are alike."""
+    """Return the numbers of law and body in which each member differs; empty where all are equal."""
     base = {"law": to_json_table(scenario.parameters), "body": to_json_table(scenario.body)}
     if not scenario.varied and len(scenario.laws) == 1:
         return []
@@ -198,8 +198,8 @@ def _member_differences(scenario: Scenario, records: Sequence[tuple[Any, Any]]) 
 
 def _group_numbers(scenario: Scenario, count: int) -> dict[str, list[int]]:
     """Return the number of each member's group, where a law needs it."""
-    asked = scenario.groups and any(law.uses_groups for law in scenario.laws)
-    return {"groups": list(scenario.group_indices[:count])} if asked else {}
+    needed = scenario.groups and any(law.uses_groups for law in scenario.laws)
+    return {"groups": list(scenario.group_indices[:count])} if needed else {}
 
 
 def default_safety(scenario: Scenario) -> SafetyLimits:

@@ -1,8 +1,8 @@
 """Faults of drones: those that a file injects, and those of the scenario at the times of a simulation.
 
-A vehicle applies them to its navigation, its motors and its motion; the radio channel, to the range between two drones;
-`FaultyNode`, to clock and packets of a node. Each looks them up by the time of the flight, so that on the real clock all
-processes let a fault begin at the same time.
+A vehicle applies them to its navigation, its motors and its motion; the radio channel, to the range between two
+drones; `FaultyNode`, to clock and packets of a node. Each looks them up by the time of the flight, so that on the real
+clock all processes let a fault begin at the same time.
 """
 
 import math
@@ -157,8 +157,8 @@ class DroneFaults:
     def begin_due(self, step: int, state_and_command: Callable[[int], tuple[State, Velocity]] | None = None) -> None:
         """Begin the faults that are due before a motion step.
 
-        state_and_command : function from a drone to its true state (m, m/s) and its last motor command (m/s); None: no rule
-                            needs them
+        state_and_command : function from a drone to its true state (m, m/s) and its last motor command (m/s); None:
+                            no rule needs them
         """
         while self._onsets and self._onsets[0].step <= step:
             onset = self._onsets.pop(0)

@@ -1,7 +1,7 @@
 """The observer of a fleet on the ground, and the broadcast for it from a radio channel in software.
 
 The observer takes bytes and the clock and sends nothing. It accepts what a member would accept: signed with the
-mission's key, in time, each once, of the same card. A channel in software also reports who hears whom and which faults
+mission's key, in time, each once, of the same card. A channel in software also reports links and faults
 hold; real radios report neither.
 """
 
@@ -42,7 +42,7 @@ NEIGHBOUR_WITHIN = 1.0  # s; a neighbour whose last packet arrived longer ago is
 NEVER_HEARD = -1e9
 SCENARIO_FAULT_NAMES = {
     kind: f"{kind} of the scenario" if kind in INJECTED_KINDS else kind for kind in OURS
-}  # by kind how it is told
+}  # text of each kind
 FAULT_NUMBERS = {
     kind: number
     for number, kind in enumerate((*INJECTED_KINDS, *SCENARIO_FAULT_NAMES.values()), start=HEARS_REPORT + 1)
@@ -71,32 +71,32 @@ class TelemetryBroadcast:
 
         now           : time of the flight, s
         utc           : µs of Unix time
-        active_faults : kinds of fault of the scenario that hold, each with the indices of the affected drones; a user's own
-                        kind has no number and is not reported
+        active_faults : kinds of fault of the scenario that hold, each with the indices of the affected drones; a kind
+                        that a user wrote has no number and is not reported
         """
         if now < self._next_report:
             return []
         self._next_report = now + REPORT_PERIOD
-        told = [
+        reports = [
             report_message(HEARS_REPORT, member, [who for who, at in known.items() if now - at <= NEIGHBOUR_WITHIN])
             for member, known in self._arrival_times.items()
         ]
-        holding: dict[str, set[int]] = {}  # several faults of one kind are told as one
+        holding: dict[str, set[int]] = {}  # several faults of one kind are reports as one
         for fault in self._faults:
             if fault.begin <= now < fault.end:
                 holding.setdefault(fault.kind, set()).update(fault.who or self._members)
         for kind, places in (active_faults or {}).items():
             if kind in SCENARIO_FAULT_NAMES:
                 holding[SCENARIO_FAULT_NAMES[kind]] = {self._members[place] for place in places}
-        told += [report_message(FAULT_NUMBERS[kind], 0, who) for kind, who in holding.items()]
-        return [self._sign(each, utc) for each in told]
+        reports += [report_message(FAULT_NUMBERS[kind], 0, who) for kind, who in holding.items()]
+        return [self._sign(each, utc) for each in reports]
 
 
 # ---- Observer
 
 LISTENER_ID = 0  # system id of who only listens
 MAX_NOTES = 200  # notes
-REPORT_LIFETIME = 2.0  # s; what the ether has not told for longer does not hold
+REPORT_LIFETIME = 2.0  # s; an older report no longer holds
 KIND_OF_NUMBER = {number: kind for kind, number in FAULT_NUMBERS.items()}
 
 
@@ -112,7 +112,7 @@ class FleetObserver:
     """Listens to the fleet of a card.
 
     card, key : of the mission
-    now, utc  : own clock (s) and Unix time (µs), which run alike from then on
+    now, utc  : own clock (s) and Unix time (µs), which advance together
 
     Attributes: peers, the newest plausible status of each member; notes, the events; refused, datagrams by reason.
     """
@@ -141,9 +141,9 @@ class FleetObserver:
         if got is None:
             return
         if got.message == STATUS_MESSAGE:
-            told = parse_status(got.values, self.card.site)
-            if told is not None:
-                self._state(got.system, told, now)
+            status = parse_status(got.values, self.card.site)
+            if status is not None:
+                self._state(got.system, status, now)
         elif got.system == CHANNEL_SYSTEM:
             self._take_report(parse_report(got.values), now)
         else:

@@ -36,7 +36,7 @@ class FleetRuns:
     simulated  : those of the simulator beside it, if requested
     runs       : report of each flight: seed, digest, phases, notes, order parameters; on the real clock its load
     recordings : of each flight (time, space, keypoint, individual), position m and velocity m/s, where they are kept
-    divergence : distance (m) between the first flight and the simulated one over time, where both start alike
+    divergence : distance (m) between the first flight and the simulated one over time, where both have the same start
     """
 
     scenario: Scenario
@@ -131,12 +131,12 @@ def fleet(
     done : callable, optional
         Called after each second that is flown.
     say : callable, optional
-        Told when the card is written, before the first flight.
+        Called with a line when the card is written, before the first flight.
 
     Returns
     -------
-    Fleets
-        `table`, one row per flight; `runs`, what is told of each; `recordings` (time, space, keypoint, individual);
+    FleetRuns
+        `table`, one row per flight; `runs`, a report of each; `recordings` (time, space, keypoint, individual);
         beside the simulator `comparison` and `divergence`.
 
     Raises

@@ -218,7 +218,7 @@ class LockstepFleet:
         self._steps_per_tick = max(1, round(min(card.safety.tick, card.period) / self._dt))
         self.steps, self.frames, self.state_times, self.log = 0, [], [], []  # type: ignore[var-annotated]
         self.standing: list[list[bool]] = []  # (time, agent): who stands because it has lost somebody
-        self._faults = befalls = DroneFaults(scenario, seed)
+        self._faults = drone_faults = DroneFaults(scenario, seed)
         self._bodies = [b for _, b in agent_records(scenario, len(card.members), seed)]
         self._has_sensor_error = scenario.has_sensor_error
         self._noise = MotionNoise(seed, len(card.members), not card.flat)
@@ -226,7 +226,7 @@ class LockstepFleet:
             make_vehicle(scenario, card, i, b, self._noise, START_TIME) for i, b in enumerate(self._bodies)
         ]
         for vehicle in self.vehicles:
-            vehicle.faults = befalls or None
+            vehicle.faults = drone_faults or None
             vehicle.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._steps_per_tick * self._dt))
             vehicle.rates |= dict.fromkeys(UNREAD_MESSAGES, 0.0)
         self.nodes = [
@@ -241,7 +241,7 @@ class LockstepFleet:
             for who in card.members
         ]
         self._faulty_nodes = [
-            FaultyNode(partial(self.nodes.__getitem__, i), befalls, i, card.site) for i in range(len(self.nodes))
+            FaultyNode(partial(self.nodes.__getitem__, i), drone_faults, i, card.site) for i in range(len(self.nodes))
         ]
         self._faulty_vehicles = [
             (vehicle, own)
@@ -252,7 +252,7 @@ class LockstepFleet:
                 ]
             )
         ]
-        reach = befalls.reach if befalls else None
+        reach = drone_faults.reach if drone_faults else None
         radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
         self.channel = RadioChannel(
             *radio, card.members, seed, period, faults, reach, partial(is_clear_between, card), card.site
@@ -330,9 +330,9 @@ class LockstepFleet:
             self._measure(self.steps // self._steps_per_period)
         dead = [i in self.dropped_out or self._is_dead(node.member, now) for i, node in enumerate(self.nodes)]
         for node, vehicle, gone in zip(self.nodes, self.vehicles, dead, strict=True):
-            told = vehicle.due_telemetry(now)
+            telemetry = vehicle.due_telemetry(now)
             if not gone:
-                node.autopilot(told, now)
+                node.autopilot(telemetry, now)
         at = [vehicle.state[:3] for vehicle in self.vehicles]
         for to, datagram in self.channel.deliver(now, at):
             if not dead[to]:

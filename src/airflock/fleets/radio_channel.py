@@ -79,28 +79,30 @@ def forge_packet(genuine: bytes, site: FlightSite, *, east: float, with_key: boo
     east     : distance east of the true position, m
     with_key : signed as its sender would, one stamp later
     """
-    told, stamp = _status_and_stamp(genuine, site)
-    x, y, z = told.position
+    status, stamp = _status_and_stamp(genuine, site)
+    x, y, z = status.position
     sign = PacketSigner(SOFTWARE_KEY if with_key else WRONG_KEY, genuine[5], last=stamp)
-    false = told._replace(position=(x + east, y, z), time=told.time + NEWER_BY)
+    false = status._replace(position=(x + east, y, z), time=status.time + NEWER_BY)
     return sign(status_message(false, site), SIGNING_EPOCH + 10 * stamp)
 
 
-def falsify_packet(genuine: bytes, site: FlightSite, tell: Callable[[State], State]) -> bytes:
+def falsify_packet(genuine: bytes, site: FlightSite, false_state: Callable[[State], State]) -> bytes:
     """Return a genuine packet with another state of the same time, signed with the same stamp."""
-    told, stamp = _status_and_stamp(genuine, site)
-    false = tell(State(*told.position, *told.velocity))
-    if false == (*told.position, *told.velocity):
+    status, stamp = _status_and_stamp(genuine, site)
+    false = false_state(State(*status.position, *status.velocity))
+    if false == (*status.position, *status.velocity):
         return genuine
     sign = PacketSigner(SOFTWARE_KEY, genuine[5], last=stamp - 1)
-    return sign(status_message(told._replace(position=false[:3], velocity=false[3:]), site), SIGNING_EPOCH + 10 * stamp)
+    return sign(
+        status_message(status._replace(position=false[:3], velocity=false[3:]), site), SIGNING_EPOCH + 10 * stamp
+    )
 
 
 def _status_and_stamp(genuine: bytes, site: FlightSite) -> tuple[DroneStatus, int]:
     """Return the status in a packet of a node of this fleet, and its stamp."""
-    told = parse_status(message_fields(STATUS_MESSAGE, genuine[HEADER_LENGTH : HEADER_LENGTH + genuine[1]]), site)
-    assert told is not None, "what a node of this fleet sent"
-    return told, STAMP_FORMAT.unpack(genuine[-12:-6] + b"\0\0")[0]
+    status = parse_status(message_fields(STATUS_MESSAGE, genuine[HEADER_LENGTH : HEADER_LENGTH + genuine[1]]), site)
+    assert status is not None, "what a node of this fleet sent"
+    return status, STAMP_FORMAT.unpack(genuine[-12:-6] + b"\0\0")[0]
 
 
 # ---- Channel
@@ -116,7 +118,7 @@ class RadioChannel:
     members     : system ids
     period      : s between two packets of a drone
     radio_range : range (m) that faults leave between two drones, by their indices, at a time (s)
-    is_clear    : function that returns True if no obstacle stands between two positions, m; None: there are no obstacles
+    is_clear    : returns True if no obstacle stands between two positions, m; None: there are no obstacles
     site        : of the flight, for positions in forged packets
     """
 
@@ -162,8 +164,8 @@ class RadioChannel:
             for to in self._others[sender]:
                 late = self._jitter(to, now) + self._rule_delay(now, sender, to, positions)
                 reached.setdefault(round(now + self._k.delay + late, 6), []).append(to)
-            for due, whom in reached.items():
-                self._queue_packet(due, sender, whom, datagram)
+            for due, receivers in reached.items():
+                self._queue_packet(due, sender, receivers, datagram)
         for f in self._attackers:
             if f.holds(self._members[sender], now) and self._site is not None:
                 false = forge_packet(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")
@@ -205,9 +207,9 @@ class RadioChannel:
         """Yield datagrams that arrive by now, each with the index of its receiver; at: true positions, m."""
         number = max(round(now / self._period), 0)
         while self._queue and self._queue[0][0] <= now + TIME_TOLERANCE:
-            _, _, who, whom, datagram = heapq.heappop(self._queue)
-            self.sent += len(whom)
-            for to in whom:
+            _, _, who, receivers, datagram = heapq.heappop(self._queue)
+            self.sent += len(receivers)
+            for to in receivers:
                 if not self._packet_arrives(now, number, who, to, positions):
                     continue
                 self.arrived_count += 1

@@ -67,9 +67,7 @@ ABSENT_VEHICLE_ROW = (math.nan,) * 6  # a row of a vehicle that has dropped out
 
 
 class FleetPorts(NamedTuple):
-    """Sockets: of each node to its autopilot and of its radio, of each vehicle to its node and to clients, of the channel
-    and of the operator.
-    """
+    """Sockets of nodes (to the autopilot, radios), vehicles (to the node, clients), channel and operator."""
 
     nodes: list[UdpPort]
     radios: list[UdpPort]
@@ -177,8 +175,8 @@ def node_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResul
     now = time.monotonic()
     utc = plan.utc(now) + initial_clock_offset(plan.faults, member)
     node = Node(card, member, SOFTWARE_KEY, now=now, utc=utc, since=utc - ACCEPTED_BEFORE_START)
-    befalls = DroneFaults(plan.scenario, plan.seed, only=i)
-    ailing = FaultyNode(lambda: node, befalls, i, card.site, lambda own: own - plan.clock[0])
+    drone_faults = DroneFaults(plan.scenario, plan.seed, only=i)
+    faulty_node = FaultyNode(lambda: node, drone_faults, i, card.site, lambda own: own - plan.clock[0])
     rows: list[Any] = []
     notes: list[tuple[float, int, str]] = []
     waits = plan.start is not None
@@ -186,7 +184,7 @@ def node_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResul
     def until() -> bool:
         nonlocal waits
         wire, now = node.autopilot_link, plan.now
-        befalls.until(now)
+        drone_faults.until(now)
         if wire.state is not None and wire.armed is not None:
             plan.clock[2 + i] = 1.0
         if waits and wire.state is not None and wire.mode == card.autopilot.ours and wire.armed:
@@ -194,12 +192,14 @@ def node_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResul
         while now >= len(rows) * card.period:
             ages = [node.peers.all[m].at - plan.clock[0] if m != member else NEVER_HEARD for m in card.members]
             rows.append(((*node.command, *(wire.state or (0.0,) * 6)), ages))
-        return plan.over or now >= dies or i in befalls.dropped_out
+        return plan.over or now >= dies or i in drone_faults.dropped_out
 
-    def tell(note: str) -> None:
+    def keep_note(note: str) -> None:
         notes.append((time.monotonic(), member, note))
 
-    ticks = yield from tick_task(ailing, [plan.ports.nodes[i], plan.ports.radios[i]], card.safety.tick, tell, until)
+    ticks = yield from tick_task(
+        faulty_node, [plan.ports.nodes[i], plan.ports.radios[i]], card.safety.tick, keep_note, until
+    )
     return TaskResult(rows, notes, ticks, node.phase, time.process_time() - began)
 
 
@@ -244,10 +244,10 @@ class RealtimeVehicle:
             self._client_address = sender
             self._send(vehicle.receive(data, now), sender)
         self._move(now)
-        told = vehicle.due_telemetry(now)
-        self._send(told)
+        telemetry = vehicle.due_telemetry(now)
+        self._send(telemetry)
         if self._client_address is not None:
-            self._send(told, self._client_address)
+            self._send(telemetry, self._client_address)
         elif now - self._called_at >= CLIENT_CALL_PERIOD:
             self._called_at = now
             self._client_port.write(vehicle.frame(MESSAGE_MAKERS["heartbeat"](vehicle)))
@@ -305,9 +305,9 @@ def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
     """Run the radio channel: packets reach the nodes that the radio allows, orders reach all at once."""
     began, card, ports = time.process_time(), plan.card, plan.ports
     flown, period = plan.scenario, card.safety.status_period
-    befalls = DroneFaults(flown, plan.seed)
-    reach = befalls.reach if befalls else None
-    ether = RadioChannel(
+    drone_faults = DroneFaults(flown, plan.seed)
+    reach = drone_faults.reach if drone_faults else None
+    channel = RadioChannel(
         flown.transceiver,
         flown.radio,
         card.members,
@@ -321,7 +321,7 @@ def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
     station = ports.station.here
     radios = [port.here for port in ports.radios]
     who = {here: i for i, here in enumerate(radios)}
-    teller = TelemetryBroadcast(card.members, plan.faults) if plan.watcher else None
+    broadcast = TelemetryBroadcast(card.members, plan.faults) if plan.watcher else None
 
     def watched(data: bytes) -> None:
         if plan.watcher is not None:
@@ -329,20 +329,24 @@ def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
 
     while not plan.over:
         now, at = plan.now, plan.places
-        befalls.until(now)
+        drone_faults.until(now)
         for data, sender in ports.channel.read_from():
             if sender in who:
-                ether.send(now, who[sender], data, at)
+                channel.send(now, who[sender], data, at)
                 watched(data)
             elif sender == station:
                 for radio in radios:
                     ports.channel.send(data, radio)
                 watched(data)
-        for to, data in ether.deliver(now, at):
+        for to, data in channel.deliver(now, at):
             ports.channel.send(data, radios[to])
-            if teller is not None:
-                teller.note_arrival(to, data, now)
-        for data in () if teller is None else teller.report(now, plan.utc(time.monotonic()), befalls.active_kinds(now)):
+            if broadcast is not None:
+                broadcast.note_arrival(to, data, now)
+        for data in (
+            ()
+            if broadcast is None
+            else broadcast.report(now, plan.utc(time.monotonic()), drone_faults.active_kinds(now))
+        ):
             watched(data)
         yield TaskRest(time.monotonic() + CHANNEL_PERIOD)
     return TaskResult([], [], TickCounts(0, 0, 0.0), MissionPhase.DONE, time.process_time() - began)
@@ -573,9 +577,9 @@ def _all(pipes: Sequence[Any], processes: Sequence[Any]) -> list[Any]:
             i = waiting[pipe]  # type: ignore[index]
             try:
                 received[i] = pipes[i].recv()
-            except EOFError as fault:
+            except EOFError as error:
                 processes[i].join()
-                raise LinkError(ENDED_MESSAGE.format(processes[i].exitcode)) from fault
+                raise LinkError(ENDED_MESSAGE.format(processes[i].exitcode)) from error
     return [received[i] for i in range(len(pipes))]
 
 
@@ -600,15 +604,15 @@ async def _watch(
 ) -> None:
     """Give the orders of a flight from the ground, end the flight, and report progress; check raises failures."""
     seconds = plan.scenario.flight.duration
-    told = 0
+    reported = 0
 
     async def until(holds: Callable[[], bool]) -> None:
-        nonlocal told
+        nonlocal reported
         while not holds():
             await asyncio.sleep(WATCH_PERIOD)
             check()
-            while on_done is not None and told < min(plan.now, seconds + SECONDS_BEFORE_START):
-                told += 1
+            while on_done is not None and reported < min(plan.now, seconds + SECONDS_BEFORE_START):
+                reported += 1
                 on_done()
 
     await until(lambda: plan.ready)

@@ -183,7 +183,7 @@ RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED = 0, 2, 3
 POSITION_IGNORED_MASK = 0x0007
 VELOCITY_IGNORED_MASK = 0x0038
 LOCAL_NED_FRAME, BODY_NED_FRAME = 1, 8
-VEHICLE_FAULTS = frozenset({"motor", "gnss", "battery", "pilot"})  # faults that befall a vehicle itself
+VEHICLE_FAULTS = frozenset({"motor", "gnss", "battery", "pilot"})  # faults of a vehicle itself
 LANDED_HEIGHT = 0.15  # m; lower is landed
 MAX_SETPOINT_GAP = 0.5  # s between setpoints that still are one stream
 BODY_ARGUMENTS = (
@@ -191,7 +191,7 @@ BODY_ARGUMENTS = (
     "dt",
     "b",
     "memory",
-)  # what a body may ask for
+)  # arguments that a body may take
 LANDING_SPEED = 1.0  # m/s, of a landing
 
 Velocity = tuple[float, float, float]
@@ -225,7 +225,9 @@ class SoftwareVehicle:
         self.last_command = self._faulty_command = (
             NO_VELOCITY  # what reached its motors last, and what faults make of the command, m/s
         )
-        self._asked: tuple[float, Velocity] | None = None  # the command of which they were asked, and when it came, s
+        self._fault_key: tuple[float, Velocity] | None = (
+            None  # the command of which they were names, and when it came, s
+        )
         self.setpoint_at, self.stream_since, self.takeoff_height = -1e9, -1e9, 0.0
         self.booted_at = 0.0  # s
         self.heartbeat_at: float | None = None  # when the last heartbeat of its station came; None: none ever
@@ -234,16 +236,16 @@ class SoftwareVehicle:
         self.accuracy, self.motor, self.steps = 0.7, True, 0
         self.off = False  # for good: it has dropped out of the flight
         self.is_taking_off, self._holding = False, HoldPosition()
-        asked = argument_names(body.move, "move", body.name)
-        for name in asked:
+        names = argument_names(body.move, "move", body.name)
+        for name in names:
             if name not in BODY_ARGUMENTS:
                 raise RuleError(f"body {body.name} asks for {name}, which a vehicle of a fleet does not have")
-        self._pick_arguments = itemgetter(*map(BODY_ARGUMENTS.index, asked))
+        self._pick_arguments = itemgetter(*map(BODY_ARGUMENTS.index, names))
         self._uses_old_velocity = choices(b).get("integration", body.integration) == "old"
         self.memory = body.Memory() if body.Memory is not None else None
         self.faults: DroneFaults | None = None  # of the scenario, with its own place among the drones
         self.place = 0
-        self.frozen_state: State | None = None  # what a navigation that stands still tells, if it does
+        self.frozen_state: State | None = None  # output of a frozen navigation; None: it works
 
     def frame(self, message: Any) -> bytes:
         """Return the bytes of a message of the dialect."""
@@ -331,9 +333,9 @@ class SoftwareVehicle:
     def _parameter_message(self, name: str) -> Any:
         value, names = self.parameters[name], list(self.parameters)
         whole = isinstance(value, int)
-        told = struct.unpack("<f", struct.pack("<i", value))[0] if whole and self.kind == "px4" else float(value)
+        encoded = struct.unpack("<f", struct.pack("<i", value))[0] if whole and self.kind == "px4" else float(value)
         return common_dialect().MAVLink_param_value_message(
-            name.encode(), told, 6 if whole else 9, len(names), names.index(name)
+            name.encode(), encoded, 6 if whole else 9, len(names), names.index(name)
         )
 
     def _setpoint(self, v: dict[str, Any], sender: tuple[int, int]) -> list[Any]:
@@ -475,9 +477,9 @@ class SoftwareVehicle:
         falls = self.off or not self.motor
         command = (vx, vy, vz - 5.0) if falls else c
         if self.faults is not None and not falls:
-            asked = self.setpoint_at, c
-            if asked != self._asked:  # as in a simulation: once for each command
-                self._asked, self._faulty_command = asked, self.faults.motor_command(self.place, now, c)
+            command_key = self.setpoint_at, c
+            if command_key != self._fault_key:  # as in a simulation: once for each command
+                self._fault_key, self._faulty_command = command_key, self.faults.motor_command(self.place, now, c)
             command = self._faulty_command
         self.last_command = command
         eu, ev, ew = self.error[3:]

@@ -22,7 +22,7 @@ ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED in HEARTBEAT.base_mode
 VELOCITY_ONLY_MASK = 0x0DC7  # type mask of a setpoint: velocity counts; position, acceleration, yaw and its rate do not
 LOCAL_NED_FRAME = 1  # MAV_FRAME
 INT32_TYPE = 6  # MAV_PARAM_TYPE
-STREAM_RATES = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message → rate that a node asks for, 1/s
+STREAM_RATES = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message → rate that a node requests, 1/s
 
 
 class ParameterCheck(NamedTuple):

@@ -21,8 +21,8 @@ def common_dialect() -> Any:
     """Return the module of the common dialect; raise LinkError where pymavlink is not installed."""
     try:
         from pymavlink.dialects.v20 import common as found
-    except ImportError as fault:
-        raise LinkError("MAVLink needs pymavlink: pip install 'airflock[fly]'") from fault
+    except ImportError as error:
+        raise LinkError("MAVLink needs pymavlink: pip install 'airflock[fly]'") from error
     return found
 
 
@@ -150,8 +150,8 @@ def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
     whole = end + CHECKSUM_LENGTH + (SIGNATURE_LENGTH if flags & SIGNED_FLAG else 0)
     if len(data) < whole:
         return None, 0
-    told = int.from_bytes(data[end : end + CHECKSUM_LENGTH], "little")
-    if told != checksum(data[start + 1 : end], known.crc_extra):
+    sent_checksum = int.from_bytes(data[end : end + CHECKSUM_LENGTH], "little")
+    if sent_checksum != checksum(data[start + 1 : end], known.crc_extra):
         return None, 1
     return MavlinkFrame(head[5], head[6], message_number(head), data[start + HEADER_LENGTH : end]), whole - start
 

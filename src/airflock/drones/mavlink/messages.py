@@ -19,7 +19,7 @@ from airflock.support import FlightSite, swap_enu_ned
 # ---- Status packets
 
 STATUS_MESSAGE = 340  # UTM_GLOBAL_POSITION
-STATUS_VERSION = 2  # version 1 told no parts of whole numbers
+STATUS_VERSION = 2  # version 1 had no parts of whole numbers
 EXTRA_FORMAT = struct.Struct("<BBI4sBBB5b")
 PARTS_PER_UNIT = 254  # of a whole number, so that a half of it, either way, fits into a byte
 ROUNDED_FIELDS = ("lat", "lon", "vx", "vy", "vz")

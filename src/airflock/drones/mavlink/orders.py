@@ -108,6 +108,6 @@ def _ed25519() -> _KeyClasses:
     try:
         from cryptography.exceptions import InvalidSignature
         from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
-    except ImportError as fault:
-        raise LinkError("orders of the operator need cryptography: pip install 'airflock[fly]'") from fault
+    except ImportError as error:
+        raise LinkError("orders of the operator need cryptography: pip install 'airflock[fly]'") from error
     return _KeyClasses(Ed25519PrivateKey, Ed25519PublicKey, InvalidSignature)

@@ -35,24 +35,24 @@ def write_key(path: Path, key: bytes) -> None:
     """Write a key to a new file of mode 0600; never over another."""
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    except FileExistsError as fault:
-        raise LinkError(f"{path}: exists; a key is never overwritten") from fault
+    except FileExistsError as error:
+        raise LinkError(f"{path}: exists; a key is never overwritten") from error
     try:
         with os.fdopen(handle, "w", encoding="ascii") as file:
             file.write(key.hex() + "\n")
-    except OSError as fault:  # a full disk; half a key is none
+    except OSError as error:  # a full disk; half a key is none
         path.unlink(missing_ok=True)
-        raise LinkError(f"{path}: cannot be written: {os_error_message(fault)}") from fault
+        raise LinkError(f"{path}: cannot be written: {os_error_message(error)}") from error
 
 
 def read_key(path: Path) -> bytes:
     """Read a key from its file; refuse a file that others can read."""
     try:
         mode, text = path.stat().st_mode, path.read_text(encoding="ascii").strip()
-    except OSError as fault:
-        raise LinkError(f"{path}: the key cannot be read: {os_error_message(fault)}") from fault
-    except UnicodeDecodeError as fault:
-        raise LinkError(f"{path}: is not a key; give {2 * KEY_LENGTH} hexadecimal digits") from fault
+    except OSError as error:
+        raise LinkError(f"{path}: the key cannot be read: {os_error_message(error)}") from error
+    except UnicodeDecodeError as error:
+        raise LinkError(f"{path}: is not a key; give {2 * KEY_LENGTH} hexadecimal digits") from error
     if mode & 0o077:
         raise LinkError(f"{path}: is readable by others (mode {mode & 0o777:04o}); chmod 600 {path}")
     try:
@@ -151,10 +151,10 @@ class PacketReceiver:
 
     def __call__(self, datagram: bytes, utc: int) -> ReceivedMessage | None:
         """Return the message of a datagram that arrived at utc (µs of Unix time); None if it is refused."""
-        fault = self._refusal_reason(datagram, utc)
-        if fault:
-            self.refused[fault] += 1
-            if fault == "own":
+        reason = self._refusal_reason(datagram, utc)
+        if reason:
+            self.refused[reason] += 1
+            if reason == "own":
                 self.own_id_stamp = _datagram_stamp(datagram)
             return None
         system, stamp, message = datagram[5], _datagram_stamp(datagram), message_number(datagram)

@@ -69,10 +69,10 @@ def read_record(record_class: Any, table: Any, section: str, errors: list[str]) 
             )
     try:
         return record_class(**to_tuples({key: value for key, value in table.items() if key in known}))
-    except ParameterError as fault:
-        errors += [f"{section}.{line.partition('.')[2]}" for line in str(fault).splitlines()]
-    except (TypeError, ValueError) as fault:
-        errors.append(f"{section}: {fault}")
+    except ParameterError as error:
+        errors += [f"{section}.{line.partition('.')[2]}" for line in str(error).splitlines()]
+    except (TypeError, ValueError) as error:
+        errors.append(f"{section}: {error}")
     return None
 
 
@@ -293,16 +293,16 @@ def law_of_package(name: str) -> Model:
         raise CardError([f"law.kind = {name!r} is not a law of this version"])
     try:
         return model(import_module(f"airflock.parts.laws.{name}"))
-    except ModuleNotFoundError as fault:
-        raise CardError([f"law.kind = {name!r} is not a law of this version"]) from fault
+    except ModuleNotFoundError as error:
+        raise CardError([f"law.kind = {name!r} is not a law of this version"]) from error
 
 
 def read_law(table: Any, errors: list[str], section: str = "law") -> tuple[Model | None, Any]:
     """Read law and parameters of a card; add the errors to the list."""
     try:
         found = law_of_package(str(table["kind"]))
-    except (AirflockError, KeyError, TypeError) as fault:
-        errors.append(str(fault) if isinstance(fault, AirflockError) else f"{section}.kind is missing")
+    except (AirflockError, KeyError, TypeError) as error:
+        errors.append(str(error) if isinstance(error, AirflockError) else f"{section}.kind is missing")
         return None, None
     return found, read_record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, section, errors)
 
@@ -321,7 +321,7 @@ def read_body(table: Any, errors: list[str]) -> tuple[Any, Any]:
 def read_member_parts(
     d: Mapping[str, Any], law: Model | None, body: Any, errors: list[str]
 ) -> tuple[tuple[Model, Any, Any], ...]:
-    """Read law, its numbers and those of the body of each member; empty where all are alike."""
+    """Read law, its numbers and those of the body of each member; empty where all are equal."""
     rows = d["own"]
     if rows == [] or law is None or body is None:
         return ()
@@ -365,7 +365,7 @@ CARD_KEYS = (
 OPTIONAL_CARD_KEYS = (
     "topology",
     "groups",
-)  # left out where a drone meets all whom it hears, where no law asks for groups
+)  # left out where a drone meets all that it hears, and where no law uses groups
 HEARING_KEYS = (
     "once",
     "any_stamp",
@@ -483,20 +483,20 @@ def parse_card(document: Any, source: str = "card") -> FlightCard:
     """Make a card from its document; CardError lists all errors."""
     if not isinstance(document, dict) or document.get("airflock_card") != CARD_VERSION:
         raise CardError([f"{source}: is not a flight card of version {CARD_VERSION}"])
-    faults: list[str] = []
+    errors: list[str] = []
     for key in document:
         if key not in (*CARD_KEYS, *OPTIONAL_CARD_KEYS):
-            faults.append(f"{key} is not known{suggest(key, (*CARD_KEYS, *OPTIONAL_CARD_KEYS), lead='; ', cutoff=0.6)}")
-    faults += [f"{key} is missing" for key in CARD_KEYS if key not in document]
-    if faults:
-        raise CardError([f"{source}: {fault}" for fault in faults])
+            errors.append(f"{key} is not known{suggest(key, (*CARD_KEYS, *OPTIONAL_CARD_KEYS), lead='; ', cutoff=0.6)}")
+    errors += [f"{key} is missing" for key in CARD_KEYS if key not in document]
+    if errors:
+        raise CardError([f"{source}: {error}" for error in errors])
     if document["hash"] != card_hash(document):
         raise CardError([f"{source}: was changed after it was written: its hash does not match"])
-    card = _card_from_document(document, faults)
-    if not faults and card is not None:
-        faults += _geometry_errors(card)
-    if faults or card is None:
-        raise CardError([f"{source}: {fault}" for fault in faults])
+    card = _card_from_document(document, errors)
+    if not errors and card is not None:
+        errors += _geometry_errors(card)
+    if errors or card is None:
+        raise CardError([f"{source}: {error}" for error in errors])
     return card
 
 
@@ -593,8 +593,8 @@ def _corner_errors(corners: Any) -> list[str]:
     """Return the errors in the corners of the fence."""
     if not is_ring(corners):
         return ["fence.corners: give a list of points [east, north] in m"]
-    fault = polygon_error(corners)
-    return [f"fence.corners {fault}"] if fault else []
+    error = polygon_error(corners)
+    return [f"fence.corners {error}"] if error else []
 
 
 def _group_errors(groups: Any, members: Any) -> list[str]:
@@ -607,33 +607,33 @@ def _group_errors(groups: Any, members: Any) -> list[str]:
 
 def _geometry_errors(card: FlightCard) -> list[str]:
     """Return the reasons for which fence, heights, layers and walls do not fit, or a law cannot be flown."""
-    faults = []
+    errors = []
     world = arena.Parameters(**to_tuples(card.document["world"]))
     top = card.layer(card.members[-1])
     if not card.low < card.safety.base or top > card.high:
-        faults.append(
+        errors.append(
             f"fence: layers from {card.safety.base:g} to {top:g} m do not lie between fence.low = {card.low:g} m and "
             f"fence.high = {card.high:g} m; raise fence.high or lower safety.layer"
         )
     low, high = (0.0, 0.0) if card.flat else arena.heights_of(world)
     if card.height + low < card.low or card.height + high > card.high:
-        faults.append(
+        errors.append(
             f"height = {card.height:g} m from {low:+g} m to {high:+g} m does not lie between fence.low = {card.low:g} "
             f"m and fence.high = {card.high:g} m"
         )
     for x, y in _arena_points(world):
         if card.outside(x, y, card.height) > 1e-6:
-            faults.append(f"fence: does not enclose the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
+            errors.append(f"fence: does not enclose the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
             break
     kind = TOPOLOGIES[card.topology.kind]
     if kind is not None and kind.flat and not card.flat:
-        faults.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
+        errors.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
     if world.edges != "open":
-        faults.append(f"world.edges = {world.edges!r}: real space has no such edges; set world.edges = 'open'")
+        errors.append(f"world.edges = {world.edges!r}: real space has no such edges; set world.edges = 'open'")
     for member in card.members if card.own else card.members[:1]:
-        with collect_errors(faults):
+        with collect_errors(errors):
             card.pilot(member)
-    return faults
+    return errors
 
 
 def _arena_points(world: arena.Parameters) -> list[tuple[float, float]]:

@@ -54,9 +54,9 @@ class LoggingNode:
         """Let the node decide, and log the digest of its output."""
         out = self.node.tick(now)
         s = self.node.autopilot_link.state
-        told = {"phase": self.node.phase.name, "own": None if s is None else list(s), "set": list(self.node.command)}
+        entry = {"phase": self.node.phase.name, "own": None if s is None else list(s), "set": list(self.node.command)}
         notes = {"notes": out.notes} if out.notes else {}
-        self._line(t=now, out=output_digest(out), **told, **notes)
+        self._line(t=now, out=output_digest(out), **entry, **notes)
         return out
 
 
@@ -70,7 +70,7 @@ class ReplayedTick(NamedTuple):
     """One tick of a log flown again: time, entry of the log, output of the node, and whether they agree."""
 
     time: float
-    told: dict[str, Any]
+    entry: dict[str, Any]
     out: NodeOutput
     same: bool
 
@@ -113,10 +113,10 @@ def read_log_ticks(path: Path) -> LogTicks:
                     if "out" in row:
                         ticks.append(_tick(row, number, before))
                 return LogTicks(member, begun[0], utc, ticks)
-        except LinkError as fault:
-            raise LinkError(f"{path}: {fault}") from fault
-        except UnicodeDecodeError as fault:
-            raise LinkError(f"{path}: this is not a log of a flight on board") from fault
+        except LinkError as error:
+            raise LinkError(f"{path}: {error}") from error
+        except UnicodeDecodeError as error:
+            raise LinkError(f"{path}: this is not a log of a flight on board") from error
 
 
 def _tick(row: Mapping[str, Any], number: int, now: float) -> LoggedTick:
@@ -196,10 +196,10 @@ def replay_log_file(path: Path, card: FlightCard, key: bytes) -> Iterator[Replay
         try:
             with open(path, encoding="utf-8") as lines:
                 yield from replay(lines, card, key)
-        except LinkError as fault:
-            raise LinkError(f"{path}: {fault}") from fault
-        except UnicodeDecodeError as fault:
-            raise LinkError(f"{path}: this is not a log of a flight on board") from fault
+        except LinkError as error:
+            raise LinkError(f"{path}: {error}") from error
+        except UnicodeDecodeError as error:
+            raise LinkError(f"{path}: this is not a log of a flight on board") from error
 
 
 def _rows(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
@@ -219,8 +219,8 @@ def read_node_memory(path: Path) -> NodeMemory:
         return NodeMemory(int(row["sent"]), {int(k): int(v) for k, v in row["heard"].items()}, int(row["order"]))
     except FileNotFoundError:
         return NodeMemory()
-    except (OSError, TextError, ValueError, OverflowError, KeyError, TypeError, AttributeError) as fault:
-        raise LinkError(f"{path}: cannot be read as the memory of a node; remove it, on the ground only") from fault
+    except (OSError, TextError, ValueError, OverflowError, KeyError, TypeError, AttributeError) as error:
+        raise LinkError(f"{path}: cannot be read as the memory of a node; remove it, on the ground only") from error
 
 
 def memory_json(memory: NodeMemory) -> str:

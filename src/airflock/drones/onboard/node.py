@@ -21,21 +21,21 @@ from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseV
 # ---- Outgoing messages
 
 ORIGIN_MESSAGE = 49
-UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, as large as a packet can tell
+UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, the largest value of a packet
 
 
 def requests(commands: AutopilotCommands, autopilot: Autopilot, link: AutopilotLink) -> list[bytes]:
     """Return requests to the autopilot for missing parameters, origin and streams."""
-    asked = [
+    messages = [
         commands.request_parameter(guard.name)
         for guard in autopilot.parameter_checks
         if guard.name not in link.parameters
     ]
     if link.origin is None:
-        asked.append(commands.request_message(ORIGIN_MESSAGE))
+        messages.append(commands.request_message(ORIGIN_MESSAGE))
     if link.state is None or link.is_landed is None or not link.clock_offsets:
-        asked += commands.request_streams()
-    return asked
+        messages += commands.request_streams()
+    return messages
 
 
 def own_status(
@@ -85,7 +85,7 @@ class Node:
     """One member of a flock.
 
     card, member, key : flight card, own system id, secret of the mission
-    now, utc : own clock (s) and Unix time (µs) at the start; both run alike from then on
+    now, utc : own clock (s) and Unix time (µs) at the start; both advance together
     memory   : state from before a restart
     radios   : periods (s) at which each radio sends the same packet
     since    : µs of Unix time; older packets are refused. The default is the start, so that no replay is accepted
@@ -154,11 +154,11 @@ class Node:
         if got.message == orders.TUNNEL_MESSAGE:
             self.operator.take(got.values, now, utc)
             return
-        told = parse_status_payload(got.payload, self.card.site)
-        if told is None:
+        status = parse_status_payload(got.payload, self.card.site)
+        if status is None:
             return
-        at = (told.time - self._clock_zero) * 1e-6
-        if self.peers.take(got.system, told, at, now):
+        at = (status.time - self._clock_zero) * 1e-6
+        if self.peers.take(got.system, status, at, now):
             index, peer = self.card.members.index(got.system), self.peers.all[got.system]
             if peer.is_flying:
                 assert peer.state is not None, "it was taken"
@@ -274,16 +274,16 @@ class Node:
 
     def _report_missing(self, mission_facts: MissionFacts) -> None:
         """Note for a person what is missing, whenever it changes."""
-        told = (
+        missing = (
             (mission_facts.fault,)
             if self.phase == MissionPhase.FAULT
             else mission_facts.missing
             if self.phase in PREFLIGHT_PHASES
             else ()
         )
-        if told != self._reported_missing:
-            self._notes += [f"missing: {line}" for line in told if line not in self._reported_missing]
-            self._reported_missing = told
+        if missing != self._reported_missing:
+            self._notes += [f"missing: {line}" for line in missing if line not in self._reported_missing]
+            self._reported_missing = missing
 
     # ------------------------------------------------------------------------------------------------- steering
 
@@ -294,7 +294,7 @@ class Node:
             if (mission_facts.armed or now == self._phase_since) and self._may_retry(now):
                 out.autopilot.append(say.arm(False, force=True))
             elif not mission_facts.armed and now - self._phase_since > KILL_SECONDS:
-                self.operator.kill_confirmed = False  # whoever arms it from now on has another flight in mind
+                self.operator.kill_confirmed = False  # whoever arms it later starts another flight
         if phase == MissionPhase.LAND and not mission_facts.in_land_mode and self._may_retry(now):
             out.autopilot.append(say.set_mode(self.card.autopilot.land))
         streams = (
@@ -362,7 +362,7 @@ class Node:
         own = self.autopilot_link.state
         if own is None:
             return []
-        told = own_status(
+        status = own_status(
             self.card,
             self.autopilot_link,
             own,
@@ -370,4 +370,4 @@ class Node:
             self.phase,
             peers=self.peers.heard(now),
         )
-        return [self._signer(status_message(told, self.card.site), self.utc(now))]
+        return [self._signer(status_message(status, self.card.site), self.utc(now))]

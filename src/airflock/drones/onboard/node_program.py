@@ -66,10 +66,10 @@ def open_port(text: str) -> Port:
             return UdpPort(_place(rest, text))
         if kind == "serial":
             return SerialPort(rest, text)
-    except OSError as fault:
-        raise LinkError(f"{text}: {fault.strerror}") from fault
-    except UnicodeError as fault:
-        raise LinkError(f"{text}: is not a valid name of a computer") from fault
+    except OSError as error:
+        raise LinkError(f"{text}: {error.strerror}") from error
+    except UnicodeError as error:
+        raise LinkError(f"{text}: is not a valid name of a computer") from error
     raise LinkError(f"{text}: {PORT_FORMS}")
 
 
@@ -78,8 +78,8 @@ def check_port(text: str) -> None:
     kind, _, rest = text.partition(":")
     if kind == "udp":
         here, _, there = rest.partition(">")
-        for told in (here, there) if there else (here,):
-            _address(told, text)
+        for address in (here, there) if there else (here,):
+            _address(address, text)
     elif kind != "serial":
         raise LinkError(f"{text}: {PORT_FORMS}")
 
@@ -171,8 +171,8 @@ class SerialPort:
     def __init__(self, rest: str, text: str):
         if termios is None:
             raise LinkError(f"{text}: serial lines need a POSIX system such as Linux; give udp:HOST:PORT")
-        path, _, told = rest.rpartition(":")
-        speed: Callable[..., int] | int | None = getattr(termios, f"B{told}", None) if told.isdigit() else None
+        path, _, rate = rest.rpartition(":")
+        speed: Callable[..., int] | int | None = getattr(termios, f"B{rate}", None) if rate.isdigit() else None
         if not path or not isinstance(speed, int):
             raise LinkError(f"{text}: give serial:/dev/NAME:BAUD with a usual baud rate such as 57600 or 921600")
         self._file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -182,10 +182,10 @@ class SerialPort:
             mode[2] = termios.CS8 | termios.CREAD | termios.CLOCAL
             mode[4] = mode[5] = speed
             termios.tcsetattr(self._file, termios.TCSANOW, mode)
-        except BaseException as fault:
+        except BaseException as error:
             os.close(self._file)
-            if isinstance(fault, termios.error):  # is no OSError
-                raise LinkError(f"{text}: {fault}") from fault
+            if isinstance(error, termios.error):  # is no OSError
+                raise LinkError(f"{text}: {error}") from error
             raise
 
     def fileno(self) -> int:
@@ -315,8 +315,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the terminal that it was started from has gone, as ssh does
     try:
         return _run(given)
-    except AirflockError as fault:
-        for line in str(fault).splitlines():
+    except AirflockError as error:
+        for line in str(error).splitlines():
             sys.stderr.write(f"airflock: {line}\n")
         return 2
     except KeyboardInterrupt:
@@ -373,8 +373,8 @@ def _run(arguments: argparse.Namespace) -> int:
             return 0
         with open(log_file, "x", encoding="utf-8", buffering=1 << 16) as log:
             run_node(card, arguments.member, key, ports, memory_file, log, write_line=_write_line)
-    except OSError as fault:
-        raise LinkError(f"{fault.filename or log_file}: {fault.strerror}") from fault
+    except OSError as error:
+        raise LinkError(f"{error.filename or log_file}: {error.strerror}") from error
     finally:
         for port in ports:
             port.close()
@@ -406,9 +406,9 @@ def run_node(
             return
         try:
             action()
-        except OSError as fault:
+        except OSError as error:
             ended.add(name)
-            tell(f"the {name} can no longer be written: {fault.strerror}; the flight goes on without it")
+            notify(f"the {name} can no longer be written: {error.strerror}; the flight goes on without it")
 
     def write(line: str) -> None:
         kept("log", lambda: log.write(line + "\n"))
@@ -419,14 +419,14 @@ def run_node(
         kept("memory", lambda: atomic.write_file(memory_file, memory_json(node.memory)))
         kept("log", log.flush)
 
-    def tell(note: str) -> None:
+    def notify(note: str) -> None:
         write_line(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
 
     try:
-        ticks = run_alone(tick_task(logged, ports, s.tick, tell, has_ended, save))
+        ticks = run_alone(tick_task(logged, ports, s.tick, notify, has_ended, save))
     finally:
         save()
-    tell(f"{ticks.total} ticks, {ticks.late} of them late by more than half a period, at most {ticks.worst:.3f} s")
+    notify(f"{ticks.total} ticks, {ticks.late} of them late by more than half a period, at most {ticks.worst:.3f} s")
 
 
 class NodeLike(Protocol):

@@ -19,7 +19,7 @@ from airflock.support import FlightSite, LinkError, swap_enu_ned
 # ---- Peers
 
 HEARD_WITHIN = 2.0  # s; a peer whose last status is younger is heard
-AGE_COUNT = 10  # packets whose ages tell of a clock
+AGE_COUNT = 10  # packets whose ages reveal a wrong clock
 MAX_PACKET_AGE = (
     1.0  # s beyond the radio's delay; a member whose packets are all older seems to have a clock that is behind
 )
@@ -37,8 +37,8 @@ class Peer:
         self.heard_at = -1e9
         self.packet_ages: deque[float] = deque(maxlen=AGE_COUNT)
         self.has_other_card = False
-        self.phase = MissionPhase.BOOT  # of its mission as it told it
-        self.state: State | None = None  # as it told it
+        self.phase = MissionPhase.BOOT  # of its mission, by its last status
+        self.state: State | None = None  # by its last status
         self.is_flying = False  # whether it is in the air, by its last word
 
 
@@ -291,7 +291,7 @@ class AutopilotLink:
     def _system_time(self, v: dict[str, Any], now: float, utc: int) -> bool:
         self._boots(v["time_boot_ms"])
         if v["time_unix_usec"] < 1_500_000_000_000_000:
-            return False  # no satellite has told it the time yet
+            return False  # it has no time from a satellite yet
         self.clock_offsets = [*self.clock_offsets[1 - CLOCK_SAMPLES :], (v["time_unix_usec"] - utc) * 1e-6]
         return True
 

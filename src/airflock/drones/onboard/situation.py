@@ -115,8 +115,8 @@ def _missing_state(card: FlightCard, wire: AutopilotLink, now: float) -> list[st
         accuracy = f"accuracy {min(wire.horizontal_accuracy, 999.0):.1f} m"
         found.append(f"navigation: fix {wire.fix_type}, {accuracy}; needs a 3-D fix and {s.h_acc:g} m")
     if wire.battery is None or wire.battery <= s.battery_low:
-        told = "not told" if wire.battery is None else f"{wire.battery:.0f} %"
-        found.append(f"battery: {told}; needs more than {s.battery_low:g} %")
+        charge = "not told" if wire.battery is None else f"{wire.battery:.0f} %"
+        found.append(f"battery: {charge}; needs more than {s.battery_low:g} %")
     if wire.is_landed is not True:
         found.append("the autopilot does not report that it is on the ground")
     return found
@@ -160,8 +160,8 @@ def permanent_error(card: FlightCard, member: int, link: AutopilotLink, has_twin
     if link.kind is not None and link.kind != card.autopilot.number:
         return f"the autopilot is of kind {link.kind}; the card is for {card.autopilot.name} ({card.autopilot.number})"
     if link.kind is None and link.other_systems:
-        told = ", ".join(map(str, sorted(link.other_systems)))
-        return f"the autopilot calls itself system {told}; this drone is member {member}"
+        systems = ", ".join(map(str, sorted(link.other_systems)))
+        return f"the autopilot calls itself system {systems}; this drone is member {member}"
     return f"another sender signs as member {member}: two drones with one number?" if has_twin else ""
 
 

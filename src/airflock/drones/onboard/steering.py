@@ -174,9 +174,9 @@ class PhaseVelocity:
         """Return the commanded velocity, m/s: the wanted one within the limits and the fence."""
         low = -1.0 if at.phase in (MissionPhase.ARMING, MissionPhase.TAKEOFF) else self._card.low
         wish = self._wanted_velocity(own, at)
-        made = limit_velocity(wish, own, self._card.sides(own), (low, self._card.high), self._card.safety)
-        self.is_fenced = made.is_fenced
-        return made.velocity
+        limited = limit_velocity(wish, own, self._card.sides(own), (low, self._card.high), self._card.safety)
+        self.is_fenced = limited.is_fenced
+        return limited.velocity
 
     def _wanted_velocity(self, own: State, at: SteeringInput) -> Velocity:
         """Return the velocity of the phase before the limiter, m/s."""
@@ -203,11 +203,11 @@ class PhaseVelocity:
         """Return the velocity of the law, m/s; an exception or a value that is no velocity counts as an overload."""
         at = self._card.law_state(own)
         try:
-            told = None if goal is None else self._card.law_state(State(*goal, 0.0, 0.0, 0.0))[:3]
-            x, y, z = self._pilot.steer(at, now, told)
-        except (AirflockError, ArithmeticError, ValueError, TypeError, IndexError) as fault:
+            goal_position = None if goal is None else self._card.law_state(State(*goal, 0.0, 0.0, 0.0))[:3]
+            x, y, z = self._pilot.steer(at, now, goal_position)
+        except (AirflockError, ArithmeticError, ValueError, TypeError, IndexError) as error:
             self.failed = True
-            self._notes.append(f"the law failed: {type(fault).__name__}: {fault}")
+            self._notes.append(f"the law failed: {type(error).__name__}: {error}")
             return NO_VELOCITY
         if not (isfinite(x) and isfinite(y) and isfinite(z)):
             self.failed = True
