@@ -85,6 +85,7 @@ def make_card_document(
     height = max(DEFAULT_HEIGHT, limits.base - low) if height is None else height
     top = limits.base + limits.layer * (len(members) - 1)
     stands = scenario.stands()
+    # A radio that keeps packets lets the newest count until the next; all others let each count once.
     held = not scenario.transceiver.keeps_packets
     stop_for_lost = not as_simulated or scenario.silence.rule == "stop" if stop_for_lost is None else stop_for_lost
     silence = with_defaults(
@@ -221,6 +222,7 @@ def _preferred_speed(scenario: Scenario) -> float:
 def fence_corners(world: arena.Parameters, margin: float) -> list[list[float]]:
     """Return the corners of a fence around an arena, margin (m) outside its walls."""
     if world.arena == "circle":
+        # The sides of the polygon, not its corners, must clear the circle.
         reach = (world.radius + margin) / math.cos(math.pi / CIRCLE_SIDES)
         angles = [2.0 * math.pi * k / CIRCLE_SIDES for k in range(CIRCLE_SIDES)]
         return [[reach * math.cos(a), reach * math.sin(a)] for a in angles]
@@ -232,6 +234,7 @@ def fence_corners(world: arena.Parameters, margin: float) -> list[list[float]]:
     sides = [inward_plane(a, b) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
     corners = []
     for one, two in zip([sides[-1], *sides[:-1]], sides, strict=True):  # each corner moves with its two sides
+        # The corner is the intersection of the two sides after both have moved outwards by the margin.
         a, b, _, d = one
         p, q, _, e = two
         det = a * q - b * p

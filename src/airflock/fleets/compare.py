@@ -38,6 +38,8 @@ def software_card(
     period = min(max(scenario.sensors.period or scenario.flight.dt, 0.02), 0.2)
     members = range(1, scenario.agents + 1)
     layer = min(3.0, 100.0 / max(scenario.agents, 1))
+    # One tick, one packet and one decision coincide, as for a simulated agent; layers shrink so that a large flock
+    # fits.
     limits = {"tick": period, "status_period": period, "layer": max(layer, 0.5), "mission_time": 36000.0}
     if realtime:
         as_simulated = False
@@ -75,6 +77,7 @@ def fleet_recording(fleet: LockstepFleet | RealtimeFleet) -> xr.Dataset:
     scenario, dims = fleet.scenario, fleet.scenario.dimensions
     rows = fleet.array()
     if dims == 3:
+        # A recording counts heights as the law does, so that it compares with a simulated one.
         rows[:, :, [2, 11]] -= fleet.law_zero_height
     columns = [*range(dims), *range(3, 3 + dims), *range(6, 6 + dims)]
     frames = rows[:, :, columns].transpose(0, 2, 1)
@@ -106,6 +109,7 @@ def fly_in_lockstep(
     fleet.advance(scenario.flight.duration + scenario.flight.dt, on_done)
     if from_ground:
         fleet.order(OrderKind.RETURN)
+        # Ten minutes at most: a drone that never lands is left to the report.
         for _ in range(60):
             if fleet.is_airborne or any(vehicle.armed for vehicle in fleet.vehicles):
                 fleet.advance(10.0)
@@ -138,6 +142,7 @@ def divergence(
         return flown.position.transpose("time", "individual", "space", "keypoint").values.reshape(-1, n, dims)
 
     def nudged(number: int) -> Any:
+        # 2.4 rad is the golden angle: the directions cover the circle, and none occurs twice.
         angle = 2.4 * np.arange(n) * (number + 1) + number  # all directions, none twice
         moved = start.copy()
         moved[:2] += NUDGE_DISTANCE * np.array([np.cos(angle), np.sin(angle)])
@@ -149,6 +154,7 @@ def divergence(
     )
     count = min(len(plain), len(ours))
     apart = _largest_distance(ours[:count] - plain[:count])
+    # A flock is chaotic: the fleet may not leave the simulated flight faster than nudges of 1 cm do by themselves.
     chaos = np.max([_largest_distance(nudged(k) - plain) for k in range(NUDGE_COUNT)], axis=0)
     period = fleet.card.period
     kept = [t for t in times if round(t / period) < count]
@@ -182,6 +188,7 @@ def compare_scores(
         if not all(isinstance(v, (int, float)) and math.isfinite(v) for pair in pairs for v in pair):
             continue
         a, b = np.array(pairs, float).T
+        # Paired by seed: both flights share start and random numbers, so most of the spread between seeds cancels.
         spread = float(np.std(b - a, ddof=1)) if len(a) > 1 else math.nan
         error = spread / math.sqrt(len(a))
         gap = float(np.mean(b - a))

@@ -164,9 +164,11 @@ class DroneFaults:
             onset = self._onsets.pop(0)
             if onset.leaves:
                 self.dropped_out.add(onset.agent)
+            # A drone that has left the flight has no further faults.
             if onset.agent in self.dropped_out:
                 continue
             began: dict[str, float] = {}
+            # Names as in the rules: at_x is x at the begin of the fault, at_cx the command then.
             if state_and_command is not None:
                 state, command = state_and_command(onset.agent)
                 began = {f"at_{name}": value for name, value in state._asdict().items()}
@@ -179,6 +181,8 @@ class DroneFaults:
         return [(kind, case) for kind, case in found if case and self._is_active(case, now)]
 
     def _is_active(self, case: ActiveFault, now: float) -> bool:
+        # Half a step of tolerance: times are multiples of a step up to rounding, and a fault must begin and end at
+        # the step of the simulation.
         half = 0.5 * self._dt
         return case.begin - half <= now < case.begin + case.lasts - half
 
@@ -204,6 +208,7 @@ class DroneFaults:
         lasting = dict(self._active_with(drone, rule, now))
         for kind in self._kinds.values():
             if kind in lasting:
+                # A frozen sensor repeats the last state before its fault, so the latest one is kept for each rule.
                 last = self._last_states.setdefault((drone, kind.name, rule), state)
                 given = {f"at_{name}": value for name, value in last._asdict().items()} | state._asdict()
                 state = State(*self._call_rule(kind, rule, lasting[kind], now, **given))
@@ -245,6 +250,7 @@ class DroneFaults:
     def reach(self, sender: int, receiver: int, now: float) -> float:
         """Return the distance (m) up to which a drone hears another one; negative: it does not."""
         far = self._default_range
+        # A radio rule returns two ranges, as a sender and as a receiver; the shortest counts.
         for drone, side in ((sender, 0), (receiver, 1)):
             for kind, case in self._active_with(drone, "radio", now):
                 far = min(far, self._call_rule(kind, "radio", case, now, reach=self._default_range)[side])

@@ -81,6 +81,7 @@ class TelemetryBroadcast:
             report_message(HEARS_REPORT, member, [who for who, at in known.items() if now - at <= NEIGHBOUR_WITHIN])
             for member, known in self._arrival_times.items()
         ]
+        # Faults of one kind are merged: a viewer shows kinds and members, not entries of a file.
         holding: dict[str, set[int]] = {}  # several faults of one kind are reports as one
         for fault in self._faults:
             if fault.begin <= now < fault.end:
@@ -108,6 +109,8 @@ class ObserverNote(NamedTuple):
     text: str
 
 
+# Reads broadcast packets only: the autopilot's client port belongs to a ground station, and over the air there is
+# none.
 class FleetObserver:
     """Listens to the fleet of a card.
 

@@ -233,6 +233,7 @@ def fly_seeds(
         if notify is not None:
             notify(f"wrote {card_file} and its key; airflock watch {card_file} shows the fleet")
     for seed in seeds:
+        # Tolerances of manufacture differ by seed, and the card holds them.
         card = card_of(seed) if scenario.varied else card
         common: dict[str, Any] = {"faults": faults, "operator": private, "on_done": on_done}
         if live:

@@ -57,6 +57,7 @@ class PacketNumbers:
     def _drawn(self, first: int) -> list[list[list[float]]]:
         """Draw a table of receivers and senders for each of PERIODS_PER_BLOCK periods."""
         periods = np.arange(first, first + PERIODS_PER_BLOCK, dtype=np.uint64)[:, None, None]
+        # A Philox block has four words, which serve four receivers of one sender, as in the simulator.
         to = np.arange(0, self._count, 4, dtype=np.uint64)[None, :, None]  # four receivers share their words
         who = np.arange(self._count, dtype=np.uint64)[None, None, :]
         words = random.random_words(self._seed, random.PACKET, 0, periods, random.pair_number(to, who, self._count))
@@ -82,6 +83,7 @@ def forge_packet(genuine: bytes, site: FlightSite, *, east: float, with_key: boo
     status, stamp = _status_and_stamp(genuine, site)
     x, y, z = status.position
     sign = PacketSigner(SOFTWARE_KEY if with_key else WRONG_KEY, genuine[5], last=stamp)
+    # Of two states of one age the first counts, so the forged one has to be newer.
     false = status._replace(position=(x + east, y, z), time=status.time + NEWER_BY)
     return sign(status_message(false, site), SIGNING_EPOCH + 10 * stamp)
 
@@ -90,6 +92,7 @@ def falsify_packet(genuine: bytes, site: FlightSite, false_state: Callable[[Stat
     """Return a genuine packet with another state of the same time, signed with the same stamp."""
     status, stamp = _status_and_stamp(genuine, site)
     false = false_state(State(*status.position, *status.velocity))
+    # A fault that changes nothing must leave the genuine bytes as they are.
     if false == (*status.position, *status.velocity):
         return genuine
     sign = PacketSigner(SOFTWARE_KEY, genuine[5], last=stamp - 1)
@@ -111,6 +114,7 @@ TIME_TOLERANCE = 1e-6  # s
 Position = tuple[float, float, float]
 
 
+# Draws by the simulator's own functions and streams, so that a fleet and a simulation of one seed can be compared.
 class RadioChannel:
     """Datagrams between the members of a fleet.
 
@@ -152,6 +156,8 @@ class RadioChannel:
         )  # in range, nothing is lost
         self._queue: list[tuple[float, int, int, Sequence[int], bytes]] = []
         self._count = 0
+        # Injected faults have a generator of their own: they must not shift the losses of the scenario. The text is
+        # part of the seed, so it cannot be renamed.
         self._random = dice.Random(f"ether {seed}")
         self.sent = self.arrived_count = 0
 
@@ -160,6 +166,7 @@ class RadioChannel:
         if self._reaches_all_at_once:
             self._queue_packet(now + self._k.delay, sender, self._others[sender], datagram)
         else:
+            # Receivers with the same delay share an entry of the queue.
             reached: dict[float, list[int]] = {}
             for to in self._others[sender]:
                 late = self._jitter(to, now) + self._rule_delay(now, sender, to, positions)
@@ -206,6 +213,7 @@ class RadioChannel:
     def deliver(self, now: float, positions: Sequence[Position]) -> Iterator[tuple[int, bytes]]:
         """Yield datagrams that arrive by now, each with the index of its receiver; at: true positions, m."""
         number = max(round(now / self._period), 0)
+        # Times are sums of steps, so two that should be equal may differ in the last bits.
         while self._queue and self._queue[0][0] <= now + TIME_TOLERANCE:
             _, _, who, receivers, datagram = heapq.heappop(self._queue)
             self.sent += len(receivers)
@@ -213,6 +221,7 @@ class RadioChannel:
                 if not self._packet_arrives(now, number, who, to, positions):
                     continue
                 self.arrived_count += 1
+                # The loop of a flight without injected faults stays free of their look-ups.
                 if not self._faults:
                     yield to, datagram
                     continue
@@ -232,6 +241,8 @@ class RadioChannel:
             or any(self._random.random() < f.amount for f in self._active_faults("loss", receiver, now))
         ):
             return False
+        # Most flights lose no packet in range: no random number is drawn, and none of the rule's arguments is
+        # computed.
         if self._loses_nothing:
             return True
         known = self._pair_arguments(sender, receiver, at, distance)
@@ -244,6 +255,7 @@ class RadioChannel:
         if self._active_faults("outage", sender, now) or self._active_faults("outage", receiver, now):
             return True
         here, there = self._members[receiver], self._members[sender]
+        # A partition separates its members from all others, in both directions.
         cuts = (f for f in self._faults.get("partition", ()) if f.begin <= now < f.end)
         return any((here in f.who) != (there in f.who) for f in cuts)
 

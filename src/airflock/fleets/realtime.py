@@ -189,6 +189,7 @@ def node_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResul
             plan.clock[2 + i] = 1.0
         if waits and wire.state is not None and wire.mode == card.autopilot.ours and wire.armed:
             waits, node.phase, node.home = False, MissionPhase.FLOCK, (wire.state.x, wire.state.y, card.layer(member))
+        # A late node fills the rows that it missed with its present state, so that all have as many.
         while now >= len(rows) * card.period:
             ages = [node.peers.all[m].at - plan.clock[0] if m != member else NEVER_HEARD for m in card.members]
             rows.append(((*node.command, *(wire.state or (0.0,) * 6)), ages))
@@ -248,6 +249,7 @@ class RealtimeVehicle:
         self._send(telemetry)
         if self._client_address is not None:
             self._send(telemetry, self._client_address)
+        # A simulator of PX4 calls its ground station, not the other way round.
         elif now - self._called_at >= CLIENT_CALL_PERIOD:
             self._called_at = now
             self._client_port.write(vehicle.frame(MESSAGE_MAKERS["heartbeat"](vehicle)))
@@ -267,6 +269,7 @@ class RealtimeVehicle:
 
     def _move(self, now: float) -> None:
         vehicle, plan, dt = self.vehicle, self.plan, self.plan.scenario.flight.dt
+        # The vehicle catches up in whole steps: its motion does not depend on when it is scheduled.
         while now >= self.steps * dt:
             at = self.steps * dt
             self._faults.begin_due(self.steps, lambda _: (vehicle.state, vehicle.last_command))
@@ -294,6 +297,7 @@ def vehicle_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskRe
         behind, period = time.monotonic() - due, craft.period
         count, late, worst = count + 1, late + (behind > 0.5 * period), max(worst, behind)
         craft.look()
+        # After a long delay it skips looks instead of running them all at once.
         due = max(due + period, time.monotonic() - period)
         yield TaskRest(due)
     return TaskResult(
@@ -492,6 +496,7 @@ def fly_in_realtime(
             now + 2.0 * FAR_FUTURE,
             *(0.0,) * len(card.members),
         ]  # the watch sets the clock when all are there
+        # Shared memory without a lock: each number has one writer, and a double is written at once.
         kept: Callable[[list[float]], Any] = list if mode == "tasks" else partial(multiprocessing.RawArray, "d")
         clock, seen = kept(first), kept([0.0] * (4 * len(card.members)))
         epoch = time.time_ns() // 1000 - round(now * 1e6)
@@ -538,6 +543,7 @@ async def run_in_event_loop(life: Task) -> TaskResult:
             loop.remove_reader(port.fileno())
 
 
+# Processes fork from a warm parent: sixty cold interpreters came up later than the flight ended.
 def _forked(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[list[TaskResult], float]:
     """Run each task in a process of its own; return their results and the processor time of all, s."""
     if not hasattr(os, "fork"):
@@ -554,6 +560,7 @@ def _forked(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[
             process.start()
             theirs.close()
         ours = [pipe[0] for pipe in pipes]
+        # Nobody may tick before all are there, or the first drones would fly among neighbours that do not exist yet.
         _all(ours, processes)  # the barrier
         for pipe in ours:
             pipe.send("go")
@@ -616,6 +623,7 @@ async def _watch(
                 on_done()
 
     await until(lambda: plan.ready)
+    # The flight begins when the packets of the start states have arrived everywhere.
     plan.clock[0] = time.monotonic() + plan.scenario.radio.delay + HOVER_SECONDS
     if plan.start is not None:
         await until(lambda: plan.now > seconds + plan.card.period)
@@ -633,6 +641,7 @@ async def _from_the_ground(plan: RealtimePlan, station: OperatorStation, until: 
 
     await until(lambda: plan.now > SECONDS_BEFORE_START)
     begun = plan.now
+    # Repeated, because the radio may lose an order.
     while not all(plan.armed) and plan.now < begun + MAX_ARM_SECONDS:
         order(OrderKind.START)
         next_ = plan.now + START_ORDER_PERIOD

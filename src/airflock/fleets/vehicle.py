@@ -45,6 +45,7 @@ LOST_STATION_MODES = {
 # ---- Holding a position
 
 STANDING_SPEED = 0.5  # m/s; our choice: slower than this it has come to stand, and holds that place
+# PX4's position gain is about twice this (MPC_XY_P 0.95 1/s); without holding, drones that hover drift by metres.
 POSITION_GAIN = 0.5  # 1/s; our choice, about half of PX4's MPC_XY_P: a metre off is half a metre a second back
 MAX_RETURN_SPEED = 1.0  # m/s; our choice
 
@@ -222,12 +223,10 @@ class SoftwareVehicle:
         ours = ("MAV_SYS_ID",) if kind == "px4" else ("SYSID_THISMAV", "SYSID_MYGCS")
         self.parameters = DEFAULT_PARAMETERS[kind] | dict.fromkeys(ours, system)
         self.target: Velocity = (0.0, 0.0, 0.0)
-        self.last_command = self._faulty_command = (
-            NO_VELOCITY  # what reached its motors last, and what faults make of the command, m/s
-        )
-        self._fault_key: tuple[float, Velocity] | None = (
-            None  # the command of which they were names, and when it came, s
-        )
+        # What reached its motors last, and what faults make of the command, m/s.
+        self.last_command = self._faulty_command = NO_VELOCITY
+        # Arrival (s) and value of the command that the faults have seen last.
+        self._fault_key: tuple[float, Velocity] | None = None
         self.setpoint_at, self.stream_since, self.takeoff_height = -1e9, -1e9, 0.0
         self.booted_at = 0.0  # s
         self.heartbeat_at: float | None = None  # when the last heartbeat of its station came; None: none ever
@@ -254,6 +253,7 @@ class SoftwareVehicle:
     @property
     def measured(self) -> State:
         """Return the own state by its navigation, with faults."""
+        # Faults of the scenario act on top of injected ones.
         known = self.frozen_state or self.controller_state
         return known if self.faults is None else self.faults.measured_state(self.place, self.now, known)
 
@@ -349,6 +349,8 @@ class SoftwareVehicle:
             or not all(map(math.isfinite, wanted))
         ):
             return []  # the nose points north, so that both frames are one
+        # ArduPilot ignores setpoints outside GUIDED; PX4 counts them before OFFBOARD, which it enters only while they
+        # stream.
         if self.kind == "ardupilot" and self.mode != GUIDED:
             return []
         if self.now - self.setpoint_at > MAX_SETPOINT_GAP:
@@ -391,6 +393,7 @@ class SoftwareVehicle:
         return RESULT_UNSUPPORTED, []
 
     def _arm(self, yes: bool, force: bool) -> int:
+        # Both autopilots refuse to disarm in the air unless forced.
         if not yes and self.flying and not force:
             return RESULT_DENIED
         self.armed = yes
@@ -399,6 +402,7 @@ class SoftwareVehicle:
     def _take_off(self, altitude: float) -> int:
         if not self.armed or (self.kind == "ardupilot" and self.mode != GUIDED):
             return RESULT_DENIED
+        # PX4 climbs to its own parameter; only ArduPilot reads the altitude of the command.
         if self.kind == "px4":
             altitude = float(self.parameters["MIS_TAKEOFF_ALT"])
         self.takeoff_height = altitude if math.isfinite(altitude) and altitude > 0.0 else 10.0
@@ -441,6 +445,7 @@ class SoftwareVehicle:
     def autopilot_velocity(self) -> Velocity:
         """Return the velocity that the autopilot commands now, m/s."""
         late = self.now - self.setpoint_at
+        # The fail-safes that a node relies on: they must act here as on the real autopilot.
         if self.mode == GUIDED and self.kind == "px4" and late > self.parameters["COM_OF_LOSS_T"]:
             self.mode = LOST_SETPOINT_MODES.get(int(self.parameters["COM_OBL_RC_ACT"]), HOLD_MODE)
         if self.mode == GUIDED and self.kind == "ardupilot" and self.heartbeat_at is not None:
@@ -474,6 +479,7 @@ class SoftwareVehicle:
             self.memory = type(self.memory)() if self.memory is not None else None
             return
         (x, y, z, vx, vy, vz), c = self.state, self.autopilot_velocity()
+        # Without motors the body is given a velocity ever further down: it falls as fast as its dynamics let it.
         falls = self.off or not self.motor
         command = (vx, vy, vz - 5.0) if falls else c
         if self.faults is not None and not falls:
@@ -489,8 +495,10 @@ class SoftwareVehicle:
         velocity, self.memory = moved[:3], moved[3] if self.memory is not None else None
         if self.faults is not None:
             velocity = self.faults.velocity_after_step(self.place, now, self.state, command, velocity, dt)
+        # As the simulated body does, or a fleet would leave the simulated flight at once.
         ux, uy, uz = (vx, vy, vz) if self._uses_old_velocity else velocity
         self.state = State(x + ux * dt, y + uy * dt, z + uz * dt, *velocity)
+        # The ground stops it, but must not keep it from taking off.
         if self.state.z <= 0.0 and (c[2] <= 0.0 or falls):
             self.state = State(self.state.x, self.state.y, 0.0, *NO_VELOCITY)
             self.armed = self.armed and self.mode not in (LAND_MODE, RETURN_MODE) and not self.off

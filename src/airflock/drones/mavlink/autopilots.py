@@ -95,6 +95,7 @@ class Autopilot:
 
     def parameter_value(self, value: float, type_: int) -> float:
         """Return the value of a PARAM_VALUE, also where it holds the bytes of an integer."""
+        # PX4 puts the four bytes of an int32 into the float field, so 4 arrives as 5.6e-45; ArduPilot converts it.
         if self.integers_as_bytes and type_ == INT32_TYPE:
             return float(struct.unpack("<i", struct.pack("<f", value))[0])
         return value
@@ -105,6 +106,8 @@ def px4_mode(main: int, sub: int = 0) -> int:
     return main << 16 | sub << 24
 
 
+# The ranges are ours where the manuals allow more: a drone that hovers after a lost link is hit by one that flies on,
+# so both autopilots must land.
 AUTOPILOTS = {
     "px4": Autopilot(
         "px4",
@@ -191,6 +194,7 @@ class AutopilotCommands:
 
     def command(self, number: int, *parameters: float) -> bytes:
         """Pack a command with up to seven parameters."""
+        # COMMAND_LONG always has seven parameters; those that a command does not use are zero.
         seven = (*parameters, *(0.0,) * (7 - len(parameters)))
         return self._pack(common_dialect().MAVLink_command_long_message(self.system, 1, number, 0, *seven))
 

@@ -53,6 +53,7 @@ def message_layout(message: int) -> MessageLayout | None:
     if kind is None:
         return None
     single, arrays, texts, index = [], [], [], 0
+    # The wire order of fields is by size, not by declaration: `orders` maps one to the other.
     by_place = sorted(zip(kind.orders, kind.fieldnames, kind.fieldtypes, strict=True))
     for (_, name, type_), count in zip(by_place, kind.array_lengths, strict=True):
         if type_ == "char":
@@ -76,6 +77,7 @@ def message_fields(message: int, payload: bytes) -> dict[str, Any]:
     known = message_layout(message)
     if known is None or len(payload) > known.size:
         raise LinkError(f"message {message} with {len(payload)} bytes is not in the common dialect")
+    # MAVLink 2 cuts trailing zeros off; the layout needs the full length.
     flat = known.unpack(payload.ljust(known.size, b"\0"))
     found: dict[str, Any] = {name: flat[index] for name, index in known.numbers}
     for name, index, count in known.arrays:
@@ -144,6 +146,8 @@ def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
     if len(head) < HEADER_LENGTH:
         return None, 0
     length, flags, known = head[1], head[2], message_layout(message_number(head))
+    # An unknown message cannot be checked, because its extra byte is unknown: it is rubbish to us. A length of zero
+    # never occurs, for MAVLink 2 keeps at least one byte.
     if known is None or length > known.size or length == 0 or flags & ~SIGNED_FLAG:
         return None, 1
     end = start + HEADER_LENGTH + length
@@ -151,6 +155,8 @@ def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
     if len(data) < whole:
         return None, 0
     sent_checksum = int.from_bytes(data[end : end + CHECKSUM_LENGTH], "little")
+    # Only the checksum tells a frame from a payload byte that happens to be 0xFD, so a mismatch costs one byte, not
+    # the length that the false header claims.
     if sent_checksum != checksum(data[start + 1 : end], known.crc_extra):
         return None, 1
     return MavlinkFrame(head[5], head[6], message_number(head), data[start + HEADER_LENGTH : end]), whole - start

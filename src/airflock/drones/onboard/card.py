@@ -268,6 +268,8 @@ class Fence:
         These are all sides of a convex fence; of any other, the sides that can be seen. From outside the nearest point
         counts, too.
         """
+        # A convex fence is a handful of planes, each valid everywhere. A polygon with a notch needs the sides that
+        # can be seen from here, or a side behind another one would push.
         if self.convex_planes:
             return [(a * x + b * y + d, a, b, 0.0) for a, b, _, d in self.convex_planes]
         count = len(self.edges)
@@ -289,6 +291,7 @@ MEMBER_PARTS = ("law", "body")  # of which members may have numbers of their own
 
 def law_of_package(name: str) -> Model:
     """Return a law of the package by its name."""
+    # A law is named, never carried as code: a card is data. Laws of a user's own fly from an installed package.
     if not name.isidentifier():
         raise CardError([f"law.kind = {name!r} is not a law of this version"])
     try:
@@ -423,6 +426,7 @@ class FlightCard:
 
     def layer(self, member: int) -> float:
         """Return the height (m) of a member's own layer."""
+        # Each member has a layer of its own, so that paths to and from home never meet.
         return self.safety.base + self.safety.layer * self.members.index(member)
 
     def turn(self, member: int) -> float:
@@ -446,6 +450,7 @@ class FlightCard:
 
     def outside(self, x: float, y: float, z: float) -> float:
         """Return the distance of a local position beyond the fence or its heights, m; negative inside."""
+        # Below the fence is no breach: a drone lands and takes off there.
         return max(self.fence.outside(x, y), z - self.high)
 
     def law_state(self, own: State) -> State:
@@ -461,6 +466,7 @@ class FlightCard:
 
 def card_hash(document: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a card without its own entry, over JSON with sorted keys and no spaces."""
+    # Sorted keys and no spaces: the hash must not depend on who wrote the JSON.
     rest = {key: value for key, value in document.items() if key != "hash"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
@@ -573,6 +579,8 @@ def _card_from_document(d: Mapping[str, Any], errors: list[str]) -> FlightCard |
 
 def _packet_policy(extrapolate: bool, max_age: float, once: bool = False, any_stamp: bool = False) -> PacketPolicy:
     """Return the use of neighbours' data; with any_stamp all times of packets are accepted."""
+    # In a simulation all agents share one clock, and packets of a jittering radio may overtake each other; believing
+    # any stamp is what the simulated agents do.
     if any_stamp:
         return PacketPolicy(extrapolate, max_age, once, early=FAR, drop_reordered=False)
     return PacketPolicy(extrapolate, max_age, once)
@@ -630,6 +638,7 @@ def _geometry_errors(card: FlightCard) -> list[str]:
         errors.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
     if world.edges != "open":
         errors.append(f"world.edges = {world.edges!r}: real space has no such edges; set world.edges = 'open'")
+    # A pilot is made here, on the ground, so that a law that cannot fly this card fails before take-off.
     for member in card.members if card.own else card.members[:1]:
         with collect_errors(errors):
             card.pilot(member)

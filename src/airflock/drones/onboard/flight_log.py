@@ -62,6 +62,7 @@ class LoggingNode:
 
 def output_digest(out: NodeOutput) -> str:
     """Return the first 16 digits of the SHA-256 of all that a tick gave."""
+    # Outputs are logged as digests: a replay makes their bytes again.
     text = repr((out.autopilot, out.radios, out.notes))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -154,6 +155,8 @@ def replay(lines: Iterable[str], card: FlightCard, key: bytes) -> Iterator[Repla
 def _node_at_start(head: Mapping[str, Any], card: FlightCard, key: bytes) -> Node:
     """Make the node as it was at the start of the log; raise LinkError where the first line lacks it."""
     heard, radios = head.get("heard"), head.get("radios")
+    # A replay starts the node as it was: the same memory, clock and radios, or the first packet is judged
+    # differently.
     stamps = [head.get(name) for name in ("sent", "order", "utc", "since")]
     stamps += list(heard.values()) if isinstance(heard, dict) else [None]
     periods: list[Any] = radios if isinstance(radios, list) and 0 < len(radios) <= MAX_RADIOS else [None]
@@ -175,6 +178,7 @@ def _time_and_bytes(row: Mapping[str, Any], number: int, before: float) -> tuple
         now, data = row["t"], bytes.fromhex(row.get("a", row.get("r", "")))
     except (KeyError, TypeError, ValueError):
         now, data = None, b""
+    # Times that run backwards or jump by hours mean a damaged file.
     if not _is_number(now) or not before <= now <= before + MAX_GAP or not {"a", "r", "out"} & set(row):
         raise LinkError(f"line {number}: was not written by a node")
     return float(now), data

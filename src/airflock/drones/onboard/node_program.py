@@ -338,6 +338,7 @@ def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, l
             )
     with collect_errors(faults):
         key = read_key(arguments.key or arguments.card.with_suffix(".key"))
+    # Typing it is the point: nobody starts a node by accident or from a script that was copied.
     if not arguments.i_am_the_pilot and not arguments.check:
         faults.append("--i-am-the-pilot is missing: somebody must hold the transmitter, know the law of the place, and "
                       "be able to take over each drone at any time")  # fmt: skip
@@ -352,6 +353,7 @@ def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, l
             port.close()
         raise CardError(faults)
     for text in arguments.radio:
+        # A port without a destination answers whoever speaks first: two such ports wait for each other for ever.
         if text.startswith("udp:") and ">" not in text:
             sys.stderr.write(
                 f"airflock: note: --radio {text} sends to nobody before it has heard somebody; where no router speaks "
@@ -371,6 +373,7 @@ def _run(arguments: argparse.Namespace) -> int:
                 f"{arguments.card}: {card.name}, {len(card.members)} members, hash {card.hash[:8]}: fits\n"
             )
             return 0
+        # Mode x: a log is evidence and is never overwritten. The buffer keeps the disk out of the tick.
         with open(log_file, "x", encoding="utf-8", buffering=1 << 16) as log:
             run_node(card, arguments.member, key, ports, memory_file, log, write_line=_write_line)
     except OSError as error:
@@ -394,10 +397,12 @@ def run_node(
 ) -> None:  # fmt: skip
     """Run a node on the real clock with a log and a memory; the first port is the autopilot's."""
     s, memory = card.safety, read_node_memory(memory_file)
+    # The first radio is the fast one; all others repeat the same packets at the slow rate.
     radios = (s.status_period, *(s.slow_period,) * (len(ports) - 2))
     now, utc = time.monotonic(), time.time_ns() // 1000
     node = Node(card, member, key, now=now, utc=utc, memory=memory, radios=radios)
 
+    # One report for each file: at twenty ticks a second the terminal would be full of them.
     ended: set[str] = set()  # files that cannot be written any more
 
     def kept(name: str, action: Callable[[], object]) -> None:

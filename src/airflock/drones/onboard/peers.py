@@ -20,9 +20,8 @@ from airflock.support import FlightSite, LinkError, swap_enu_ned
 
 HEARD_WITHIN = 2.0  # s; a peer whose last status is younger is heard
 AGE_COUNT = 10  # packets whose ages reveal a wrong clock
-MAX_PACKET_AGE = (
-    1.0  # s beyond the radio's delay; a member whose packets are all older seems to have a clock that is behind
-)
+# s beyond the radio's delay; a member whose packets are all older seems to have a clock that is behind.
+MAX_PACKET_AGE = 1.0
 MAX_OUTSIDE = 100.0  # m; a member may be this far beyond the fence and still be believed
 PHASE_OF_NUMBER = {int(phase): phase for phase in MissionPhase}
 STATUS_REFUSALS = ("mission", "card", "phase", "fast", "far", "jump", "time")
@@ -110,6 +109,8 @@ class Peers:
         """Return True if at least two members, and all that are known, seem to have a wrong clock: then it is ours."""
         wrong, limit = 0, self._card.safety.clock_error
         for peer in self.all.values():
+            # The youngest of ten packets says most: delay only makes packets older, so a whole batch that is too old
+            # or from the future can only be a clock.
             if len(peer.packet_ages) == AGE_COUNT:
                 if -limit <= min(peer.packet_ages) <= self._card.delay + MAX_PACKET_AGE:
                     return False
@@ -121,9 +122,8 @@ class Peers:
 
 KILL_CONFIRM_WITHIN = 5_000_000  # µs; a kill must be confirmed within
 MAX_ORDER_AGE = 5_000_000  # µs; an order given longer ago is not obeyed
-MAX_START_DELAY = (
-    10_000_000  # µs after its turn a drone may still start; our choice: later somebody may stand beside it
-)
+# µs after its turn a drone may still start; our choice: later somebody may stand beside it.
+MAX_START_DELAY = 10_000_000
 ORDER_REFUSALS = ("seal", "mission", "old", "replay", "no library")
 
 
@@ -155,8 +155,10 @@ class OperatorOrders:
             return self._refuse("mission")
         if abs(order.given_at - utc) > MAX_ORDER_AGE:
             return self._refuse("old")
+        # Orders grow in time, over restarts too; whoever records one cannot send it again.
         if order.given_at <= self.last_order_time:
             return self._refuse("replay")
+        # Also for orders to others: they prove that the operator is there, and use up their time.
         self.last_order_time, self.heard_at = order.given_at, now
         if order.target in (0, self._member):
             self._obey(order, utc)
@@ -176,6 +178,7 @@ class OperatorOrders:
         elif order.kind == OrderKind.GOTO:
             lat, lon, alt = order.point
             self.goal = self._card.site.local(lat * 1e-7, lon * 1e-7, alt * 1e-3)
+        # Two steps, because one wrong order must not drop a drone.
         elif order.kind == OrderKind.KILL:
             self._kill_at = utc
         elif order.kind == OrderKind.CONFIRM_KILL:
@@ -254,6 +257,7 @@ class AutopilotLink:
         self._max_jump = max_jump
         for frame in self._stream(data):
             if frame.system != self._member:
+                # Another vehicle on this wire means a wrong cable or a wrong system id: noticed before take-off.
                 if frame.message == 0 and frame.values()["autopilot"] != INVALID_AUTOPILOT:
                     self.other_systems.add(frame.system)
             elif frame.component == AUTOPILOT_COMPONENT:
@@ -269,6 +273,7 @@ class AutopilotLink:
 
         since_boot : time since boot in a message, ms; a step back by more than REBOOT_MS means a reboot
         """
+        # In the air a time that goes back is a broken message, never a reason to forget the state.
         if since_boot >= self._boot_ms - REBOOT_MS:
             self._boot_ms = max(since_boot, self._boot_ms)
         elif not self.armed:
@@ -349,11 +354,13 @@ class AutopilotLink:
     def _moved(self, state: State, now: float) -> None:
         """Take a new own state, unless it has a velocity but an unchanged position: then the estimate is frozen."""
         last, passed = self.state, now - self.state_at
+        # A frozen estimate keeps sending: without this it would look fresh for ever.
         if last is not None and last[:3] == state[:3] and max(map(abs, state[3:])) > MOVING_SPEED:
             return
         if last is not None and passed < 1.0:
             step = max(abs(a - b) for a, b in zip(last[:3], state[:3], strict=True))
             speed = max(max(map(abs, last[3:])), max(map(abs, state[3:])))
+            # A jump that no velocity explains means that the navigation has reset.
             if step > 2.0 * speed * passed + self._max_jump:
                 self.jumped_at = now
         self.state, self.state_at = state, now
@@ -371,4 +378,5 @@ class AutopilotLink:
 
     def clock_offset(self) -> float | None:
         """Return how far (s) the autopilot's clock is ahead of ours, by the least delayed sample; None: unknown."""
+        # Delay only makes the autopilot's time look older, so the largest offset was delayed least.
         return max(self.clock_offsets) if self.clock_offsets else None

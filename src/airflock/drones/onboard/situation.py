@@ -179,6 +179,7 @@ def mission_facts(
     alive = now - link.heartbeat_at <= MAX_HEARTBEAT_AGE
     flying = peers.flying()
     fresh = {who: peer for who, peer in flying.items() if now - peer.heard_at <= HEARD_WITHIN}
+    # Members that return or land are not waited for, or the last one would hold for ever.
     expected = min(s.peers_least, len([peer for peer in flying.values() if peer.phase not in LEAVING_PHASES]))
     position_bad = timers("position", not now - link.state_at <= s.stale or not alive, now)
     gnss_bad = timers("gnss", _is_gnss_bad(card, link, now), now)
@@ -187,6 +188,7 @@ def mission_facts(
     out = own is not None and phase in FLYING_PHASES and card.outside(*own[:3]) > 0.0
     near = own is not None and _is_anybody_near(own, fresh.values(), s.near)
     operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time
+    # Hysteresis: HOLD ends only after all reasons have been absent for a while (row 25).
     calm = not (position_bad or gnss_bad or few or clock_bad or near or tick.is_overloaded)
     calm = calm and not (operator_lost and s.operator_lost == "hold")
     missing = (
@@ -196,7 +198,9 @@ def mission_facts(
     )
     if timers("silent", phase == MissionPhase.BOOT and not alive, now) > MAX_HEARTBEAT_AGE:
         missing = (NO_HEARTBEAT_TEXT,)
+    # An unknown battery keeps a drone on the ground; in the air it must not land everybody at once.
     battery = 100.0 if link.battery is None else link.battery
+    # The reserve grows with the way home.
     way = 0.0 if own is None or tick.home is None else state_distance(own, State(*tick.home, 0.0, 0.0, 0.0))
     layer = card.layer(member)
     return MissionFacts(
@@ -260,8 +264,8 @@ def _is_clock_bad(card: FlightCard, wire: AutopilotLink, peers: Peers) -> bool:
 def _is_anybody_near(own: State, peers: Iterable[Peer], distance: float) -> bool:
     """Return True if one of these peers is nearer than a distance, m."""
     return any(
-        abs(peer.state.x - own.x) < distance
-        and state_distance(own, peer.state) < distance  # the first spares most roots
+        abs(peer.state.x - own.x) < distance and state_distance(own, peer.state) < distance
+        # The first comparison spares most square roots: this runs for each pair at each tick.
         for peer in peers
         if peer.state is not None
     )

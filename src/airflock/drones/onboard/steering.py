@@ -36,6 +36,7 @@ def limit_velocity(
     surfaces : distance (m, negative beyond) and inward unit normal of the fence's sides and of obstacles
     heights  : lowest and highest, m
     """
+    # The limiter trusts nobody, laws included: nan would pass every comparison below.
     if not all(map(isfinite, wanted_velocity)):
         wanted_velocity = NO_VELOCITY
     vx, vy, _ = shorten(wanted_velocity[0], wanted_velocity[1], 0.0, safety.speed_max)
@@ -46,6 +47,8 @@ def limit_velocity(
     fenced = False
     walls = list(surfaces)
     for _ in range(2):  # a corner: what one side turns, another may have to turn again
+        # Each side allows the outward speed from which the drone can still brake before the soft margin. Only the
+        # component across the side is cut, so that a drone slides along it.
         for distance, nx, ny, nz in walls:
             outward = -(vx * nx + vy * ny + vz * nz)
             if outward <= 0.0:
@@ -55,16 +58,19 @@ def limit_velocity(
             if outward > most:
                 k = outward - most
                 vx, vy, vz, fenced = vx + k * nx, vy + k * ny, vz + k * nz, True
+    # In a sharp corner two passes need not converge; a drone that stops is safe.
     for distance, nx, ny, nz in walls:
         if -(vx * nx + vy * ny + vz * nz) > braking_curve(distance, safety.brake, safety.brake_gain) + 1e-9:
             vx, vy, vz, fenced = 0.0, 0.0, 0.0, True  # sides that contradict each other: stop
     low, high = heights
+    # Heights are kept like walls, but without the soft margin.
     vz = clamp(
         vz,
         -braking_curve(own.z - low, safety.brake, safety.brake_gain),
         braking_curve(high - own.z, safety.brake, safety.brake_gain),
     )
     speed = norm(vx, vy, 0.0)
+    # Sliding along several sides may have added speed.
     k = min(1.0, safety.speed_max / speed)
     return LimitedVelocity((k * vx, k * vy, clamp(vz, -safety.climb_max, safety.climb_max)), fenced)
 
@@ -108,6 +114,7 @@ def velocity_from_neighbours(own: State, neighbours: Iterable[State], safety: Sa
     x = y = 0.0
     for other in neighbours:
         dx, dy, dz = own.x - other.x, own.y - other.y, own.z - other.z
+        # Drones on the way home keep their layers, so those in other layers pass above or below.
         if abs(dz) > PASSING_SHARE * safety.layer:
             continue
         near = PUSH_GAIN * max(safety.yield_range - norm(dx, dy, dz), 0.0) / norm(dx, dy, 0.0)
@@ -172,6 +179,7 @@ class PhaseVelocity:
 
     def velocity(self, own: State, at: SteeringInput) -> Velocity:
         """Return the commanded velocity, m/s: the wanted one within the limits and the fence."""
+        # While it takes off it is still below the lowest height of the fence, which must not lift it at full speed.
         low = -1.0 if at.phase in (MissionPhase.ARMING, MissionPhase.TAKEOFF) else self._card.low
         wish = self._wanted_velocity(own, at)
         limited = limit_velocity(wish, own, self._card.sides(own), (low, self._card.high), self._card.safety)
@@ -182,6 +190,7 @@ class PhaseVelocity:
         """Return the velocity of the phase before the limiter, m/s."""
         s, phase = self._card.safety, at.phase
         if phase == MissionPhase.HOLD and at.has_navigation:
+            # First brake, then keep the place where it stopped: going back to where HOLD began would swing.
             if self._hold_position is None and norm(*own[3:]) < STANDING_SPEED:
                 self._hold_position = own[:3]
             return NO_VELOCITY if self._hold_position is None else velocity_to_stay(own, self._hold_position, s)
@@ -193,6 +202,7 @@ class PhaseVelocity:
             return wish if at.stay is None else (*at.stay[:2], wish[2])
         if phase not in (MissionPhase.FLOCK, MissionPhase.GOTO):
             return NO_VELOCITY
+        # The law decides once a period, as in the simulation; between two decisions its last velocity is flown.
         if at.now >= self._next_decision - TIME_TOLERANCE:
             self._next_decision = max(self._next_decision + self._card.period, at.now)
             self._law_velocity = self._law(own, at.now, self.goal if phase == MissionPhase.GOTO else None)
@@ -213,6 +223,7 @@ class PhaseVelocity:
             self.failed = True
             self._notes.append(f"the law commanded {(x, y, z)}, which is not a velocity")
             return NO_VELOCITY
+        # Half the way to the goal, half the law: the flock stays together while it goes.
         if goal is not None:
             gx, gy, _ = velocity_towards(own, goal, self._card.safety)
             x, y = 0.5 * (x + gx), 0.5 * (y + gy)
