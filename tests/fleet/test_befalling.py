@@ -64,7 +64,7 @@ def flown(settings, faults, seed=1, duration=5.2, **limits):
     """A fleet in lock-step and its scenario, from where the simulated drones start."""
     found = scenario(3, duration, **CROWD, **settings, **({"faults": faults} if faults else {}))
     found = compare.with_metric_period(found, 0.2)
-    made = card(found, as_simulated=True, silent=False, safety=OPEN_MINDED | limits)
+    made = card(found, as_simulated=True, stop_for_lost=False, safety=OPEN_MINDED | limits)
     fleet = LockstepFleet(found, made, seed, start=compare.simulated_start(found, seed))
     fleet.advance(duration + found.flight.dt)
     return fleet
@@ -214,7 +214,7 @@ def test_on_the_real_clock_packets_say_what_a_fault_tells():
     for time in (0.5, 1.5, 2.5):
         faults.until(time)
         (datagram,) = node.status_datagrams(zero + time)
-        said.append(ailing.told(datagram, time) == datagram)
+        said.append(ailing.falsified(datagram, time) == datagram)
     assert said == [True, False, True]
 
 

@@ -1,4 +1,4 @@
-"""From a scenario to a flight card: the law, its world and its limits as the numbers that a drone carries."""
+"""From a scenario to a flight card: the law, its world and its limits as numbers that a drone carries."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,11 +18,11 @@ from airflock.world import arena, inward_plane
 
 
 def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tuple[Any, Any]]:
-    """Numbers of law and body of each of the first `count` agents.
+    """Return the numbers of law and body of each of the first `count` agents.
 
-    seed : with tolerances of manufacture as this seed draws them; None: without, for real drones have their own
+    seed : of the tolerances of manufacture; None: without tolerances, for real drones have their own
 
-    Raises ScenarioError where groups are of fewer agents.
+    Raises ScenarioError where groups have fewer agents.
     """
     if not scenario.varied and len(scenario.laws) == 1:
         return [(scenario.parameters, scenario.body)] * count
@@ -31,12 +31,12 @@ def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tupl
             [f"groups are of {scenario.agents} agents, and {count} drones are to fly; set agents = {count}"]
         )
     groups = tuple(replace(group, spread={}) for group in scenario.groups) if seed is None else scenario.groups
-    told = replace(scenario, groups=groups)
-    varied = dict.fromkeys([*told.varied, *(each for law in told.laws for each in law.varied)])
-    columns = {(of, name): told.agent_values(of, name, seed or 0) for of, name in varied}
+    resolved = replace(scenario, groups=groups)
+    varied = dict.fromkeys([*resolved.varied, *(each for law in resolved.laws for each in law.varied)])
+    columns = {(of, name): resolved.agent_values(of, name, seed or 0) for of, name in varied}
 
     def own(agent: int) -> tuple[Any, Any]:
-        law = told.law_of(agent)
+        law = resolved.law_of(agent)
         p = {name: columns["p", name][agent] for _, name in law.varied}
         b = {name: column[agent] for (of, name), column in columns.items() if of == "b"}
         return replace(law.parameters, **p), replace(scenario.body, **b)
@@ -45,7 +45,7 @@ def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tupl
 
 
 def agent_sensors(scenario: Scenario, count: int, seed: int) -> list[Any]:
-    """Numbers of the sensor of each of the first `count` agents, with tolerances as a seed draws them."""
+    """Return the numbers of the sensor of each of the first `count` agents, with the tolerances of a seed."""
     columns = {name: scenario.agent_values("s", name, seed) for of, name in scenario.varied if of == "s"}
     own = [{name: column[agent] for name, column in columns.items()} for agent in range(count)]
     return [replace(scenario.sensors, **numbers) for numbers in own]
@@ -65,19 +65,19 @@ def make_card_document(
     as_simulated: bool = False, seed: int | None = None, safety: Mapping[str, Any] | None = None,
     stop_for_lost: bool | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Document of a flight card, without its hash.
+    """Return the document of a flight card, without its hash.
 
-    site         : latitude and longitude (degrees), altitude (m) of the arena's centre on the ground
-    height       : at which the flock flies, m above the site; in space, of the arena's centre
-    margin       : of the fence around the law's walls, m
-    as_simulated : treat neighbours' data as the scenario's radio does; else they are carried forward and kept for 5 s
-    seed         : of the tolerances of manufacture that groups have; None: real drones bring their own
-    safety       : limits that differ from those that follow from the scenario
-    silent       : whether the rule of silence stops a drone, whatever the scenario says; by default it does, and as
-                   simulated where the scenario says so
+    site          : latitude and longitude (degrees), altitude (m) of the arena's centre on the ground
+    height        : of the flock, m above the site; in space, of the arena's centre
+    margin        : of the fence around the law's walls, m
+    as_simulated  : use neighbours' data as the scenario's radio does; else they are carried forward and kept for 5 s
+    seed          : of the tolerances of manufacture that groups have; None: real drones bring their own
+    safety        : limits that differ from those that follow from the scenario
+    stop_for_lost : whether the rule of silence stops a drone, whatever the scenario says; None: it does, and with
+                    as_simulated only where the scenario says so
 
-    Raises CardError where the scenario has no walls, or where neighbours are seen instead of heard, or where its law
-    or its topology is not in the package.
+    Raises CardError where the scenario has no walls, where neighbours are seen instead of heard, or where its law or
+    its topology is not in the package.
     """
     _check_flyable(scenario)
     limits = replace(default_safety(scenario), **(safety or {}))
@@ -85,6 +85,7 @@ def make_card_document(
     height = max(DEFAULT_HEIGHT, limits.base - low) if height is None else height
     top = limits.base + limits.layer * (len(members) - 1)
     stands = scenario.stands()
+    # A radio that keeps packets lets the newest count until the next; all others let each count once.
     held = not scenario.transceiver.keeps_packets
     stop_for_lost = not as_simulated or scenario.silence.rule == "stop" if stop_for_lost is None else stop_for_lost
     silence = with_defaults(
@@ -126,7 +127,7 @@ def make_card_document(
 
 
 def omission_notes(scenario: Scenario) -> list[str]:
-    """What of a scenario no card holds, in a line for each: real drones bring their own."""
+    """Return one line for each part of a scenario that no card holds: real drones bring their own."""
     kinds = ", ".join(dict.fromkeys(entry.fault.name for entry in scenario.faults))
     spread = ", ".join(dict.fromkeys(key for group in scenario.groups for _, key in group.spread))
     said = {"faults": kinds, "tolerances of groups": spread}
@@ -134,30 +135,30 @@ def omission_notes(scenario: Scenario) -> list[str]:
 
 
 def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> list[str]:
-    """What of a card the scenario did not fly, in a line for each: its scores and certificates do not speak of it."""
-    told = []
+    """Return one line for each part of a card that the scenario did not fly: its scores do not cover it."""
+    notes = []
     if members != scenario.agents:
-        told.append(
+        notes.append(
             f"the card is for {members} drones, the scenario flies {scenario.agents}: scores and certificates of it do "
             f"not speak of {members}"
         )
     likely = default_safety(scenario)
     if safety.response < likely.response:
-        told.append(
+        notes.append(
             f"response = {safety.response:g} s is shorter than what the scenario gives a card, {likely.response:g} s: "
-            "distances to stop are told too short, unless the drones are as quick"
+            "distances to stop are notes too short, unless the drones are as quick"
         )
     for name in ("accel", "brake"):
         if getattr(safety, name) > likely.accel:
-            told.append(
+            notes.append(
                 f"{name} = {getattr(safety, name):g} m/s^2 is more than what the scenario gives a card, "
-                f"{likely.accel:g} m/s^2: distances to stop are told too short, unless the drones are as quick"
+                f"{likely.accel:g} m/s^2: distances to stop are notes too short, unless the drones are as quick"
             )
-    return told
+    return notes
 
 
 def _check_flyable(scenario: Scenario) -> None:
-    """Raise a CardError where a scenario has what no card can hold."""
+    """Raise CardError where a scenario has a part that no card can hold."""
     fault = ""
     others = [
         law.model.name for law in scenario.laws if not law.model.decide.__module__.startswith("airflock.parts.laws.")
@@ -178,7 +179,7 @@ def _check_flyable(scenario: Scenario) -> None:
 
 
 def _member_differences(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:
-    """Of each member the numbers of law and body in which it differs from the flock; none where all are alike."""
+    """Return the numbers of law and body in which each member differs; empty where all are equal."""
     base = {"law": to_json_table(scenario.parameters), "body": to_json_table(scenario.body)}
     if not scenario.varied and len(scenario.laws) == 1:
         return []
@@ -197,13 +198,13 @@ def _member_differences(scenario: Scenario, records: Sequence[tuple[Any, Any]]) 
 
 
 def _group_numbers(scenario: Scenario, count: int) -> dict[str, list[int]]:
-    """Of each member the number of its group, where a law asks for it."""
-    asked = scenario.groups and any(law.uses_groups for law in scenario.laws)
-    return {"groups": list(scenario.group_indices[:count])} if asked else {}
+    """Return the number of each member's group, where a law needs it."""
+    needed = scenario.groups and any(law.uses_groups for law in scenario.laws)
+    return {"groups": list(scenario.group_indices[:count])} if needed else {}
 
 
 def default_safety(scenario: Scenario) -> SafetyLimits:
-    """Limits that follow from a scenario: half as fast again as its law prefers, as agile as its body."""
+    """Return the limits that follow from a scenario: 1.5 times the preferred speed, as agile as its body."""
     body = scenario.body if isinstance(scenario.body, Multirotor) else Multirotor()
     return SafetyLimits(
         speed_max=min(1.5 * _preferred_speed(scenario), 60.0),
@@ -219,8 +220,9 @@ def _preferred_speed(scenario: Scenario) -> float:
 
 
 def fence_corners(world: arena.Parameters, margin: float) -> list[list[float]]:
-    """Corners of a fence around an arena, margin (m) outside its walls."""
+    """Return the corners of a fence around an arena, margin (m) outside its walls."""
     if world.arena == "circle":
+        # The sides of the polygon, not its corners, must clear the circle.
         reach = (world.radius + margin) / math.cos(math.pi / CIRCLE_SIDES)
         angles = [2.0 * math.pi * k / CIRCLE_SIDES for k in range(CIRCLE_SIDES)]
         return [[reach * math.cos(a), reach * math.sin(a)] for a in angles]
@@ -232,6 +234,7 @@ def fence_corners(world: arena.Parameters, margin: float) -> list[list[float]]:
     sides = [inward_plane(a, b) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
     corners = []
     for one, two in zip([sides[-1], *sides[:-1]], sides, strict=True):  # each corner moves with its two sides
+        # The corner is the intersection of the two sides after both have moved outwards by the margin.
         a, b, _, d = one
         p, q, _, e = two
         det = a * q - b * p
@@ -241,7 +244,7 @@ def fence_corners(world: arena.Parameters, margin: float) -> list[list[float]]:
 
 
 def to_json_table(record: Parameters) -> dict[str, Any]:
-    """A record as a table for JSON; numbers that were left to the scenario are left out."""
+    """Return a record as a table for JSON, without numbers that were left to the scenario."""
     return {key: _listed(value) for key, value in asdict(record).items() if value is not None}
 
 

@@ -1,4 +1,4 @@
-"""Fleets beside the simulator: the same starts, the same dice, and whether order parameters differ."""
+"""Fleets beside the simulator: equal starts and random numbers, and the difference of their order parameters."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -29,15 +29,17 @@ def software_card(
     scenario: Scenario, *, vehicle: str = "px4", operator: bytes = b"", stop_for_lost: bool | None = None,
     margin: float = 40.0, as_simulated: bool = True, seed: int = 0, realtime: bool = False,
 ) -> FlightCard:  # fmt: skip
-    """Card of a fleet in software: one tick and one packet per decision, as the simulated agents.
+    """Make the card of a fleet in software: one tick and one packet per decision, as in the simulation.
 
-    live   : on the real clock instead: ticks and packets as often as real drones have them, neighbours carried forward
+    realtime      : on the real clock: ticks and packets as often as on real drones, neighbours carried forward
     stop_for_lost : whether the rule of silence stops a drone; by default where the scenario says so
-    seed   : of the tolerances of manufacture that groups have
+    seed          : of the tolerances of manufacture that groups have
     """
     period = min(max(scenario.sensors.period or scenario.flight.dt, 0.02), 0.2)
     members = range(1, scenario.agents + 1)
     layer = min(3.0, 100.0 / max(scenario.agents, 1))
+    # One tick, one packet and one decision coincide, as for a simulated agent; layers shrink so that a large flock
+    # fits.
     limits = {"tick": period, "status_period": period, "layer": max(layer, 0.5), "mission_time": 36000.0}
     if realtime:
         as_simulated = False
@@ -62,7 +64,7 @@ def software_card(
 
 
 def simulated_start(scenario: Scenario, seed: int) -> list[State]:
-    """Where the simulated agents of a seed start."""
+    """Return the start states of the simulated agents of a seed."""
     short = replace(scenario, flight=replace(scenario.flight, duration=scenario.flight.dt))
     begun = simulate(short, seed, precision=64, device="python").isel(time=0)
     dims, n = scenario.dimensions, scenario.agents
@@ -71,10 +73,11 @@ def simulated_start(scenario: Scenario, seed: int) -> list[State]:
 
 
 def fleet_recording(fleet: LockstepFleet | RealtimeFleet) -> xr.Dataset:
-    """The flight of a fleet in the simulator's layout, with what each node knew of itself."""
+    """Return the flight of a fleet in the simulator's layout, with each node's knowledge of itself."""
     scenario, dims = fleet.scenario, fleet.scenario.dimensions
     rows = fleet.array()
     if dims == 3:
+        # A recording counts heights as the law does, so that it compares with a simulated one.
         rows[:, :, [2, 11]] -= fleet.law_zero_height
     columns = [*range(dims), *range(3, 3 + dims), *range(6, 6 + dims)]
     frames = rows[:, :, columns].transpose(0, 2, 1)
@@ -106,6 +109,7 @@ def fly_in_lockstep(
     fleet.advance(scenario.flight.duration + scenario.flight.dt, on_done)
     if from_ground:
         fleet.order(OrderKind.RETURN)
+        # Ten minutes at most: a drone that never lands is left to the report.
         for _ in range(60):
             if fleet.is_airborne or any(vehicle.armed for vehicle in fleet.vehicles):
                 fleet.advance(10.0)
@@ -125,7 +129,7 @@ def divergence(
     times: Sequence[float] = (2.0, 5.0, 10.0, 20.0, 30.0, 60.0),
     device: str = "cpu",
 ) -> Divergence:
-    """How fast a fleet leaves the simulated flight of its seed, and the simulation itself after nudges.
+    """Measure how fast a fleet leaves the simulated flight of its seed, and the simulation itself after nudges.
 
     A nudge moves each agent at the start by 1 cm in a direction of its own; the largest of eight nudges counts.
     """
@@ -138,6 +142,7 @@ def divergence(
         return flown.position.transpose("time", "individual", "space", "keypoint").values.reshape(-1, n, dims)
 
     def nudged(number: int) -> Any:
+        # 2.4 rad is the golden angle: the directions cover the circle, and none occurs twice.
         angle = 2.4 * np.arange(n) * (number + 1) + number  # all directions, none twice
         moved = start.copy()
         moved[:2] += NUDGE_DISTANCE * np.array([np.cos(angle), np.sin(angle)])
@@ -149,6 +154,7 @@ def divergence(
     )
     count = min(len(plain), len(ours))
     apart = _largest_distance(ours[:count] - plain[:count])
+    # A flock is chaotic: the fleet may not leave the simulated flight faster than nudges of 1 cm do by themselves.
     chaos = np.max([_largest_distance(nudged(k) - plain) for k in range(NUDGE_COUNT)], axis=0)
     period = fleet.card.period
     kept = [t for t in times if round(t / period) < count]
@@ -157,12 +163,12 @@ def divergence(
 
 
 def _largest_distance(apart: Any) -> Any:
-    """Largest length over agents, (time,), of differences (time, agent, axis); who is absent does not count."""
+    """Return the largest length over agents, (time,), of differences (time, agent, axis); nan does not count."""
     return np.nanmax(np.linalg.norm(apart, axis=-1), axis=1, initial=0.0)
 
 
 class MetricComparison(NamedTuple):
-    """One order parameter of both: means, standard error of the paired difference, z, and p after Holm's correction."""
+    """One order parameter of both: means, standard error of the paired difference, z, and p by Holm."""
 
     name: str
     simulator: float
@@ -175,13 +181,14 @@ class MetricComparison(NamedTuple):
 def compare_scores(
     simulated: Sequence[Mapping[str, Any]], flown: Sequence[Mapping[str, Any]]
 ) -> list[MetricComparison]:
-    """Paired comparison of order parameters over seeds; Holm's correction over all of them."""
+    """Compare order parameters in pairs over seeds, with Holm's correction over all of them."""
     lines = []
     for name in simulated[0]:
         pairs = [(a.get(name), b.get(name)) for a, b in zip(simulated, flown, strict=True)]
         if not all(isinstance(v, (int, float)) and math.isfinite(v) for pair in pairs for v in pair):
             continue
         a, b = np.array(pairs, float).T
+        # Paired by seed: both flights share start and random numbers, so most of the spread between seeds cancels.
         spread = float(np.std(b - a, ddof=1)) if len(a) > 1 else math.nan
         error = spread / math.sqrt(len(a))
         gap = float(np.mean(b - a))
@@ -195,7 +202,7 @@ def compare_scores(
 
 
 def with_metric_period(scenario: Scenario, period: float) -> Scenario:
-    """The scenario with order parameters taken once per decision, as a fleet is recorded."""
+    """Return the scenario with order parameters taken once per decision, as a fleet is recorded."""
     document = {**scenario.document, "metrics": {**scenario.document.get("metrics", {}), "period": period}}
     return replace(scenario, metrics=replace(scenario.metrics, period=period), document=document)
 
@@ -203,6 +210,6 @@ def with_metric_period(scenario: Scenario, period: float) -> Scenario:
 def simulated_and_flown_scores(
     scenario: Scenario, fleet: LockstepFleet | RealtimeFleet
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Order parameters of the simulated flight and of the fleet of one seed, measured alike from recordings."""
+    """Measure order parameters of the simulated flight and of the fleet of one seed from their recordings."""
     simulated = simulate(scenario, fleet.seed, precision=64)
     return measure_recording(simulated)[0], measure_recording(fleet_recording(fleet))[0]

@@ -1,8 +1,8 @@
-"""Befalling: faults of the scenario as they befall the drones of a fleet, at the times of a simulation.
+"""Faults of drones: those that a file injects, and those of the scenario at the times of a simulation.
 
-A vehicle asks them what its navigation tells, what reaches its motors and how it moves; the ether, how far a drone is
-heard; and a node suffers them in `fleets.ailing`. Each asks by the time of the flight, so that on the real clock all of
-them let the same fault begin at the same time, each for itself.
+A vehicle applies them to its navigation, its motors and its motion; the radio channel, to the range between two
+drones; `FaultyNode`, to clock and packets of a node. Each looks them up by the time of the flight, so that on the real
+clock all processes let a fault begin at the same time.
 """
 
 import math
@@ -44,7 +44,10 @@ AMOUNT_RANGES = {
 class InjectedFault:
     """One fault.
 
-    kind   : one of KINDS; who: system ids, empty: all; begin, end: when it holds, s; amount: as its kind says
+    kind       : one of INJECTED_KINDS
+    who        : system ids; empty: all
+    begin, end : s
+    amount     : number whose meaning depends on the kind
     """
 
     kind: str
@@ -54,21 +57,21 @@ class InjectedFault:
     amount: float = 0.0
 
     def holds(self, system: int, now: float) -> bool:
-        """Whether it holds for a drone at a time, s."""
+        """Return True if it holds for a drone at a time, s."""
         return self.affects(system) and self.begin - 1e-9 <= now < self.end - 1e-9
 
     def affects(self, system: int) -> bool:
-        """Whether it holds for a drone at some time."""
+        """Return True if it holds for a drone at some time."""
         return not self.who or system in self.who
 
 
 def initial_clock_offset(faults: Sequence[InjectedFault], system: int) -> int:
-    """By how much the clock of a node is ahead from the start of the flight on, µs."""
+    """Return how far the clock of a node is ahead from the start of the flight on, µs."""
     return sum(round(fault.amount * 1e6) for fault in faults if fault.kind == "clock" and fault.affects(system))
 
 
 def read_injected_faults(path: Path, members: tuple[int, ...]) -> tuple[InjectedFault, ...]:
-    """Faults from a TOML file of tables [[fault]]; ScenarioError with one line per mistake."""
+    """Read faults from a TOML file of tables [[fault]]; ScenarioError has one line per error."""
     with as_error(path):
         document = read_toml(path)
     faults, mistakes = [], [f"{path}: {key} is not known; write [[fault]]" for key in document if key != "fault"]
@@ -119,7 +122,7 @@ Velocity = tuple[float, float, float]
 
 
 class ActiveFault(NamedTuple):
-    """A fault of one drone: since when and for how long (s), its numbers, and what was so when it began."""
+    """A fault of one drone: begin and duration (s), its numbers, and state and command at its begin."""
 
     begin: float
     lasts: float
@@ -128,10 +131,10 @@ class ActiveFault(NamedTuple):
 
 
 class DroneFaults:
-    """Faults of the scenario as they befall the drones of a fleet: the same ones at the same times as in a simulation.
+    """Faults of the scenario that affect the drones of a fleet, at the times of the simulation of the same seed.
 
-    only : of this drone, by its place; None: of all
-    gone : places of drones that have dropped out: the node is dead, the motors are off
+    only        : index of the one drone whose faults count; None: all
+    dropped_out : indices of drones that have left the flight: the node is dead, the motors are off
     """
 
     def __init__(self, scenario: Scenario, seed: int, only: int | None = None):
@@ -148,21 +151,24 @@ class DroneFaults:
         return bool(self._kinds)
 
     def until(self, now: float) -> None:
-        """Let begin what is due by a time of the flight, s, for rules that ask for nothing of that moment."""
+        """Begin the faults that are due by a time of the flight, s; their rules see no start values."""
         self.begin_due(math.floor(now / self._dt + 1e-6))
 
     def begin_due(self, step: int, state_and_command: Callable[[int], tuple[State, Velocity]] | None = None) -> None:
-        """Let begin what is due before a motion step.
+        """Begin the faults that are due before a motion step.
 
-        known : true state (m, m/s) of a drone and the command that reached its motors last (m/s); None: nobody asks
+        state_and_command : function from a drone to its true state (m, m/s) and its last motor command (m/s); None:
+                            no rule needs them
         """
         while self._onsets and self._onsets[0].step <= step:
             onset = self._onsets.pop(0)
             if onset.leaves:
                 self.dropped_out.add(onset.agent)
+            # A drone that has left the flight has no further faults.
             if onset.agent in self.dropped_out:
                 continue
             began: dict[str, float] = {}
+            # Names as in the rules: at_x is x at the begin of the fault, at_cx the command then.
             if state_and_command is not None:
                 state, command = state_and_command(onset.agent)
                 began = {f"at_{name}": value for name, value in state._asdict().items()}
@@ -175,6 +181,8 @@ class DroneFaults:
         return [(kind, case) for kind, case in found if case and self._is_active(case, now)]
 
     def _is_active(self, case: ActiveFault, now: float) -> bool:
+        # Half a step of tolerance: times are multiples of a step up to rounding, and a fault must begin and end at
+        # the step of the simulation.
         half = 0.5 * self._dt
         return case.begin - half <= now < case.begin + case.lasts - half
 
@@ -183,23 +191,24 @@ class DroneFaults:
         return call_rule(kind.rules[rule], rule, known, kind.name)
 
     def measured_state(self, drone: int, now: float, state: State) -> State:
-        """Own state as the navigation of a drone tells it."""
+        """Return the own state as the navigation of a drone measures it."""
         return self._state_after_rule("sense", drone, now, state)
 
     @property
     def can_falsify(self) -> bool:
-        """Whether a drone may send another state than the one that it flies by."""
+        """Return True if a drone may send another state than the one that it flies by."""
         return any("tell" in kind.rules for kind in self._kinds.values())
 
-    def told(self, drone: int, now: float, state: State) -> State:
-        """The state that a drone sends."""
+    def sent_state(self, drone: int, now: float, state: State) -> State:
+        """Return the state that a drone sends."""
         return self._state_after_rule("tell", drone, now, state)
 
     def _state_after_rule(self, rule: str, drone: int, now: float, state: State) -> State:
-        """A state as a rule leaves it, which may repeat the one that it was last given before its fault."""
+        """Return a state after a rule, which may repeat the last state before its fault."""
         lasting = dict(self._active_with(drone, rule, now))
         for kind in self._kinds.values():
             if kind in lasting:
+                # A frozen sensor repeats the last state before its fault, so the latest one is kept for each rule.
                 last = self._last_states.setdefault((drone, kind.name, rule), state)
                 given = {f"at_{name}": value for name, value in last._asdict().items()} | state._asdict()
                 state = State(*self._call_rule(kind, rule, lasting[kind], now, **given))
@@ -208,13 +217,13 @@ class DroneFaults:
         return state
 
     def ahead(self, drone: int, now: float) -> float:
-        """How far the clock of a drone is ahead, s."""
+        """Return how far the clock of a drone is ahead, s."""
         return float(
             sum(self._call_rule(kind, "clock", case, now) for kind, case in self._active_with(drone, "clock", now))
         )
 
     def active_kinds(self, now: float) -> dict[str, set[int]]:
-        """Kinds of fault that hold, and whom they have befallen, by their places."""
+        """Return the kinds of fault that hold, each with the indices of the affected drones."""
         found: dict[str, set[int]] = {}
         for drone, kind in self._active:
             if self._is_active(self._active[drone, kind], now):
@@ -222,7 +231,7 @@ class DroneFaults:
         return found
 
     def motor_command(self, drone: int, now: float, command: Sequence[float]) -> Velocity:
-        """The velocity (m/s) that reaches the motors."""
+        """Return the velocity (m/s) that reaches the motors."""
         x, y, z = command
         for kind, case in self._active_with(drone, "overrule", now):
             x, y, z = self._call_rule(kind, "overrule", case, now, cx=x, cy=y, cz=z)
@@ -231,7 +240,7 @@ class DroneFaults:
     def velocity_after_step(
         self, drone: int, now: float, state: State, command: Sequence[float], velocity: Any, dt: float
     ) -> Any:
-        """Velocity after a motion step, m/s."""
+        """Return the velocity after a motion step, m/s."""
         for kind, case in self._active_with(drone, "motion", now):
             given = dict(zip(("vx", "vy", "vz"), state[3:], strict=True))
             given |= dict(zip(("cx", "cy", "cz", "nx", "ny", "nz"), (*command, *velocity), strict=True))
@@ -239,8 +248,9 @@ class DroneFaults:
         return velocity
 
     def reach(self, sender: int, receiver: int, now: float) -> float:
-        """How far (m) a drone is heard by another one; negative for not at all."""
+        """Return the distance (m) up to which a drone hears another one; negative: it does not."""
         far = self._default_range
+        # A radio rule returns two ranges, as a sender and as a receiver; the shortest counts.
         for drone, side in ((sender, 0), (receiver, 1)):
             for kind, case in self._active_with(drone, "radio", now):
                 far = min(far, self._call_rule(kind, "radio", case, now, reach=self._default_range)[side])

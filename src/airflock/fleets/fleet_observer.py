@@ -1,7 +1,8 @@
-"""Observer: what somebody on the ground knows of a fleet by its packets. Bytes in, the clock passed in; sends nothing.
+"""The observer of a fleet on the ground, and the broadcast for it from a radio channel in software.
 
-It accepts what a member would accept: signed with the mission's key, in time, each once, of the same card. Of a fleet
-in software the ether tells, too, who hears whom and which faults hold; real radios tell neither.
+The observer takes bytes and the clock and sends nothing. It accepts what a member would accept: signed with the
+mission's key, in time, each once, of the same card. A channel in software also reports links and faults
+hold; real radios report neither.
 """
 
 from collections import deque
@@ -41,7 +42,7 @@ NEIGHBOUR_WITHIN = 1.0  # s; a neighbour whose last packet arrived longer ago is
 NEVER_HEARD = -1e9
 SCENARIO_FAULT_NAMES = {
     kind: f"{kind} of the scenario" if kind in INJECTED_KINDS else kind for kind in OURS
-}  # by kind how it is told
+}  # text of each kind
 FAULT_NUMBERS = {
     kind: number
     for number, kind in enumerate((*INJECTED_KINDS, *SCENARIO_FAULT_NAMES.values()), start=HEARS_REPORT + 1)
@@ -49,7 +50,7 @@ FAULT_NUMBERS = {
 
 
 class TelemetryBroadcast:
-    """Keeps whose packets arrived, and reports it with the faults twice a second.
+    """Counts arrived packets, and reports links and faults twice a second.
 
     members : system ids
     """
@@ -60,58 +61,63 @@ class TelemetryBroadcast:
         self._sign, self._next_report = PacketSigner(SOFTWARE_KEY, CHANNEL_SYSTEM), NEVER_HEARD
 
     def note_arrival(self, receiver: int, datagram: bytes, now: float) -> None:
-        """Note a datagram that arrived at a drone, by its place among the members."""
+        """Note a datagram that arrived at a drone, by its index among the members."""
         sender = datagram[5] if len(datagram) > 5 else 0
         if sender in self._arrival_times:
             self._arrival_times[self._members[receiver]][sender] = now
 
     def report(self, now: float, utc: int, active_faults: Mapping[str, Collection[int]] | None = None) -> list[bytes]:
-        """Signed datagrams for who watches, where they are due.
+        """Return signed datagrams for observers, where they are due.
 
-        now      : time of the flight, s; utc: µs of Unix time
-        befallen : kinds of fault of the scenario that hold, each with the places of whom they have befallen; a user's
-                   own has no number, and is not told
+        now           : time of the flight, s
+        utc           : µs of Unix time
+        active_faults : kinds of fault of the scenario that hold, each with the indices of the affected drones; a kind
+                        that a user wrote has no number and is not reported
         """
         if now < self._next_report:
             return []
         self._next_report = now + REPORT_PERIOD
-        told = [
+        reports = [
             report_message(HEARS_REPORT, member, [who for who, at in known.items() if now - at <= NEIGHBOUR_WITHIN])
             for member, known in self._arrival_times.items()
         ]
-        holding: dict[str, set[int]] = {}  # several faults of one kind are told as one
+        # Faults of one kind are merged: a viewer shows kinds and members, not entries of a file.
+        holding: dict[str, set[int]] = {}  # several faults of one kind are reports as one
         for fault in self._faults:
             if fault.begin <= now < fault.end:
                 holding.setdefault(fault.kind, set()).update(fault.who or self._members)
         for kind, places in (active_faults or {}).items():
             if kind in SCENARIO_FAULT_NAMES:
                 holding[SCENARIO_FAULT_NAMES[kind]] = {self._members[place] for place in places}
-        told += [report_message(FAULT_NUMBERS[kind], 0, who) for kind, who in holding.items()]
-        return [self._sign(each, utc) for each in told]
+        reports += [report_message(FAULT_NUMBERS[kind], 0, who) for kind, who in holding.items()]
+        return [self._sign(each, utc) for each in reports]
 
 
 # ---- Observer
 
 LISTENER_ID = 0  # system id of who only listens
 MAX_NOTES = 200  # notes
-REPORT_LIFETIME = 2.0  # s; what the ether has not told for longer does not hold
+REPORT_LIFETIME = 2.0  # s; an older report no longer holds
 KIND_OF_NUMBER = {number: kind for kind, number in FAULT_NUMBERS.items()}
 
 
 class ObserverNote(NamedTuple):
-    """Something that happened: time of the own clock, s; system id, 0 for the fleet; what."""
+    """An event: time of the own clock, s; system id, 0 for the fleet; text."""
 
     time: float
     member: int
     text: str
 
 
+# Reads broadcast packets only: the autopilot's client port belongs to a ground station, and over the air there is
+# none.
 class FleetObserver:
     """Listens to the fleet of a card.
 
-    card, key : of the mission; now, utc : the own clock (s) and Unix time (µs), which run alike from then on
+    card, key : of the mission
+    now, utc  : own clock (s) and Unix time (µs), which advance together
 
-    Attributes: peers, the newest believed status of each member; notes, what happened; refused, datagrams by reason.
+    Attributes: peers, the newest plausible status of each member; notes, the events; refused, datagrams by reason.
     """
 
     def __init__(self, card: FlightCard, key: bytes, *, now: float, utc: int):
@@ -138,9 +144,9 @@ class FleetObserver:
         if got is None:
             return
         if got.message == STATUS_MESSAGE:
-            told = parse_status(got.values, self.card.site)
-            if told is not None:
-                self._state(got.system, told, now)
+            status = parse_status(got.values, self.card.site)
+            if status is not None:
+                self._state(got.system, status, now)
         elif got.system == CHANNEL_SYSTEM:
             self._take_report(parse_report(got.values), now)
         else:
@@ -177,7 +183,7 @@ class FleetObserver:
             self._note(now, order.target, f"the operator orders {order.kind.name.lower().replace('_', ' ')}")
 
     def look(self, now: float) -> None:
-        """Note who fell silent or came back, and which faults are over; to be called a few times a second."""
+        """Note members that fell silent or came back, and faults that are over; call it a few times a second."""
         for who, peer in self.peers.items():
             silent = peer.status is not None and now - peer.heard_at > HEARD_WITHIN
             if silent != (who in self._silent):
@@ -194,25 +200,25 @@ class FleetObserver:
 
     @property
     def peers(self) -> dict[int, Peer]:
-        """What is known of each member, by its system id."""
+        """Return the knowledge of each member, by its system id."""
         return self._peers.all
 
     @property
     def refused(self) -> dict[str, int]:
-        """Datagrams that were refused, by reason; those without any are left out."""
+        """Return the counts of refused datagrams, by reason; zero counts are left out."""
         return {reason: n for reason, n in (self._receive.refused | self._peers.refused).items() if n}
 
     @property
     def accepted_count(self) -> int:
-        """Datagrams that were accepted."""
+        """Return the number of accepted datagrams."""
         return self._receive.accepted_count
 
     def heard(self, now: float) -> list[int]:
-        """Members that are heard now."""
+        """Return the members that are heard now."""
         return [who for who, peer in self.peers.items() if now - peer.heard_at <= HEARD_WITHIN]
 
     def place(self, member: int, now: float) -> tuple[float, float, float] | None:
-        """Where a member is now, m from the site: as it told, carried on by its velocity while it is heard."""
+        """Return the position of a member now, m from the site: its status carried on by its velocity."""
         peer = self.peers[member]
         if peer.state is None:
             return None
@@ -221,7 +227,7 @@ class FleetObserver:
         return x, y, z
 
     def links(self, now: float) -> dict[tuple[int, int], bool]:
-        """Pairs of members between whom packets arrive, and whether they do so both ways; nothing of real radios."""
+        """Return pairs of members with packets between them, and whether both ways; empty for real radios."""
         ways = {
             (who, other)
             for who, (at, others) in self._heard_reports.items()
@@ -232,15 +238,15 @@ class FleetObserver:
 
     @property
     def faults(self) -> dict[str, frozenset[int]]:
-        """Kinds of faults that hold, each with the members that it befalls; nothing of real fleets."""
+        """Return the kinds of fault that hold, each with the affected members; empty for real fleets."""
         return {kind: who for kind, (_, who) in self._faults.items()}
 
     def flying(self, now: float) -> list[int]:
-        """Members that are heard now and fly."""
+        """Return the members that are heard now and fly."""
         return [who for who in self.heard(now) if self.peers[who].is_flying]
 
     def named(self, systems: frozenset[int]) -> str:
-        """System ids in words."""
+        """Return system ids in words."""
         known = [who for who in self.card.members if who in systems]
         if len(known) == len(self.card.members):
             return "all drones"
@@ -248,7 +254,7 @@ class FleetObserver:
 
 
 def is_on_ground(phase: MissionPhase) -> bool:
-    """Whether a drone in this phase has not started, or has landed."""
+    """Return True if a drone in this phase has not started, or has landed."""
     return phase in (
         MissionPhase.BOOT,
         MissionPhase.READY,

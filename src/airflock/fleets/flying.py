@@ -28,14 +28,15 @@ FIRST_CLIENT_PORT = 14540  # port where the first vehicle contacts a client
 
 @dataclass
 class FleetRuns:
-    """What a fleet flew, seed after seed.
+    """Flights of a fleet, seed after seed.
 
-    scenario   : what was flown; vehicle: the autopilot that the vehicles imitated
+    scenario   : the scenario that was flown
+    vehicle    : the autopilot that the vehicles imitated
     measured   : order parameters of each flight
-    simulated  : those of the simulator beside it, where it was asked for
-    runs       : what is told of each flight: seed, digest, phases, notes, order parameters; on the real clock its load
+    simulated  : those of the simulator beside it, if requested
+    runs       : report of each flight: seed, digest, phases, notes, order parameters; on the real clock its load
     recordings : of each flight (time, space, keypoint, individual), position m and velocity m/s, where they are kept
-    departure  : how fast the first flight leaves the simulated one, m, where a fleet follows it
+    divergence : distance (m) between the first flight and the simulated one over time, where both have the same start
     """
 
     scenario: Scenario
@@ -48,19 +49,19 @@ class FleetRuns:
 
     @property
     def table(self) -> pd.DataFrame:
-        """Order parameters, one row per flight by its seed; `attrs` say units and meanings as those of `score` do."""
+        """Return order parameters, one row per flight by its seed, with units and meanings in `attrs`."""
         index = pd.Index([run["seed"] for run in self.runs], name="seed")
         return with_units(pd.DataFrame(self.measured, index=index), dict(reported_values(self.scenario.measures)))
 
     @property
     def comparison(self) -> list[compare.MetricComparison]:
-        """Of each order parameter the means of both, z and p after Holm's correction; none of fewer than two seeds."""
+        """Return means of both, z and p after Holm's correction of each order parameter; empty for one seed."""
         return compare.compare_scores(self.simulated, self.measured) if len(self.simulated) > 1 else []
 
     def add(self, flown: Any, *, with_simulator: bool, starts_alike: bool) -> None:
-        """Measure a flight, and fly the simulator beside it where asked.
+        """Measure a flight, and fly the simulator beside it if requested.
 
-        follows : whether both start alike, on one clock
+        starts_alike : both start from equal states, on one clock
         """
         if with_simulator:
             simulated, measured = compare.simulated_and_flown_scores(flown.scenario, flown)
@@ -130,12 +131,12 @@ def fleet(
     done : callable, optional
         Called after each second that is flown.
     say : callable, optional
-        Told when the card is written, before the first flight.
+        Called with a line when the card is written, before the first flight.
 
     Returns
     -------
-    Fleets
-        `table`, one row per flight; `runs`, what is told of each; `recordings` (time, space, keypoint, individual);
+    FleetRuns
+        `table`, one row per flight; `runs`, a report of each; `recordings` (time, space, keypoint, individual);
         beside the simulator `comparison` and `divergence`.
 
     Raises
@@ -178,7 +179,13 @@ def fleet(
         raise ScenarioError(mistakes)
     stops = True if silence is None and not beside else silence
     flights = FleetRuns(known, vehicle)
-    how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "silent": stops, "ground": ground, "join": join}
+    how: dict[str, Any] = {
+        "vehicle": vehicle,
+        "mode": mode,
+        "join": join,
+        "stop_for_lost": stops,
+        "from_ground": ground,
+    }
     if card is not None:
         how["card_file"] = expand_path(card)
     for flown in fly_seeds(known, numbers, faults=injected, on_done=done, notify=say, **how):
@@ -201,11 +208,12 @@ def fly_seeds(
     on_done: Callable[[], None] | None = None,
     notify: Callable[[str], None] | None = None,
 ) -> Iterator[Any]:
-    """Fly a scenario that fleets can fly, one seed after another; what each flew.
+    """Fly a scenario that fleets can fly, one seed after another, and yield each flight.
 
-    silent    : whether the rule of silence stops a drone; None: where the scenario says so
-    ground    : from the ground by orders of an operator, whose keys are made here
-    card_file : where the card is written before the first flight, so that `airflock watch` can show it; say: told so
+    stop_for_lost : whether the rule of silence stops a drone; None: where the scenario says so
+    from_ground   : from the ground by orders of an operator, whose keys are made here
+    card_file     : file for the card, written before the first flight for `airflock watch`
+    notify        : function that takes a line when the card is written
     """
     private, public = b"", b""
     if from_ground:
@@ -225,6 +233,7 @@ def fly_seeds(
         if notify is not None:
             notify(f"wrote {card_file} and its key; airflock watch {card_file} shows the fleet")
     for seed in seeds:
+        # Tolerances of manufacture differ by seed, and the card holds them.
         card = card_of(seed) if scenario.varied else card
         common: dict[str, Any] = {"faults": faults, "operator": private, "on_done": on_done}
         if live:

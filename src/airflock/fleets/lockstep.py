@@ -1,6 +1,6 @@
-"""A fleet in lock-step: nodes, vehicles and ether on one virtual clock in one process. The same seed, the same bits.
+"""A fleet in lock-step: nodes, vehicles and radio channel on one virtual clock in one process. Equal seeds, equal bits.
 
-At each motion step: telemetry and packets that are due arrive, nodes whose tick it is decide, vehicles move.
+At each motion step telemetry and packets that are due arrive, the nodes whose tick it is decide, and vehicles move.
 """
 
 import hashlib
@@ -42,10 +42,12 @@ NormalTriple = tuple[float, float, float]
 
 
 class MotionNoise:
-    """Normal random numbers of every drone at every motion step, to be asked in the order of time.
+    """Normal random numbers of every drone at every motion step, to be drawn in the order of time.
 
-    seed : of the flight; count: of drones; three: in space, where a draw serves one step; in a plane it serves two
-    first : of the drones that are asked for, where not all are
+    seed        : of the flight
+    count       : of drones
+    in_space    : a draw serves one step; in a plane it serves two
+    first_drone : index of the first of these drones
     """
 
     def __init__(self, seed: int, count: int, in_space: bool, first_drone: int = 0):
@@ -54,7 +56,7 @@ class MotionNoise:
         self._numbers: tuple[list[float], list[float]] = ([], [])  # first and second half of each draw, flat
 
     def __call__(self, step: int, drone: int) -> NormalTriple:
-        """Three numbers N(0, 1) of a drone at a step; in a plane the third is zero."""
+        """Return three numbers N(0, 1) of a drone at a step; in a plane the third is zero."""
         if not self._first_step <= step < self._first_step + STEPS_PER_BLOCK:
             self._first_step = step - step % STEPS_PER_BLOCK
             self._numbers = self._drawn(self._first_step)
@@ -67,7 +69,9 @@ class MotionNoise:
         return numbers[at], numbers[at + 1], 0.0
 
     def _drawn(self, first: int) -> tuple[list[float], list[float]]:
-        """Numbers of BLOCK steps; the words come as arrays, what is made of them by the function of one pair."""
+        """Draw the numbers of STEPS_PER_BLOCK steps: words as arrays, normal numbers by the scalar function."""
+        # Words come as arrays, 256 steps at once; the normal numbers are made by the scalar function of the
+        # simulator, because NumPy's functions may round differently.
         steps = np.arange(first, first + STEPS_PER_BLOCK, 1 if self._in_space else 2, dtype=np.uint64)
         if not self._in_space:
             steps //= np.uint64(2)
@@ -80,9 +84,10 @@ class MotionNoise:
 
 
 class SensorWords:
-    """Random words of the errors of every drone's navigation, to be asked in the order of time.
+    """Random words for the errors of every drone's navigation, to be drawn in the order of time.
 
-    seed : of the flight; count: of drones
+    seed  : of the flight
+    count : of drones
     """
 
     def __init__(self, seed: int, count: int):
@@ -90,7 +95,7 @@ class SensorWords:
         self._first_measurement, self._tables = -MEASUREMENTS_PER_BLOCK, {}  # type: ignore[var-annotated]
 
     def __call__(self, measurement: int, draw: int, drone: int) -> tuple[int, int, int, int]:
-        """Four words of a measurement, a draw and a drone."""
+        """Return four words of a measurement, a draw and a drone."""
         if not self._first_measurement <= measurement < self._first_measurement + MEASUREMENTS_PER_BLOCK:
             self._first_measurement, self._tables = measurement - measurement % MEASUREMENTS_PER_BLOCK, {}
         if draw not in self._tables:
@@ -105,19 +110,21 @@ class SensorWords:
 
 # ---- Start of a fleet
 
+# Time for satellites, parameters and clocks to be reported before anybody may start.
 SECONDS_BEFORE_START = 12.0  # s on the ground before a start is ordered
 DROPS_OUT_NOTE = "drops out by a fault: node and motors are off"
-ACCEPTED_BEFORE_START = (
-    60_000_000  # µs; packets sent so long before a node began are accepted, for its clock may be wrong
-)
+# Μs; packets sent so long before a node began are accepted, for its clock may be wrong.
+ACCEPTED_BEFORE_START = 60_000_000
 
 
 def make_vehicle(
     scenario: Scenario, card: FlightCard, index: int, body: Any, noise: MotionNoise, started: int
 ) -> SoftwareVehicle:
-    """A vehicle on the ground; grounds are a square of places 4 m apart.
+    """Make a vehicle on the ground; the places form a square grid 4 m apart.
 
-    place : among the members; body: numbers of its own; started: Unix time of its time 0, µs
+    index   : among the members
+    body    : numbers of its own body
+    started : Unix time of its time 0, µs
     """
     side = max(1, round(len(card.members) ** 0.5))
     at = (4.0 * (index % side) - 2.0 * (side - 1), 4.0 * (index // side) - 2.0 * (side - 1), 0.0)
@@ -131,9 +138,9 @@ def make_vehicle(
 
 
 def write_card_and_key(path: Path, card: FlightCard) -> None:
-    """Write the card of a fleet in software, and its key beside it, so that `airflock watch` shows the fleet.
+    """Write the card of a fleet in software, and its key beside it, for `airflock watch`.
 
-    Over such files of an earlier fleet in software only: raises CardError where a mission's own would be lost.
+    Files of an earlier fleet in software are replaced; raises CardError where those of a real mission would be lost.
     """
     key = path.with_suffix(".key")
     if key.exists() and read_key(key) != SOFTWARE_KEY:
@@ -146,26 +153,27 @@ def write_card_and_key(path: Path, card: FlightCard) -> None:
 
 
 def law_zero_height(card: FlightCard) -> float:
-    """Height (m) above the site at which the law counts zero."""
+    """Return the height (m) above the site of the law's zero."""
     return -card.law_state(State(*(0.0,) * 6)).z
 
 
 def is_clear_between(card: FlightCard, here: tuple[float, float, float], there: tuple[float, float, float]) -> bool:
-    """Whether nothing stands between two places of vehicles, m."""
+    """Return True if no obstacle stands between two positions of vehicles, m."""
     a, b = (card.law_state(State(*place, 0.0, 0.0, 0.0)) for place in (here, there))
     return not card.place.is_blocked(*a[:3], *b[:3])
 
 
 def put_in_air(vehicle: SoftwareVehicle, card: FlightCard, start: State) -> None:
-    """Put a vehicle in the air, where it obeys its node as if it had for long."""
+    """Put a vehicle in the air, where it obeys its node as if it had done so for long."""
     vehicle.state = start._replace(z=start.z + (card.height if card.flat else law_zero_height(card)))
     vehicle.armed, vehicle.mode, vehicle.setpoint_at, vehicle.stream_since = True, GUIDED, 0.0, -9.0
 
 
 class OperatorStation:
-    """An operator of a fleet in software: signs orders.
+    """The operator of a fleet in software, who signs orders.
 
-    card : of the fleet; private: key of the operator
+    card    : of the fleet
+    private : key of the operator
     """
 
     def __init__(self, card: FlightCard, private: bytes):
@@ -177,7 +185,7 @@ class OperatorStation:
         )
 
     def order(self, do: OrderKind, utc: int, *, target: int = 0, at: int = 0, point: Geodetic | None = None) -> bytes:
-        """Datagram of an order given at utc for a time `at`, µs of Unix time; no two are given at one time."""
+        """Return the datagram of an order given at utc for a time `at`, µs of Unix time; no two share a time."""
         self._last_order_time = max(utc, self._last_order_time + 1)
         p = point or Geodetic(0.0, 0.0, 0.0)
         place = (round(p.latitude * 1e7), round(p.longitude * 1e7), round(p.altitude * 1e3))
@@ -190,15 +198,17 @@ class OperatorStation:
 START_TIME = 1_800_000_000_000_000  # virtual Unix time of 0 s, µs
 UNREAD_MESSAGES = ("attitude", "home", "battery")  # messages that no node reads; in lock-step nobody else is there
 ABSENT_ROW = (math.nan,) * 15  # a row of a drone that has dropped out
+# A peer that was never heard has the time -1e9 (its default), far below this bound whatever the clock offsets add.
 HEARD_SINCE = -1e8  # s; a peer whose last state held before this has not been heard
 
 
 class LockstepFleet:
-    """N nodes with their vehicles.
+    """Nodes with their vehicles on one virtual clock.
 
-    scenario : body, sensors, radio and motion step of the simulated world; card: what the nodes carry
+    scenario : body, sensors, radio and motion step of the simulated world
+    card     : card of all nodes
     start    : state of each drone in the air, from which all flock at once; None: from the ground, by orders
-    operator : private key of the operator, to order from the ground
+    operator : private key of the operator, for orders from the ground
     """
 
     def __init__(
@@ -211,7 +221,7 @@ class LockstepFleet:
         self._steps_per_tick = max(1, round(min(card.safety.tick, card.period) / self._dt))
         self.steps, self.frames, self.state_times, self.log = 0, [], [], []  # type: ignore[var-annotated]
         self.standing: list[list[bool]] = []  # (time, agent): who stands because it has lost somebody
-        self._faults = befalls = DroneFaults(scenario, seed)
+        self._faults = drone_faults = DroneFaults(scenario, seed)
         self._bodies = [b for _, b in agent_records(scenario, len(card.members), seed)]
         self._has_sensor_error = scenario.has_sensor_error
         self._noise = MotionNoise(seed, len(card.members), not card.flat)
@@ -219,7 +229,7 @@ class LockstepFleet:
             make_vehicle(scenario, card, i, b, self._noise, START_TIME) for i, b in enumerate(self._bodies)
         ]
         for vehicle in self.vehicles:
-            vehicle.faults = befalls or None
+            vehicle.faults = drone_faults or None
             vehicle.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._steps_per_tick * self._dt))
             vehicle.rates |= dict.fromkeys(UNREAD_MESSAGES, 0.0)
         self.nodes = [
@@ -234,7 +244,7 @@ class LockstepFleet:
             for who in card.members
         ]
         self._faulty_nodes = [
-            FaultyNode(partial(self.nodes.__getitem__, i), befalls, i, card.site) for i in range(len(self.nodes))
+            FaultyNode(partial(self.nodes.__getitem__, i), drone_faults, i, card.site) for i in range(len(self.nodes))
         ]
         self._faulty_vehicles = [
             (vehicle, own)
@@ -245,7 +255,7 @@ class LockstepFleet:
                 ]
             )
         ]
-        reach = befalls.reach if befalls else None
+        reach = drone_faults.reach if drone_faults else None
         radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
         self.channel = RadioChannel(
             *radio, card.members, seed, period, faults, reach, partial(is_clear_between, card), card.site
@@ -260,7 +270,7 @@ class LockstepFleet:
             self._begin(start)
 
     def _begin(self, start: Sequence[State]) -> None:
-        """Put all in the air, flocking, and let everybody have heard the start states as the simulator does."""
+        """Put all in the air, flocking, and let all hear the start states as in the simulator."""
         for vehicle, node, s in zip(self.vehicles, self.nodes, start, strict=True):
             put_in_air(vehicle, self.card, s)
             node.phase, node.home = MissionPhase.FLOCK, (*vehicle.home[:2], self.card.layer(node.member))
@@ -268,24 +278,26 @@ class LockstepFleet:
             node.autopilot(vehicle.due_telemetry(0.0), 0.0)
         delay, period = self.scenario.radio.delay, self.card.safety.status_period
         for who, (node, vehicle) in enumerate(zip(self.nodes, self.vehicles, strict=True)):
+            # At time 0 a simulated agent has already heard packets that were sent one delay ago: a node of its own
+            # sends them.
             early = Node(self.card, node.member, SOFTWARE_KEY, now=-delay, utc=START_TIME - round(1e6 * delay))
             early.phase = MissionPhase.FLOCK
             early.autopilot(vehicle.origin_frame(), -delay)
             for k in range(round(delay / period), 0, -1):
                 early.autopilot(vehicle.state_frames(), -k * period)
                 for datagram in early.status_datagrams(-k * period):
-                    self.channel.send(-k * period, who, self._faulty_nodes[who].told(datagram, -k * period))
+                    self.channel.send(-k * period, who, self._faulty_nodes[who].falsified(datagram, -k * period))
 
     # ------------------------------------------------------------------------------------------------------ flight
 
     @property
     def now(self) -> float:
-        """Virtual time, s."""
+        """Return the virtual time, s."""
         return self.steps * self._dt
 
     @property
     def law_zero_height(self) -> float:
-        """Height (m) above the site at which the law counts zero."""
+        """Return the height (m) above the site of the law's zero."""
         return law_zero_height(self.card)
 
     def order(self, do: OrderKind, target: int = 0, at: float = 0.0, point: Geodetic | None = None) -> None:
@@ -296,12 +308,13 @@ class LockstepFleet:
             node.radio(datagram, self.now)
 
     def advance(self, seconds: float, on_done: Callable[[], None] | None = None) -> None:
-        """Fly on."""
+        """Fly on for some seconds."""
         for _ in range(round(seconds / self._dt)):
             self._step()
             if on_done is not None and self.steps % 100 == 0:
                 on_done()
 
+    # One loop on a virtual clock: sixty processes on two cores start late, tick late and give other bits each time.
     def _step(self) -> None:
         now = self.now
         if self._faults:
@@ -318,14 +331,16 @@ class LockstepFleet:
         self.steps += 1
 
     def _exchange(self, now: float) -> None:
-        """Telemetry, packets and decisions of one tick."""
+        """Deliver telemetry and packets, and let the nodes decide, for one tick."""
         if self.steps % self._steps_per_period == 0:
             self._measure(self.steps // self._steps_per_period)
         dead = [i in self.dropped_out or self._is_dead(node.member, now) for i, node in enumerate(self.nodes)]
+        # The order of the simulator: measure, receive, decide, move. A packet of this tick arrives at the next one at
+        # best.
         for node, vehicle, gone in zip(self.nodes, self.vehicles, dead, strict=True):
-            told = vehicle.due_telemetry(now)
+            telemetry = vehicle.due_telemetry(now)
             if not gone:
-                node.autopilot(told, now)
+                node.autopilot(telemetry, now)
         at = [vehicle.state[:3] for vehicle in self.vehicles]
         for to, datagram in self.channel.deliver(now, at):
             if not dead[to]:
@@ -349,11 +364,11 @@ class LockstepFleet:
 
     @property
     def dropped_out(self) -> set[int]:
-        """Places of the drones that have dropped out by a fault of the scenario."""
+        """Return the indices of the drones that have dropped out by a fault of the scenario."""
         return self._faults.dropped_out
 
     def _is_dead(self, member: int, now: float) -> bool:
-        """Whether a fault keeps a node from hearing and saying anything."""
+        """Return True if a fault keeps a node from receiving and sending."""
         return any(fault.kind == "node" and fault.holds(member, now) for fault in self.faults)
 
     def _measure(self, number: int) -> None:
@@ -381,33 +396,33 @@ class LockstepFleet:
         self.standing.append([n.stands for n in self.nodes])
 
     def array(self) -> NDArray[np.float64]:
-        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them.
+        """Return (time, agent, 15): true position and velocity, setpoint, own position and velocity of the node.
 
-        Of drones that have dropped out nan, as in the recording of a simulation.
+        Rows of drones that have dropped out are nan, as in the recording of a simulation.
         """
         return np.array(self.frames)
 
     def packet_ages(self) -> NDArray[np.float64]:
-        """(time, receiver, sender): s since the state that a node has of another one held; nan: it has none."""
+        """Return (time, receiver, sender): age (s) of the state that a node has of another one; nan: none."""
         times = self._steps_per_period * self._dt * np.arange(len(self.state_times))
         stamps = np.array(self.state_times)
         return np.where(stamps > HEARD_SINCE, times[:, None, None] - stamps, np.nan)
 
     def digest(self) -> str:
-        """SHA-256 of all that was flown."""
+        """Return the SHA-256 of the flight."""
         return hashlib.sha256(self.array().tobytes()).hexdigest()
 
     def phases(self) -> list[MissionPhase]:
-        """Phase of every node."""
+        """Return the phase of every node."""
         return [node.phase for node in self.nodes]
 
     @property
     def is_airborne(self) -> bool:
-        """Whether any drone still flies by its node."""
+        """Return True if any drone still flies by its node."""
         return any(phase in FLYING_PHASES for i, phase in enumerate(self.phases()) if i not in self.dropped_out)
 
 
 def states_from_arrays(frames: Any, dims: int) -> list[State]:
-    """States from positions and velocities (component, agent)."""
+    """Return states from positions and velocities (component, agent)."""
     pad = (0.0,) * (3 - dims)
     return [State(*map(float, c[:dims]), *pad, *map(float, c[dims : 2 * dims]), *pad) for c in np.asarray(frames).T]

@@ -1,7 +1,7 @@
-"""The ether: every datagram on its way, by the radio rules of the simulator and with faults. Pure: virtual time.
+"""The radio channel: datagrams on their way, by the radio rules of the simulator and with faults. Pure: virtual time.
 
-The dice are those of the simulator: the same streams with the number of the arrival period and the pair, so that a
-fleet whose packets arrive once per decision loses the very packets that the simulated flock loses.
+Packets are lost by the random numbers of the simulator: the same streams with the number of the arrival period and the
+pair, so that a fleet whose packets arrive once per decision loses exactly the packets that the simulated flock loses.
 """
 
 import hashlib
@@ -36,9 +36,10 @@ PERIODS_PER_BLOCK = 16  # periods of the radio that are drawn together
 
 
 class PacketNumbers:
-    """Uniform random numbers by which packets are lost, of every pair in every period, to be asked in order of time.
+    """Uniform random numbers for the loss of packets, of every pair in every period, to be drawn in the order of time.
 
-    seed : of the flight; count: of drones
+    seed  : of the flight
+    count : of drones
     """
 
     def __init__(self, seed: int, count: int):
@@ -46,7 +47,7 @@ class PacketNumbers:
         self._first_period, self._tables = -PERIODS_PER_BLOCK, []  # type: ignore[var-annotated]
 
     def __call__(self, period: int, receiver: int, sender: int) -> float:
-        """Number between 0 and 1 of a period, a receiver and a sender, by their places among the drones."""
+        """Return the number between 0 and 1 of a period, a receiver and a sender, by their indices."""
         if not self._first_period <= period < self._first_period + PERIODS_PER_BLOCK:
             self._first_period = period - period % PERIODS_PER_BLOCK
             self._tables = self._drawn(self._first_period)
@@ -54,8 +55,9 @@ class PacketNumbers:
         return drawn
 
     def _drawn(self, first: int) -> list[list[list[float]]]:
-        """A table of receivers and senders for each of PERIODS periods."""
+        """Draw a table of receivers and senders for each of PERIODS_PER_BLOCK periods."""
         periods = np.arange(first, first + PERIODS_PER_BLOCK, dtype=np.uint64)[:, None, None]
+        # A Philox block has four words, which serve four receivers of one sender, as in the simulator.
         to = np.arange(0, self._count, 4, dtype=np.uint64)[None, :, None]  # four receivers share their words
         who = np.arange(self._count, dtype=np.uint64)[None, None, :]
         words = random.random_words(self._seed, random.PACKET, 0, periods, random.pair_number(to, who, self._count))
@@ -73,32 +75,37 @@ STAMP_FORMAT = struct.Struct("<Q")
 
 
 def forge_packet(genuine: bytes, site: FlightSite, *, east: float, with_key: bool) -> bytes:
-    """A packet that says that the sender of a genuine one is elsewhere.
+    """Return a packet that puts the sender of a genuine one at another position.
 
-    east : how far east of where it is, m; with_key: signed as its sender would, one stamp later
+    east     : distance east of the true position, m
+    with_key : signed as its sender would, one stamp later
     """
-    told, stamp = _status_and_stamp(genuine, site)
-    x, y, z = told.position
+    status, stamp = _status_and_stamp(genuine, site)
+    x, y, z = status.position
     sign = PacketSigner(SOFTWARE_KEY if with_key else WRONG_KEY, genuine[5], last=stamp)
-    false = told._replace(position=(x + east, y, z), time=told.time + NEWER_BY)
+    # Of two states of one age the first counts, so the forged one has to be newer.
+    false = status._replace(position=(x + east, y, z), time=status.time + NEWER_BY)
     return sign(status_message(false, site), SIGNING_EPOCH + 10 * stamp)
 
 
-def falsify_packet(genuine: bytes, site: FlightSite, tell: Callable[[State], State]) -> bytes:
-    """What a drone sends in place of a genuine packet of its own: another state of the same time, signed as that is."""
-    told, stamp = _status_and_stamp(genuine, site)
-    false = tell(State(*told.position, *told.velocity))
-    if false == (*told.position, *told.velocity):
+def falsify_packet(genuine: bytes, site: FlightSite, false_state: Callable[[State], State]) -> bytes:
+    """Return a genuine packet with another state of the same time, signed with the same stamp."""
+    status, stamp = _status_and_stamp(genuine, site)
+    false = false_state(State(*status.position, *status.velocity))
+    # A fault that changes nothing must leave the genuine bytes as they are.
+    if false == (*status.position, *status.velocity):
         return genuine
     sign = PacketSigner(SOFTWARE_KEY, genuine[5], last=stamp - 1)
-    return sign(status_message(told._replace(position=false[:3], velocity=false[3:]), site), SIGNING_EPOCH + 10 * stamp)
+    return sign(
+        status_message(status._replace(position=false[:3], velocity=false[3:]), site), SIGNING_EPOCH + 10 * stamp
+    )
 
 
 def _status_and_stamp(genuine: bytes, site: FlightSite) -> tuple[DroneStatus, int]:
-    """What a packet of a node of this fleet says, and its stamp."""
-    told = parse_status(message_fields(STATUS_MESSAGE, genuine[HEADER_LENGTH : HEADER_LENGTH + genuine[1]]), site)
-    assert told is not None, "what a node of this fleet sent"
-    return told, STAMP_FORMAT.unpack(genuine[-12:-6] + b"\0\0")[0]
+    """Return the status in a packet of a node of this fleet, and its stamp."""
+    status = parse_status(message_fields(STATUS_MESSAGE, genuine[HEADER_LENGTH : HEADER_LENGTH + genuine[1]]), site)
+    assert status is not None, "what a node of this fleet sent"
+    return status, STAMP_FORMAT.unpack(genuine[-12:-6] + b"\0\0")[0]
 
 
 # ---- Channel
@@ -107,13 +114,16 @@ TIME_TOLERANCE = 1e-6  # s
 Position = tuple[float, float, float]
 
 
+# Draws by the simulator's own functions and streams, so that a fleet and a simulation of one seed can be compared.
 class RadioChannel:
     """Datagrams between the members of a fleet.
 
-    radio, k : kind of radio and its numbers; members: system ids; period: s between two packets of a drone
-    clear : whether nothing stands between two places, m; None: nothing stands anywhere
-    site : of the flight, by which forged packets tell places
-    reach : how far (m) faults let the first of two drones, by their places, be heard by the second at a time, s
+    radio, k    : kind of radio and its numbers
+    members     : system ids
+    period      : s between two packets of a drone
+    radio_range : range (m) that faults leave between two drones, by their indices, at a time (s)
+    is_clear    : returns True if no obstacle stands between two positions, m; None: there are no obstacles
+    site        : of the flight, for positions in forged packets
     """
 
     def __init__(
@@ -146,34 +156,37 @@ class RadioChannel:
         )  # in range, nothing is lost
         self._queue: list[tuple[float, int, int, Sequence[int], bytes]] = []
         self._count = 0
+        # Injected faults have a generator of their own: they must not shift the losses of the scenario. The text is
+        # part of the seed, so it cannot be renamed.
         self._random = dice.Random(f"ether {seed}")
         self.sent = self.arrived_count = 0
 
     def send(self, now: float, sender: int, datagram: bytes, positions: Sequence[Position] = ()) -> None:
-        """A drone, by its place in the list of members, sends a datagram to all; at: true positions, m."""
+        """Send a datagram of a drone, by its index, to all; at: true positions, m."""
         if self._reaches_all_at_once:
             self._queue_packet(now + self._k.delay, sender, self._others[sender], datagram)
         else:
+            # Receivers with the same delay share an entry of the queue.
             reached: dict[float, list[int]] = {}
             for to in self._others[sender]:
                 late = self._jitter(to, now) + self._rule_delay(now, sender, to, positions)
                 reached.setdefault(round(now + self._k.delay + late, 6), []).append(to)
-            for due, whom in reached.items():
-                self._queue_packet(due, sender, whom, datagram)
+            for due, receivers in reached.items():
+                self._queue_packet(due, sender, receivers, datagram)
         for f in self._attackers:
             if f.holds(self._members[sender], now) and self._site is not None:
                 false = forge_packet(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")
                 self._queue_packet(now + self._k.delay, sender, range(len(self._members)), false)
 
     def _rule_delay(self, now: float, sender: int, receiver: int, at: Sequence[Position]) -> float:
-        """How much later a packet comes by the rule of the radio, s."""
+        """Return the delay of a packet by the rule of the radio, s."""
         if self._radio.late is None or not at:
             return 0.0
         known = self._pair_arguments(sender, receiver, at, math.dist(at[receiver], at[sender]))
         return self._reception.late(receiver, sender, round((now + self._k.delay) / self._period), known)
 
     def _pair_arguments(self, sender: int, receiver: int, at: Sequence[Position], distance: float) -> dict[str, float]:
-        """What rules of the radio may ask for of a pair."""
+        """Return the arguments of a pair for rules of the radio."""
         known = {"distance": distance}
         if not self._asked_arguments:
             return known
@@ -198,15 +211,17 @@ class RadioChannel:
         return found and [f for f in found if f.holds(self._members[to], now)]
 
     def deliver(self, now: float, positions: Sequence[Position]) -> Iterator[tuple[int, bytes]]:
-        """Datagrams that arrive by now, each with the place of its receiver; at: true positions, m."""
+        """Yield datagrams that arrive by now, each with the index of its receiver; at: true positions, m."""
         number = max(round(now / self._period), 0)
+        # Times are sums of steps, so two that should be equal may differ in the last bits.
         while self._queue and self._queue[0][0] <= now + TIME_TOLERANCE:
-            _, _, who, whom, datagram = heapq.heappop(self._queue)
-            self.sent += len(whom)
-            for to in whom:
+            _, _, who, receivers, datagram = heapq.heappop(self._queue)
+            self.sent += len(receivers)
+            for to in receivers:
                 if not self._packet_arrives(now, number, who, to, positions):
                     continue
                 self.arrived_count += 1
+                # The loop of a flight without injected faults stays free of their look-ups.
                 if not self._faults:
                     yield to, datagram
                     continue
@@ -215,7 +230,7 @@ class RadioChannel:
                     yield to, datagram
 
     def _packet_arrives(self, now: float, number: int, sender: int, receiver: int, at: Sequence[Position]) -> bool:
-        """Whether a packet gets through between two drones at these places, m."""
+        """Return True if a packet gets through between two drones at these positions, m."""
         distance = math.dist(at[receiver], at[sender])
         if distance > self._k.range or (
             self._radio_range is not None and distance > self._radio_range(sender, receiver, now)
@@ -226,6 +241,8 @@ class RadioChannel:
             or any(self._random.random() < f.amount for f in self._active_faults("loss", receiver, now))
         ):
             return False
+        # Most flights lose no packet in range: no random number is drawn, and none of the rule's arguments is
+        # computed.
         if self._loses_nothing:
             return True
         known = self._pair_arguments(sender, receiver, at, distance)
@@ -238,6 +255,7 @@ class RadioChannel:
         if self._active_faults("outage", sender, now) or self._active_faults("outage", receiver, now):
             return True
         here, there = self._members[receiver], self._members[sender]
+        # A partition separates its members from all others, in both directions.
         cuts = (f for f in self._faults.get("partition", ()) if f.begin <= now < f.end)
         return any((here in f.who) != (there in f.who) for f in cuts)
 
@@ -255,13 +273,13 @@ class RadioChannel:
 
 
 class FaultyNode:
-    """A node with the faults that befall it, used like the node itself.
+    """A node with faults of the scenario, used like the node itself.
 
-    It sends what they tell, and its clock is as far ahead as they say; all else is left to the node.
+    Its packets carry the false state and its clock the error that the faults say; all else is left to the node.
 
-    node  : gives the node; asked each time, so that it may be exchanged for one that keeps a log
-    place : of the drone among the members
-    time  : of the flight (s) at a time of the node's own clock
+    node        : function that returns the node, called each time: a logging one may take its place
+    index       : of the drone among the members
+    flight_time : function from a time of the node's own clock to the time of the flight, s
     """
 
     def __init__(
@@ -288,7 +306,7 @@ class FaultyNode:
         at = self._flight_time(now)
         self.update_clock(at)
         out = self._node().tick(now)
-        radios = tuple([self.told(datagram, at) for datagram in sent] for sent in out.radios)
+        radios = tuple([self.falsified(datagram, at) for datagram in sent] for sent in out.radios)
         return out._replace(radios=radios)
 
     def update_clock(self, time: float) -> None:
@@ -298,8 +316,8 @@ class FaultyNode:
             self._node().shift_clock(ahead - self._clock_offset)
             self._clock_offset = ahead
 
-    def told(self, datagram: bytes, time: float) -> bytes:
-        """What is sent in place of a packet of the node at a time of the flight, s."""
+    def falsified(self, datagram: bytes, time: float) -> bytes:
+        """Return the datagram that replaces a packet of the node at a time of the flight, s."""
         if not self._faults.can_falsify:
             return datagram
-        return falsify_packet(datagram, self._site, lambda state: self._faults.told(self._index, time, state))
+        return falsify_packet(datagram, self._site, lambda state: self._faults.sent_state(self._index, time, state))

@@ -1,7 +1,7 @@
 """Fleets on the real clock: as tasks of one process, or as processes that fork from a warm parent.
 
-Processes wait behind a ready barrier: each says that it is there, and only when all have does the clock start. There
-is no time-out: a process that ends before is named in one line, and ends the fleet.
+Processes wait at a barrier: each reports that it is ready, and the clock starts when all have. There is no time-out: a
+process that ends early is named in one line, and ends the fleet.
 """
 
 import asyncio
@@ -67,9 +67,7 @@ ABSENT_VEHICLE_ROW = (math.nan,) * 6  # a row of a vehicle that has dropped out
 
 
 class FleetPorts(NamedTuple):
-    """Sockets of a fleet: of each node to its autopilot and of its radio, of each vehicle to its node and to clients,
-    of the ether, and of who gives orders.
-    """
+    """Sockets of nodes (to the autopilot, radios), vehicles (to the node, clients), channel and operator."""
 
     nodes: list[UdpPort]
     radios: list[UdpPort]
@@ -80,7 +78,7 @@ class FleetPorts(NamedTuple):
 
     @classmethod
     def open(cls, count: int, first_client: tuple[str, int]) -> "FleetPorts":
-        """Ports for so many drones; vehicle i calls clients at the port `join` + i."""
+        """Open ports for this many drones; vehicle i calls clients at the port `join` + i."""
         nodes, radios, vehicles, clients = ([_port() for _ in range(count)] for _ in range(4))
         found = cls(nodes, radios, vehicles, clients, _port(), _port())
         for i in range(count):
@@ -91,7 +89,7 @@ class FleetPorts(NamedTuple):
         return found
 
     def close(self) -> None:
-        """Close all."""
+        """Close all ports."""
         for port in (*self.nodes, *self.radios, *self.vehicles, *self.clients, self.channel, self.station):
             port.close()
 
@@ -102,14 +100,14 @@ def _port() -> UdpPort:
 
 @dataclass(frozen=True)
 class RealtimePlan:
-    """What all lives of a fleet know.
+    """Data that all tasks of a fleet share.
 
-    start : states of drones that begin in the air; None: on the ground
-    clock : time.monotonic of the flight's time 0, and of its end, s; then for each node 1 once it has heard its
-            vehicle; shared by all
-    seen  : of each vehicle its position (m) and whether it is armed, four numbers; shared by all
-    epoch : Unix time at which time.monotonic was 0, µs
-    watcher : address at which somebody hears all packets, and what the ether tells; None: nobody does
+    start   : states of drones that begin in the air; None: on the ground
+    clock   : time.monotonic of the flight's time 0, and of its end, s; then for each node 1 once it has heard its
+              vehicle; shared memory
+    seen    : position (m) of each vehicle and whether it is armed, four numbers; shared memory
+    epoch   : Unix time at which time.monotonic was 0, µs
+    watcher : address that gets all packets and the reports of the channel; None: no such address
     """
 
     scenario: Scenario
@@ -125,39 +123,41 @@ class RealtimePlan:
 
     @property
     def now(self) -> float:
-        """Time of the flight, s; negative while all hover."""
+        """Return the time of the flight, s; negative while all hover."""
         return time.monotonic() - self.clock[0]
 
     @property
     def ready(self) -> bool:
-        """Whether every node has heard its vehicle."""
+        """Return True if every node has heard its vehicle."""
         return all(self.clock[2 + i] > 0.5 for i in range(len(self.card.members)))
 
     @property
     def places(self) -> list[tuple[float, float, float]]:
-        """Where the vehicles are, m."""
+        """Return the positions of the vehicles, m."""
         return list(zip(self.seen[0::4], self.seen[1::4], self.seen[2::4], strict=True))
 
     @property
     def armed(self) -> list[bool]:
-        """Which vehicles are armed."""
+        """Return which vehicles are armed."""
         return [armed > 0.5 for armed in self.seen[3::4]]
 
     @property
     def over(self) -> bool:
-        """Whether the flight has ended."""
+        """Return True if the flight has ended."""
         return time.monotonic() >= self.clock[1]
 
     def utc(self, now: float) -> int:
-        """Unix time (µs) at a time of `time.monotonic`, s."""
+        """Return the Unix time (µs) at a time of `time.monotonic`, s."""
         return self.epoch + round(now * 1e6)
 
 
 class TaskResult(NamedTuple):
-    """What is left of one node or vehicle when it ends.
+    """Result of one node or vehicle.
 
-    rows   : one per period: true state of a vehicle; command, own state and times of peers' states of a node
-    notes  : time.monotonic (s), member and text; ticks: of a node, of a vehicle its looks; processor: s
+    rows      : one per period: true state of a vehicle; command, own state and times of peers' states of a node
+    notes     : time.monotonic (s), member and text
+    ticks     : ticks of a node, looks of a vehicle
+    processor : processor time, s
     """
 
     rows: list[Any]
@@ -168,15 +168,15 @@ class TaskResult(NamedTuple):
 
 
 def node_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResult]:
-    """Life of a node, from now until the end of the flight or its own."""
+    """Run a node until the end of the flight or its own."""
     card, began = plan.card, time.process_time()
     member = card.members[i]
     dies = min([fault.begin for fault in plan.faults if fault.kind == "node" and fault.affects(member)], default=1e9)
     now = time.monotonic()
     utc = plan.utc(now) + initial_clock_offset(plan.faults, member)
     node = Node(card, member, SOFTWARE_KEY, now=now, utc=utc, since=utc - ACCEPTED_BEFORE_START)
-    befalls = DroneFaults(plan.scenario, plan.seed, only=i)
-    ailing = FaultyNode(lambda: node, befalls, i, card.site, lambda own: own - plan.clock[0])
+    drone_faults = DroneFaults(plan.scenario, plan.seed, only=i)
+    faulty_node = FaultyNode(lambda: node, drone_faults, i, card.site, lambda own: own - plan.clock[0])
     rows: list[Any] = []
     notes: list[tuple[float, int, str]] = []
     waits = plan.start is not None
@@ -184,20 +184,23 @@ def node_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResul
     def until() -> bool:
         nonlocal waits
         wire, now = node.autopilot_link, plan.now
-        befalls.until(now)
+        drone_faults.until(now)
         if wire.state is not None and wire.armed is not None:
             plan.clock[2 + i] = 1.0
         if waits and wire.state is not None and wire.mode == card.autopilot.ours and wire.armed:
             waits, node.phase, node.home = False, MissionPhase.FLOCK, (wire.state.x, wire.state.y, card.layer(member))
+        # A late node fills the rows that it missed with its present state, so that all have as many.
         while now >= len(rows) * card.period:
             ages = [node.peers.all[m].at - plan.clock[0] if m != member else NEVER_HEARD for m in card.members]
             rows.append(((*node.command, *(wire.state or (0.0,) * 6)), ages))
-        return plan.over or now >= dies or i in befalls.dropped_out
+        return plan.over or now >= dies or i in drone_faults.dropped_out
 
-    def tell(note: str) -> None:
+    def keep_note(note: str) -> None:
         notes.append((time.monotonic(), member, note))
 
-    ticks = yield from tick_task(ailing, [plan.ports.nodes[i], plan.ports.radios[i]], card.safety.tick, tell, until)
+    ticks = yield from tick_task(
+        faulty_node, [plan.ports.nodes[i], plan.ports.radios[i]], card.safety.tick, keep_note, until
+    )
     return TaskResult(rows, notes, ticks, node.phase, time.process_time() - began)
 
 
@@ -228,11 +231,11 @@ class RealtimeVehicle:
 
     @property
     def period(self) -> float:
-        """Time between two looks, s: as often as it tells what it tells most often."""
+        """Return the time between two looks, s: the period of its most frequent message."""
         return max(MIN_LOOK_PERIOD, 1.0 / max(self.vehicle.rates.values()))
 
     def look(self) -> None:
-        """Read what came, move up to now, and tell."""
+        """Read what came, move up to now, and send what is due."""
         vehicle, plan, zero = self.vehicle, self.plan, self.plan.clock[0]  # once: the clock may be set meanwhile
         now = time.monotonic() - zero
         vehicle.start_time, vehicle.booted_at = plan.utc(zero), self._booted - zero
@@ -242,29 +245,31 @@ class RealtimeVehicle:
             self._client_address = sender
             self._send(vehicle.receive(data, now), sender)
         self._move(now)
-        told = vehicle.due_telemetry(now)
-        self._send(told)
+        telemetry = vehicle.due_telemetry(now)
+        self._send(telemetry)
         if self._client_address is not None:
-            self._send(told, self._client_address)
+            self._send(telemetry, self._client_address)
+        # A simulator of PX4 calls its ground station, not the other way round.
         elif now - self._called_at >= CLIENT_CALL_PERIOD:
             self._called_at = now
             self._client_port.write(vehicle.frame(MESSAGE_MAKERS["heartbeat"](vehicle)))
         self._publish_position()
 
     def _send(self, data: bytes, client: tuple[str, int] | None = None) -> None:
-        """Tell the node or a client, if there is anything to tell: an empty datagram would wake them as well."""
+        """Send bytes to the node or a client; no empty datagram, which would wake them as well."""
         if data and client is not None:
             self._client_port.send(data, client)
         elif data:
             self._node_port.write(data)
 
     def _publish_position(self) -> None:
-        """Write down where it is, for the ether and for who watches."""
+        """Publish its position, for the channel and for observers."""
         at = 4 * self.place
         self.plan.seen[at : at + 4] = (*self.vehicle.state[:3], float(self.vehicle.armed))
 
     def _move(self, now: float) -> None:
         vehicle, plan, dt = self.vehicle, self.plan, self.plan.scenario.flight.dt
+        # The vehicle catches up in whole steps: its motion does not depend on when it is scheduled.
         while now >= self.steps * dt:
             at = self.steps * dt
             self._faults.begin_due(self.steps, lambda _: (vehicle.state, vehicle.last_command))
@@ -285,13 +290,14 @@ class RealtimeVehicle:
 
 
 def vehicle_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResult]:
-    """Life of a vehicle until the end of the flight."""
+    """Run a vehicle until the end of the flight."""
     began, craft = time.process_time(), RealtimeVehicle(plan, i)
     count, late, worst, due = 0, 0, 0.0, time.monotonic()
     while not plan.over:
         behind, period = time.monotonic() - due, craft.period
         count, late, worst = count + 1, late + (behind > 0.5 * period), max(worst, behind)
         craft.look()
+        # After a long delay it skips looks instead of running them all at once.
         due = max(due + period, time.monotonic() - period)
         yield TaskRest(due)
     return TaskResult(
@@ -300,12 +306,12 @@ def vehicle_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskRe
 
 
 def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
-    """Life of the ether: packets of nodes reach those whom the radio lets them reach, orders reach all at once."""
+    """Run the radio channel: packets reach the nodes that the radio allows, orders reach all at once."""
     began, card, ports = time.process_time(), plan.card, plan.ports
     flown, period = plan.scenario, card.safety.status_period
-    befalls = DroneFaults(flown, plan.seed)
-    reach = befalls.reach if befalls else None
-    ether = RadioChannel(
+    drone_faults = DroneFaults(flown, plan.seed)
+    reach = drone_faults.reach if drone_faults else None
+    channel = RadioChannel(
         flown.transceiver,
         flown.radio,
         card.members,
@@ -319,7 +325,7 @@ def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
     station = ports.station.here
     radios = [port.here for port in ports.radios]
     who = {here: i for i, here in enumerate(radios)}
-    teller = TelemetryBroadcast(card.members, plan.faults) if plan.watcher else None
+    broadcast = TelemetryBroadcast(card.members, plan.faults) if plan.watcher else None
 
     def watched(data: bytes) -> None:
         if plan.watcher is not None:
@@ -327,20 +333,24 @@ def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
 
     while not plan.over:
         now, at = plan.now, plan.places
-        befalls.until(now)
+        drone_faults.until(now)
         for data, sender in ports.channel.read_from():
             if sender in who:
-                ether.send(now, who[sender], data, at)
+                channel.send(now, who[sender], data, at)
                 watched(data)
             elif sender == station:
                 for radio in radios:
                     ports.channel.send(data, radio)
                 watched(data)
-        for to, data in ether.deliver(now, at):
+        for to, data in channel.deliver(now, at):
             ports.channel.send(data, radios[to])
-            if teller is not None:
-                teller.note_arrival(to, data, now)
-        for data in () if teller is None else teller.report(now, plan.utc(time.monotonic()), befalls.active_kinds(now)):
+            if broadcast is not None:
+                broadcast.note_arrival(to, data, now)
+        for data in (
+            ()
+            if broadcast is None
+            else broadcast.report(now, plan.utc(time.monotonic()), drone_faults.active_kinds(now))
+        ):
             watched(data)
         yield TaskRest(time.monotonic() + CHANNEL_PERIOD)
     return TaskResult([], [], TickCounts(0, 0, 0.0), MissionPhase.DONE, time.process_time() - began)
@@ -352,11 +362,12 @@ ABSENT_ROW = (math.nan,) * 15  # a row of a drone that has dropped out
 
 
 class ComputerLoad(NamedTuple):
-    """What a fleet on the real clock cost, and how late it was.
+    """Cost and lateness of a fleet on the real clock.
 
-    cores : processor time of all per second; nodes, vehicles: of these (with the ether), where they are processes
-    ticks, late, worst : of all nodes: how many, how many late by more than half a period, by how much at most (s)
-    others : load of this computer (processes that want a processor, one minute) when the flight ended
+    cores             : processor time of all per second
+    nodes, vehicles   : of these (with the channel), where they are processes
+    ticks, late, worst: of all nodes: total, late by more than half a period, largest delay (s)
+    others            : load of this computer (processes that want a processor, one minute) at the end of the flight
     """
 
     cores: float
@@ -380,16 +391,16 @@ class RealtimeFleet:
 
     @property
     def law_zero_height(self) -> float:
-        """Height (m) above the site at which the law counts zero."""
+        """Return the height (m) above the site of the law's zero."""
         return law_zero_height(self.card)
 
     def _frame_count(self) -> int:
         return min(len(life.rows) for life in self._vehicles)
 
     def array(self) -> NDArray[np.float64]:
-        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them.
+        """Return (time, agent, 15): true position and velocity, setpoint, own position and velocity of the node.
 
-        Of drones that have dropped out nan, as in the recording of a simulation.
+        Rows of drones that have dropped out are nan, as in the recording of a simulation.
         """
         frames = [
             [
@@ -403,7 +414,7 @@ class RealtimeFleet:
         return np.array(frames, float)
 
     def packet_ages(self) -> NDArray[np.float64]:
-        """(time, receiver, sender): s since the state that a node has of another one held; nan: it has none."""
+        """Return (time, receiver, sender): age (s) of the state that a node has of another one; nan: none."""
         never = [NEVER_HEARD] * len(self.card.members)
         stamps = np.array(
             [
@@ -421,21 +432,21 @@ class RealtimeFleet:
         return zip(self._vehicles, self._nodes, strict=True)
 
     def digest(self) -> str:
-        """SHA-256 of all that was flown."""
+        """Return the SHA-256 of the flight."""
         return hashlib.sha256(self.array().tobytes()).hexdigest()
 
     def phases(self) -> list[MissionPhase]:
-        """Phase in which every node ended."""
+        """Return the last phase of every node."""
         return [life.phase for life in self._nodes]
 
 
 def _row_part_at(rows: Sequence[Any], k: int, part: int, none: Any) -> Any:
-    """What a node said at period k; where it has died, what it said last."""
+    """Return the entries of a node at period k; after its end, the last ones."""
     return rows[min(k, len(rows) - 1)][part] if rows else none
 
 
 def _has_dropped_out(craft: TaskResult, k: int) -> bool:
-    """Whether a vehicle has dropped out by period k."""
+    """Return True if a vehicle has dropped out by period k."""
     return bool(math.isnan(craft.rows[k][0]))
 
 
@@ -455,7 +466,7 @@ CHANNEL_TASK = 0  # place of the ether among the lives
 
 
 def lockstep_only_errors(faults: Sequence[InjectedFault]) -> list[str]:
-    """What flies in lock-step only, one line each."""
+    """Return one line for each fault that only a fleet in lock-step can fly."""
     gone = [f for f in faults if f.kind == "node" and f.end < 1e9]
     return ["fault node: on the real clock a node that died stays dead; leave out end"] * bool(gone)
 
@@ -467,12 +478,12 @@ def fly_in_realtime(
 ) -> RealtimeFleet:  # fmt: skip
     """Fly one fleet for the scenario's duration on the real clock, in the mode "tasks" or "processes".
 
-    start : states in the air; None: from the ground by orders of the operator, and back
-    join  : where vehicle 1 calls for a client that joins; vehicle 2 calls at the next port
-    done  : called once for each second flown
-    watcher : address that gets every packet, and what the ether tells (`fleets.teller`)
+    start        : states in the air; None: from the ground by orders of the operator, and back
+    first_client : address at which vehicle 1 calls a client; vehicle 2 calls at the next port
+    on_done      : called once for each second flown
+    watcher      : address that gets every packet and the reports of the channel (`TelemetryBroadcast`)
 
-    Raises ScenarioError for what flies in lock-step only, LinkError where a process ends before its time.
+    Raises ScenarioError for faults that need lock-step, LinkError where a process ends before its time.
     """
     wrong = lockstep_only_errors(faults)
     if wrong:
@@ -485,6 +496,7 @@ def fly_in_realtime(
             now + 2.0 * FAR_FUTURE,
             *(0.0,) * len(card.members),
         ]  # the watch sets the clock when all are there
+        # Shared memory without a lock: each number has one writer, and a double is written at once.
         kept: Callable[[list[float]], Any] = list if mode == "tasks" else partial(multiprocessing.RawArray, "d")
         clock, seen = kept(first), kept([0.0] * (4 * len(card.members)))
         epoch = time.time_ns() // 1000 - round(now * 1e6)
@@ -503,7 +515,7 @@ def fly_in_realtime(
 
 
 async def _tasks(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[list[TaskResult], float]:
-    """All lives in one event loop; what is left of each, and the processor time of all, s."""
+    """Run all tasks in one event loop; return their results and the processor time of all, s."""
     began = time.process_time()
     async with asyncio.TaskGroup() as group:
         tasks = [group.create_task(run_in_event_loop(life())) for life in lives]
@@ -512,7 +524,7 @@ async def _tasks(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> t
 
 
 async def run_in_event_loop(life: Task) -> TaskResult:
-    """Live a life among others in one event loop, as `alone` does in a process of its own."""
+    """Run a task among others in one event loop, as `run_alone` does in a process of its own."""
     loop, hears = asyncio.get_running_loop(), TaskRest(0.0).handlers
     try:
         while True:
@@ -531,8 +543,9 @@ async def run_in_event_loop(life: Task) -> TaskResult:
             loop.remove_reader(port.fileno())
 
 
+# Processes fork from a warm parent: sixty cold interpreters came up later than the flight ended.
 def _forked(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[list[TaskResult], float]:
-    """Each life in a process of its own; what is left of each, and the processor time of all, s."""
+    """Run each task in a process of its own; return their results and the processor time of all, s."""
     if not hasattr(os, "fork"):
         raise LinkError("mode = 'processes' forks, which this system does not do; give mode = 'tasks'")
     context, began = multiprocessing.get_context("fork"), time.process_time()
@@ -547,6 +560,7 @@ def _forked(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[
             process.start()
             theirs.close()
         ours = [pipe[0] for pipe in pipes]
+        # Nobody may tick before all are there, or the first drones would fly among neighbours that do not exist yet.
         _all(ours, processes)  # the barrier
         for pipe in ours:
             pipe.send("go")
@@ -562,7 +576,7 @@ def _forked(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[
 
 
 def _all(pipes: Sequence[Any], processes: Sequence[Any]) -> list[Any]:
-    """One message of each process; LinkError if one ends without it."""
+    """Return one message of each process; raise LinkError if one ends without it."""
     received: dict[int, Any] = {}
     while len(received) < len(pipes):
         waiting = {pipe: i for i, pipe in enumerate(pipes) if i not in received}
@@ -570,9 +584,9 @@ def _all(pipes: Sequence[Any], processes: Sequence[Any]) -> list[Any]:
             i = waiting[pipe]  # type: ignore[index]
             try:
                 received[i] = pipes[i].recv()
-            except EOFError as fault:
+            except EOFError as error:
                 processes[i].join()
-                raise LinkError(ENDED_MESSAGE.format(processes[i].exitcode)) from fault
+                raise LinkError(ENDED_MESSAGE.format(processes[i].exitcode)) from error
     return [received[i] for i in range(len(pipes))]
 
 
@@ -584,7 +598,7 @@ def _alive(processes: Sequence[Any]) -> None:
 
 
 def _process_main(life: Callable[[], Task], pipe: Any) -> None:
-    """A process: says that it is ready, waits for all others, lives, and hands over what is left."""
+    """Report that the process is ready, wait for all others, run the task, and send its result."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the fleet, and says why
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     pipe.send("ready")
@@ -595,20 +609,21 @@ def _process_main(life: Callable[[], Task], pipe: Any) -> None:
 async def _watch(
     plan: RealtimePlan, operator: bytes, on_done: Callable[[], None] | None, check: Callable[[], None]
 ) -> None:
-    """Give the orders of a flight from the ground, end the flight, and tell how far it is; check raises what failed."""
+    """Give the orders of a flight from the ground, end the flight, and report progress; check raises failures."""
     seconds = plan.scenario.flight.duration
-    told = 0
+    reported = 0
 
     async def until(holds: Callable[[], bool]) -> None:
-        nonlocal told
+        nonlocal reported
         while not holds():
             await asyncio.sleep(WATCH_PERIOD)
             check()
-            while on_done is not None and told < min(plan.now, seconds + SECONDS_BEFORE_START):
-                told += 1
+            while on_done is not None and reported < min(plan.now, seconds + SECONDS_BEFORE_START):
+                reported += 1
                 on_done()
 
     await until(lambda: plan.ready)
+    # The flight begins when the packets of the start states have arrived everywhere.
     plan.clock[0] = time.monotonic() + plan.scenario.radio.delay + HOVER_SECONDS
     if plan.start is not None:
         await until(lambda: plan.now > seconds + plan.card.period)
@@ -618,7 +633,7 @@ async def _watch(
 
 
 async def _from_the_ground(plan: RealtimePlan, station: OperatorStation, until: Callable[..., Any]) -> None:
-    """Order a start, a return when the time is over, and wait until all stand on the ground again."""
+    """Order a start, a return when the time is over, and wait until all have landed."""
 
     def order(do: OrderKind) -> None:
         utc = plan.utc(time.monotonic())
@@ -626,6 +641,7 @@ async def _from_the_ground(plan: RealtimePlan, station: OperatorStation, until: 
 
     await until(lambda: plan.now > SECONDS_BEFORE_START)
     begun = plan.now
+    # Repeated, because the radio may lose an order.
     while not all(plan.armed) and plan.now < begun + MAX_ARM_SECONDS:
         order(OrderKind.START)
         next_ = plan.now + START_ORDER_PERIOD

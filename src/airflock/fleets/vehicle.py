@@ -1,10 +1,12 @@
 """A vehicle in software: a body of the simulator behind MAVLink, as PX4 or as ArduPilot. Pure: no sockets, no clock.
 
-receive(bytes) takes frames and gives answers; telemetry(now) gives what is due; step(now, dt) moves it. Inside
+receive(bytes) takes frames and returns answers; due_telemetry(now) returns what is due; step(now, dt) moves it. Inside
 east-north-up, north-east-down only in frames. It keeps the autopilots' rules that matter to a node: PX4 enters
 OFFBOARD only after a second of setpoints and leaves it COM_OF_LOSS_T after the last; ArduPilot takes off by command,
 brakes GUID_TIMEOUT after the last setpoint, and acts FS_GCS_TIMEOUT after the last heartbeat of SYSID_MYGCS. Both hold
 their place where they hover or land by themselves.
+
+Sources: PX4 user guide, Parameter Reference; ArduPilot Copter, pages Flight Modes and GCS Failsafe.
 """
 
 import math
@@ -43,24 +45,25 @@ LOST_STATION_MODES = {
 # ---- Holding a position
 
 STANDING_SPEED = 0.5  # m/s; our choice: slower than this it has come to stand, and holds that place
+# PX4's position gain is about twice this (MPC_XY_P 0.95 1/s); without holding, drones that hover drift by metres.
 POSITION_GAIN = 0.5  # 1/s; our choice, about half of PX4's MPC_XY_P: a metre off is half a metre a second back
 MAX_RETURN_SPEED = 1.0  # m/s; our choice
 
 
 class HoldPosition:
-    """The place that is held, from when the drone has come to stand there."""
+    """A position that is held, from the moment at which the drone has stopped there."""
 
     def __init__(self) -> None:
         self._held_position: tuple[float, float] | None = None
 
     def release(self) -> None:
-        """Hold no place any more."""
+        """Stop holding a position."""
         self._held_position = None
 
     def velocity(self, at: State | None, up: float) -> tuple[float, float, float]:
-        """Velocity (m/s) that brakes, and then goes back to the place; `up` is kept.
+        """Return the velocity (m/s) that brakes, and then goes back to the position; `up` is kept.
 
-        at : where the drone is by its own navigation; None where that stands still: then it only brakes
+        at : own state by its own navigation; None where that is frozen: then it only brakes
         """
         if at is not None and self._held_position is None and math.hypot(at.vx, at.vy) < STANDING_SPEED:
             self._held_position = at.x, at.y
@@ -181,7 +184,7 @@ RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED = 0, 2, 3
 POSITION_IGNORED_MASK = 0x0007
 VELOCITY_IGNORED_MASK = 0x0038
 LOCAL_NED_FRAME, BODY_NED_FRAME = 1, 8
-VEHICLE_FAULTS = frozenset({"motor", "gnss", "battery", "pilot"})  # faults that befall a vehicle itself
+VEHICLE_FAULTS = frozenset({"motor", "gnss", "battery", "pilot"})  # faults of a vehicle itself
 LANDED_HEIGHT = 0.15  # m; lower is landed
 MAX_SETPOINT_GAP = 0.5  # s between setpoints that still are one stream
 BODY_ARGUMENTS = (
@@ -189,7 +192,7 @@ BODY_ARGUMENTS = (
     "dt",
     "b",
     "memory",
-)  # what a body may ask for
+)  # arguments that a body may take
 LANDING_SPEED = 1.0  # m/s, of a landing
 
 Velocity = tuple[float, float, float]
@@ -199,8 +202,12 @@ NO_VELOCITY: Velocity = (0.0, 0.0, 0.0)
 class SoftwareVehicle:
     """One drone and its autopilot.
 
-    kind : px4 or ardupilot; system: its MAVLink id; site: where the local origin of the flight is
-    at   : where it stands, m; body, b: of the simulator; draw: normal random numbers of a motion step
+    kind    : px4 or ardupilot
+    system  : its MAVLink id
+    site    : local origin of the flight
+    at      : position at the start, m
+    body, b : body of the simulator and its numbers
+    draw    : function that returns the normal random numbers of a motion step
     """
 
     def __init__(
@@ -216,10 +223,10 @@ class SoftwareVehicle:
         ours = ("MAV_SYS_ID",) if kind == "px4" else ("SYSID_THISMAV", "SYSID_MYGCS")
         self.parameters = DEFAULT_PARAMETERS[kind] | dict.fromkeys(ours, system)
         self.target: Velocity = (0.0, 0.0, 0.0)
-        self.last_command = self._faulty_command = (
-            NO_VELOCITY  # what reached its motors last, and what faults make of the command, m/s
-        )
-        self._asked: tuple[float, Velocity] | None = None  # the command of which they were asked, and when it came, s
+        # What reached its motors last, and what faults make of the command, m/s.
+        self.last_command = self._faulty_command = NO_VELOCITY
+        # Arrival (s) and value of the command that the faults have seen last.
+        self._fault_key: tuple[float, Velocity] | None = None
         self.setpoint_at, self.stream_since, self.takeoff_height = -1e9, -1e9, 0.0
         self.booted_at = 0.0  # s
         self.heartbeat_at: float | None = None  # when the last heartbeat of its station came; None: none ever
@@ -228,51 +235,52 @@ class SoftwareVehicle:
         self.accuracy, self.motor, self.steps = 0.7, True, 0
         self.off = False  # for good: it has dropped out of the flight
         self.is_taking_off, self._holding = False, HoldPosition()
-        asked = argument_names(body.move, "move", body.name)
-        for name in asked:
+        names = argument_names(body.move, "move", body.name)
+        for name in names:
             if name not in BODY_ARGUMENTS:
                 raise RuleError(f"body {body.name} asks for {name}, which a vehicle of a fleet does not have")
-        self._pick_arguments = itemgetter(*map(BODY_ARGUMENTS.index, asked))
+        self._pick_arguments = itemgetter(*map(BODY_ARGUMENTS.index, names))
         self._uses_old_velocity = choices(b).get("integration", body.integration) == "old"
         self.memory = body.Memory() if body.Memory is not None else None
         self.faults: DroneFaults | None = None  # of the scenario, with its own place among the drones
         self.place = 0
-        self.frozen_state: State | None = None  # what a navigation that stands still tells, if it does
+        self.frozen_state: State | None = None  # output of a frozen navigation; None: it works
 
     def frame(self, message: Any) -> bytes:
-        """Bytes of a message of the dialect."""
+        """Return the bytes of a message of the dialect."""
         return self._packer(message)
 
     @property
     def measured(self) -> State:
-        """Own state as its navigation tells it."""
+        """Return the own state by its navigation, with faults."""
+        # Faults of the scenario act on top of injected ones.
         known = self.frozen_state or self.controller_state
         return known if self.faults is None else self.faults.measured_state(self.place, self.now, known)
 
     @property
     def controller_state(self) -> State:
-        """Own state with the error of its navigation, by which its controller flies.
+        """Return the own state with the error of its navigation, by which its controller flies.
 
-        Where the navigation stands still, the controller keeps the velocity of its inertial sensors.
+        Where the navigation is frozen, the controller keeps the velocity of its inertial sensors.
         """
         (x, y, z, vx, vy, vz), (ex, ey, ez, eu, ev, ew) = self.state, self.error
         return State(x + ex, y + ey, z + ez, vx + eu, vy + ev, vz + ew)
 
     def origin_frame(self) -> bytes:
-        """GPS_GLOBAL_ORIGIN, as it is sent on request."""
+        """Return GPS_GLOBAL_ORIGIN, as it is sent on request."""
         return self.frame(MESSAGE_MAKERS["origin"](self))
 
     def state_frames(self) -> bytes:
-        """LOCAL_POSITION_NED and what else a node needs, now."""
+        """Return LOCAL_POSITION_NED and all other frames that a node needs, now."""
         return b"".join(self.frame(MESSAGE_MAKERS[name](self)) for name in ("heartbeat", "gps", "landed", "local"))
 
     @property
     def flying(self) -> bool:
-        """Whether it is off the ground."""
+        """Return True if it is off the ground."""
         return self.state.z > LANDED_HEIGHT
 
     def due_telemetry(self, now: float) -> bytes:
-        """Bytes that are due now."""
+        """Return the bytes that are due now."""
         self.now = now
         out = b""
         for name, rate in self.rates.items():
@@ -285,7 +293,7 @@ class SoftwareVehicle:
     # -------------------------------------------------------------------------------------------------- frames in
 
     def receive(self, data: bytes, now: float) -> bytes:
-        """Take bytes; gives the answers."""
+        """Take bytes and return the answers."""
         self.now = now
         out = b""
         for frame in self._stream(data):
@@ -325,9 +333,9 @@ class SoftwareVehicle:
     def _parameter_message(self, name: str) -> Any:
         value, names = self.parameters[name], list(self.parameters)
         whole = isinstance(value, int)
-        told = struct.unpack("<f", struct.pack("<i", value))[0] if whole and self.kind == "px4" else float(value)
+        encoded = struct.unpack("<f", struct.pack("<i", value))[0] if whole and self.kind == "px4" else float(value)
         return common_dialect().MAVLink_param_value_message(
-            name.encode(), told, 6 if whole else 9, len(names), names.index(name)
+            name.encode(), encoded, 6 if whole else 9, len(names), names.index(name)
         )
 
     def _setpoint(self, v: dict[str, Any], sender: tuple[int, int]) -> list[Any]:
@@ -341,6 +349,8 @@ class SoftwareVehicle:
             or not all(map(math.isfinite, wanted))
         ):
             return []  # the nose points north, so that both frames are one
+        # ArduPilot ignores setpoints outside GUIDED; PX4 counts them before OFFBOARD, which it enters only while they
+        # stream.
         if self.kind == "ardupilot" and self.mode != GUIDED:
             return []
         if self.now - self.setpoint_at > MAX_SETPOINT_GAP:
@@ -360,7 +370,7 @@ class SoftwareVehicle:
         return [ack, *more]
 
     def run_command(self, number: int, v: dict[str, Any]) -> tuple[int, list[Any]]:
-        """Result of a command, and messages that it asked for."""
+        """Run a command; return its result, and messages that it requested."""
         if number == 400:
             return self._arm(v["param1"] > 0.5, v["param2"] > 21195.0), []
         if number == 22:
@@ -383,6 +393,7 @@ class SoftwareVehicle:
         return RESULT_UNSUPPORTED, []
 
     def _arm(self, yes: bool, force: bool) -> int:
+        # Both autopilots refuse to disarm in the air unless forced.
         if not yes and self.flying and not force:
             return RESULT_DENIED
         self.armed = yes
@@ -391,6 +402,7 @@ class SoftwareVehicle:
     def _take_off(self, altitude: float) -> int:
         if not self.armed or (self.kind == "ardupilot" and self.mode != GUIDED):
             return RESULT_DENIED
+        # PX4 climbs to its own parameter; only ArduPilot reads the altitude of the command.
         if self.kind == "px4":
             altitude = float(self.parameters["MIS_TAKEOFF_ALT"])
         self.takeoff_height = altitude if math.isfinite(altitude) and altitude > 0.0 else 10.0
@@ -400,7 +412,7 @@ class SoftwareVehicle:
         return RESULT_ACCEPTED
 
     def set_mode(self, custom: int) -> bool:
-        """Change the mode by its number; False if it is not known or, in PX4, the setpoints do not stream yet."""
+        """Change the mode by its number; False if unknown, or if setpoints do not stream yet (PX4)."""
         name = next((name for name, number in self.mode_numbers.items() if number == custom), "")
         if name == GUIDED and self.kind == "px4":
             stream = self.now - self.setpoint_at < MAX_SETPOINT_GAP and self.now - self.stream_since >= 1.0
@@ -419,7 +431,7 @@ class SoftwareVehicle:
     # ----------------------------------------------------------------------------------------------------- motion
 
     def apply_faults(self, faults: Sequence[InjectedFault], now: float, dt: float) -> None:
-        """Let faults act that befall it in the step from now on: motors, navigation, battery, a pilot's hand."""
+        """Apply faults to the step from now on: motors, navigation, battery, a pilot's take-over."""
         kinds = {f.kind for f in faults if f.holds(self.system, now)}
         self.motor = "motor" not in kinds
         frozen = "gnss" in kinds
@@ -431,8 +443,9 @@ class SoftwareVehicle:
                 self.mode = PILOT_MODE
 
     def autopilot_velocity(self) -> Velocity:
-        """Velocity that the autopilot makes for now, m/s."""
+        """Return the velocity that the autopilot commands now, m/s."""
         late = self.now - self.setpoint_at
+        # The fail-safes that a node relies on: they must act here as on the real autopilot.
         if self.mode == GUIDED and self.kind == "px4" and late > self.parameters["COM_OF_LOSS_T"]:
             self.mode = LOST_SETPOINT_MODES.get(int(self.parameters["COM_OBL_RC_ACT"]), HOLD_MODE)
         if self.mode == GUIDED and self.kind == "ardupilot" and self.heartbeat_at is not None:
@@ -466,12 +479,13 @@ class SoftwareVehicle:
             self.memory = type(self.memory)() if self.memory is not None else None
             return
         (x, y, z, vx, vy, vz), c = self.state, self.autopilot_velocity()
+        # Without motors the body is given a velocity ever further down: it falls as fast as its dynamics let it.
         falls = self.off or not self.motor
         command = (vx, vy, vz - 5.0) if falls else c
         if self.faults is not None and not falls:
-            asked = self.setpoint_at, c
-            if asked != self._asked:  # as in a simulation: once for each command
-                self._asked, self._faulty_command = asked, self.faults.motor_command(self.place, now, c)
+            command_key = self.setpoint_at, c
+            if command_key != self._fault_key:  # as in a simulation: once for each command
+                self._fault_key, self._faulty_command = command_key, self.faults.motor_command(self.place, now, c)
             command = self._faulty_command
         self.last_command = command
         eu, ev, ew = self.error[3:]
@@ -481,8 +495,10 @@ class SoftwareVehicle:
         velocity, self.memory = moved[:3], moved[3] if self.memory is not None else None
         if self.faults is not None:
             velocity = self.faults.velocity_after_step(self.place, now, self.state, command, velocity, dt)
+        # As the simulated body does, or a fleet would leave the simulated flight at once.
         ux, uy, uz = (vx, vy, vz) if self._uses_old_velocity else velocity
         self.state = State(x + ux * dt, y + uy * dt, z + uz * dt, *velocity)
+        # The ground stops it, but must not keep it from taking off.
         if self.state.z <= 0.0 and (c[2] <= 0.0 or falls):
             self.state = State(self.state.x, self.state.y, 0.0, *NO_VELOCITY)
             self.armed = self.armed and self.mode not in (LAND_MODE, RETURN_MODE) and not self.off

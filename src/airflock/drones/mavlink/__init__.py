@@ -1,4 +1,4 @@
-"""Layer 3: bytes and their meaning: MAVLink 2 frames, signatures, coordinates, status packets, autopilots."""
+"""Bytes and their meaning: MAVLink 2 frames, signatures, messages, autopilots."""
 
 import lazy_loader
 

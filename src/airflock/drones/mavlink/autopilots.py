@@ -1,4 +1,4 @@
-"""Autopilots: what PX4 and ArduPilot call their modes, how they are told to fly, and which parameters keep us safe.
+"""Autopilots: modes of PX4 and ArduPilot, the commands that fly them, and the parameters that make a flight safe.
 
 Sources: PX4 user guide, pages Offboard Mode and Parameter Reference; ArduPilot Copter, pages Guided Mode, Copter
 Commands in Guided Mode and Complete Parameter List. Numbers of commands and messages: MAVLink common.xml.
@@ -22,15 +22,16 @@ ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED in HEARTBEAT.base_mode
 VELOCITY_ONLY_MASK = 0x0DC7  # type mask of a setpoint: velocity counts; position, acceleration, yaw and its rate do not
 LOCAL_NED_FRAME = 1  # MAV_FRAME
 INT32_TYPE = 6  # MAV_PARAM_TYPE
-STREAM_RATES = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message → rate that a node asks for, 1/s
+STREAM_RATES = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message → rate that a node requests, 1/s
 
 
 class ParameterCheck(NamedTuple):
-    """A parameter of the autopilot that must lie between two values before anything arms, and why.
+    """A parameter of the autopilot with its range of safe values, checked before the drone may arm.
 
-    but    : a value between them that is not safe either
-    own    : it must be the autopilot's own system id instead
-    silent : a time-out, s, until which the drone flies on; `reason` says how far
+    why          : the reason, in a few words
+    own          : the safe value is the autopilot's own system id
+    timeout      : time-out (s) during which the drone flies on; `reason` adds the distance of that flight; 0: none
+    unsafe_value : a value inside the range that is not safe
     """
 
     name: str
@@ -42,23 +43,23 @@ class ParameterCheck(NamedTuple):
     unsafe_value: float | None = None
 
     def range(self, member: int) -> tuple[float, float]:
-        """Least and largest value that is safe for a member of a flock."""
+        """Return the least and the largest value that is safe for a member of a flock."""
         return (float(member), float(member)) if self.own else (self.low, self.high)
 
     def told(self, member: int | None = None) -> str:
-        """The values that are safe, in words; without a member those of all."""
+        """Describe the safe values in words: those of one member, or of all."""
         if self.own and member is None:
             return "to the own system id"
         low, high = self.range(member or 0)
         return f"within [{low:g}, {high:g}]" + ("" if self.unsafe_value is None else f", not {self.unsafe_value:g}")
 
     def safe(self, value: float, member: int) -> bool:
-        """Whether a value is safe for a member of a flock."""
+        """Return True if a value is safe for a member of a flock."""
         low, high = self.range(member)
         return low <= value <= high and value != self.unsafe_value
 
     def reason(self, speed: float, response: float) -> str:
-        """Why, for a drone of a largest speed (m/s) that gets slower with a relaxation time (s)."""
+        """Explain the check to a drone with a largest speed (m/s) and a relaxation time (s) of its velocity."""
         if not self.timeout:
             return self.why
         way = speed * (self.timeout + response)
@@ -67,13 +68,14 @@ class ParameterCheck(NamedTuple):
 
 @dataclass(frozen=True)
 class Autopilot:
-    """What a node has to know of one kind of autopilot.
+    """Properties of one kind of autopilot.
 
-    number    : MAV_AUTOPILOT in its HEARTBEAT
-    ours      : custom mode in which it obeys velocity setpoints; land, hold: modes it goes to by itself
-    climbs    : whether it takes off by setpoints; else by the command TAKE_OFF once armed
-    bytewise  : whether integers travel as their bytes in PARAM_VALUE (PX4), not as a converted float
-    guards    : parameters that are checked
+    number                 : MAV_AUTOPILOT in its HEARTBEAT
+    ours                   : custom mode in which it obeys velocity setpoints
+    land, hold             : custom modes that it enters by itself
+    takes_off_by_setpoints : False: it takes off by the command TAKE_OFF once it is armed
+    integers_as_bytes      : PARAM_VALUE holds the bytes of an integer (PX4) instead of a converted float
+    parameter_checks       : parameters that are checked before the drone arms
     """
 
     name: str
@@ -86,23 +88,26 @@ class Autopilot:
     parameter_checks: tuple[ParameterCheck, ...]
 
     def mode_parameters(self, mode: int) -> tuple[float, ...]:
-        """Parameters of DO_SET_MODE for a custom mode."""
+        """Return the parameters of DO_SET_MODE for a custom mode."""
         if self.name == "px4":
             return CUSTOM_MODE_ENABLED, float(mode >> 16 & 0xFF), float(mode >> 24 & 0xFF)
         return CUSTOM_MODE_ENABLED, float(mode)
 
     def parameter_value(self, value: float, type_: int) -> float:
-        """Value of a PARAM_VALUE, whose integers may travel as their bytes."""
+        """Return the value of a PARAM_VALUE, also where it holds the bytes of an integer."""
+        # PX4 puts the four bytes of an int32 into the float field, so 4 arrives as 5.6e-45; ArduPilot converts it.
         if self.integers_as_bytes and type_ == INT32_TYPE:
             return float(struct.unpack("<i", struct.pack("<f", value))[0])
         return value
 
 
 def px4_mode(main: int, sub: int = 0) -> int:
-    """Custom mode of PX4 from its main mode and sub mode."""
+    """Return the custom mode of PX4 for a main mode and a sub mode."""
     return main << 16 | sub << 24
 
 
+# The ranges are ours where the manuals allow more: a drone that hovers after a lost link is hit by one that flies on,
+# so both autopilots must land.
 AUTOPILOTS = {
     "px4": Autopilot(
         "px4",
@@ -151,20 +156,20 @@ AUTOPILOTS = {
 
 
 class AutopilotCommands:
-    """Packs what a node says to its autopilot.
+    """Packs the messages of a node to its autopilot.
 
-    system : of the autopilot; the node is another component of the same system
+    system : system id of the autopilot; the node is another component of the same system
     """
 
     def __init__(self, autopilot: Autopilot, system: int, component: int = 191):
         self.autopilot, self.system, self._pack = autopilot, system, FramePacker(system, component)
 
     def heartbeat(self) -> bytes:
-        """A sign of life of an onboard computer (MAV_TYPE 18)."""
+        """Pack the heartbeat of an onboard computer (MAV_TYPE 18)."""
         return self._pack(common_dialect().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
 
     def velocity(self, velocity: tuple[float, float, float], boot_ms: int) -> bytes:
-        """A setpoint: velocity east, north, up, m/s."""
+        """Pack a setpoint: velocity east, north, up, m/s."""
         vx, vy, vz = swap_enu_ned(*velocity)
         return self._pack(
             common_dialect().MAVLink_set_position_target_local_ned_message(
@@ -188,29 +193,30 @@ class AutopilotCommands:
         )
 
     def command(self, number: int, *parameters: float) -> bytes:
-        """A command with up to seven parameters."""
+        """Pack a command with up to seven parameters."""
+        # COMMAND_LONG always has seven parameters; those that a command does not use are zero.
         seven = (*parameters, *(0.0,) * (7 - len(parameters)))
         return self._pack(common_dialect().MAVLink_command_long_message(self.system, 1, number, 0, *seven))
 
     def set_mode(self, mode: int) -> bytes:
-        """Ask for a custom mode."""
+        """Pack the command that sets a custom mode."""
         return self.command(SET_MODE_COMMAND, *self.autopilot.mode_parameters(mode))
 
     def arm(self, yes: bool, force: bool = False) -> bytes:
-        """Ask to arm or to disarm; force cuts the motors in the air."""
+        """Pack the command that arms or disarms; force cuts the motors in the air."""
         return self.command(ARM_COMMAND, float(yes), FORCE_DISARM_CODE if force else 0.0)
 
     def request_parameter(self, name: str) -> bytes:
-        """Ask for the value of one parameter."""
+        """Request the value of one parameter."""
         kind: Any = common_dialect().MAVLink_param_request_read_message
         return self._pack(kind(self.system, 1, name.encode("ascii"), -1))
 
     def request_message(self, number: int) -> bytes:
-        """Ask for one message once."""
+        """Request one message once."""
         return self.command(REQUEST_MESSAGE_COMMAND, float(number))
 
     def request_streams(self) -> list[bytes]:
-        """Ask for all messages that a node flies by, at their rates."""
+        """Request all messages that a node flies by, at their rates."""
         return [
             self.command(MESSAGE_INTERVAL_COMMAND, float(number), 1e6 / rate) for number, rate in STREAM_RATES.items()
         ]

@@ -1,8 +1,11 @@
-"""MAVLink 2 frames: packing, and finding whole frames in bytes from a wire.
+"""MAVLink 2 frames: layouts of messages, packing, and the search for whole frames in a stream of bytes.
 
 A frame is 0xFD, length of the payload, two bytes of flags, sequence, system, component, three bytes of message number,
-payload, checksum and, if flag 1 is set, 13 bytes of signature. What a wire delivers is bytes: frames are found by their
-checksum, and after rubbish the search goes on at the next byte, so that no false start hides what follows it.
+payload, checksum and, if flag 1 is set, 13 bytes of signature. A wire delivers bytes: frames are recognised by their
+checksum. After bytes that are no frame the search goes on at the next byte, so that no false start hides a frame.
+
+`pymavlink.dialects.v20.common` supplies the layouts of the common messages. It needs neither NumPy nor a compiler;
+`pymavlink.mavutil` would import NumPy and is not used. pymavlink packs, but never receives.
 """
 
 from functools import cache
@@ -15,21 +18,23 @@ from airflock.support import LinkError
 
 @cache
 def common_dialect() -> Any:
-    """The module of the common dialect; LinkError where pymavlink is not installed."""
+    """Return the module of the common dialect; raise LinkError where pymavlink is not installed."""
     try:
         from pymavlink.dialects.v20 import common as found
-    except ImportError as fault:
-        raise LinkError("MAVLink needs pymavlink: pip install 'airflock[fly]'") from fault
+    except ImportError as error:
+        raise LinkError("MAVLink needs pymavlink: pip install 'airflock[fly]'") from error
     return found
 
 
 class MessageLayout(NamedTuple):
     """Layout of one message on the wire.
 
-    unpack : payload of full length → values in wire order; size : of that payload, bytes
-    crc_extra : byte that goes into the checksum and stands for the message's definition
-    single, texts : names of numbers and of texts, with the index of the value
-    arrays : name, index of the first value, how many values
+    unpack    : function from a payload of full length to the values in wire order
+    size      : length of the payload, bytes
+    crc_extra : byte that stands for the message's definition in the checksum
+    numbers   : name and index of each number
+    arrays    : name, index of the first value, count of values
+    texts     : name and index of each text
     """
 
     name: str
@@ -43,11 +48,12 @@ class MessageLayout(NamedTuple):
 
 @cache
 def message_layout(message: int) -> MessageLayout | None:
-    """Layout of a message by its number; None where the dialect does not know it."""
+    """Return the layout of a message by its number; None where the dialect does not know it."""
     kind = common_dialect().mavlink_map.get(message)
     if kind is None:
         return None
     single, arrays, texts, index = [], [], [], 0
+    # The wire order of fields is by size, not by declaration: `orders` maps one to the other.
     by_place = sorted(zip(kind.orders, kind.fieldnames, kind.fieldtypes, strict=True))
     for (_, name, type_), count in zip(by_place, kind.array_lengths, strict=True):
         if type_ == "char":
@@ -64,13 +70,14 @@ def message_layout(message: int) -> MessageLayout | None:
 
 
 def message_fields(message: int, payload: bytes) -> dict[str, Any]:
-    """Fields of a message by name; a payload that was cut at its trailing zeros is filled up again.
+    """Return the fields of a message by name; trailing zeros that the sender cut off are restored.
 
     Raises LinkError where the dialect does not know the message or the payload is too long for it.
     """
     known = message_layout(message)
     if known is None or len(payload) > known.size:
         raise LinkError(f"message {message} with {len(payload)} bytes is not in the common dialect")
+    # MAVLink 2 cuts trailing zeros off; the layout needs the full length.
     flat = known.unpack(payload.ljust(known.size, b"\0"))
     found: dict[str, Any] = {name: flat[index] for name, index in known.numbers}
     for name, index, count in known.arrays:
@@ -81,7 +88,7 @@ def message_fields(message: int, payload: bytes) -> dict[str, Any]:
 
 
 def checksum(data: bytes, crc_extra: int) -> int:
-    """Checksum of a frame's bytes after the first, with the message's extra byte (CRC-16/MCRF4XX)."""
+    """Return the checksum of a frame's bytes after the first, with the message's extra byte (CRC-16/MCRF4XX)."""
     found = common_dialect().x25crc(data)
     found.accumulate(bytes((crc_extra,)))
     return int(found.crc)
@@ -98,7 +105,7 @@ MAX_FRAME_LENGTH = HEADER_LENGTH + 255 + CHECKSUM_LENGTH + SIGNATURE_LENGTH
 
 
 class MavlinkFrame(NamedTuple):
-    """A whole frame with a right checksum: who sent it, what it is, and its payload without trailing zeros."""
+    """A whole frame with a valid checksum: sender, message number, and payload without trailing zeros."""
 
     system: int
     component: int
@@ -106,32 +113,32 @@ class MavlinkFrame(NamedTuple):
     payload: bytes
 
     def values(self) -> dict[str, Any]:
-        """Its fields by name."""
+        """Return the fields by name."""
         return message_fields(self.message, self.payload)
 
 
 class FramePacker:
-    """Packs messages of one sender; counts its frames as MAVLink wants it."""
+    """Packs messages of one sender and numbers its frames as MAVLink requires."""
 
     def __init__(self, system: int, component: int):
         self._mav = common_dialect().MAVLink(None, srcSystem=system, srcComponent=component)
 
     def __call__(self, message: Any) -> bytes:
-        """Bytes of a message of the dialect, unsigned."""
+        """Return the unsigned bytes of a message of the dialect."""
         data = bytes(message.pack(self._mav))
         self._mav.seq = (self._mav.seq + 1) & 0xFF
         return data
 
 
 def message_number(head: bytes) -> int:
-    """Number of the message of a frame that starts with these bytes (at least HEADER of them)."""
+    """Return the message number of a frame from its first bytes (at least HEADER_LENGTH of them)."""
     return int.from_bytes(head[7:10], "little")
 
 
 def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
-    """The frame that starts at an index, and how many bytes it takes.
+    """Return the frame that starts at an index, and how many bytes it takes.
 
-    (None, 0) means that more bytes must come before this can be told; (None, 1) that no frame starts here.
+    (None, 0): more bytes are needed to decide. (None, 1): no frame starts here.
     """
     if data[start] != FRAME_MAGIC:
         return None, 1
@@ -139,20 +146,24 @@ def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
     if len(head) < HEADER_LENGTH:
         return None, 0
     length, flags, known = head[1], head[2], message_layout(message_number(head))
+    # An unknown message cannot be checked, because its extra byte is unknown: it is rubbish to us. A length of zero
+    # never occurs, for MAVLink 2 keeps at least one byte.
     if known is None or length > known.size or length == 0 or flags & ~SIGNED_FLAG:
         return None, 1
     end = start + HEADER_LENGTH + length
     whole = end + CHECKSUM_LENGTH + (SIGNATURE_LENGTH if flags & SIGNED_FLAG else 0)
     if len(data) < whole:
         return None, 0
-    told = int.from_bytes(data[end : end + CHECKSUM_LENGTH], "little")
-    if told != checksum(data[start + 1 : end], known.crc_extra):
+    sent_checksum = int.from_bytes(data[end : end + CHECKSUM_LENGTH], "little")
+    # Only the checksum tells a frame from a payload byte that happens to be 0xFD, so a mismatch costs one byte, not
+    # the length that the false header claims.
+    if sent_checksum != checksum(data[start + 1 : end], known.crc_extra):
         return None, 1
     return MavlinkFrame(head[5], head[6], message_number(head), data[start + HEADER_LENGTH : end]), whole - start
 
 
 def frames_in(datagram: bytes) -> list[MavlinkFrame]:
-    """All whole frames in one datagram; a part of a frame is lost."""
+    """Return all whole frames in one datagram; a partial frame is dropped."""
     found, start = [], 0
     while start < len(datagram):
         frame, taken = frame_at(datagram, start)
@@ -163,17 +174,17 @@ def frames_in(datagram: bytes) -> list[MavlinkFrame]:
 
 
 class FrameStream:
-    """Frames from a serial line: keeps what is not whole yet, at most one frame's length."""
+    """Frames from a serial line; keeps at most one partial frame between two calls."""
 
     def __init__(self) -> None:
         self._rest = b""
 
     def __call__(self, data: bytes) -> list[MavlinkFrame]:
-        """Frames that are whole now."""
+        """Take bytes and return the frames that are complete now."""
         return [frame for frame, _ in self._frames_and_bytes(data)]
 
     def whole_frames(self, data: bytes) -> list[bytes]:
-        """The bytes of frames that are whole now, with their signatures."""
+        """Take bytes and return those of complete frames, with their signatures."""
         return [whole for _, whole in self._frames_and_bytes(data)]
 
     def _frames_and_bytes(self, data: bytes) -> list[tuple[MavlinkFrame, bytes]]:

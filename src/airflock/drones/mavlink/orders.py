@@ -1,8 +1,8 @@
-"""Orders of the operator: signed with a key of their own, so that no drone, captured or not, can give them.
+"""Orders of the operator, signed with a key of their own, so that no drone, captured or not, can give one.
 
 An order is a TUNNEL message: 35 bytes of content and an Ed25519 signature of 64. It travels inside a frame that is
-signed like all others. The content holds a magic word, version, what to do, for whom (0: all), the mission, the time
-at which the order was given, the time it is for, and a point in degrees and millimetres.
+signed like all others. The content holds a magic word, version, kind of order, target (0: all), the mission, the time
+at which the order was given, the time for which it is, and a point in degrees and millimetres.
 """
 
 import struct
@@ -20,7 +20,7 @@ SEAL_LENGTH = 64  # bytes of an Ed25519 signature
 
 
 class OrderKind(IntEnum):
-    """What an operator may order."""
+    """Kinds of orders."""
 
     START = 1  # arm and take off, at the time that the order is for
     GO = 2  # flock now, without waiting for those who are missing
@@ -42,9 +42,11 @@ CALL_OFF_ORDERS = frozenset(
 class OperatorOrder(NamedTuple):
     """One order.
 
-    do    : what; target : system id, 0 for all; mission : number of the mission
-    given : when it was given, at : when it is to be done, µs of Unix time
-    point : latitude and longitude in 1e-7 degrees, altitude in mm; only for GOTO
+    target   : system id, 0 for all
+    mission  : number of the mission
+    given_at : time at which it was given, µs of Unix time
+    at       : time at which it is to be done, µs of Unix time
+    point    : latitude and longitude in 1e-7 degrees, altitude in mm; only for GOTO
     """
 
     kind: OrderKind
@@ -56,20 +58,20 @@ class OperatorOrder(NamedTuple):
 
 
 def order_bytes(order: OperatorOrder) -> bytes:
-    """The bytes that are signed."""
+    """Return the bytes that are signed."""
     return ORDER_FORMAT.pack(
         ORDER_MAGIC, ORDER_VERSION, int(order.kind), order.target, order.mission, order.given_at, order.at, *order.point
     )  # fmt: skip
 
 
 def new_operator_keys() -> tuple[bytes, bytes]:
-    """A private and a public key, 32 bytes each."""
+    """Return a new private and public key, 32 bytes each."""
     private = _ed25519().Ed25519PrivateKey.generate()
     return private.private_bytes_raw(), private.public_key().public_bytes_raw()
 
 
 def order_message(order: OperatorOrder, private_key: bytes) -> Any:
-    """The dialect's message of an order, sealed with the operator's private key."""
+    """Return the dialect's message of an order, signed with the operator's private key."""
     data = order_bytes(order)
     sealed = data + _ed25519().Ed25519PrivateKey.from_private_bytes(private_key).sign(data)
     padded = list(sealed.ljust(128, b"\0"))
@@ -77,9 +79,9 @@ def order_message(order: OperatorOrder, private_key: bytes) -> Any:
 
 
 def parse_order(values: dict[str, Any], public_key: bytes) -> OperatorOrder | None:
-    """The order in the fields of a message; None if it is no order or its seal is not the operator's.
+    """Return the order in the fields of a message; None if it is no order or the operator did not sign it.
 
-    Raises LinkError where the library that checks seals is not installed.
+    Raises LinkError where the library that checks signatures is not installed.
     """
     data = bytes(values["payload"])[: values["payload_length"]]
     if len(data) != ORDER_FORMAT.size + SEAL_LENGTH or values["payload_type"] != 0:
@@ -102,10 +104,10 @@ class _KeyClasses(NamedTuple):
 
 
 def _ed25519() -> _KeyClasses:
-    """The library's keys, loaded when a seal is first made or checked: it takes longer to load than all the rest."""
+    """Import the classes of the keys when a signature is first made or checked: the import is slow."""
     try:
         from cryptography.exceptions import InvalidSignature
         from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
-    except ImportError as fault:
-        raise LinkError("orders of the operator need cryptography: pip install 'airflock[fly]'") from fault
+    except ImportError as error:
+        raise LinkError("orders of the operator need cryptography: pip install 'airflock[fly]'") from error
     return _KeyClasses(Ed25519PrivateKey, Ed25519PublicKey, InvalidSignature)

@@ -1,10 +1,8 @@
-"""Signed packets between drones: MAVLink 2 signatures with one secret per mission, sent and strictly received.
+"""Signed packets between drones: MAVLink 2 signatures with one secret per mission, and their strict reception.
 
 A signature is the first six bytes of SHA-256 over secret, frame, link and stamp; a stamp counts 10 µs since 2015. The
-receiver checks in an order in which nothing that is wrong can change its state: header, length, sender, signature,
-then the stamp against the own clock and against the last one of this sender, and only then is the stamp kept. Of a
-packet that comes by two radios the second has the bytes of the first, whose signature has been found right.
-pymavlink's check keeps the stamp first, so that one forged datagram locks a neighbour out.
+receiver checks header, length, sender and signature, then the stamp against the own clock and against the last one of
+this sender. Only then does it keep the stamp, so that nothing invalid can change its state.
 """
 
 import hashlib
@@ -37,24 +35,24 @@ def write_key(path: Path, key: bytes) -> None:
     """Write a key to a new file of mode 0600; never over another."""
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    except FileExistsError as fault:
-        raise LinkError(f"{path}: exists; a key is never overwritten") from fault
+    except FileExistsError as error:
+        raise LinkError(f"{path}: exists; a key is never overwritten") from error
     try:
         with os.fdopen(handle, "w", encoding="ascii") as file:
             file.write(key.hex() + "\n")
-    except OSError as fault:  # a full disk; half a key is none
+    except OSError as error:  # a full disk; half a key is none
         path.unlink(missing_ok=True)
-        raise LinkError(f"{path}: cannot be written: {os_error_message(fault)}") from fault
+        raise LinkError(f"{path}: cannot be written: {os_error_message(error)}") from error
 
 
 def read_key(path: Path) -> bytes:
-    """Key from its file; refused if others can read it."""
+    """Read a key from its file; refuse a file that others can read."""
     try:
         mode, text = path.stat().st_mode, path.read_text(encoding="ascii").strip()
-    except OSError as fault:
-        raise LinkError(f"{path}: the key cannot be read: {os_error_message(fault)}") from fault
-    except UnicodeDecodeError as fault:
-        raise LinkError(f"{path}: is not a key; give {2 * KEY_LENGTH} hexadecimal digits") from fault
+    except OSError as error:
+        raise LinkError(f"{path}: the key cannot be read: {os_error_message(error)}") from error
+    except UnicodeDecodeError as error:
+        raise LinkError(f"{path}: is not a key; give {2 * KEY_LENGTH} hexadecimal digits") from error
     if mode & 0o077:
         raise LinkError(f"{path}: is readable by others (mode {mode & 0o777:04o}); chmod 600 {path}")
     try:
@@ -75,15 +73,15 @@ PACKET_REFUSALS = ("short", "header", "length", "own", "stranger", "signature", 
 
 
 def stamp_of_time(utc: int) -> int:
-    """Stamp of a time (µs of Unix time)."""
+    """Return the stamp of a time (µs of Unix time)."""
     return (utc - SIGNING_EPOCH) // 10
 
 
 class PacketSigner:
-    """Packs and signs messages of one sender.
+    """Packs and signs the messages of one sender.
 
-    last   : stamp that was used last, also before a restart; stamps only grow, and no time is taken from others
-    recent : the stamps that were used last, by which an echo of an own frame is known
+    last          : last used stamp, also from before a restart; stamps only grow, and no time is taken from others
+    recent_stamps : the latest stamps, by which an echo of an own frame is recognised
     """
 
     def __init__(self, key: bytes, system: int, component: int = 191, last: int = 0):
@@ -94,7 +92,9 @@ class PacketSigner:
         self.recent_stamps: deque[int] = deque(maxlen=256)
 
     def __call__(self, message: Any, utc: int) -> bytes:
-        """Signed bytes of a message of the dialect, sent at utc (µs of Unix time)."""
+        """Return the signed bytes of a message of the dialect, sent at utc (µs of Unix time)."""
+        # A clock that was set back must not repeat a stamp: receivers would refuse all packets until it has caught
+        # up.
         self.last = max(stamp_of_time(utc), self.last + 1)
         self.recent_stamps.append(self.last)
         self._mav.signing.timestamp = self.last
@@ -104,7 +104,7 @@ class PacketSigner:
 
 
 class ReceivedMessage(NamedTuple):
-    """A genuine message: sender, its stamp, number of the message, and its payload without trailing zeros."""
+    """A genuine message: sender, stamp, message number, and payload without trailing zeros."""
 
     system: int
     stamp: int
@@ -113,20 +113,20 @@ class ReceivedMessage(NamedTuple):
 
     @property
     def values(self) -> dict[str, Any]:
-        """Its fields by name."""
+        """Return the fields by name."""
         return message_fields(self.message, self.payload)
 
 
 class PacketReceiver:
     """Accepts signed frames of known senders, each once, and near the own time.
 
-    key     : secret of the mission
-    own     : own system id, from which nothing is accepted
-    senders : number of a message → the systems that may send it
-    started : own time when the receiver was made, µs of Unix time: nothing that was sent before is accepted, so that a
-              restart accepts no replay
-    heard   : system → last stamp, kept from before a restart
-    spread  : how far a sender's clock may be from the own, s
+    key                  : secret of the mission
+    own_id               : own system id, from which nothing is accepted
+    senders              : system ids that may send a message, by its number
+    started              : own time at the start, µs of Unix time: older packets are refused, so that a restart
+                           accepts no replay
+    last_stamps          : last stamp of each system, kept from before a restart
+    max_clock_difference : largest difference between a sender's clock and the own one, s
     """
 
     def __init__(
@@ -141,6 +141,8 @@ class PacketReceiver:
     ):
         self._key, self._own = key, own_id
         self._senders = {message: frozenset(systems) for message, systems in senders.items()}
+        # Nothing sent before the start is accepted, so a restart needs no file against replays. Time is never taken
+        # from a peer.
         self._min_stamp, self._max_clock_difference = (
             stamp_of_time(started),
             round(max_clock_difference * STAMPS_PER_SECOND),
@@ -152,11 +154,13 @@ class PacketReceiver:
         self.own_id_stamp: int | None = None  # stamp of the last genuine, fresh frame that bears our own system id
 
     def __call__(self, datagram: bytes, utc: int) -> ReceivedMessage | None:
-        """The message of a datagram that arrived at utc (µs of Unix time); None if it is refused."""
-        fault = self._refusal_reason(datagram, utc)
-        if fault:
-            self.refused[fault] += 1
-            if fault == "own":
+        """Return the message of a datagram that arrived at utc (µs of Unix time); None if it is refused."""
+        reason = self._refusal_reason(datagram, utc)
+        if reason:
+            self.refused[reason] += 1
+            # A genuine frame with the own id is an echo of ours, or a second drone with our number: the node decides
+            # which.
+            if reason == "own":
                 self.own_id_stamp = _datagram_stamp(datagram)
             return None
         system, stamp, message = datagram[5], _datagram_stamp(datagram), message_number(datagram)
@@ -167,7 +171,9 @@ class PacketReceiver:
         return ReceivedMessage(system, stamp, message, payload)
 
     def _refusal_reason(self, data: bytes, utc: int) -> str:
-        """Why a datagram is refused; empty if it is not. Changes nothing."""
+        """Return the reason to refuse a datagram, or an empty text. Changes nothing."""
+        # The order is the point: nothing wrong may change state. pymavlink keeps the stamp before it compares the
+        # signature, so one forged datagram locks a neighbour out for good.
         if len(data) < HEADER_LENGTH + CHECKSUM_LENGTH + SIGNATURE_LENGTH + 1:
             return "short"
         message = message_number(data)

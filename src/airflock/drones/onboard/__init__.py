@@ -1,1 +1,1 @@
-"""Layer 4: what one drone runs beside its autopilot: card, mission, limiter, log. Plain Python and pymavlink."""
+"""The program on board, beside the autopilot: card, mission, limiter, log. Plain Python and pymavlink."""

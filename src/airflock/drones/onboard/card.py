@@ -1,7 +1,7 @@
-"""The flight card: everything that a drone must know before it flies, as plain JSON that every member carries alike.
+"""The flight card: everything that a drone must know before it flies, as plain JSON; all members carry the same one.
 
-Written on the ground from a scenario (`airflock fly prepare`), read on board with the standard library. Its hash
-travels in every packet: drones with different cards do not flock.
+It is written on the ground from a scenario (`airflock fly prepare`), and read on board with the standard library. Its
+hash travels in every packet: drones with different cards do not flock.
 """
 
 import hashlib
@@ -57,7 +57,7 @@ from airflock.world import (
 
 
 def read_record(record_class: Any, table: Any, section: str, errors: list[str]) -> Any:
-    """A record of parameters from a table, its faults noted."""
+    """Read a record of parameters from a table; add its errors to the list."""
     if not isinstance(table, dict):
         errors.append(f"{section} = {table!r} is not a table")
         return None
@@ -69,15 +69,15 @@ def read_record(record_class: Any, table: Any, section: str, errors: list[str]) 
             )
     try:
         return record_class(**to_tuples({key: value for key, value in table.items() if key in known}))
-    except ParameterError as fault:
-        errors += [f"{section}.{line.partition('.')[2]}" for line in str(fault).splitlines()]
-    except (TypeError, ValueError) as fault:
-        errors.append(f"{section}: {fault}")
+    except ParameterError as error:
+        errors += [f"{section}.{line.partition('.')[2]}" for line in str(error).splitlines()]
+    except (TypeError, ValueError) as error:
+        errors.append(f"{section}: {error}")
     return None
 
 
 def to_tuples(table: Any) -> Any:
-    """A table whose lists are tuples."""
+    """Return a table with tuples in place of its lists."""
     if isinstance(table, dict):
         return {key: to_tuples(value) for key, value in table.items()}
     return tuple(to_tuples(value) for value in table) if isinstance(table, list) else table
@@ -90,7 +90,7 @@ def read_numbers(
     errors: list[str],
     other_keys: tuple[str, ...] = (),
 ) -> dict[str, float]:
-    """Numbers of a table within their ranges; what is wrong is noted."""
+    """Read numbers of a table within their ranges; add the errors to the list."""
     found = {}
     if not isinstance(table, dict):
         errors.append(f"{key_prefix} = {table!r} is not a table")
@@ -110,7 +110,7 @@ def read_numbers(
 
 
 def are_valid_shapes(rows: Any) -> bool:
-    """Whether the rows of a scene can be read: `world.shapes` and the tree of `world.bvh`."""
+    """Return True if the rows of a scene can be read: `world.shapes` and the tree of `world.bvh`."""
     if not isinstance(rows, dict) or set(rows) != {"shapes", "nodes", "links"}:
         return False
     wide = {"shapes": COLUMNS, "nodes": 6, "links": 3}
@@ -125,14 +125,14 @@ def are_valid_shapes(rows: Any) -> bool:
 
 
 def is_ring(corners: Any) -> bool:
-    """Whether it is a list of points."""
+    """Return True if a value is a list of points."""
     return isinstance(corners, list) and all(
         isinstance(c, list) and len(c) == 2 and all(type(v) in (int, float) and isfinite(v) for v in c) for c in corners
     )
 
 
 def read_public_key(text: Any, errors: list[str]) -> bytes:
-    """A public key from its digits; empty for none."""
+    """Return a public key from its hexadecimal digits; empty for none."""
     try:
         key = bytes.fromhex(text)
     except (TypeError, ValueError):
@@ -149,7 +149,7 @@ OWN_CHOICE = "our choice"
 
 @dataclass(frozen=True, kw_only=True)
 class SafetyLimits(Record):
-    """What the limiter allows, and when the mission gives up what it does."""
+    """Limits of the velocity, and thresholds at which a mission is interrupted or ended."""
 
     speed_max: float = quantity(6.0, "m/s", low=0.1, high=60.0, source=OWN_CHOICE, meaning="largest commanded speed")
     climb_max: float = quantity(2.0, "m/s", low=0.1, high=10.0, source=OWN_CHOICE, meaning="largest vertical speed")
@@ -251,7 +251,7 @@ FenceSide = tuple[float, float, float, float]
 
 
 class Fence:
-    """Sides of a polygon as the limiter reads them.
+    """A fence around the flight, as distances and normals of its sides for the limiter.
 
     corners : of a simple polygon, m
     """
@@ -263,10 +263,13 @@ class Fence:
         self.convex_planes = [inward_plane(a, b) for a, b in pairs] if is_convex(corners) else []
 
     def sides(self, x: float, y: float) -> list[FenceSide]:
-        """Distance (m, negative beyond) and inward unit normal of each side that can be met from a position.
+        """Return distance (m, negative beyond) and inward unit normal of each side that can be reached from a position.
 
-        All of a convex fence; of any other those that can be seen, and the nearest point for who is outside.
+        These are all sides of a convex fence; of any other, the sides that can be seen. From outside the nearest point
+        counts, too.
         """
+        # A convex fence is a handful of planes, each valid everywhere. A polygon with a notch needs the sides that
+        # can be seen from here, or a side behind another one would push.
         if self.convex_planes:
             return [(a * x + b * y + d, a, b, 0.0) for a, b, _, d in self.convex_planes]
         count = len(self.edges)
@@ -275,7 +278,7 @@ class Fence:
         return [(s.distance, s.nx, s.ny, 0.0) for s in found if s.distance < FAR]
 
     def outside(self, x: float, y: float) -> float:
-        """Distance beyond the fence, m; negative inside."""
+        """Return the distance beyond the fence, m; negative inside."""
         if self.convex_planes:
             return -min([a * x + b * y + d for a, b, _, d in self.convex_planes])
         return float(polygon.obstacle(x, y, 0.0, self.edges, 0, len(self.edges)).distance)
@@ -287,27 +290,28 @@ MEMBER_PARTS = ("law", "body")  # of which members may have numbers of their own
 
 
 def law_of_package(name: str) -> Model:
-    """A law of the package by its name."""
+    """Return a law of the package by its name."""
+    # A law is named, never carried as code: a card is data. Laws of a user's own fly from an installed package.
     if not name.isidentifier():
         raise CardError([f"law.kind = {name!r} is not a law of this version"])
     try:
         return model(import_module(f"airflock.parts.laws.{name}"))
-    except ModuleNotFoundError as fault:
-        raise CardError([f"law.kind = {name!r} is not a law of this version"]) from fault
+    except ModuleNotFoundError as error:
+        raise CardError([f"law.kind = {name!r} is not a law of this version"]) from error
 
 
 def read_law(table: Any, errors: list[str], section: str = "law") -> tuple[Model | None, Any]:
-    """Law and parameters of a card; what is wrong is added to the faults."""
+    """Read law and parameters of a card; add the errors to the list."""
     try:
         found = law_of_package(str(table["kind"]))
-    except (AirflockError, KeyError, TypeError) as fault:
-        errors.append(str(fault) if isinstance(fault, AirflockError) else f"{section}.kind is missing")
+    except (AirflockError, KeyError, TypeError) as error:
+        errors.append(str(error) if isinstance(error, AirflockError) else f"{section}.kind is missing")
         return None, None
     return found, read_record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, section, errors)
 
 
 def read_body(table: Any, errors: list[str]) -> tuple[Any, Any]:
-    """Body and parameters of a card; what is wrong is added to the faults."""
+    """Read body and parameters of a card; add the errors to the list."""
     kind = table.get("kind") if isinstance(table, dict) else None
     if not isinstance(kind, str) or kind not in BODIES:
         errors.append(f"body.kind = {kind!r} is none of {', '.join(BODIES)}")
@@ -320,7 +324,7 @@ def read_body(table: Any, errors: list[str]) -> tuple[Any, Any]:
 def read_member_parts(
     d: Mapping[str, Any], law: Model | None, body: Any, errors: list[str]
 ) -> tuple[tuple[Model, Any, Any], ...]:
-    """Law, its numbers and those of the body of each member; none where all are alike."""
+    """Read law, its numbers and those of the body of each member; empty where all are equal."""
     rows = d["own"]
     if rows == [] or law is None or body is None:
         return ()
@@ -350,7 +354,7 @@ def read_member_parts(
 
 
 def wall_reach(law: Model, p: Any) -> float:
-    """How far (m) a law with these numbers looks for what stands in the world."""
+    """Return the distance (m) up to which a law with these numbers perceives walls and obstacles."""
     return FAR if law.wall_reach is None else float(law.wall_reach(p))
 
 
@@ -364,7 +368,7 @@ CARD_KEYS = (
 OPTIONAL_CARD_KEYS = (
     "topology",
     "groups",
-)  # left out where a drone meets all whom it hears, where no law asks for groups
+)  # left out where a drone meets all that it hears, and where no law uses groups
 HEARING_KEYS = (
     "once",
     "any_stamp",
@@ -379,13 +383,15 @@ MAX_SYSTEM_ID = 250  # system ids above are left to ground stations
 class FlightCard:
     """A checked card.
 
-    mission  : number of the mission; expires: Unix time, s
-    site     : origin of local coordinates; members: system ids, in the order of their layers
-    operator : public key of who may give orders, 32 bytes; empty: nobody may
-    own      : law, its numbers and those of the body of each member, where they differ from one to another
-    groups   : number of each member's group, -1 in none, where a law asks for it
-    fence    : corners; low, high: heights above the site, m
-    height   : at which the flock flies, m above the site; in space, of the arena's centre
+    mission  : number of the mission
+    expires  : Unix time, s
+    site     : origin of local coordinates
+    members  : system ids, in the order of their layers
+    operator : public key of the operator, 32 bytes; empty: nobody may give orders
+    own      : law, its numbers and those of the body of each member, where members differ
+    groups   : number of each member's group, -1 in none, where a law needs it
+    low, high: heights of the fence above the site, m
+    height   : of the flock, m above the site; in space, of the arena's centre
     hash     : SHA-256 of the document without its own entry
     """
 
@@ -419,15 +425,16 @@ class FlightCard:
     document: Mapping[str, Any] = field(repr=False)
 
     def layer(self, member: int) -> float:
-        """Height (m) of a member's own layer."""
+        """Return the height (m) of a member's own layer."""
+        # Each member has a layer of its own, so that paths to and from home never meet.
         return self.safety.base + self.safety.layer * self.members.index(member)
 
     def turn(self, member: int) -> float:
-        """How long (s) after the start of the first member this one starts."""
+        """Return how long (s) after the first member this one starts."""
         return self.safety.start_step * self.members.index(member)
 
     def pilot(self, member: int) -> Pilot:
-        """The pilot of one member."""
+        """Make the pilot of one member."""
         index = self.members.index(member)
         law, p, b = self.own[index] if self.own else (self.model, self.parameters, self.body_parameters)
         return Pilot(
@@ -437,27 +444,29 @@ class FlightCard:
         )  # fmt: skip
 
     def sides(self, own: State) -> list[tuple[float, float, float, float]]:
-        """Distance (m, negative beyond) and inward normal of the fence's sides and of obstacles, for the limiter."""
+        """Return distance (m, negative beyond) and inward normal of the fence's sides and of obstacles."""
         found = self.fence.sides(own.x, own.y)
         return found + [(s.distance, s.nx, s.ny, s.nz) for s in self.place.solid_surfaces(*self.law_state(own)[:3])]
 
     def outside(self, x: float, y: float, z: float) -> float:
-        """Distance of a local position beyond the fence or its heights, m; negative inside."""
+        """Return the distance of a local position beyond the fence or its heights, m; negative inside."""
+        # Below the fence is no breach: a drone lands and takes off there.
         return max(self.fence.outside(x, y), z - self.high)
 
     def law_state(self, own: State) -> State:
-        """A local state as the law counts heights: from the arena's centre, or from the ground of a scene."""
+        """Return a local state with the law's height: from the arena's centre, or from the ground of a scene."""
         x, y, z, vx, vy, vz = own
         return own if self._has_ground else State(x, y, z - self.height, vx, vy, vz)
 
     @cached_property
     def _has_ground(self) -> bool:
-        """Whether it flies over the ground of a scene."""
+        """Return True if it flies over the ground of a scene."""
         return bool(self.document["shapes"].get("shapes"))
 
 
 def card_hash(document: Mapping[str, Any]) -> str:
-    """SHA-256 of a card without its own entry, over JSON with sorted keys and no spaces."""
+    """Return the SHA-256 of a card without its own entry, over JSON with sorted keys and no spaces."""
+    # Sorted keys and no spaces: the hash must not depend on who wrote the JSON.
     rest = {key: value for key, value in document.items() if key != "hash"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
@@ -471,34 +480,34 @@ def write_card(path: Path, document: Mapping[str, Any]) -> FlightCard:
 
 
 def read_card(path: Path) -> FlightCard:
-    """Card from its file; CardError with one line per fault."""
+    """Read a card from its file; CardError has one line per error."""
     with as_error(path, CardError):
         return parse_card(parse_json(read_text(path)), str(path))
 
 
 def parse_card(document: Any, source: str = "card") -> FlightCard:
-    """Card from its document, all faults at once."""
+    """Make a card from its document; CardError lists all errors."""
     if not isinstance(document, dict) or document.get("airflock_card") != CARD_VERSION:
         raise CardError([f"{source}: is not a flight card of version {CARD_VERSION}"])
-    faults: list[str] = []
+    errors: list[str] = []
     for key in document:
         if key not in (*CARD_KEYS, *OPTIONAL_CARD_KEYS):
-            faults.append(f"{key} is not known{suggest(key, (*CARD_KEYS, *OPTIONAL_CARD_KEYS), lead='; ', cutoff=0.6)}")
-    faults += [f"{key} is missing" for key in CARD_KEYS if key not in document]
-    if faults:
-        raise CardError([f"{source}: {fault}" for fault in faults])
+            errors.append(f"{key} is not known{suggest(key, (*CARD_KEYS, *OPTIONAL_CARD_KEYS), lead='; ', cutoff=0.6)}")
+    errors += [f"{key} is missing" for key in CARD_KEYS if key not in document]
+    if errors:
+        raise CardError([f"{source}: {error}" for error in errors])
     if document["hash"] != card_hash(document):
         raise CardError([f"{source}: was changed after it was written: its hash does not match"])
-    card = _made(document, faults)
-    if not faults and card is not None:
-        faults += _geometry_errors(card)
-    if faults or card is None:
-        raise CardError([f"{source}: {fault}" for fault in faults])
+    card = _card_from_document(document, errors)
+    if not errors and card is not None:
+        errors += _geometry_errors(card)
+    if errors or card is None:
+        raise CardError([f"{source}: {error}" for error in errors])
     return card
 
 
-def _made(d: Mapping[str, Any], errors: list[str]) -> FlightCard | None:
-    """Card from a document whose keys are all there; None where something is wrong with what they hold, as noted."""
+def _card_from_document(d: Mapping[str, Any], errors: list[str]) -> FlightCard | None:
+    """Make a card from a document that has all keys; None where a value is invalid, as noted in errors."""
     site = read_numbers(
         d["site"],
         "site",
@@ -569,14 +578,16 @@ def _made(d: Mapping[str, Any], errors: list[str]) -> FlightCard | None:
 
 
 def _packet_policy(extrapolate: bool, max_age: float, once: bool = False, any_stamp: bool = False) -> PacketPolicy:
-    """What is done with neighbours' data; any_stamp: they count whatever time they say that they are of."""
+    """Return the use of neighbours' data; with any_stamp all times of packets are accepted."""
+    # In a simulation all agents share one clock, and packets of a jittering radio may overtake each other; believing
+    # any stamp is what the simulated agents do.
     if any_stamp:
         return PacketPolicy(extrapolate, max_age, once, early=FAR, drop_reordered=False)
     return PacketPolicy(extrapolate, max_age, once)
 
 
 def _member_errors(members: Any) -> list[str]:
-    """What is wrong with the list of system ids."""
+    """Return the errors in the list of system ids."""
     listed = members if isinstance(members, list) else []
     wrong = [m for m in listed if type(m) is not int or not 1 <= m <= MAX_SYSTEM_ID]
     if wrong:
@@ -587,15 +598,15 @@ def _member_errors(members: Any) -> list[str]:
 
 
 def _corner_errors(corners: Any) -> list[str]:
-    """What is wrong with the corners of the fence."""
+    """Return the errors in the corners of the fence."""
     if not is_ring(corners):
         return ["fence.corners: give a list of points [east, north] in m"]
-    fault = polygon_error(corners)
-    return [f"fence.corners {fault}"] if fault else []
+    error = polygon_error(corners)
+    return [f"fence.corners {error}"] if error else []
 
 
 def _group_errors(groups: Any, members: Any) -> list[str]:
-    """What is wrong with the numbers of the members' groups."""
+    """Return the errors in the numbers of the members' groups."""
     sound = isinstance(groups, list) and all(type(g) is int and -1 <= g <= MAX_SYSTEM_ID for g in groups)
     if not sound or (groups and isinstance(members, list) and len(groups) != len(members)):
         return [f"groups = {groups!r}: give the number of each member's group, -1 in none"]
@@ -603,34 +614,35 @@ def _group_errors(groups: Any, members: Any) -> list[str]:
 
 
 def _geometry_errors(card: FlightCard) -> list[str]:
-    """Why fence, heights, layers and walls do not fit together, or why no drone can fly the law."""
-    faults = []
+    """Return the reasons for which fence, heights, layers and walls do not fit, or a law cannot be flown."""
+    errors = []
     world = arena.Parameters(**to_tuples(card.document["world"]))
     top = card.layer(card.members[-1])
     if not card.low < card.safety.base or top > card.high:
-        faults.append(
+        errors.append(
             f"fence: layers from {card.safety.base:g} to {top:g} m do not lie between fence.low = {card.low:g} m and "
             f"fence.high = {card.high:g} m; raise fence.high or lower safety.layer"
         )
     low, high = (0.0, 0.0) if card.flat else arena.heights_of(world)
     if card.height + low < card.low or card.height + high > card.high:
-        faults.append(
+        errors.append(
             f"height = {card.height:g} m from {low:+g} m to {high:+g} m does not lie between fence.low = {card.low:g} "
             f"m and fence.high = {card.high:g} m"
         )
     for x, y in _arena_points(world):
         if card.outside(x, y, card.height) > 1e-6:
-            faults.append(f"fence: does not enclose the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
+            errors.append(f"fence: does not enclose the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
             break
     kind = TOPOLOGIES[card.topology.kind]
     if kind is not None and kind.flat and not card.flat:
-        faults.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
+        errors.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
     if world.edges != "open":
-        faults.append(f"world.edges = {world.edges!r}: real space has no such edges; set world.edges = 'open'")
+        errors.append(f"world.edges = {world.edges!r}: real space has no such edges; set world.edges = 'open'")
+    # A pilot is made here, on the ground, so that a law that cannot fly this card fails before take-off.
     for member in card.members if card.own else card.members[:1]:
-        with collect_errors(faults):
+        with collect_errors(errors):
             card.pilot(member)
-    return faults
+    return errors
 
 
 def _arena_points(world: arena.Parameters) -> list[tuple[float, float]]:

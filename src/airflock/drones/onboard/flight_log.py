@@ -1,6 +1,6 @@
 """The log of a flight on board: every input with its time, and the digest of every output, one JSON line each.
 
-A log can be flown again through the same node, bit for bit: what was decided and why can be looked at in a debugger.
+A log can be flown again through the same node, bit for bit: each decision can be looked at in a debugger.
 """
 
 import hashlib
@@ -23,9 +23,9 @@ MAX_CLOCK = 1e12  # s; clocks count from the start of a computer
 
 
 class LoggingNode:
-    """A node whose inputs and outputs are written down; it is used like the node itself.
+    """A node whose inputs and outputs are written to a log; it is used like the node itself.
 
-    write : takes one line without its end
+    write : function that takes one line without its end
     """
 
     def __init__(
@@ -51,34 +51,35 @@ class LoggingNode:
         self.node.radio(datagram, now)
 
     def tick(self, now: float) -> NodeOutput:
-        """Let the node decide."""
+        """Let the node decide, and log the digest of its output."""
         out = self.node.tick(now)
         s = self.node.autopilot_link.state
-        told = {"phase": self.node.phase.name, "own": None if s is None else list(s), "set": list(self.node.command)}
+        entry = {"phase": self.node.phase.name, "own": None if s is None else list(s), "set": list(self.node.command)}
         notes = {"notes": out.notes} if out.notes else {}
-        self._line(t=now, out=output_digest(out), **told, **notes)
+        self._line(t=now, out=output_digest(out), **entry, **notes)
         return out
 
 
 def output_digest(out: NodeOutput) -> str:
-    """First 16 digits of the SHA-256 of everything that a tick gave."""
+    """Return the first 16 digits of the SHA-256 of all that a tick gave."""
+    # Outputs are logged as digests: a replay makes their bytes again.
     text = repr((out.autopilot, out.radios, out.notes))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 class ReplayedTick(NamedTuple):
-    """One tick of a log flown again: its time, what the log tells, what the node gave, and whether they agree."""
+    """One tick of a log flown again: time, entry of the log, output of the node, and whether they agree."""
 
     time: float
-    told: dict[str, Any]
+    entry: dict[str, Any]
     out: NodeOutput
     same: bool
 
 
 class LoggedTick(NamedTuple):
-    """What a log tells of one tick: its line, the time of the own clock (s), phase, own state, and command (m/s).
+    """One tick in a log: line, time of the own clock (s), phase, own state, and command (m/s).
 
-    own : x, y, z (m), vx, vy, vz (m/s); None where the node did not know it
+    own : x, y, z (m), vx, vy, vz (m/s); None where the node did not know its state
     """
 
     line: int
@@ -89,7 +90,7 @@ class LoggedTick(NamedTuple):
 
 
 class LogTicks(NamedTuple):
-    """What a log tells without being flown again: whose it is, Unix time (µs) at a time of its clock (s), its ticks."""
+    """Ticks of a log that is not flown again, with the member, and Unix time (µs) at a time of its clock (s)."""
 
     member: int
     now: float
@@ -98,7 +99,7 @@ class LogTicks(NamedTuple):
 
 
 def read_log_ticks(path: Path) -> LogTicks:
-    """What the log of a file tells of its ticks; LinkError, which names file and line, where it is no log."""
+    """Read the ticks of a log file; LinkError names the file and the line that is no log."""
     with as_error(path, LinkError):
         try:
             with open(path, encoding="utf-8") as lines:
@@ -113,14 +114,14 @@ def read_log_ticks(path: Path) -> LogTicks:
                     if "out" in row:
                         ticks.append(_tick(row, number, before))
                 return LogTicks(member, begun[0], utc, ticks)
-        except LinkError as fault:
-            raise LinkError(f"{path}: {fault}") from fault
-        except UnicodeDecodeError as fault:
-            raise LinkError(f"{path}: this is not a log of a flight on board") from fault
+        except LinkError as error:
+            raise LinkError(f"{path}: {error}") from error
+        except UnicodeDecodeError as error:
+            raise LinkError(f"{path}: this is not a log of a flight on board") from error
 
 
 def _tick(row: Mapping[str, Any], number: int, now: float) -> LoggedTick:
-    """What a line tells of a tick; LinkError where it is none that a node wrote."""
+    """Read the tick of a line; raise LinkError where no node wrote such a line."""
     given, phase = row.get("own"), str(row.get("phase"))
     own, command = _numbers_or_none(given, 6), _numbers_or_none(row.get("set"), 3)
     if (own is None and given is not None) or command is None or phase not in MissionPhase.__members__:
@@ -131,7 +132,7 @@ def _tick(row: Mapping[str, Any], number: int, now: float) -> LoggedTick:
 
 
 def replay(lines: Iterable[str], card: FlightCard, key: bytes) -> Iterator[ReplayedTick]:
-    """Fly a log again; LinkError where it is of another card or is no log."""
+    """Fly a log again; raise LinkError where it belongs to another card or is no log."""
     rows = enumerate(_rows(lines), 1)
     _, head = next(rows, (0, {}))
     if head.get("log") != LOG_VERSION:
@@ -152,8 +153,10 @@ def replay(lines: Iterable[str], card: FlightCard, key: bytes) -> Iterator[Repla
 
 
 def _node_at_start(head: Mapping[str, Any], card: FlightCard, key: bytes) -> Node:
-    """The node as it was when the log began; LinkError where the first line does not tell it."""
+    """Make the node as it was at the start of the log; raise LinkError where the first line lacks it."""
     heard, radios = head.get("heard"), head.get("radios")
+    # A replay starts the node as it was: the same memory, clock and radios, or the first packet is judged
+    # differently.
     stamps = [head.get(name) for name in ("sent", "order", "utc", "since")]
     stamps += list(heard.values()) if isinstance(heard, dict) else [None]
     periods: list[Any] = radios if isinstance(radios, list) and 0 < len(radios) <= MAX_RADIOS else [None]
@@ -169,19 +172,20 @@ def _node_at_start(head: Mapping[str, Any], card: FlightCard, key: bytes) -> Nod
 
 
 def _time_and_bytes(row: Mapping[str, Any], number: int, before: float) -> tuple[float, bytes]:
-    """Time (s) and bytes of a line; LinkError where it is none that a node wrote."""
+    """Read time (s) and bytes of a line; raise LinkError where no node wrote such a line."""
     now: Any
     try:
         now, data = row["t"], bytes.fromhex(row.get("a", row.get("r", "")))
     except (KeyError, TypeError, ValueError):
         now, data = None, b""
+    # Times that run backwards or jump by hours mean a damaged file.
     if not _is_number(now) or not before <= now <= before + MAX_GAP or not {"a", "r", "out"} & set(row):
         raise LinkError(f"line {number}: was not written by a node")
     return float(now), data
 
 
 def _numbers_or_none(values: Any, count: int) -> tuple[float, ...] | None:
-    """So many numbers of a line; None if they are none."""
+    """Return this many numbers of a line; None if it does not hold them."""
     sound = isinstance(values, list) and len(values) == count and all(map(_is_number, values))
     return tuple(map(float, values)) if sound else None
 
@@ -191,15 +195,15 @@ def _is_number(value: Any) -> bool:
 
 
 def replay_log_file(path: Path, card: FlightCard, key: bytes) -> Iterator[ReplayedTick]:
-    """Fly the log of a file again; LinkError, which names the file, where it is of another card or is no log."""
+    """Fly the log of a file again; LinkError names the file that belongs to another card or is no log."""
     with as_error(path, LinkError):
         try:
             with open(path, encoding="utf-8") as lines:
                 yield from replay(lines, card, key)
-        except LinkError as fault:
-            raise LinkError(f"{path}: {fault}") from fault
-        except UnicodeDecodeError as fault:
-            raise LinkError(f"{path}: this is not a log of a flight on board") from fault
+        except LinkError as error:
+            raise LinkError(f"{path}: {error}") from error
+        except UnicodeDecodeError as error:
+            raise LinkError(f"{path}: this is not a log of a flight on board") from error
 
 
 def _rows(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
@@ -213,16 +217,16 @@ def _rows(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
 
 
 def read_node_memory(path: Path) -> NodeMemory:
-    """What outlived a restart; nothing where there is no file yet."""
+    """Read a node's memory from before a restart; empty where there is no file yet."""
     try:
         row = parse_json_object(read_text(path))
         return NodeMemory(int(row["sent"]), {int(k): int(v) for k, v in row["heard"].items()}, int(row["order"]))
     except FileNotFoundError:
         return NodeMemory()
-    except (OSError, TextError, ValueError, OverflowError, KeyError, TypeError, AttributeError) as fault:
-        raise LinkError(f"{path}: cannot be read as the memory of a node; remove it, on the ground only") from fault
+    except (OSError, TextError, ValueError, OverflowError, KeyError, TypeError, AttributeError) as error:
+        raise LinkError(f"{path}: cannot be read as the memory of a node; remove it, on the ground only") from error
 
 
 def memory_json(memory: NodeMemory) -> str:
-    """The text of the file that `read_node_memory` reads."""
+    """Return the text of the file that `read_node_memory` reads."""
     return json.dumps(memory._asdict())

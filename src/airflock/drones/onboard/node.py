@@ -1,6 +1,6 @@
 """The node: what a drone runs beside its autopilot. Bytes in, bytes out, the clock passed in; no sockets, no files.
 
-autopilot(bytes, now) and radio(datagram, now) take what arrives; tick(now) gives what is to be sent. The same inputs
+autopilot(bytes, now) and radio(datagram, now) take what arrives; tick(now) returns what is to be sent. The same inputs
 give the same outputs to the bit, so that a log can be flown again.
 """
 
@@ -21,27 +21,27 @@ from airflock.drones.onboard.steering import NO_VELOCITY, TIME_TOLERANCE, PhaseV
 # ---- Outgoing messages
 
 ORIGIN_MESSAGE = 49
-UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, as large as a packet can tell
+UNKNOWN_CLOCK_ERROR = 2.5  # s; error of a clock that nobody has compared yet, the largest value of a packet
 
 
 def requests(commands: AutopilotCommands, autopilot: Autopilot, link: AutopilotLink) -> list[bytes]:
-    """What is still to be asked of the autopilot: parameters, origin, streams."""
-    asked = [
+    """Return requests to the autopilot for missing parameters, origin and streams."""
+    messages = [
         commands.request_parameter(guard.name)
         for guard in autopilot.parameter_checks
         if guard.name not in link.parameters
     ]
     if link.origin is None:
-        asked.append(commands.request_message(ORIGIN_MESSAGE))
+        messages.append(commands.request_message(ORIGIN_MESSAGE))
     if link.state is None or link.is_landed is None or not link.clock_offsets:
-        asked += commands.request_streams()
-    return asked
+        messages += commands.request_streams()
+    return messages
 
 
 def own_status(
     card: FlightCard, link: AutopilotLink, own: State, time: int, phase: MissionPhase, *, peers: int
 ) -> DroneStatus:
-    """The own status at a time (µs of Unix time), with how many peers are heard."""
+    """Return the own status at a time (µs of Unix time), with the number of peers that are heard."""
     offset = link.clock_offset()
     return DroneStatus(
         time=time,
@@ -66,7 +66,7 @@ PREFLIGHT_PHASES = frozenset({MissionPhase.BOOT, MissionPhase.READY, MissionPhas
 
 
 class NodeMemory(NamedTuple):
-    """What outlives a restart: own last stamp, last stamp of each member, when the last order was given (µs)."""
+    """State that survives a restart: own last stamp, last stamp of each member, time of the last order (µs)."""
 
     sent: int = 0
     heard: dict[int, int] = {}  # never changed in place
@@ -74,21 +74,22 @@ class NodeMemory(NamedTuple):
 
 
 class NodeOutput(NamedTuple):
-    """What one tick gives: bytes for the autopilot, datagrams for each radio, lines for a person to read."""
+    """Output of one tick: bytes for the autopilot, datagrams for each radio, lines for a person to read."""
 
     autopilot: list[bytes]
     radios: tuple[list[bytes], ...]
     notes: list[str]
 
 
+# Bytes and a clock in, bytes out: lock-step fleets, fuzzing and replay of a log run the code that flies.
 class Node:
     """One member of a flock.
 
     card, member, key : flight card, own system id, secret of the mission
-    now, utc : the own clock (s) and Unix time (µs) at the start; both run alike from then on
-    memory   : what outlived a restart
+    now, utc : own clock (s) and Unix time (µs) at the start; both advance together
+    memory   : state from before a restart
     radios   : periods (s) at which each radio sends the same packet
-    since    : µs of Unix time; nothing that was sent before is accepted. By default the start, so that no replay is
+    since    : µs of Unix time; older packets are refused. The default is the start, so that no replay is accepted
     """
 
     def __init__(
@@ -128,11 +129,11 @@ class Node:
     # ------------------------------------------------------------------------------------------------------ in
 
     def utc(self, now: float) -> int:
-        """Unix time (µs) at a time of the own clock (s)."""
+        """Return the Unix time (µs) at a time of the own clock (s)."""
         return self._clock_zero + round(now * 1e6)
 
     def shift_clock(self, ahead: int) -> None:
-        """Set the own clock forward by so much, µs: it stamps packets by it, and tells how old those of others are."""
+        """Set the own clock forward (µs): it stamps own packets and gives the age of others."""
         self._clock_zero += ahead
         self.peers.shift_clock(1e-6 * ahead)
         self.pilot.shift_clock(1e-6 * ahead)
@@ -147,6 +148,7 @@ class Node:
         got = self._receiver(datagram, utc)
         if got is None:
             stamp = self._receiver.own_id_stamp
+            # A radio may repeat our own frames to us. Only a stamp that we never sent proves a second sender.
             if stamp is not None and stamp not in self._signer.recent_stamps and not self._has_twin:
                 self._has_twin = True
                 self._notes.append(f"another sender signs as member {self.member}")
@@ -154,12 +156,13 @@ class Node:
         if got.message == orders.TUNNEL_MESSAGE:
             self.operator.take(got.values, now, utc)
             return
-        told = parse_status_payload(got.payload, self.card.site)
-        if told is None:
+        status = parse_status_payload(got.payload, self.card.site)
+        if status is None:
             return
-        at = (told.time - self._clock_zero) * 1e-6
-        if self.peers.take(got.system, told, at, now):
+        at = (status.time - self._clock_zero) * 1e-6
+        if self.peers.take(got.system, status, at, now):
             index, peer = self.card.members.index(got.system), self.peers.all[got.system]
+            # A drone on the ground is no neighbour: the law would flee from it or follow it down.
             if peer.is_flying:
                 assert peer.state is not None, "it was taken"
                 self.pilot.receive(
@@ -170,17 +173,17 @@ class Node:
 
     @property
     def memory(self) -> NodeMemory:
-        """What must outlive a restart."""
+        """Return the state that must survive a restart."""
         return NodeMemory(self._signer.last, dict(self._receiver.heard), self.operator.last_order_time)
 
     @property
     def stands(self) -> bool:
-        """Whether it stands because somebody whom it has lost could be near."""
+        """Return True if it stands because a lost neighbour could be near."""
         return self._standing_velocity is not None
 
     @property
     def refused(self) -> dict[str, int]:
-        """Datagrams and orders that were refused, by reason."""
+        """Return the counts of refused datagrams and orders, by reason."""
         return (
             self._receiver.refused | self.peers.refused | {f"order: {k}": n for k, n in self.operator.refused.items()}
         )
@@ -188,7 +191,8 @@ class Node:
     # ----------------------------------------------------------------------------------------------------- out
 
     def tick(self, now: float) -> NodeOutput:
-        """Look at the mission and say what is to be sent; to be called every `safety.tick` seconds."""
+        """Decide by the mission table, and return what is to be sent; call it every `safety.tick` seconds."""
+        # A computer that is overloaded ticks late; the mission counts that like a law that fails.
         late = now - self._last_tick > self.card.safety.late
         self._last_tick = now
         out = NodeOutput([], tuple([] for _ in self._radio_periods), [])
@@ -198,12 +202,13 @@ class Node:
         step = next_step(self.phase, known, self.card.safety)
         if step.row is not None:
             self._enter(step.next_phase, step.row.event, now, out)
+            # The row that fired has changed the phase, and the order would be lost with this tick: give it to the
+            # next one.
             if known.order in orders.CALL_OFF_ORDERS and step.row.number != "23" and self.phase in FLYING_PHASES:
                 self.operator.again(known.order)  # something else came first at this tick
+        # A kill that could not be done now must not strike later, when the pilot has given the drone back.
         if known.kill_confirmed and self.phase != MissionPhase.DONE:
-            self.operator.kill_confirmed = (
-                False  # it must not wait for the moment at which the pilot gives the drone back
-            )
+            self.operator.kill_confirmed = False
             self._notes.append(f"not killed: in {self.phase.name} this node does not fly the drone")
         self.peers.member_joined = False
         self._report_missing(known)
@@ -220,6 +225,7 @@ class Node:
         order = self.operator.next_order()
         if self.phase in PREFLIGHT_PHASES and self.operator.missed(self.utc(now), self.card.turn(self.member)):
             self._notes.append("not started: something was missing when its turn came; order the start once more")
+        # The limiter would stop at the fence anyway; refusing the order tells the operator why.
         if order == OrderKind.GOTO and self._is_goal_outside():
             order = None
             self._notes.append("the point that was ordered lies outside the fence; not followed")
@@ -250,7 +256,7 @@ class Node:
         return goal is None or self.card.outside(*goal) > 0.0 or goal[2] < self.card.low
 
     def _enter(self, to: MissionPhase, event: str, now: float, out: NodeOutput) -> None:
-        """Change the phase, and do what belongs to it once."""
+        """Change the phase, and do once what belongs to it."""
         was = self.phase
         self._notes.append(f"{was.name} → {to.name}: {event}")
         if to == MissionPhase.HOLD and was in FLYING_PHASES:
@@ -268,35 +274,38 @@ class Node:
             self._takeoff_at, self._overload_count = now, 0
         if to in (MissionPhase.FLOCK, MissionPhase.GOTO) and was not in (MissionPhase.FLOCK, MissionPhase.GOTO):
             self._phase_velocity.begin(now)
+        # A node that was restarted in flight does not know its home: the place where it begins to return has to do.
         if to == MissionPhase.RETURN and self.home is None and self.autopilot_link.state is not None:
             self.home = (self.autopilot_link.state.x, self.autopilot_link.state.y, self.card.layer(self.member))
         self.phase, self._phase_since, self._command_at = to, now, -1e9
 
     def _report_missing(self, mission_facts: MissionFacts) -> None:
-        """Tell a person what is missing, when it changes."""
-        told = (
+        """Note for a person what is missing, whenever it changes."""
+        missing = (
             (mission_facts.fault,)
             if self.phase == MissionPhase.FAULT
             else mission_facts.missing
             if self.phase in PREFLIGHT_PHASES
             else ()
         )
-        if told != self._reported_missing:
-            self._notes += [f"missing: {line}" for line in told if line not in self._reported_missing]
-            self._reported_missing = told
+        if missing != self._reported_missing:
+            self._notes += [f"missing: {line}" for line in missing if line not in self._reported_missing]
+            self._reported_missing = missing
 
     # ------------------------------------------------------------------------------------------------- steering
 
     def _steer(self, now: float, mission_facts: MissionFacts, out: NodeOutput) -> None:
-        """Say to the autopilot what the phase asks for: a setpoint, a mode, or nothing."""
+        """Send the autopilot the setpoint or the mode of the phase, or nothing."""
         phase, say = self.phase, self._speaker
         if phase == MissionPhase.DONE and self.operator.kill_confirmed:
+            # Once at least, even if the autopilot seems disarmed: its last heartbeat may be a second old.
             if (mission_facts.armed or now == self._phase_since) and self._may_retry(now):
                 out.autopilot.append(say.arm(False, force=True))
             elif not mission_facts.armed and now - self._phase_since > KILL_SECONDS:
-                self.operator.kill_confirmed = False  # whoever arms it from now on has another flight in mind
+                self.operator.kill_confirmed = False  # whoever arms it later starts another flight
         if phase == MissionPhase.LAND and not mission_facts.in_land_mode and self._may_retry(now):
             out.autopilot.append(say.set_mode(self.card.autopilot.land))
+        # PX4 leaves its mode when setpoints end, so they go on in every phase in which we fly, and before we arm.
         streams = (
             phase in FLYING_PHASES
             or phase == MissionPhase.ARMING
@@ -329,7 +338,7 @@ class Node:
         out.autopilot.append(say.velocity(self.command, round(now * 1e3)))
 
     def _climb_height(self) -> float:
-        """How far above the ground the own layer lies, m."""
+        """Return the height of the own layer above the ground, m."""
         ground = 0.0 if self.autopilot_link.state is None else min(self.autopilot_link.state.z, self.card.safety.base)
         return self.card.layer(self.member) - (ground if self.autopilot_link.is_landed else 0.0)
 
@@ -342,7 +351,7 @@ class Node:
     # ------------------------------------------------------------------------------------------------- speaking
 
     def _speak(self, now: float, out: NodeOutput) -> None:
-        """Heartbeat, questions to the autopilot, and the own status on every radio that is due."""
+        """Send heartbeat, requests to the autopilot, and the own status on every radio that is due."""
         if now - self._heartbeat_at >= RETRY_PERIOD - TIME_TOLERANCE:
             self._heartbeat_at = now
             out.autopilot.append(self._speaker.heartbeat())
@@ -358,11 +367,11 @@ class Node:
                 out.radios[k].append(datagram)
 
     def status_datagrams(self, now: float) -> list[bytes]:
-        """The own status as a signed datagram; nothing while no own position is known."""
+        """Return the own status as a signed datagram; nothing while the own position is unknown."""
         own = self.autopilot_link.state
         if own is None:
             return []
-        told = own_status(
+        status = own_status(
             self.card,
             self.autopilot_link,
             own,
@@ -370,4 +379,4 @@ class Node:
             self.phase,
             peers=self.peers.heard(now),
         )
-        return [self._signer(status_message(told, self.card.site), self.utc(now))]
+        return [self._signer(status_message(status, self.card.site), self.utc(now))]

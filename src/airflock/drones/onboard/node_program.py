@@ -1,4 +1,4 @@
-"""Run a node: its sockets, its clock, its files. The only part on board that does input and output."""
+"""The program of a node: its sockets, its clock, its files. Only this part does input and output on board."""
 
 import argparse
 import os
@@ -39,10 +39,10 @@ class Port(Protocol):
     """One open port."""
 
     def fileno(self) -> int:
-        """Number of the open file."""
+        """Return the number of the open file."""
 
     def read(self) -> list[bytes]:
-        """What has arrived: datagrams, or one piece of a stream."""
+        """Return what has arrived: datagrams, or one piece of a stream."""
 
     def write(self, data: bytes) -> bool:
         """Send; False if the port could not take it now."""
@@ -52,34 +52,34 @@ class Port(Protocol):
 
 
 class UdpAddresses(NamedTuple):
-    """Where a UDP port listens and sends."""
+    """Addresses at which a UDP port listens and to which it sends."""
 
     here: tuple[str, int]
     destination: tuple[str, int] | None
 
 
 def open_port(text: str) -> Port:
-    """Open a port from its text; LinkError in one line if it cannot be."""
+    """Open a port from its text; raise LinkError, one line, where it cannot be opened."""
     kind, _, rest = text.partition(":")
     try:
         if kind == "udp":
             return UdpPort(_place(rest, text))
         if kind == "serial":
             return SerialPort(rest, text)
-    except OSError as fault:
-        raise LinkError(f"{text}: {fault.strerror}") from fault
-    except UnicodeError as fault:
-        raise LinkError(f"{text}: is not a valid name of a computer") from fault
+    except OSError as error:
+        raise LinkError(f"{text}: {error.strerror}") from error
+    except UnicodeError as error:
+        raise LinkError(f"{text}: is not a valid name of a computer") from error
     raise LinkError(f"{text}: {PORT_FORMS}")
 
 
 def check_port(text: str) -> None:
-    """Refuse the text of a port that can be none, before it is opened. Raises LinkError, one line."""
+    """Check the text of a port before it is opened; raise LinkError, one line, where it is invalid."""
     kind, _, rest = text.partition(":")
     if kind == "udp":
         here, _, there = rest.partition(">")
-        for told in (here, there) if there else (here,):
-            _address(told, text)
+        for address in (here, there) if there else (here,):
+            _address(address, text)
     elif kind != "serial":
         raise LinkError(f"{text}: {PORT_FORMS}")
 
@@ -90,7 +90,7 @@ def _place(rest: str, text: str) -> UdpAddresses:
 
 
 def _resolved(host: str, port: int) -> tuple[str, int]:
-    """An address by its number: a name is looked up once, before the first packet, so a wrong one is found early."""
+    """Return the numeric address of a name. The look-up happens once, before the first packet, to fail early."""
     return socket.gethostbyname(host), port
 
 
@@ -119,24 +119,24 @@ class UdpPort:
 
     @property
     def here(self) -> tuple[str, int]:
-        """Where it listens."""
+        """Return the address at which it listens."""
         host, port = self._socket.getsockname()
         return str(host), int(port)
 
     def fileno(self) -> int:
-        """Number of the open file."""
+        """Return the number of the open file."""
         return self._socket.fileno()
 
     def aim(self, there: tuple[str, int]) -> None:
-        """Send there from now on, whoever speaks."""
+        """Send to this address from now on, whoever sends to it."""
         self._destination, self._answers_last_sender = there, False
 
     def read(self) -> list[bytes]:
-        """The datagrams that have arrived."""
+        """Return the datagrams that have arrived."""
         return [data for data, _ in self.read_from()]
 
     def read_from(self) -> list[tuple[bytes, tuple[str, int]]]:
-        """The datagrams that have arrived, each with who sent it; at most MOST of them."""
+        """Return the datagrams that have arrived, each with its sender; at most MAX_DATAGRAMS of them."""
         found: list[tuple[bytes, tuple[str, int]]] = []
         take = self._socket.recvfrom
         while len(found) < MAX_DATAGRAMS:
@@ -171,8 +171,8 @@ class SerialPort:
     def __init__(self, rest: str, text: str):
         if termios is None:
             raise LinkError(f"{text}: serial lines need a POSIX system such as Linux; give udp:HOST:PORT")
-        path, _, told = rest.rpartition(":")
-        speed: Callable[..., int] | int | None = getattr(termios, f"B{told}", None) if told.isdigit() else None
+        path, _, rate = rest.rpartition(":")
+        speed: Callable[..., int] | int | None = getattr(termios, f"B{rate}", None) if rate.isdigit() else None
         if not path or not isinstance(speed, int):
             raise LinkError(f"{text}: give serial:/dev/NAME:BAUD with a usual baud rate such as 57600 or 921600")
         self._file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -182,18 +182,18 @@ class SerialPort:
             mode[2] = termios.CS8 | termios.CREAD | termios.CLOCAL
             mode[4] = mode[5] = speed
             termios.tcsetattr(self._file, termios.TCSANOW, mode)
-        except BaseException as fault:
+        except BaseException as error:
             os.close(self._file)
-            if isinstance(fault, termios.error):  # is no OSError
-                raise LinkError(f"{text}: {fault}") from fault
+            if isinstance(error, termios.error):  # is no OSError
+                raise LinkError(f"{text}: {error}") from error
             raise
 
     def fileno(self) -> int:
-        """Number of the open file."""
+        """Return the number of the open file."""
         return self._file
 
     def read(self) -> list[bytes]:
-        """The bytes that have arrived."""
+        """Return the bytes that have arrived."""
         try:
             data = os.read(self._file, MAX_DATAGRAM)
         except OSError:  # nothing has arrived, or the line was pulled out
@@ -201,7 +201,7 @@ class SerialPort:
         return [data] if data else []
 
     def write(self, data: bytes) -> bool:
-        """Send bytes; what the line cannot take at once is dropped as a whole frame."""
+        """Send bytes; a frame that the line cannot take at once is dropped as a whole."""
         try:
             return os.write(self._file, data) == len(data)
         except OSError:
@@ -219,9 +219,10 @@ DataHandler = Callable[[bytes, float], None]  # takes bytes, and when they were 
 
 
 class TaskRest(NamedTuple):
-    """A rest.
+    """A rest of a task.
 
-    until : time.monotonic, s; hears: ports that are read as soon as anything arrives, each with who takes it
+    until    : end of the rest by time.monotonic, s
+    handlers : ports that are read as soon as anything arrives, each with the function that takes it
     """
 
     until: float
@@ -229,13 +230,16 @@ class TaskRest(NamedTuple):
 
 
 def hand_on_data(port: Port, handler: DataHandler) -> None:
-    """Hand on what has arrived."""
+    """Hand the data that has arrived to its handlers."""
     for data in port.read():
         handler(data, time.monotonic())
 
 
 def run_alone(task: Generator[TaskRest, None, Result]) -> Result:
-    """Live a life to its end; what it returns. Its ports are heard at least once at each rest, however late it is."""
+    """Run a task to its end, and return its result.
+
+    Ports are read at least once at each rest, however late the task is.
+    """
     hears: Sequence[tuple[Port, DataHandler]] = ()
     poll, hands = select.poll(), {}  # type: ignore[var-annotated]
     while True:
@@ -276,15 +280,15 @@ SAVE_PERIOD = 1.0  # s between two writes of what outlives a restart
 
 
 class ArgumentParser(argparse.ArgumentParser):
-    """Arguments whose faults are one line, as all others are."""
+    """A parser of arguments whose errors are one line, as all others are."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and end with status 2."""
+        """Print the error and end with status 2."""
         self.exit(2, f"airflock: {message}; {self.prog} --help lists all options\n")
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Arguments of the command."""
+    """Make the parser of the command."""
     found = ArgumentParser(
         prog="python -m airflock.drones.onboard", description=COMMAND_HELP, epilog=COMMAND_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
@@ -303,7 +307,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run; exit status 2 and one line per fault for whatever cannot be flown."""
+    """Run the command; exit with status 2 and one line per error where nothing can be flown."""
     given = make_parser().parse_args(arguments)
     if threading.current_thread() is threading.main_thread():  # only there are signals heard
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # a service that is stopped ends as by Ctrl-C
@@ -311,8 +315,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the terminal that it was started from has gone, as ssh does
     try:
         return _run(given)
-    except AirflockError as fault:
-        for line in str(fault).splitlines():
+    except AirflockError as error:
+        for line in str(error).splitlines():
             sys.stderr.write(f"airflock: {line}\n")
         return 2
     except KeyboardInterrupt:
@@ -321,7 +325,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, list[Port]]:
-    """Card, key and open ports; all faults at once."""
+    """Return card, key and open ports; raise all errors together."""
     faults: list[str] = []
     card, key = None, b""
     with collect_errors(faults):
@@ -334,6 +338,7 @@ def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, l
             )
     with collect_errors(faults):
         key = read_key(arguments.key or arguments.card.with_suffix(".key"))
+    # Typing it is the point: nobody starts a node by accident or from a script that was copied.
     if not arguments.i_am_the_pilot and not arguments.check:
         faults.append("--i-am-the-pilot is missing: somebody must hold the transmitter, know the law of the place, and "
                       "be able to take over each drone at any time")  # fmt: skip
@@ -348,6 +353,7 @@ def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, l
             port.close()
         raise CardError(faults)
     for text in arguments.radio:
+        # A port without a destination answers whoever speaks first: two such ports wait for each other for ever.
         if text.startswith("udp:") and ">" not in text:
             sys.stderr.write(
                 f"airflock: note: --radio {text} sends to nobody before it has heard somebody; where no router speaks "
@@ -367,10 +373,11 @@ def _run(arguments: argparse.Namespace) -> int:
                 f"{arguments.card}: {card.name}, {len(card.members)} members, hash {card.hash[:8]}: fits\n"
             )
             return 0
+        # Mode x: a log is evidence and is never overwritten. The buffer keeps the disk out of the tick.
         with open(log_file, "x", encoding="utf-8", buffering=1 << 16) as log:
             run_node(card, arguments.member, key, ports, memory_file, log, write_line=_write_line)
-    except OSError as fault:
-        raise LinkError(f"{fault.filename or log_file}: {fault.strerror}") from fault
+    except OSError as error:
+        raise LinkError(f"{error.filename or log_file}: {error.strerror}") from error
     finally:
         for port in ports:
             port.close()
@@ -378,7 +385,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _write_line(text: str) -> None:
-    """Say a line, if anybody can still hear it: a terminal that has gone or a full disk must not bring a drone down."""
+    """Print a line, and ignore a closed terminal or a full disk: neither may bring a drone down."""
     with suppress(OSError):
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
@@ -388,23 +395,25 @@ def run_node(
     card: FlightCard, member: int, key: bytes, ports: Sequence[Port], memory_file: Path, log: TextIO,
     write_line: Callable[[str], None], has_ended: Callable[[], bool] = lambda: False,
 ) -> None:  # fmt: skip
-    """Make a node, and let it live on the real clock with a log and a memory; the first port is the autopilot's."""
+    """Run a node on the real clock with a log and a memory; the first port is the autopilot's."""
     s, memory = card.safety, read_node_memory(memory_file)
+    # The first radio is the fast one; all others repeat the same packets at the slow rate.
     radios = (s.status_period, *(s.slow_period,) * (len(ports) - 2))
     now, utc = time.monotonic(), time.time_ns() // 1000
     node = Node(card, member, key, now=now, utc=utc, memory=memory, radios=radios)
 
+    # One report for each file: at twenty ticks a second the terminal would be full of them.
     ended: set[str] = set()  # files that cannot be written any more
 
     def kept(name: str, action: Callable[[], object]) -> None:
-        """Write to a file; where that fails, say it once and fly on: a full disk must not bring a drone down."""
+        """Write to a file; report the first failure and fly on: a full disk must not bring a drone down."""
         if name in ended:
             return
         try:
             action()
-        except OSError as fault:
+        except OSError as error:
             ended.add(name)
-            tell(f"the {name} can no longer be written: {fault.strerror}; the flight goes on without it")
+            notify(f"the {name} can no longer be written: {error.strerror}; the flight goes on without it")
 
     def write(line: str) -> None:
         kept("log", lambda: log.write(line + "\n"))
@@ -415,18 +424,18 @@ def run_node(
         kept("memory", lambda: atomic.write_file(memory_file, memory_json(node.memory)))
         kept("log", log.flush)
 
-    def tell(note: str) -> None:
+    def notify(note: str) -> None:
         write_line(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
 
     try:
-        ticks = run_alone(tick_task(logged, ports, s.tick, tell, has_ended, save))
+        ticks = run_alone(tick_task(logged, ports, s.tick, notify, has_ended, save))
     finally:
         save()
-    tell(f"{ticks.total} ticks, {ticks.late} of them late by more than half a period, at most {ticks.worst:.3f} s")
+    notify(f"{ticks.total} ticks, {ticks.late} of them late by more than half a period, at most {ticks.worst:.3f} s")
 
 
 class NodeLike(Protocol):
-    """A node, or what is used like one."""
+    """The interface of a node and of its wrappers."""
 
     def autopilot(self, data: bytes, now: float, /) -> None:
         """Take bytes that came from the autopilot."""
@@ -439,7 +448,7 @@ class NodeLike(Protocol):
 
 
 class TickCounts(NamedTuple):
-    """Ticks of a node on the real clock: how many, how many were late by more than half a period, the worst (s)."""
+    """Ticks of a node on the real clock: total, late by more than half a period, the worst delay (s)."""
 
     total: int
     late: int
@@ -450,13 +459,14 @@ def tick_task(
     node: NodeLike, ports: Sequence[Port], period: float, notify: Callable[[str], None],
     has_ended: Callable[[], bool], save: Callable[[], None] = lambda: None,
 ) -> Generator[TaskRest, None, TickCounts]:  # fmt: skip
-    """Tick a node every `period` s on the real clock until `until` says so, and pass bytes.
+    """Tick a node every `period` s on the real clock until `has_ended` returns True, and pass bytes.
 
-    What the autopilot and serial lines send is read as it comes: an own state holds when it arrives, and a line keeps
-    little. Datagrams of radios tell themselves when they hold; they wait for the tick that looks at them, which spares
-    the computer a wake-up for each.
+    Bytes from the autopilot and from serial lines are read as they come: an own state holds when it arrives, and a line
+    buffers little. Datagrams of radios carry the time at which they hold; they wait for the next tick.
 
-    ports : the autopilot's first, then those of the radios; tell: takes the node's notes; save: called every second
+    ports : the autopilot's first, then those of the radios
+    notify: function that takes the node's notes
+    save  : function that is called every second
     """
     at_once: list[tuple[Port, DataHandler]] = [(ports[0], node.autopilot)]
     at_ticks: list[tuple[Port, DataHandler]] = []
@@ -486,7 +496,7 @@ def tick_task(
 
 
 def _whole_frames(port: Port, hand: DataHandler) -> DataHandler:
-    """Hand on whole signed frames: a serial radio gives pieces of a stream, UDP gives datagrams."""
+    """Hand on whole signed frames: a serial radio delivers pieces of a stream, UDP delivers datagrams."""
     if not isinstance(port, SerialPort):
         return hand
     line = FrameStream()

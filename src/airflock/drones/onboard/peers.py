@@ -1,4 +1,7 @@
-"""Peers: the newest plausible status of each member. Peers tell states; nothing that they send is a command."""
+"""Knowledge of others: status of each member, orders of the operator, and state and health of the autopilot.
+
+Peers send states; nothing that they send is a command. Implausible statuses and frames change nothing.
+"""
 
 from collections import deque
 from math import isfinite, sqrt
@@ -16,17 +19,16 @@ from airflock.support import FlightSite, LinkError, swap_enu_ned
 # ---- Peers
 
 HEARD_WITHIN = 2.0  # s; a peer whose last status is younger is heard
-AGE_COUNT = 10  # packets whose ages tell of a clock
-MAX_PACKET_AGE = (
-    1.0  # s beyond the radio's delay; a member whose packets are all older seems to have a clock that is behind
-)
+AGE_COUNT = 10  # packets whose ages reveal a wrong clock
+# s beyond the radio's delay; a member whose packets are all older seems to have a clock that is behind.
+MAX_PACKET_AGE = 1.0
 MAX_OUTSIDE = 100.0  # m; a member may be this far beyond the fence and still be believed
 PHASE_OF_NUMBER = {int(phase): phase for phase in MissionPhase}
 STATUS_REFUSALS = ("mission", "card", "phase", "fast", "far", "jump", "time")
 
 
 class Peer:
-    """What is known of one member."""
+    """State and history of one member."""
 
     def __init__(self) -> None:
         self.status: DroneStatus | None = None
@@ -34,8 +36,8 @@ class Peer:
         self.heard_at = -1e9
         self.packet_ages: deque[float] = deque(maxlen=AGE_COUNT)
         self.has_other_card = False
-        self.phase = MissionPhase.BOOT  # of its mission as it told it
-        self.state: State | None = None  # as it told it
+        self.phase = MissionPhase.BOOT  # of its mission, by its last status
+        self.state: State | None = None  # by its last status
         self.is_flying = False  # whether it is in the air, by its last word
 
 
@@ -50,7 +52,7 @@ class Peers:
         self.member_joined = False
 
     def take(self, member: int, status: DroneStatus, state_at: float, now: float) -> bool:
-        """Take note of a status that held at `state_at` and arrived now (own time, s); False if it is not believed."""
+        """Take a status that held at `state_at` and arrived now (own time, s); return False if it is implausible."""
         reason = self._refusal_reason(member, status, state_at, now)
         peer = self.all[member]
         if reason:
@@ -66,7 +68,7 @@ class Peers:
         return True
 
     def _refusal_reason(self, member: int, status: DroneStatus, at: float, now: float) -> str:
-        """Why a status is not believed; empty if it is."""
+        """Return the reason to refuse a status, or an empty text."""
         card, s = self._card, self._card.safety
         if status.mission != card.mission:
             return "mission"
@@ -91,22 +93,24 @@ class Peers:
         return ""
 
     def shift_clock(self, ahead: float) -> None:
-        """The own clock has been set forward by so much, s: by it, all states held earlier."""
+        """Move all known times back, after the own clock has been set forward (s)."""
         for peer in self.all.values():
             peer.at -= ahead
 
     def heard(self, now: float) -> int:
-        """How many members are heard now."""
+        """Return the number of members that are heard now."""
         return sum([now - peer.heard_at <= HEARD_WITHIN for peer in self.all.values()])
 
     def flying(self) -> dict[int, Peer]:
-        """Members that are in the air by their last word."""
+        """Return the members that were in the air by their last status."""
         return {who: peer for who, peer in self.all.items() if peer.is_flying}
 
     def is_own_clock_suspect(self) -> bool:
-        """Whether two or more members, and all that are known, seem to have a wrong clock: then it is the own."""
+        """Return True if at least two members, and all that are known, seem to have a wrong clock: then it is ours."""
         wrong, limit = 0, self._card.safety.clock_error
         for peer in self.all.values():
+            # The youngest of ten packets says most: delay only makes packets older, so a whole batch that is too old
+            # or from the future can only be a clock.
             if len(peer.packet_ages) == AGE_COUNT:
                 if -limit <= min(peer.packet_ages) <= self._card.delay + MAX_PACKET_AGE:
                     return False
@@ -118,16 +122,15 @@ class Peers:
 
 KILL_CONFIRM_WITHIN = 5_000_000  # µs; a kill must be confirmed within
 MAX_ORDER_AGE = 5_000_000  # µs; an order given longer ago is not obeyed
-MAX_START_DELAY = (
-    10_000_000  # µs after its turn a drone may still start; our choice: later somebody may stand beside it
-)
+# µs after its turn a drone may still start; our choice: later somebody may stand beside it.
+MAX_START_DELAY = 10_000_000
 ORDER_REFUSALS = ("seal", "mission", "old", "replay", "no library")
 
 
 class OperatorOrders:
     """Orders that were taken.
 
-    given : when the last order was given, µs of Unix time, kept over restarts, so that none is obeyed twice
+    last_order_time : time at which the last order was given, µs of Unix time; kept over restarts against replays
     """
 
     def __init__(self, card: FlightCard, member: int, last_order_time: int):
@@ -141,7 +144,7 @@ class OperatorOrders:
         self._queue: list[OrderKind] = []
 
     def take(self, values: dict[str, Any], now: float, utc: int) -> bool:
-        """Take the order in a message's fields; False if it is none for this mission, not sealed, old or a replay."""
+        """Take an order from a message; return False for another mission, a wrong signature or a replay."""
         try:
             order = parse_order(values, self._card.operator) if self._card.operator else None
         except LinkError:
@@ -152,8 +155,10 @@ class OperatorOrders:
             return self._refuse("mission")
         if abs(order.given_at - utc) > MAX_ORDER_AGE:
             return self._refuse("old")
+        # Orders grow in time, over restarts too; whoever records one cannot send it again.
         if order.given_at <= self.last_order_time:
             return self._refuse("replay")
+        # Also for orders to others: they prove that the operator is there, and use up their time.
         self.last_order_time, self.heard_at = order.given_at, now
         if order.target in (0, self._member):
             self._obey(order, utc)
@@ -173,6 +178,7 @@ class OperatorOrders:
         elif order.kind == OrderKind.GOTO:
             lat, lon, alt = order.point
             self.goal = self._card.site.local(lat * 1e-7, lon * 1e-7, alt * 1e-3)
+        # Two steps, because one wrong order must not drop a drone.
         elif order.kind == OrderKind.KILL:
             self._kill_at = utc
         elif order.kind == OrderKind.CONFIRM_KILL:
@@ -184,19 +190,19 @@ class OperatorOrders:
         self._queue.append(order.kind)
 
     def next_order(self) -> OrderKind | None:
-        """The order to be done at this tick, in the order in which they came."""
+        """Return the order of this tick; orders keep the sequence of their arrival."""
         return self._queue.pop(0) if self._queue else None
 
     def again(self, order: OrderKind) -> None:
-        """Take an order at the next tick once more, for something else came first at this one."""
+        """Put an order back for the next tick, because something else came first at this one."""
         self._queue.insert(0, order)
 
     def due(self, utc: int, member_delay: float) -> bool:
-        """Whether the start was ordered and the own turn (s after it) has come."""
+        """Return True if a start was ordered and the own turn (s after it) has come."""
         return self.start_at is not None and utc - self.start_at - round(member_delay * 1e6) >= 0
 
     def missed(self, utc: int, member_delay: float) -> bool:
-        """Whether the own turn was so long ago that it starts no more; then the start is forgotten."""
+        """Return True, and forget the start, if the own turn was too long ago."""
         if self.start_at is None or utc - self.start_at - round(member_delay * 1e6) <= MAX_START_DELAY:
             return False
         self.start_at = None
@@ -214,12 +220,15 @@ MOVING_SPEED = 0.3  # m/s; who flies faster than this cannot stay at the same pl
 
 
 class AutopilotLink:
-    """What is known from the autopilot's frames.
+    """State and health of the own drone, from the frames of its autopilot.
 
-    member  : its system id; site: origin of local coordinates
-    state   : own position and velocity, local; state_at : when they were heard, s; -1e9: never
-    far     : distance (m) from the site of a position so far away that it was refused last; 0: none was
-    refused : frames with implausible content; strangers: system ids of other autopilots on this wire
+    member        : its system id
+    site          : origin of local coordinates
+    state         : own position and velocity, local
+    state_at      : time at which the state arrived, s; -1e9: never
+    far           : distance (m) from the site of the last position that was refused as too far away; 0: none
+    refused       : number of frames with implausible content
+    other_systems : system ids of other autopilots on this wire
     """
 
     def __init__(self, autopilot: Autopilot, member: int, site: FlightSite):
@@ -244,10 +253,11 @@ class AutopilotLink:
         self._boot_ms = 0
 
     def __call__(self, data: bytes, now: float, utc: int, max_jump: float) -> None:
-        """Take bytes from the wire at now (s) and utc (µs of Unix time); jump: largest plausible step (m)."""
+        """Take bytes at now (s) and utc (µs of Unix time); max_jump: largest plausible step (m)."""
         self._max_jump = max_jump
         for frame in self._stream(data):
             if frame.system != self._member:
+                # Another vehicle on this wire means a wrong cable or a wrong system id: noticed before take-off.
                 if frame.message == 0 and frame.values()["autopilot"] != INVALID_AUTOPILOT:
                     self.other_systems.add(frame.system)
             elif frame.component == AUTOPILOT_COMPONENT:
@@ -259,10 +269,11 @@ class AutopilotLink:
             self.refused += 1
 
     def _boots(self, since_boot: int) -> None:
-        """Forget what an autopilot told before it was started anew on the ground: it is to be asked once more.
+        """Forget all values after an autopilot has rebooted on the ground, so that they are requested once more.
 
-        since_boot : ms, of a message; one that went back by more than REBOOT tells of a new start
+        since_boot : time since boot in a message, ms; a step back by more than REBOOT_MS means a reboot
         """
+        # In the air a time that goes back is a broken message, never a reason to forget the state.
         if since_boot >= self._boot_ms - REBOOT_MS:
             self._boot_ms = max(since_boot, self._boot_ms)
         elif not self.armed:
@@ -285,7 +296,7 @@ class AutopilotLink:
     def _system_time(self, v: dict[str, Any], now: float, utc: int) -> bool:
         self._boots(v["time_boot_ms"])
         if v["time_unix_usec"] < 1_500_000_000_000_000:
-            return False  # no satellite has told it the time yet
+            return False  # it has no time from a satellite yet
         self.clock_offsets = [*self.clock_offsets[1 - CLOCK_SAMPLES :], (v["time_unix_usec"] - utc) * 1e-6]
         return True
 
@@ -341,13 +352,15 @@ class AutopilotLink:
         return True
 
     def _moved(self, state: State, now: float) -> None:
-        """A new own state, unless it says that it moves and stands still: then the estimate is frozen."""
+        """Take a new own state, unless it has a velocity but an unchanged position: then the estimate is frozen."""
         last, passed = self.state, now - self.state_at
+        # A frozen estimate keeps sending: without this it would look fresh for ever.
         if last is not None and last[:3] == state[:3] and max(map(abs, state[3:])) > MOVING_SPEED:
             return
         if last is not None and passed < 1.0:
             step = max(abs(a - b) for a, b in zip(last[:3], state[:3], strict=True))
             speed = max(max(map(abs, last[3:])), max(map(abs, state[3:])))
+            # A jump that no velocity explains means that the navigation has reset.
             if step > 2.0 * speed * passed + self._max_jump:
                 self.jumped_at = now
         self.state, self.state_at = state, now
@@ -358,11 +371,12 @@ class AutopilotLink:
     }  # fmt: skip
 
     def position_disagreement(self, now: float) -> float:
-        """Distance (m) of the two positions that the autopilot tells, while both are fresh; else 0."""
+        """Return the distance (m) of the two positions of the autopilot, while both are fresh; else 0."""
         if self.state is None or self.global_state is None or now - self.global_at > 0.5 or now - self.state_at > 0.5:
             return 0.0
         return max(abs(a - b) for a, b in zip(self.state[:3], self.global_state[:3], strict=True))
 
     def clock_offset(self) -> float | None:
-        """How far (s) the autopilot's clock is ahead of ours, by the sample that was least delayed; None: not known."""
+        """Return how far (s) the autopilot's clock is ahead of ours, by the least delayed sample; None: unknown."""
+        # Delay only makes the autopilot's time look older, so the largest offset was delayed least.
         return max(self.clock_offsets) if self.clock_offsets else None

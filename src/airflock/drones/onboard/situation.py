@@ -1,4 +1,4 @@
-"""The situation: facts for the mission table from what wire, peers and operator know at one tick."""
+"""The situation: facts for the mission table, from autopilot, peers and operator, at one tick."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -19,11 +19,11 @@ LEAVING_PHASES = frozenset({MissionPhase.RETURN, MissionPhase.LAND, MissionPhase
 
 
 class NodeTick(NamedTuple):
-    """What only the node itself knows at one tick; what has no line here is as in `Facts`.
+    """Facts of one tick that only the node itself knows; fields without a line here are as in `MissionFacts`.
 
-    now, utc : the own clock, s, and Unix time, µs
-    home     : where it armed, in its own layer, m; None before
-    twin     : whether another sender signs as this member
+    now, utc : own clock, s, and Unix time, µs
+    home     : position where it armed, in its own layer, m; None before
+    has_twin : another sender signs as this member
     """
 
     now: float
@@ -43,13 +43,13 @@ class NodeTick(NamedTuple):
 
 
 class ConditionTimers:
-    """For how long each of some conditions has held, s; 0 where it does not hold."""
+    """Times since conditions began to hold, s; 0 where they do not hold."""
 
     def __init__(self) -> None:
         self._since: dict[str, float] = {}
 
     def __call__(self, name: str, holds: bool, now: float) -> float:
-        """Time since the condition began to hold; just above 0 at first."""
+        """Return the time since the condition began to hold; just above 0 at first."""
         if not holds:
             self._since.pop(name, None)
             return 0.0
@@ -59,7 +59,7 @@ class ConditionTimers:
 def missing_before_start(
     card: FlightCard, member: int, link: AutopilotLink, peers: Peers, utc: int, now: float
 ) -> tuple[str, ...]:
-    """What keeps a drone from arming, one line each."""
+    """Return the reasons for which a drone may not arm, one line each."""
     found = []
     if utc >= card.expires * 1_000_000:
         found.append(f"the card expired at Unix time {card.expires} s; the clock says {utc // 1_000_000} s")
@@ -74,7 +74,7 @@ def missing_before_start(
 
 
 def _missing_parameters(card: FlightCard, member: int, wire: AutopilotLink) -> list[str]:
-    """Parameters of the autopilot that are not told or not safe."""
+    """Return the parameters of the autopilot that are unknown or unsafe."""
     found = []
     for guard in card.autopilot.parameter_checks:
         value = wire.parameters.get(guard.name)
@@ -88,7 +88,7 @@ def _missing_parameters(card: FlightCard, member: int, wire: AutopilotLink) -> l
 
 
 def _missing_state(card: FlightCard, wire: AutopilotLink, now: float) -> list[str]:
-    """What is wrong with the own position, battery or stand."""
+    """Return the defects of the own position, battery or stand."""
     s, found, own = card.safety, [], wire.state
     far = (
         wire.far if wire.fix_type >= 3 else 0.0
@@ -115,15 +115,15 @@ def _missing_state(card: FlightCard, wire: AutopilotLink, now: float) -> list[st
         accuracy = f"accuracy {min(wire.horizontal_accuracy, 999.0):.1f} m"
         found.append(f"navigation: fix {wire.fix_type}, {accuracy}; needs a 3-D fix and {s.h_acc:g} m")
     if wire.battery is None or wire.battery <= s.battery_low:
-        told = "not told" if wire.battery is None else f"{wire.battery:.0f} %"
-        found.append(f"battery: {told}; needs more than {s.battery_low:g} %")
+        charge = "not told" if wire.battery is None else f"{wire.battery:.0f} %"
+        found.append(f"battery: {charge}; needs more than {s.battery_low:g} %")
     if wire.is_landed is not True:
         found.append("the autopilot does not report that it is on the ground")
     return found
 
 
 def _missing_clock(card: FlightCard, wire: AutopilotLink, peers: Peers) -> list[str]:
-    """Whether the own clock is known and right."""
+    """Return why the own clock is unknown or wrong."""
     offset = wire.clock_offset()
     if offset is None:
         return ["SYSTEM_TIME: the autopilot has not reported the time"]
@@ -136,7 +136,7 @@ def _missing_clock(card: FlightCard, wire: AutopilotLink, peers: Peers) -> list[
 
 
 def _missing_peers(card: FlightCard, wire: AutopilotLink, peers: Peers, now: float) -> list[str]:
-    """Who is not heard, has another card, or stands too near."""
+    """Return the members that are not heard, have another card, or stand too near."""
     found = []
     for who, peer in peers.all.items():
         if peer.has_other_card:
@@ -151,17 +151,17 @@ def _missing_peers(card: FlightCard, wire: AutopilotLink, peers: Peers, now: flo
 
 
 def state_distance(a: State, b: State) -> float:
-    """Distance of two states, m."""
+    """Return the distance of two states, m."""
     return float(norm(a.x - b.x, a.y - b.y, a.z - b.z))
 
 
 def permanent_error(card: FlightCard, member: int, link: AutopilotLink, has_twin: bool) -> str:
-    """What can never fit; empty if nothing is wrong."""
+    """Return the error that no waiting can mend; empty if there is none."""
     if link.kind is not None and link.kind != card.autopilot.number:
         return f"the autopilot is of kind {link.kind}; the card is for {card.autopilot.name} ({card.autopilot.number})"
     if link.kind is None and link.other_systems:
-        told = ", ".join(map(str, sorted(link.other_systems)))
-        return f"the autopilot calls itself system {told}; this drone is member {member}"
+        systems = ", ".join(map(str, sorted(link.other_systems)))
+        return f"the autopilot calls itself system {systems}; this drone is member {member}"
     return f"another sender signs as member {member}: two drones with one number?" if has_twin else ""
 
 
@@ -174,11 +174,12 @@ def mission_facts(
     timers: ConditionTimers,
     tick: NodeTick,
 ) -> MissionFacts:
-    """Everything that the mission table asks for, at one tick."""
+    """Return all facts that the mission table uses, at one tick."""
     s, own, now, phase = card.safety, link.state, tick.now, tick.phase
     alive = now - link.heartbeat_at <= MAX_HEARTBEAT_AGE
     flying = peers.flying()
     fresh = {who: peer for who, peer in flying.items() if now - peer.heard_at <= HEARD_WITHIN}
+    # Members that return or land are not waited for, or the last one would hold for ever.
     expected = min(s.peers_least, len([peer for peer in flying.values() if peer.phase not in LEAVING_PHASES]))
     position_bad = timers("position", not now - link.state_at <= s.stale or not alive, now)
     gnss_bad = timers("gnss", _is_gnss_bad(card, link, now), now)
@@ -187,6 +188,7 @@ def mission_facts(
     out = own is not None and phase in FLYING_PHASES and card.outside(*own[:3]) > 0.0
     near = own is not None and _is_anybody_near(own, fresh.values(), s.near)
     operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time
+    # Hysteresis: HOLD ends only after all reasons have been absent for a while (row 25).
     calm = not (position_bad or gnss_bad or few or clock_bad or near or tick.is_overloaded)
     calm = calm and not (operator_lost and s.operator_lost == "hold")
     missing = (
@@ -196,7 +198,9 @@ def mission_facts(
     )
     if timers("silent", phase == MissionPhase.BOOT and not alive, now) > MAX_HEARTBEAT_AGE:
         missing = (NO_HEARTBEAT_TEXT,)
+    # An unknown battery keeps a drone on the ground; in the air it must not land everybody at once.
     battery = 100.0 if link.battery is None else link.battery
+    # The reserve grows with the way home.
     way = 0.0 if own is None or tick.home is None else state_distance(own, State(*tick.home, 0.0, 0.0, 0.0))
     layer = card.layer(member)
     return MissionFacts(
@@ -241,7 +245,7 @@ def mission_facts(
 
 
 def _is_gnss_bad(card: FlightCard, wire: AutopilotLink, now: float) -> bool:
-    """Whether the own position cannot be trusted: no fix, too inaccurate, it jumped, or two sources disagree."""
+    """Return True if the own position is unreliable: no fix, inaccurate, a jump, or two sources that disagree."""
     s = card.safety
     return (
         wire.fix_type < 3
@@ -252,23 +256,23 @@ def _is_gnss_bad(card: FlightCard, wire: AutopilotLink, now: float) -> bool:
 
 
 def _is_clock_bad(card: FlightCard, wire: AutopilotLink, peers: Peers) -> bool:
-    """Whether the own clock is off the autopilot's or all peers'."""
+    """Return True if the own clock differs from the autopilot's or from those of all peers."""
     offset = wire.clock_offset()
     return (offset is not None and abs(offset) > card.safety.clock_error) or peers.is_own_clock_suspect()
 
 
 def _is_anybody_near(own: State, peers: Iterable[Peer], distance: float) -> bool:
-    """Whether one of these peers is nearer than a distance, m."""
+    """Return True if one of these peers is nearer than a distance, m."""
     return any(
-        abs(peer.state.x - own.x) < distance
-        and state_distance(own, peer.state) < distance  # the first spares most roots
+        abs(peer.state.x - own.x) < distance and state_distance(own, peer.state) < distance
+        # The first comparison spares most square roots: this runs for each pair at each tick.
         for peer in peers
         if peer.state is not None
     )
 
 
 def _have_gathered(card: FlightCard, own: State | None, peers: Peers, now: float) -> bool:
-    """Whether all members have gathered around the own position."""
+    """Return True if all members have gathered around the own position."""
     return own is not None and all(
         now - peer.heard_at <= HEARD_WITHIN
         and peer.phase in GATHERED_PHASES
@@ -279,6 +283,6 @@ def _have_gathered(card: FlightCard, own: State | None, peers: Peers, now: float
 
 
 def _is_at_home(card: FlightCard, own: State, home: tuple[float, float, float], layer: float) -> bool:
-    """Whether the drone hovers above its home in its own layer."""
+    """Return True if the drone hovers above its home in its own layer."""
     over = norm(own.x - home[0], own.y - home[1], 0.0) < card.safety.home_radius and abs(own.z - layer) < 1.0
     return over and norm(own.vx, own.vy, 0.0) < STANDING_SPEED

@@ -1,4 +1,4 @@
-"""Steering: the velocity that each phase of a mission wishes to fly, and what the limiter makes of it."""
+"""Steering: the limiter, the guidance to points, and the velocity that each phase of a mission commands."""
 
 from collections.abc import Iterable
 from math import isfinite
@@ -17,7 +17,7 @@ NO_VELOCITY: Velocity = (0.0, 0.0, 0.0)
 
 
 class LimitedVelocity(NamedTuple):
-    """A velocity that may be flown (m/s), and whether the fence or an obstacle turned it."""
+    """A velocity within the limits (m/s), and whether the fence or an obstacle turned it."""
 
     velocity: Velocity
     is_fenced: bool
@@ -30,11 +30,13 @@ def limit_velocity(
     heights: tuple[float, float],
     safety: SafetyLimits,
 ) -> LimitedVelocity:
-    """The velocity nearest to a wish that may be flown.
+    """Return the velocity nearest to the wanted one that respects all limits.
 
-    own      : state as measured; surfaces: distance (m, negative beyond) and inward unit normal of the fence's sides
-               and of obstacles; heights: lowest and highest, m
+    own      : state as measured
+    surfaces : distance (m, negative beyond) and inward unit normal of the fence's sides and of obstacles
+    heights  : lowest and highest, m
     """
+    # The limiter trusts nobody, laws included: nan would pass every comparison below.
     if not all(map(isfinite, wanted_velocity)):
         wanted_velocity = NO_VELOCITY
     vx, vy, _ = shorten(wanted_velocity[0], wanted_velocity[1], 0.0, safety.speed_max)
@@ -45,6 +47,8 @@ def limit_velocity(
     fenced = False
     walls = list(surfaces)
     for _ in range(2):  # a corner: what one side turns, another may have to turn again
+        # Each side allows the outward speed from which the drone can still brake before the soft margin. Only the
+        # component across the side is cut, so that a drone slides along it.
         for distance, nx, ny, nz in walls:
             outward = -(vx * nx + vy * ny + vz * nz)
             if outward <= 0.0:
@@ -54,16 +58,19 @@ def limit_velocity(
             if outward > most:
                 k = outward - most
                 vx, vy, vz, fenced = vx + k * nx, vy + k * ny, vz + k * nz, True
+    # In a sharp corner two passes need not converge; a drone that stops is safe.
     for distance, nx, ny, nz in walls:
         if -(vx * nx + vy * ny + vz * nz) > braking_curve(distance, safety.brake, safety.brake_gain) + 1e-9:
             vx, vy, vz, fenced = 0.0, 0.0, 0.0, True  # sides that contradict each other: stop
     low, high = heights
+    # Heights are kept like walls, but without the soft margin.
     vz = clamp(
         vz,
         -braking_curve(own.z - low, safety.brake, safety.brake_gain),
         braking_curve(high - own.z, safety.brake, safety.brake_gain),
     )
     speed = norm(vx, vy, 0.0)
+    # Sliding along several sides may have added speed.
     k = min(1.0, safety.speed_max / speed)
     return LimitedVelocity((k * vx, k * vy, clamp(vz, -safety.climb_max, safety.climb_max)), fenced)
 
@@ -77,25 +84,25 @@ PUSH_GAIN = 1.0  # 1/s; half a spring: a metre too near pushes with a metre per 
 
 
 def climb_rate(own: State, height: float, safety: SafetyLimits) -> float:
-    """Vertical velocity towards a height (m)."""
+    """Return the vertical velocity towards a height (m)."""
     return float(clamp(HEIGHT_GAIN * (height - own.z), -safety.climb_max, safety.climb_max))
 
 
 def velocity_to_hover_point(own: State, point: tuple[float, float, float], safety: SafetyLimits) -> Velocity:
-    """Velocity that keeps a point of the ground plan while climbing to its height."""
+    """Return the velocity that keeps a point of the ground plan while climbing to its height."""
     vx, vy, _ = shorten(KEEP_GAIN * (point[0] - own.x), KEEP_GAIN * (point[1] - own.y), 0.0, 1.0)
     return vx, vy, climb_rate(own, point[2], safety)
 
 
 def velocity_to_stay(own: State, point: tuple[float, float, float], safety: SafetyLimits) -> Velocity:
-    """Velocity back to a point where the drone came to stand, height and all."""
+    """Return the velocity back to the point where the drone stopped, height included."""
     dx, dy, dz = point[0] - own.x, point[1] - own.y, point[2] - own.z
     vx, vy, _ = shorten(KEEP_GAIN * dx, KEEP_GAIN * dy, 0.0, 1.0)
     return vx, vy, float(clamp(KEEP_GAIN * dz, -safety.climb_max, safety.climb_max))
 
 
 def velocity_towards(own: State, point: tuple[float, float, float], safety: SafetyLimits) -> Velocity:
-    """Velocity towards a point of the ground plan, with which one can still stop there."""
+    """Return the velocity towards a point of the ground plan, slow enough to stop there."""
     dx, dy = point[0] - own.x, point[1] - own.y
     far = norm(dx, dy, 0.0)
     k = min(braking_curve(far, safety.brake, safety.brake_gain), safety.speed_max) / far
@@ -103,10 +110,11 @@ def velocity_towards(own: State, point: tuple[float, float, float], safety: Safe
 
 
 def velocity_from_neighbours(own: State, neighbours: Iterable[State], safety: SafetyLimits) -> Velocity:
-    """Velocity along the ground plan away from all neighbours within s.yield_range that are on no other layer."""
+    """Return the velocity along the ground plan away from all neighbours within s.yield_range in the own layer."""
     x = y = 0.0
     for other in neighbours:
         dx, dy, dz = own.x - other.x, own.y - other.y, own.z - other.z
+        # Drones on the way home keep their layers, so those in other layers pass above or below.
         if abs(dz) > PASSING_SHARE * safety.layer:
             continue
         near = PUSH_GAIN * max(safety.yield_range - norm(dx, dy, dz), 0.0) / norm(dx, dy, 0.0)
@@ -118,7 +126,7 @@ def velocity_from_neighbours(own: State, neighbours: Iterable[State], safety: Sa
 def velocity_home(
     own: State, home: tuple[float, float, float], neighbours: Iterable[State], safety: SafetyLimits
 ) -> Velocity:
-    """Velocity home on the own layer, past neighbours."""
+    """Return the velocity home in the own layer, past neighbours."""
     gx, gy, _ = velocity_towards(own, home, safety)
     px, py, _ = velocity_from_neighbours(own, neighbours, safety)
     return gx + px, gy + py, climb_rate(own, home[2], safety)
@@ -131,11 +139,13 @@ Position = tuple[float, float, float]
 
 
 class SteeringInput(NamedTuple):
-    """What a velocity depends on beside the own state.
+    """Inputs of a velocity beside the own state.
 
-    now : s of the own clock; home : above the place of the start, at the own layer
-    stay : velocity that keeps it where it stopped for somebody who is not heard
-    near : those who fly and are heard; navigates : whether the own position is good enough to hold a place
+    now            : s of the own clock
+    home           : point above the place of the start, in the own layer
+    stay           : velocity that keeps it where it stopped for a lost neighbour
+    near           : states of the members that fly and are heard
+    has_navigation : the own position is good enough to hold a place
     """
 
     now: float
@@ -147,10 +157,12 @@ class SteeringInput(NamedTuple):
 
 
 class PhaseVelocity:
-    """What one drone commands.
+    """Velocity commands of one drone.
 
-    goal   : point that was ordered; failed : the law failed since this was last set to False
-    fenced : the limiter has turned the last velocity along the fence; notes : lines for a person to read
+    goal      : point of a GOTO order
+    failed    : the law has failed since this was last set to False
+    is_fenced : the limiter has turned the last velocity along the fence
+    notes     : lines for a person to read
     """
 
     def __init__(self, card: FlightCard, pilot: Pilot, now: float, notes: list[str]):
@@ -162,21 +174,23 @@ class PhaseVelocity:
         self._hold_position: Position | None = None  # where it came to stand in HOLD
 
     def begin(self, now: float) -> None:
-        """Ask the law at once, as it is to be flown from now on."""
+        """Call the law at the next tick: the phase begins to fly it."""
         self._next_decision = now
 
     def velocity(self, own: State, at: SteeringInput) -> Velocity:
-        """What is commanded, m/s: the wish, within the limits and the fence."""
+        """Return the commanded velocity, m/s: the wanted one within the limits and the fence."""
+        # While it takes off it is still below the lowest height of the fence, which must not lift it at full speed.
         low = -1.0 if at.phase in (MissionPhase.ARMING, MissionPhase.TAKEOFF) else self._card.low
         wish = self._wanted_velocity(own, at)
-        made = limit_velocity(wish, own, self._card.sides(own), (low, self._card.high), self._card.safety)
-        self.is_fenced = made.is_fenced
-        return made.velocity
+        limited = limit_velocity(wish, own, self._card.sides(own), (low, self._card.high), self._card.safety)
+        self.is_fenced = limited.is_fenced
+        return limited.velocity
 
     def _wanted_velocity(self, own: State, at: SteeringInput) -> Velocity:
-        """What the phase wishes to fly, m/s."""
+        """Return the velocity of the phase before the limiter, m/s."""
         s, phase = self._card.safety, at.phase
         if phase == MissionPhase.HOLD and at.has_navigation:
+            # First brake, then keep the place where it stopped: going back to where HOLD began would swing.
             if self._hold_position is None and norm(*own[3:]) < STANDING_SPEED:
                 self._hold_position = own[:3]
             return NO_VELOCITY if self._hold_position is None else velocity_to_stay(own, self._hold_position, s)
@@ -188,6 +202,7 @@ class PhaseVelocity:
             return wish if at.stay is None else (*at.stay[:2], wish[2])
         if phase not in (MissionPhase.FLOCK, MissionPhase.GOTO):
             return NO_VELOCITY
+        # The law decides once a period, as in the simulation; between two decisions its last velocity is flown.
         if at.now >= self._next_decision - TIME_TOLERANCE:
             self._next_decision = max(self._next_decision + self._card.period, at.now)
             self._law_velocity = self._law(own, at.now, self.goal if phase == MissionPhase.GOTO else None)
@@ -195,19 +210,20 @@ class PhaseVelocity:
         return x, y, climb_rate(own, self._card.height, s) if self._card.flat else z
 
     def _law(self, own: State, now: float, goal: Position | None) -> Velocity:
-        """What the law wishes, m/s; a law that fails or commands what is no velocity counts as an overload."""
+        """Return the velocity of the law, m/s; an exception or a value that is no velocity counts as an overload."""
         at = self._card.law_state(own)
         try:
-            told = None if goal is None else self._card.law_state(State(*goal, 0.0, 0.0, 0.0))[:3]
-            x, y, z = self._pilot.steer(at, now, told)
-        except (AirflockError, ArithmeticError, ValueError, TypeError, IndexError) as fault:
+            goal_position = None if goal is None else self._card.law_state(State(*goal, 0.0, 0.0, 0.0))[:3]
+            x, y, z = self._pilot.steer(at, now, goal_position)
+        except (AirflockError, ArithmeticError, ValueError, TypeError, IndexError) as error:
             self.failed = True
-            self._notes.append(f"the law failed: {type(fault).__name__}: {fault}")
+            self._notes.append(f"the law failed: {type(error).__name__}: {error}")
             return NO_VELOCITY
         if not (isfinite(x) and isfinite(y) and isfinite(z)):
             self.failed = True
             self._notes.append(f"the law commanded {(x, y, z)}, which is not a velocity")
             return NO_VELOCITY
+        # Half the way to the goal, half the law: the flock stays together while it goes.
         if goal is not None:
             gx, gy, _ = velocity_towards(own, goal, self._card.safety)
             x, y = 0.5 * (x + gx), 0.5 * (y + gy)
