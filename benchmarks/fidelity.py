@@ -17,13 +17,8 @@ from scipy.stats import kendalltau
 from airflock.engine import score_flight, score_flights
 from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import read_toml_file
-from airflock.runs.space import with_parameters
-from airflock.runs.store import CandidateBatch, FlightStore
-from airflock.scenarios.scenario_builder import build_scenario, rebuilt
-from airflock.search.space_table import read_space
 from airflock.runs.search_space import with_parameters
-from airflock.scenarios.change import rebuilt
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario, rebuilt
 from airflock.search.study_space import read_space
 
 PARTS = {"early": (2, 4, 6, 8, 10, 12), "late": (40, 46, 52, 58, 64, 70)}  # generations, five candidates of each

@@ -12,13 +12,8 @@ import numpy as np
 from airflock.engine import score_flights
 from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import read_toml_file
-from airflock.runs.space import with_parameters
-from airflock.runs.store import CandidateBatch, FlightStore
-from airflock.scenarios.scenario_builder import build_scenario
-from airflock.search.racing import remaining_candidates
-from airflock.search.space_table import read_space
 from airflock.runs.search_space import with_parameters
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.generations import remaining_candidates
 from airflock.search.study_space import read_space
 

@@ -37,7 +37,7 @@ def begin(sizes: Callable[..., Any] = SimpleNamespace) -> Any:
     import cuda_c
     from numba.cuda.simulator.kernel import FakeCUDAKernel
 
-    from airflock.engine.cuda import launch
+    from airflock.engine.cuda import large_flock, launch
     from airflock.support import gpu as device
 
     device.unavailable_reason = lambda: None

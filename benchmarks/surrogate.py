@@ -21,13 +21,8 @@ from cma.fitness_models import LQModel, SurrogatePopulation, kendall_tau
 from airflock.engine import score_flights
 from airflock.runs.flight_store import CandidateBatch, FlightStore
 from airflock.runs.folder import read_toml_file
-from airflock.runs.space import with_parameters
-from airflock.runs.store import CandidateBatch, FlightStore
-from airflock.scenarios.scenario_builder import build_scenario
-from airflock.search.cmaes import CMAES
-from airflock.search.space_table import read_space
 from airflock.runs.search_space import with_parameters
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search.optimisers import CMAES
 from airflock.search.study_space import read_space
 

@@ -10,18 +10,12 @@ from random import Random
 
 from airflock.core.parameters import choices, declarations
 from airflock.engine import plan_of
-from airflock.parts.bodies.registry import BODIES
-from airflock.parts.faults.registry import KINDS
-from airflock.parts.radios.registry import RADIOS
-from airflock.parts.sensors.registry import SENSORS
-from airflock.parts.topologies.registry import TOPOLOGIES
-from airflock.scenarios.scenario_builder import build_scenario
 from airflock.parts.bodies.body_kinds import BODIES
 from airflock.parts.faults.fault_kinds import KINDS
 from airflock.parts.radios.radio_kinds import RADIOS
 from airflock.parts.sensors.sensor_kinds import SENSORS
 from airflock.parts.topologies.topology_kinds import TOPOLOGIES
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.scenario_builder import build_scenario
 from airflock.scenarios.sections import SECTIONS
 from flocks import ISLANDS, NOTCHED, scenario
 

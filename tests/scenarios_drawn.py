@@ -18,19 +18,12 @@ from numpy.typing import NDArray
 from airflock.core.model import Model
 from airflock.core.parameters import Choice, Parameters, Quantity, choices, declarations, quantity
 from airflock.core.topology import topology as topology_of_ones_own
-from airflock.parts.bodies.registry import BODIES as KNOWN_BODIES
-from airflock.parts.faults.registry import KINDS
-from airflock.parts.radios.registry import RADIOS
-from airflock.parts.sensors.registry import SENSORS
-from airflock.scenarios.named_code import MODELS, find_law
-from airflock.scenarios.part_kinds import CallerParts
 from airflock.parts.bodies.body_kinds import BODIES as KNOWN_BODIES
 from airflock.parts.faults.fault_kinds import KINDS
 from airflock.parts.radios.radio_kinds import RADIOS
 from airflock.parts.sensors.sensor_kinds import SENSORS
-from airflock.scenarios.families import CallerParts
-from airflock.scenarios.laws import MODELS, find_law
-from airflock.scenarios.making import build_scenario
+from airflock.scenarios.named_code import MODELS, find_law
+from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.scenarios.sections import SECTIONS, Flight

@@ -56,7 +56,7 @@ from .studio.live_page import watch as watch
 from .support.errors import AirflockError as AirflockError
 from .view import plots as plots
 from .view.plot_by_kind import plot as plot
-from .view.video_writer import video as video
 from .view.replay_page import replay as replay
+from .view.video_writer import video as video
 
 __version__: str

@@ -8,9 +8,7 @@ import pytest
 
 import airflock
 from airflock.engine import driver_text, fly_world, plan_of
-from airflock.parts.faults.registry import KINDS
 from airflock.parts.faults.fault_kinds import KINDS
-from airflock.recordings.flights import recording_of
 from airflock.recordings.scores import measure_recording
 from airflock.recordings.simulation import recording_of
 from airflock.scenarios.files import load, presets

@@ -17,12 +17,8 @@ from airflock.core.model import model
 from airflock.core.parameters import choices
 from airflock.core.pilot import PacketPolicy, Pilot
 from airflock.core.silence import Parameters as Silence, could_be_near, counts, for_standing_neighbour, with_defaults
-from airflock.core.vocabulary import call_rule
 from airflock.drones.onboard.card import to_tuples
 from airflock.fleets.card_document import to_json_table
-from airflock.parts.bodies.registry import BODIES
-from airflock.drones.onboard.fields import to_tuples
-from airflock.fleets.prepare import to_json_table
 from airflock.parts.bodies.body_kinds import BODIES
 from airflock.parts.laws import dimock_2003, vasarhelyi_2018, vicsek_1995
 from airflock.parts.radios.radio_kinds import RADIOS

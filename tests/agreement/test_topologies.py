@@ -15,9 +15,6 @@ from airflock.drones.onboard.card import card_hash, parse_card
 from airflock.engine import plan_of
 from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario_builder import build_scenario
-from airflock.search.space_table import read_space
-from airflock.scenarios.families import CallerParts
-from airflock.scenarios.files import build_scenario
 from airflock.search.study_space import read_space
 from airflock.support.errors import CardError, ScenarioError
 from fleets import document, scenario

@@ -14,9 +14,6 @@ from airflock.fleets.drone_faults import InjectedFault
 from airflock.fleets.fleet_observer import FleetObserver, TelemetryBroadcast
 from airflock.fleets.lockstep import START_TIME
 from airflock.fleets.radio_channel import SOFTWARE_KEY
-from airflock.fleets.observer import FleetObserver
-from airflock.fleets.starting import SOFTWARE_KEY
-from airflock.fleets.teller import TelemetryBroadcast
 from airflock.studio.browser_view import BrowserView
 from airflock.studio.fleet_page import FleetPage
 from fleets import fleet, scenario

@@ -17,14 +17,8 @@ from airflock.fleets.drone_faults import DroneFaults
 from airflock.fleets.lockstep import LockstepFleet, is_clear_between
 from airflock.fleets.radio_channel import FaultyNode
 from airflock.fleets.realtime import fly_in_realtime, lockstep_only_errors
-from airflock.parts.faults.registry import KINDS
-from airflock.recordings.simulation import simulate
-from airflock.fleets import compare, live as live_, realtime, starting
-from airflock.fleets.ailing import FaultyNode
-from airflock.fleets.befalling import DroneFaults
-from airflock.fleets.lockstep import LockstepFleet
 from airflock.parts.faults.fault_kinds import KINDS
-from airflock.recordings.flights import simulate
+from airflock.recordings.simulation import simulate
 from airflock.support.errors import CardError
 from fleets import card, document, scenario
 from flocks import ISLANDS

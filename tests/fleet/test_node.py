@@ -13,9 +13,6 @@ from airflock.core.agent import State
 from airflock.drones.mavlink import orders
 from airflock.drones.mavlink.frames import FramePacker, common_dialect, frames_in
 from airflock.drones.mavlink.messages import DroneStatus, status_message
-from airflock.core.contract import State
-from airflock.drones.mavlink import dialect, orders, status
-from airflock.drones.mavlink.frames import FramePacker, frames_in
 from airflock.drones.mavlink.orders import OperatorOrder, OrderKind, new_operator_keys
 from airflock.drones.mavlink.signing import PacketSigner
 from airflock.drones.onboard.card import card_hash, parse_card, read_card, write_card

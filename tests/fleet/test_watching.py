@@ -13,9 +13,6 @@ import airflock
 from airflock.cli.main import app
 from airflock.core.agent import State
 from airflock.drones.mavlink.messages import CHANNEL_SYSTEM, HEARS_REPORT, parse_report, report_message
-from airflock.core.contract import State
-from airflock.drones.mavlink import witness
-from airflock.drones.mavlink.keys import write_key
 from airflock.drones.mavlink.orders import OrderKind
 from airflock.drones.mavlink.signing import PacketSigner, write_key
 from airflock.drones.onboard.card import read_card
@@ -28,16 +25,6 @@ from airflock.fleets.fleet_observer import SCENARIO_FAULT_NAMES, FleetObserver, 
 from airflock.fleets.lockstep import START_TIME, OperatorStation, write_card_and_key
 from airflock.fleets.radio_channel import SOFTWARE_KEY
 from airflock.fleets.realtime import fly_in_realtime
-from airflock.studio.fleet_tables import drone_html, faults_html, fleet_warning, members_html, notes_html
-from airflock.studio.fleet_watch import open_card_and_radios
-from airflock.drones.onboard.ports import UdpAddresses, UdpPort
-from airflock.fleets import compare, realtime
-from airflock.fleets.befalling import DroneFaults
-from airflock.fleets.faults import INJECTED_KINDS, InjectedFault
-from airflock.fleets.lockstep import START_TIME
-from airflock.fleets.observer import FleetObserver
-from airflock.fleets.starting import SOFTWARE_KEY, OperatorStation, write_card_and_key
-from airflock.fleets.teller import SCENARIO_FAULT_NAMES, TelemetryBroadcast
 from airflock.studio.fleet_page import drone_html, faults_html, fleet_warning, members_html, notes_html
 from airflock.studio.live_page import open_card_and_radios
 from airflock.support.errors import AirflockError, CardError, StudioError

@@ -26,11 +26,6 @@ from airflock import __version__
 from airflock.runs.folder import STUDY_FILE
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_builder import build_scenario
-from airflock.search.harden import COST, harden
-from airflock.search.held import SAFETY, SLACK
-from airflock.search.intervals import mean_interval
-from airflock.search.steps import ScoreColumns, fly_parameters
-from airflock.search.tune.start import prepare_start
 from airflock.search.hardening import COST, SAFETY, SLACK, harden
 from airflock.search.hardening_steps import ScoreColumns, fly_parameters
 from airflock.search.study_result import mean_interval

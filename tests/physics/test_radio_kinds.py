@@ -7,11 +7,8 @@ import pandas as pd
 import pytest
 from hypothesis import given, strategies as st
 
-from airflock.core.radio import packets
-from airflock.core.reception import PacketReception, arrival_probability
-from airflock.estimate.identification.radio_links import table_entries
 from airflock.core.radio import PacketReception, arrival_probability, packets
-from airflock.estimate.identification.packets import table_entries
+from airflock.estimate.identification.radio_links import table_entries
 from airflock.parts.radios import bursts, congestion, jitter, links, shadow, table
 from airflock.parts.radios.radio_kinds import RADIOS
 from airflock.support.errors import RecordingError

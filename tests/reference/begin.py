@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from airflock.core import random
 from airflock.core.agent import State
 from airflock.scenarios.flight_world import FlightWorld
-from airflock.core.contract import State
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.scenario_checks import FORMATIONS
 from airflock.world import start as start_rules

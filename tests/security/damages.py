@@ -88,9 +88,6 @@ def results():
     import pandas as pd
 
     from airflock.recordings.recording_files import load_recording
-    from airflock.view.plots.trajectories import trajectories
-    from airflock.view.replays.build import replay
-    from airflock.recordings.files import load_recording
     from airflock.view.replay_page import replay
     from airflock.view.trajectory_plots import trajectories
 

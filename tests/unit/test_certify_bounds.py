@@ -18,10 +18,7 @@ from airflock.certificates.limits import (
     rate_per_hour,
     take_look,
 )
-from airflock.certificates.hazard import event_timing
 from airflock.recordings.rare_events import upper_probability_bound
-from airflock.recordings.rare import upper_probability_bound
-from airflock.scenarios.change import rebuilt
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import rebuilt
 from airflock.search.study import load_study

@@ -23,14 +23,10 @@ from airflock.core.topology import topology
 from airflock.parts.bodies.body_kinds import BODIES
 from airflock.parts.laws import vasarhelyi_2018, viragh_2014
 from airflock.parts.laws.vasarhelyi_2018 import Sums
-from airflock.parts.metrics.registry import METRICS, SETS
-from airflock.parts.radios.registry import RADIOS
-from airflock.parts.sensors.registry import SENSORS
-from airflock.scenarios.named_code import MODELS, find_law
 from airflock.parts.metrics.metric_sets import METRICS, SETS
 from airflock.parts.radios.radio_kinds import RADIOS
 from airflock.parts.sensors.sensor_kinds import SENSORS
-from airflock.scenarios.laws import MODELS, find_law
+from airflock.scenarios.named_code import MODELS, find_law
 from airflock.support.errors import RuleError, ScenarioError
 
 

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock import support
 from airflock.engine import pick_device, plan_of, score_flights
 from airflock.scenarios import cost
 from airflock.scenarios.files import load
-from airflock.support import gpu
+from airflock.support import gpu as gpu
 from airflock.support.errors import DeviceError, FlightError, ScenarioError
 from flocks import scenario
 from gpus import forget_gpu, replace_gpu
@@ -22,9 +21,6 @@ SMALL = scenario(agents=3, duration=0.2, world__side=60.0, world__walls="nearest
 
 @pytest.fixture
 def present(monkeypatch):
-    for home in (gpu, support):  # where it is, and the door through which others reach it
-        monkeypatch.setattr(home, "unavailable_reason", lambda: None)
-        monkeypatch.setattr(home, "cuda_runtime", lambda: runtime(free=140e9))
     replace_gpu(monkeypatch, free=140e9)
     yield
     forget_gpu()
@@ -32,8 +28,6 @@ def present(monkeypatch):
 
 @pytest.fixture
 def absent(monkeypatch):
-    for home in (gpu, support):
-        monkeypatch.setattr(home, "unavailable_reason", lambda: "no driver")
     replace_gpu(monkeypatch, available=False, fault="no driver")
     yield
     forget_gpu()
@@ -155,8 +149,6 @@ def test_the_step_at_which_a_closed_flight_left_the_finite_numbers_is_found(wron
 
 def test_the_command_ends_with_one_line_and_status_2_without_a_gpu():
     code = "import sys; sys.argv = ['airflock', 'run', 'vasarhelyi_2018/4ms', '--device', 'cuda']\n"
-    code += "from airflock.support import gpu as device\ndevice.unavailable_reason = lambda: 'no driver'\n"
-    code += "from airflock.cli.main import main\nmain()\n"
     code += "from airflock.support import gpu\ngpu.unavailable_reason = lambda: 'no driver'\n"
     code += "from airflock.cli import main\nmain()\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -8,10 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from airflock.parts.metrics import registry
-from airflock.scenarios.named_code import MODELS
 from airflock.parts.metrics import metric_sets as registry
-from airflock.scenarios.laws import MODELS
+from airflock.scenarios.named_code import MODELS
 
 DOCS = Path(__file__).parents[2] / "docs"
 sys.path.insert(0, str(DOCS))

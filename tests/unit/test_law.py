@@ -19,12 +19,9 @@ from airflock.core.model import model
 from airflock.core.vocabulary import VOCABULARY
 from airflock.engine.text.generate import DriverSource
 from airflock.engine.text.probe import probe_model
-from airflock.parts.bodies.registry import BODIES
-from airflock.parts.metrics.registry import METRICS
-from airflock.scenarios.named_code import MODELS
 from airflock.parts.bodies.body_kinds import BODIES
 from airflock.parts.metrics.metric_sets import METRICS
-from airflock.scenarios.laws import MODELS
+from airflock.scenarios.named_code import MODELS
 from airflock.support.errors import RuleError
 
 RULES = ("reach", "sight", "neighbour", "boundary", "decide", "preferred_speed", "interaction_range")

@@ -8,8 +8,6 @@ import pytest
 import airflock
 from airflock.core.agent import State
 from airflock.drones.onboard.flight_log import LoggingNode
-from airflock.core.contract import State
-from airflock.drones.onboard.log import LoggingNode
 from airflock.drones.onboard.mission import MissionPhase
 from airflock.drones.onboard.node import Node, NodeMemory
 from airflock.support.errors import RecordingError

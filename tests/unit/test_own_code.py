@@ -9,9 +9,6 @@ import pytest
 import airflock
 from airflock.engine import Flight
 from airflock.scenarios.named_code import import_user_file
-from airflock.studio.flights import FlightRequest
-from airflock.studio.player import Player
-from airflock.scenarios.own_code import import_user_file
 from airflock.studio.player import FlightRequest, Player
 from airflock.support.errors import RuleError, ScenarioError
 

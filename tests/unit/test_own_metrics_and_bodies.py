@@ -8,10 +8,7 @@ import pytest
 
 import airflock
 from airflock.engine import fly_world
-from airflock.parts.metrics.registry import SETS, metric_set, reported_values
 from airflock.parts.metrics.metric_sets import SETS, metric_set, reported_values
-from airflock.recordings.files import replay_recording
-from airflock.recordings.flights import bare_document
 from airflock.recordings.flown_scenario import scenario_of_recording
 from airflock.recordings.recording_files import replay_recording
 from airflock.recordings.simulation import bare_document

@@ -16,14 +16,11 @@ from airflock.cli.main import app
 PACKAGES = {"plots", "measures"}
 CLASSES = {"AirflockError", "Scenario", "Flight", "Parameters"}
 HOMES = {
-    "evolve": "airflock.search.run", "certify": "airflock.certificates.run", "display": "airflock.displays.shows",
-    "tune": "airflock.search.tune.run", "identify": "airflock.estimate.identification.vehicle_identification",
-    "infer": "airflock.estimate.inference.law_inference",
     "evolve": "airflock.search.evolution", "certify": "airflock.certificates.certification",
-    "display": "airflock.displays.displays",
-    "tune": "airflock.search.tuning_run", "identify": "airflock.estimate.identification.run",
-    "infer": "airflock.estimate.inference.run",
-    "body": "airflock.core.body", "fleet": "airflock.fleets.flying",
+    "display": "airflock.displays.shows", "tune": "airflock.search.tuning_run",
+    "identify": "airflock.estimate.identification.vehicle_identification",
+    "infer": "airflock.estimate.inference.law_inference", "body": "airflock.core.body",
+    "fleet": "airflock.fleets.flying",
 }  # fmt: skip
 UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "s", "body_length": "m"}
 FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__"} - CLASSES)  # their examples: test_api_page

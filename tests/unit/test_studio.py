@@ -22,22 +22,6 @@ from airflock.recordings.recording_files import load_recording
 from airflock.scenarios.files import presets
 from airflock.search.study import load_study
 from airflock.search.study_space import shipped_study_axes
-from airflock.studio import charts, door, measures
-from airflock.studio.collisions import BOTH_PANES, CollisionList
-from airflock.studio.controls import fault_controls, scenario_controls, slider_span
-from airflock.studio.drawing import DrawnFlock, arrival_curve
-from airflock.studio.flights import FlightRequest
-from airflock.studio.moments import KeptSnapshots
-from airflock.studio.opening import OpeningPanel
-from airflock.studio.origin import FlightSource
-from airflock.studio.pace import PageClock
-from airflock.studio.perceiving import PerceptLines, _named_vectors
-from airflock.studio.player import Player
-from airflock.studio.score_tables import difference_table_html, scenario_differences
-from airflock.studio.shading import AgentColouring, available_colourings, joined_colours
-from airflock.studio.side import FlightPane, scenario_value
-from airflock.studio.trails import FRAMES_PER_PIECE, Trails
-from airflock.studio.tuning import KEY_EXAMPLE, parse_setting
 from airflock.studio import access_token, browser_view, page_measures as measures
 from airflock.studio.browser_view import FRAMES_PER_PIECE, Trails
 from airflock.studio.flight_pane import (

@@ -9,28 +9,17 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from airflock.search.tune import run as tuning
 from hypothesis import given, strategies as st
 
 import airflock
 from airflock.certificates.campaign import campaign_from_request, scenario_identity
+from airflock.cli.flight_verbs import run as tuning
 from airflock.cli.options import parse_seconds
 from airflock.engine import score_flights
 from airflock.runs.flight_store import FlightStore
 from airflock.runs.folder import Interrupted
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
-from airflock.search.race import RACE_ROUNDS
-from airflock.search.tune import run as tuning
-from airflock.search.tune.assumed import default_rows
-from airflock.search.tune.feasible import infeasible_limit_lines
-from airflock.search.tune.folder import MOST_SEEDS, read_plan
-from airflock.search.tune.next_flight import replay_files
-from airflock.search.tune.plan import CERTIFY_SHARE, HARDEN, POPULATION, SEARCH, TRIED, make_plan
-from airflock.search.tune.request import default_limits
-from airflock.search.tune.run import tune
-from airflock.search.tune.start import prepare_start
-from airflock.scenarios.making import build_scenario
 from airflock.search.finals import RACE_ROUNDS
 from airflock.search.tune_report import default_rows, replay_files
 from airflock.search.tune_stages import (

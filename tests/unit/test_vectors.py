@@ -12,12 +12,9 @@ import several_terms
 from airflock.core.parameters import declarations, number_names
 from airflock.engine import driver_text, fly_world
 from airflock.engine.text.generate import DriverSource
-from airflock.runs.space import full_space
+from airflock.runs.search_space import full_space
 from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario_builder import build_scenario
-from airflock.runs.search_space import full_space
-from airflock.scenarios.families import CallerParts
-from airflock.scenarios.making import build_scenario
 from airflock.studio.flight_pane import scenario_controls
 from airflock.support.errors import ParameterError, RuleError, ScenarioError
 from flocks import interpreted

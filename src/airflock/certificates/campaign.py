@@ -368,7 +368,11 @@ class CampaignTask(ScenarioTask):
 
 FIRST = 1 << 62
 BITS = 30  # numbers of flights within one part
-COUNT_PURPOSE, TOLERANCE_PURPOSE, SPLIT_PURPOSE, MAP_PURPOSE = range(4)  # parts of a certificate; they share no seed
+# parts of a certificate; they share no seed
+COUNT_PURPOSE: int = 0
+TOLERANCE_PURPOSE: int = 1
+SPLIT_PURPOSE: int = 2
+MAP_PURPOSE: int = 3
 
 
 def scenario_identity(scenario: Scenario) -> str:

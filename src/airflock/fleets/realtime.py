@@ -42,7 +42,6 @@ from airflock.fleets.lockstep import (
     ACCEPTED_BEFORE_START,
     DROPS_OUT_NOTE,
     SECONDS_BEFORE_START,
-    SOFTWARE_KEY,
     MotionNoise,
     OperatorStation,
     is_clear_between,
@@ -50,7 +49,7 @@ from airflock.fleets.lockstep import (
     make_vehicle,
     put_in_air,
 )
-from airflock.fleets.radio_channel import FaultyNode, RadioChannel
+from airflock.fleets.radio_channel import SOFTWARE_KEY, FaultyNode, RadioChannel
 from airflock.fleets.vehicle import MESSAGE_MAKERS
 from airflock.scenarios import Scenario
 from airflock.support import LinkError, ScenarioError

@@ -1,7 +1,7 @@
 """Drag descent: down the gradient of the own induced drag, beside whatever else an aircraft is told to do.
 
 The third rule of Dimock & Selig (2003, Eq. 8) as a law of its own, to be added to any model that commands a velocity
-(`core.model.add_laws`, the section `[aero]` of a scenario): so a flock of drones becomes one of fixed-wing aircraft that
+(`core.law.add_laws`, the section `[aero]` of a scenario): so a flock of drones becomes one of fixed-wing aircraft that
 look for each other's upwash. Its forward is the wing's (wing.frame): along x, or the mean heading of the flock.
 """
 
