@@ -194,6 +194,8 @@ def _declared(before: str, owner: str, record: type) -> list[Key]:
     return keys_of_record
 
 
+# --- Keys that no record declares ---
+
 OWN = "FILE.py"
 
 
