@@ -69,7 +69,7 @@ def load(
     laws: Any = None,
     trust: bool = False,
 ) -> Scenario:
-    """Scenario from a preset's name or a file.
+    """Load a scenario from a preset's name or a file.
 
     Parameters
     ----------
@@ -189,6 +189,7 @@ def _with_given(
         if part is None:
             continue
         table, kind = document.get(family.section, {}), str(part)
+        # A name of the package needs no object: the document finds it by the name.
         if not (isinstance(part, str) and part in family.shipped):
             own_part, more = family.from_caller(part)
             errors += more
@@ -311,6 +312,8 @@ def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return a document in which relative files of rules or meshes have absolute paths."""
     result = dict(document)
     kinds = [(section, "kind") for section in ("model", "body", "sensors", "radio", "topology", "metrics")]
+    # Relative names are relative to the file that has them, which is lost when documents are
+    # merged.
     for section, key in (*kinds, ("scene", "file")):
         table = result.get(section)
         name = value_of(table.get(key)) if isinstance(table, Mapping) else None

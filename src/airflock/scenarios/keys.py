@@ -105,7 +105,7 @@ def sections() -> Mapping[str, Section]:
 
 
 def keys(section: str | None = None) -> list[Key]:
-    """Every key of a scenario file: what it means, its unit, range, default and source.
+    """List every key of a scenario file: its meaning, unit, range, default and source.
 
     Parameters
     ----------
