@@ -27,6 +27,8 @@ def step_counts(scenario: Scenario) -> dict[str, int]:
     }
 
 
+# --- Cells: neighbours are found in cells as wide as the reach of a law ---
+
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
 # Agents from which order parameters look at pairs by cells: below, all pairs in vectors are as fast. A pair costs four
 # times as much where its offset goes to the nearest image. Measured: one sample of `zapotecatl` on one thread, of 1,000
@@ -113,6 +115,8 @@ def metrics_use_cells(scenario: Scenario) -> bool:
     periodic = scenario.world.edges == "periodic"
     return bool(scenario.agents >= (NEAR_FROM_IN_A_BOX if periodic else NEAR_FROM))
 
+
+# --- Run time, in seconds of one core ---
 
 TIMES = (("days", 86400.0), ("h", 3600.0), ("min", 60.0))
 # Counted and not timed, as an answer is needed before anything is compiled. Shipped presets took

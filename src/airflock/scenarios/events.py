@@ -78,6 +78,7 @@ def to_vector(name: str, value: Any, dimensions: int, unit: str) -> list[float]:
 
 def check_agent(agent: Any, agents: int) -> int:
     """Return the number of an agent of the flock. Raises FlightError in one line."""
+    # __index__ and not int(): 1.5 or "3" would pass as another agent.
     if isinstance(agent, bool) or not hasattr(agent, "__index__") or not 0 <= _index(agent) < agents:
         raise FlightError(f"agent = {agent!r}: this flight has the agents 0 to {agents - 1}")
     return _index(agent)
@@ -112,6 +113,8 @@ def _index(given: Any) -> int:
     except TypeError:
         return -1
 
+
+# --- Seeds ---
 
 LARGEST_SEED = 2**64 - 1
 MAX_FLIGHTS = 10_000_000  # flights at a time

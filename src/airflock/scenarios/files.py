@@ -69,7 +69,7 @@ def load(
     laws: Any = None,
     trust: bool = False,
 ) -> Scenario:
-    """Scenario from a preset's name or a file.
+    """Load a scenario from a preset's name or a file.
 
     Parameters
     ----------
@@ -189,6 +189,7 @@ def _with_given(
         if part is None:
             continue
         table, kind = document.get(family.section, {}), str(part)
+        # A name of the package needs no object: the document finds it by the name.
         if not (isinstance(part, str) and part in family.shipped):
             own_part, more = family.from_caller(part)
             errors += more
@@ -244,6 +245,8 @@ def scenario_variant(
         raise ScenarioError([f"{scenario.name}: is a Scenario already; give its law to load(name, law=...)"])
     return rebuilt(scenario, settings) if settings else scenario
 
+
+# --- Files that extend another: extends = "vasarhelyi_2018/real_6ms" ---
 
 OF_ITS_OWN = ("published", "title")  # what a paper published of a file and what the file is called: not of another
 LONGEST = 10  # files in a chain of extends
@@ -309,6 +312,8 @@ def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return a document in which relative files of rules or meshes have absolute paths."""
     result = dict(document)
     kinds = [(section, "kind") for section in ("model", "body", "sensors", "radio", "topology", "metrics")]
+    # Relative names are relative to the file that has them, which is lost when documents are
+    # merged.
     for section, key in (*kinds, ("scene", "file")):
         table = result.get(section)
         name = value_of(table.get(key)) if isinstance(table, Mapping) else None
@@ -334,6 +339,8 @@ def _kind_with_path(entry: Any, folder: Path) -> Any:
         return entry
     return {**entry, "kind": str((folder / name).absolute())}
 
+
+# --- Fields from a GeoJSON or KML file: the key world.file ---
 
 FROM_FILE = ("world.file", "world.simplify")
 GIVEN = ("corners", "obstacles", "heights")  # keys that come from the map file, so the scenario may not have them

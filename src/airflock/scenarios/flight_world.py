@@ -66,6 +66,7 @@ def scene_errors(scenario: Scenario, started: bool = False) -> list[str]:
             errors.append(
                 f"goals.points[{number}] = [{where}] m lies {depth:.3g} m inside what stands in the scene; move it out"
             )
+    # The region is sampled, so only a share of exactly 1 counts as shut.
     if not started and _blocked(scenario) == 1.0:
         errors.append(
             "start: the whole region in which agents start lies inside what stands in the scene, or nearer to it than "
@@ -161,6 +162,9 @@ def _blocked_share(scene: scenery.Parameters, begin: start.Parameters, dims: int
     return shut / number
 
 
+# --- The world and the goals of an interpreted flight ---
+
+
 class FlightWorld(Map):
     """The world of a flight: the map of a drone, with edges that act and shapes that appear."""
 
@@ -185,6 +189,7 @@ class FlightWorld(Map):
         """Return True if an agent may start here: start.wall_clearance off walls, start.clearance off the scene."""
         if self.shapes and bvh.nearest(x, y, z, self.clearance, *self._scene).distance < self.clearance:
             return False
+        # Distances to a mesh are to its faces: deep inside of one they are large again.
         if self.meshed and inside(x, y, z, *self._scene) > 0.5:
             return False
         return self.excursion(x, y, z) <= -self.wall_clearance

@@ -105,7 +105,7 @@ def sections() -> Mapping[str, Section]:
 
 
 def keys(section: str | None = None) -> list[Key]:
-    """Every key of a scenario file: what it means, its unit, range, default and source.
+    """List every key of a scenario file: its meaning, unit, range, default and source.
 
     Parameters
     ----------
@@ -193,6 +193,8 @@ def _declared(before: str, owner: str, record: type) -> list[Key]:
         keys_of_record.append(Key(whole, owner, kind, default, unit, low, high, options, meaning, source))
     return keys_of_record
 
+
+# --- Keys that no record declares ---
 
 OWN = "FILE.py"
 

@@ -13,7 +13,7 @@ BETWEEN = "between the columns of Table S1"
 
 
 def starting_set(v_flock: float) -> str:
-    """Scenario file for a flocking speed, by the scaling rules of Vásárhelyi et al. 2018.
+    """Return a scenario file for a flocking speed, by the scaling rules of Vásárhelyi et al. 2018.
 
     Parameters
     ----------

@@ -322,6 +322,7 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     A flight can take all keys of a scenario file but the number of agents, the dimensions, the motion step and the
     start. Raises ScenarioError with one line per error.
     """
+    # Compare after building: a setting may say the same in other units, or change nothing.
     new = rebuilt(scenario, settings, started=True)
     errors = [
         f"{key} = {getattr(new.flight, key):g}: {what} cannot change in flight; open another flight"

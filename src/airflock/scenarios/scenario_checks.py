@@ -26,6 +26,8 @@ def body_errors(body: Body, parts: Mapping[str, Any], model: Model | None, start
     begin, wing = parts["start"], parts["wing"]
     if begin is None or wing is None:
         return []
+    # A flight in the air may be slower than its body can start, so its speed at the start counts as
+    # fast enough.
     start = math.inf if started else begin.speed
     return body.limit_errors(b=b, dt=flight.dt, speed=model.speed(p), start=start, wing=wing)
 
@@ -77,6 +79,8 @@ def metric_errors(measures: MetricSet, q: Any, world: Any) -> list[str]:
     """Return the errors that a metric set finds in its parameters beyond single ranges."""
     if q is None or world is None or measures.faults is None:
         return []
+    # A metric set names the arguments that its check needs; the same call serves sets of the user's
+    # own.
     given = {"q": q, "largest": largest_extension(world), "edges": world.edges}
     return list(call_rule(measures.faults, "faults", given, measures.name))
 
@@ -119,6 +123,8 @@ def field_file_errors(world: Any) -> list[str]:
         return []
     return [f"world.file = {world.file!r}: a file is read where a scenario is loaded, and not here"]
 
+
+# --- Wings: stall, overlap at the start, and the gradient of the drag ---
 
 FormationPlace = Callable[[int, float, float, float], tuple[float, float, float]]
 FORMATIONS: dict[str, FormationPlace] = {"vee": start.in_vee, "echelon": start.in_echelon}  # by the key start.kind
@@ -187,6 +193,8 @@ def _overlapping(parts: Mapping[str, Any]) -> list[str]:
                 ]
     return []
 
+
+# --- The arena: simple polygons, containment, room for all agents ---
 
 MOST_JITTER = 5.8  # standard deviations; no normal number of `core.random` is larger
 ROUNDED = 2e-3  # m; by how much an obstacle at an edge may reach outside: files round corners to the millimetre
@@ -273,6 +281,7 @@ def formation_errors(world: arena.Parameters, start_record: start.Parameters, ag
     if plan is None:
         return []
     margin = 0.0 if world.edges == "open" else MOST_JITTER * start_record.jitter  # a face would move an agent outside
+    # The last two agents end the two arms of a vee; an echelon ends with the last one.
     ends = (0, max(agents - 2, 0), agents - 1)
     for agent in dict.fromkeys(range(agents) if world.arena == "polygon" else ends):
         x, y, z = FORMATIONS[start_record.kind](
@@ -310,6 +319,8 @@ def start_region_errors(world: arena.Parameters, start_record: start.Parameters,
         reach = start_record.radius if start_record.kind == "ball" else 0.5 * start_record.side
         z = min(-arena.heights_of(world)[0], arena.heights_of(world)[1]) if world.dimensions == "3" else math.inf
         plan = ground_plan(world)
+        # A thousandth smaller, so that the polygon of a circular arena may hold a ball of the same
+        # radius.
         round_ = Point(0.0, 0.0).buffer(reach * 0.999, quad_segs=64)
         region = round_ if start_record.kind == "ball" else box(-reach, -reach, reach, reach)
         if plan is not None and (not plan.covers(region) or reach > z):

@@ -60,6 +60,7 @@ def _speed_alone(scenario: Scenario) -> str:
     model, p = scenario.model, scenario.parameters
     numbers = {name: default for name, declared, default in declarations(p) if isinstance(declared, Quantity)}
     changed = [name for name, default in numbers.items() if getattr(p, name) != default]
+    # Laws of fewer than four numbers have no set of gains that could belong to one speed.
     if changed != ["v_flock"] or len(numbers) < 4:
         return ""
     hint = f"; airflock presets --for-speed {p.v_flock:.4g} gives a starting set"
