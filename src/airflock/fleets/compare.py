@@ -38,8 +38,8 @@ def software_card(
     period = min(max(scenario.sensors.period or scenario.flight.dt, 0.02), 0.2)
     members = range(1, scenario.agents + 1)
     layer = min(3.0, 100.0 / max(scenario.agents, 1))
-    # One tick, one packet and one decision coincide, as for a simulated agent; layers shrink so that a large flock
-    # fits.
+    # One tick, one packet and one decision coincide, as for a simulated agent; layers shrink so
+    # that a large flock fits.
     limits = {"tick": period, "status_period": period, "layer": max(layer, 0.5), "mission_time": 36000.0}
     if realtime:
         as_simulated = False
@@ -154,7 +154,8 @@ def divergence(
     )
     count = min(len(plain), len(ours))
     apart = _largest_distance(ours[:count] - plain[:count])
-    # A flock is chaotic: the fleet may not leave the simulated flight faster than nudges of 1 cm do by themselves.
+    # A flock is chaotic: the fleet may not leave the simulated flight faster than nudges of 1 cm do
+    # by themselves.
     chaos = np.max([_largest_distance(nudged(k) - plain) for k in range(NUDGE_COUNT)], axis=0)
     period = fleet.card.period
     kept = [t for t in times if round(t / period) < count]
@@ -188,7 +189,8 @@ def compare_scores(
         if not all(isinstance(v, (int, float)) and math.isfinite(v) for pair in pairs for v in pair):
             continue
         a, b = np.array(pairs, float).T
-        # Paired by seed: both flights share start and random numbers, so most of the spread between seeds cancels.
+        # Paired by seed: both flights share start and random numbers, so most of the spread between
+        # seeds cancels.
         spread = float(np.std(b - a, ddof=1)) if len(a) > 1 else math.nan
         error = spread / math.sqrt(len(a))
         gap = float(np.mean(b - a))

@@ -181,8 +181,8 @@ class DroneFaults:
         return [(kind, case) for kind, case in found if case and self._is_active(case, now)]
 
     def _is_active(self, case: ActiveFault, now: float) -> bool:
-        # Half a step of tolerance: times are multiples of a step up to rounding, and a fault must begin and end at
-        # the step of the simulation.
+        # Half a step of tolerance: times are multiples of a step up to rounding, and a fault must
+        # begin and end at the step of the simulation.
         half = 0.5 * self._dt
         return case.begin - half <= now < case.begin + case.lasts - half
 
@@ -208,7 +208,8 @@ class DroneFaults:
         lasting = dict(self._active_with(drone, rule, now))
         for kind in self._kinds.values():
             if kind in lasting:
-                # A frozen sensor repeats the last state before its fault, so the latest one is kept for each rule.
+                # A frozen sensor repeats the last state before its fault, so the latest one is kept
+                # for each rule.
                 last = self._last_states.setdefault((drone, kind.name, rule), state)
                 given = {f"at_{name}": value for name, value in last._asdict().items()} | state._asdict()
                 state = State(*self._call_rule(kind, rule, lasting[kind], now, **given))

@@ -57,7 +57,8 @@ class PacketNumbers:
     def _drawn(self, first: int) -> list[list[list[float]]]:
         """Draw a table of receivers and senders for each of PERIODS_PER_BLOCK periods."""
         periods = np.arange(first, first + PERIODS_PER_BLOCK, dtype=np.uint64)[:, None, None]
-        # A Philox block has four words, which serve four receivers of one sender, as in the simulator.
+        # A Philox block has four words, which serve four receivers of one sender, as in the
+        # simulator.
         to = np.arange(0, self._count, 4, dtype=np.uint64)[None, :, None]  # four receivers share their words
         who = np.arange(self._count, dtype=np.uint64)[None, None, :]
         words = random.random_words(self._seed, random.PACKET, 0, periods, random.pair_number(to, who, self._count))
@@ -114,7 +115,8 @@ TIME_TOLERANCE = 1e-6  # s
 Position = tuple[float, float, float]
 
 
-# Draws by the simulator's own functions and streams, so that a fleet and a simulation of one seed can be compared.
+# Draws by the simulator's own functions and streams, so that a fleet and a simulation of one seed
+# can be compared.
 class RadioChannel:
     """Datagrams between the members of a fleet.
 
@@ -156,8 +158,8 @@ class RadioChannel:
         )  # in range, nothing is lost
         self._queue: list[tuple[float, int, int, Sequence[int], bytes]] = []
         self._count = 0
-        # Injected faults have a generator of their own: they must not shift the losses of the scenario. The text is
-        # part of the seed, so it cannot be renamed.
+        # Injected faults have a generator of their own: they must not shift the losses of the
+        # scenario. The text is part of the seed, so it cannot be renamed.
         self._random = dice.Random(f"ether {seed}")
         self.sent = self.arrived_count = 0
 
@@ -241,8 +243,8 @@ class RadioChannel:
             or any(self._random.random() < f.amount for f in self._active_faults("loss", receiver, now))
         ):
             return False
-        # Most flights lose no packet in range: no random number is drawn, and none of the rule's arguments is
-        # computed.
+        # Most flights lose no packet in range: no random number is drawn, and none of the rule's
+        # arguments is computed.
         if self._loses_nothing:
             return True
         known = self._pair_arguments(sender, receiver, at, distance)

@@ -45,7 +45,8 @@ LOST_STATION_MODES = {
 # ---- Holding a position
 
 STANDING_SPEED = 0.5  # m/s; our choice: slower than this it has come to stand, and holds that place
-# PX4's position gain is about twice this (MPC_XY_P 0.95 1/s); without holding, drones that hover drift by metres.
+# PX4's position gain is about twice this (MPC_XY_P 0.95 1/s); without holding, drones that hover
+# drift by metres.
 POSITION_GAIN = 0.5  # 1/s; our choice, about half of PX4's MPC_XY_P: a metre off is half a metre a second back
 MAX_RETURN_SPEED = 1.0  # m/s; our choice
 
@@ -349,8 +350,8 @@ class SoftwareVehicle:
             or not all(map(math.isfinite, wanted))
         ):
             return []  # the nose points north, so that both frames are one
-        # ArduPilot ignores setpoints outside GUIDED; PX4 counts them before OFFBOARD, which it enters only while they
-        # stream.
+        # ArduPilot ignores setpoints outside GUIDED; PX4 counts them before OFFBOARD, which it
+        # enters only while they stream.
         if self.kind == "ardupilot" and self.mode != GUIDED:
             return []
         if self.now - self.setpoint_at > MAX_SETPOINT_GAP:
@@ -479,7 +480,8 @@ class SoftwareVehicle:
             self.memory = type(self.memory)() if self.memory is not None else None
             return
         (x, y, z, vx, vy, vz), c = self.state, self.autopilot_velocity()
-        # Without motors the body is given a velocity ever further down: it falls as fast as its dynamics let it.
+        # Without motors the body is given a velocity ever further down: it falls as fast as its
+        # dynamics let it.
         falls = self.off or not self.motor
         command = (vx, vy, vz - 5.0) if falls else c
         if self.faults is not None and not falls:

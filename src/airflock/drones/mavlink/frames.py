@@ -146,8 +146,8 @@ def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
     if len(head) < HEADER_LENGTH:
         return None, 0
     length, flags, known = head[1], head[2], message_layout(message_number(head))
-    # An unknown message cannot be checked, because its extra byte is unknown: it is rubbish to us. A length of zero
-    # never occurs, for MAVLink 2 keeps at least one byte.
+    # An unknown message cannot be checked, because its extra byte is unknown: it is rubbish to us.
+    # A length of zero never occurs, for MAVLink 2 keeps at least one byte.
     if known is None or length > known.size or length == 0 or flags & ~SIGNED_FLAG:
         return None, 1
     end = start + HEADER_LENGTH + length
@@ -155,8 +155,8 @@ def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
     if len(data) < whole:
         return None, 0
     sent_checksum = int.from_bytes(data[end : end + CHECKSUM_LENGTH], "little")
-    # Only the checksum tells a frame from a payload byte that happens to be 0xFD, so a mismatch costs one byte, not
-    # the length that the false header claims.
+    # Only the checksum distinguishes a frame from a payload byte that happens to be 0xFD, so a mismatch
+    # costs one byte, not the length that the false header claims.
     if sent_checksum != checksum(data[start + 1 : end], known.crc_extra):
         return None, 1
     return MavlinkFrame(head[5], head[6], message_number(head), data[start + HEADER_LENGTH : end]), whole - start

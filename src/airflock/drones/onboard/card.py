@@ -268,8 +268,8 @@ class Fence:
         These are all sides of a convex fence; of any other, the sides that can be seen. From outside the nearest point
         counts, too.
         """
-        # A convex fence is a handful of planes, each valid everywhere. A polygon with a notch needs the sides that
-        # can be seen from here, or a side behind another one would push.
+        # A convex fence is a handful of planes, each valid everywhere. A polygon with a notch needs
+        # the sides that can be seen from here, or a side behind another one would push.
         if self.convex_planes:
             return [(a * x + b * y + d, a, b, 0.0) for a, b, _, d in self.convex_planes]
         count = len(self.edges)
@@ -291,7 +291,8 @@ MEMBER_PARTS = ("law", "body")  # of which members may have numbers of their own
 
 def law_of_package(name: str) -> Model:
     """Return a law of the package by its name."""
-    # A law is named, never carried as code: a card is data. Laws of a user's own fly from an installed package.
+    # A law is named, never carried as code: a card is data. Laws of a user's own fly from an
+    # installed package.
     if not name.isidentifier():
         raise CardError([f"law.kind = {name!r} is not a law of this version"])
     try:
@@ -579,8 +580,8 @@ def _card_from_document(d: Mapping[str, Any], errors: list[str]) -> FlightCard |
 
 def _packet_policy(extrapolate: bool, max_age: float, once: bool = False, any_stamp: bool = False) -> PacketPolicy:
     """Return the use of neighbours' data; with any_stamp all times of packets are accepted."""
-    # In a simulation all agents share one clock, and packets of a jittering radio may overtake each other; believing
-    # any stamp is what the simulated agents do.
+    # In a simulation all agents share one clock, and packets of a jittering radio may overtake each
+    # other; believing any stamp is what the simulated agents do.
     if any_stamp:
         return PacketPolicy(extrapolate, max_age, once, early=FAR, drop_reordered=False)
     return PacketPolicy(extrapolate, max_age, once)
@@ -638,7 +639,8 @@ def _geometry_errors(card: FlightCard) -> list[str]:
         errors.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
     if world.edges != "open":
         errors.append(f"world.edges = {world.edges!r}: real space has no such edges; set world.edges = 'open'")
-    # A pilot is made here, on the ground, so that a law that cannot fly this card fails before take-off.
+    # A pilot is made here, on the ground, so that a law that cannot fly this card fails before
+    # take-off.
     for member in card.members if card.own else card.members[:1]:
         with collect_errors(errors):
             card.pilot(member)

@@ -128,7 +128,7 @@ class UdpPort:
         return self._socket.fileno()
 
     def aim(self, there: tuple[str, int]) -> None:
-        """Send to this address from now on, whoever sends to it."""
+        """Send to this address from now on, whatever arrives."""
         self._destination, self._answers_last_sender = there, False
 
     def read(self) -> list[bytes]:
@@ -353,7 +353,8 @@ def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, l
             port.close()
         raise CardError(faults)
     for text in arguments.radio:
-        # A port without a destination answers whoever speaks first: two such ports wait for each other for ever.
+        # A port without a destination answers the first sender: two such ports wait for each
+        # other for ever.
         if text.startswith("udp:") and ">" not in text:
             sys.stderr.write(
                 f"airflock: note: --radio {text} sends to nobody before it has heard somebody; where no router speaks "
@@ -373,7 +374,8 @@ def _run(arguments: argparse.Namespace) -> int:
                 f"{arguments.card}: {card.name}, {len(card.members)} members, hash {card.hash[:8]}: fits\n"
             )
             return 0
-        # Mode x: a log is evidence and is never overwritten. The buffer keeps the disk out of the tick.
+        # Mode x: a log is evidence and is never overwritten. The buffer keeps the disk out of the
+        # tick.
         with open(log_file, "x", encoding="utf-8", buffering=1 << 16) as log:
             run_node(card, arguments.member, key, ports, memory_file, log, write_line=_write_line)
     except OSError as error:
