@@ -46,7 +46,7 @@ def software_card(
         limits = {key: limits[key] for key in ("layer", "mission_time")}
     if scenario.dimensions == 3:
         limits["climb_max"] = min(default_safety(scenario).speed_max, 10.0)  # the law climbs as fast as it flies
-    made = make_card_document(
+    document = make_card_document(
         scenario,
         site=SOFTWARE_SITE,
         members=members,
@@ -60,7 +60,7 @@ def software_card(
         seed=seed,
         safety=limits,
     )
-    return parse_card({**made, "hash": card_hash(made)})
+    return parse_card({**document, "hash": card_hash(document)})
 
 
 def simulated_start(scenario: Scenario, seed: int) -> list[State]:
@@ -88,8 +88,12 @@ def fleet_recording(fleet: LockstepFleet | RealtimeFleet) -> xr.Dataset:
     recorded = make_dataset(
         frames, dims, fleet.card.period, attributes, "velocity", group_names(scenario.groups, scenario.agents)
     )
-    known = rows[:, :, 9 : 9 + dims].transpose(0, 2, 1)[:, :, None, :]
-    recorded["own_position"] = (recorded["position"].dims, known, {"units": "m", "meaning": "as the node knows it"})
+    own_position = rows[:, :, 9 : 9 + dims].transpose(0, 2, 1)[:, :, None, :]
+    recorded["own_position"] = (
+        recorded["position"].dims,
+        own_position,
+        {"units": "m", "meaning": "as the node knows it"},
+    )
     recorded["age"] = (("time", "receiver", "sender"), fleet.packet_ages().astype(np.float32), {"units": "s"})
     return recorded
 

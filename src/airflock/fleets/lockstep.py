@@ -130,11 +130,11 @@ def make_vehicle(
     at = (4.0 * (index % side) - 2.0 * (side - 1), 4.0 * (index // side) - 2.0 * (side - 1), 0.0)
     noisy = "noise" in number_names(body) and body.noise > 0.0
     draw = partial(noise, drone=index) if noisy else lambda step: (0.0, 0.0, 0.0)
-    made = SoftwareVehicle(
+    vehicle = SoftwareVehicle(
         card.autopilot.name, card.members[index], card.site, at, scenario.vehicle, body, draw, started
     )
-    made.place = index
-    return made
+    vehicle.place = index
+    return vehicle
 
 
 def write_card_and_key(path: Path, card: FlightCard) -> None:

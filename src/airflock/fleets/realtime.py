@@ -485,9 +485,9 @@ def fly_in_realtime(
 
     Raises ScenarioError for faults that need lock-step, LinkError where a process ends before its time.
     """
-    wrong = lockstep_only_errors(faults)
-    if wrong:
-        raise ScenarioError(wrong)
+    errors = lockstep_only_errors(faults)
+    if errors:
+        raise ScenarioError(errors)
     ports = FleetPorts.open(len(card.members), first_client)
     try:
         now = time.monotonic()
@@ -531,8 +531,8 @@ async def run_in_event_loop(task: Task) -> TaskResult:
             try:
                 rest = next(task)
             except StopIteration as end:
-                found: TaskResult = end.value
-                return found
+                result: TaskResult = end.value
+                return result
             if rest.handlers is not hears:
                 hears = rest.handlers
                 for port, hand in hears:

@@ -179,11 +179,11 @@ class PacketReceiver:
         message = message_number(data)
         if data[0] != FRAME_MAGIC or data[2] != SIGNED_FLAG or message not in self._senders:
             return "header"
-        known = message_layout(message)
+        layout = message_layout(message)
         length = data[1]
         if (
-            known is None
-            or not 0 < length <= known.size
+            layout is None
+            or not 0 < length <= layout.size
             or len(data) != HEADER_LENGTH + length + CHECKSUM_LENGTH + SIGNATURE_LENGTH
         ):
             return "length"
