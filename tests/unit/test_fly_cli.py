@@ -79,7 +79,7 @@ def test_mistakes_of_a_preparation_are_told_together_and_nothing_is_written(airf
         (["--limit", "breake=2"], "--limit breake: is not a limit; did you mean brake?"),
         (["--limit", "brake=900"], "outside [0.1, 20] m/s^2"),
         (["--limit", "status_period=0.02", "--fast-bits", "30000"], "fast radio: 3 drones would take"),
-        (["--autopilot", "naza"], "none of px4, ardupilot"), (["--limit", "base=1"], "Safety.base = 1 m"),
+        (["--autopilot", "naza"], "none of px4, ardupilot"), (["--limit", "base=1"], "SafetyLimits.base = 1 m"),
     ):  # fmt: skip
         code, _, lines = airflock("fly", "prepare", REAL, *HERE, *more)
         assert code == 2 and any(part in line for line in lines), (more, lines)

@@ -85,7 +85,8 @@ def make_card_document(
     height = max(DEFAULT_HEIGHT, limits.base - low) if height is None else height
     top = limits.base + limits.layer * (len(members) - 1)
     stands = scenario.stands()
-    # A radio that keeps packets lets the newest count until the next; all others let each count once.
+    # A radio that keeps packets lets the newest count until the next; all others let each count
+    # once.
     held = not scenario.transceiver.keeps_packets
     stop_for_lost = not as_simulated or scenario.silence.rule == "stop" if stop_for_lost is None else stop_for_lost
     silence = with_defaults(
@@ -146,13 +147,13 @@ def deviation_notes(scenario: Scenario, safety: SafetyLimits, members: int) -> l
     if safety.response < likely.response:
         notes.append(
             f"response = {safety.response:g} s is shorter than what the scenario gives a card, {likely.response:g} s: "
-            "distances to stop are notes too short, unless the drones are as quick"
+            "distances to stop are told too short, unless the drones are as quick"
         )
     for name in ("accel", "brake"):
         if getattr(safety, name) > likely.accel:
             notes.append(
                 f"{name} = {getattr(safety, name):g} m/s^2 is more than what the scenario gives a card, "
-                f"{likely.accel:g} m/s^2: distances to stop are notes too short, unless the drones are as quick"
+                f"{likely.accel:g} m/s^2: distances to stop are told too short, unless the drones are as quick"
             )
     return notes
 
@@ -234,7 +235,8 @@ def fence_corners(world: arena.Parameters, margin: float) -> list[list[float]]:
     sides = [inward_plane(a, b) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
     corners = []
     for one, two in zip([sides[-1], *sides[:-1]], sides, strict=True):  # each corner moves with its two sides
-        # The corner is the intersection of the two sides after both have moved outwards by the margin.
+        # The corner is the intersection of the two sides after both have moved outwards by the
+        # margin.
         a, b, _, d = one
         p, q, _, e = two
         det = a * q - b * p

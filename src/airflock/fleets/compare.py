@@ -38,15 +38,15 @@ def software_card(
     period = min(max(scenario.sensors.period or scenario.flight.dt, 0.02), 0.2)
     members = range(1, scenario.agents + 1)
     layer = min(3.0, 100.0 / max(scenario.agents, 1))
-    # One tick, one packet and one decision coincide, as for a simulated agent; layers shrink so that a large flock
-    # fits.
+    # One tick, one packet and one decision coincide, as for a simulated agent; layers shrink so
+    # that a large flock fits.
     limits = {"tick": period, "status_period": period, "layer": max(layer, 0.5), "mission_time": 36000.0}
     if realtime:
         as_simulated = False
         limits = {key: limits[key] for key in ("layer", "mission_time")}
     if scenario.dimensions == 3:
         limits["climb_max"] = min(default_safety(scenario).speed_max, 10.0)  # the law climbs as fast as it flies
-    made = make_card_document(
+    document = make_card_document(
         scenario,
         site=SOFTWARE_SITE,
         members=members,
@@ -60,7 +60,7 @@ def software_card(
         seed=seed,
         safety=limits,
     )
-    return parse_card({**made, "hash": card_hash(made)})
+    return parse_card({**document, "hash": card_hash(document)})
 
 
 def simulated_start(scenario: Scenario, seed: int) -> list[State]:
@@ -88,8 +88,12 @@ def fleet_recording(fleet: LockstepFleet | RealtimeFleet) -> xr.Dataset:
     recorded = make_dataset(
         frames, dims, fleet.card.period, attributes, "velocity", group_names(scenario.groups, scenario.agents)
     )
-    known = rows[:, :, 9 : 9 + dims].transpose(0, 2, 1)[:, :, None, :]
-    recorded["own_position"] = (recorded["position"].dims, known, {"units": "m", "meaning": "as the node knows it"})
+    own_position = rows[:, :, 9 : 9 + dims].transpose(0, 2, 1)[:, :, None, :]
+    recorded["own_position"] = (
+        recorded["position"].dims,
+        own_position,
+        {"units": "m", "meaning": "as the node knows it"},
+    )
     recorded["age"] = (("time", "receiver", "sender"), fleet.packet_ages().astype(np.float32), {"units": "s"})
     return recorded
 
@@ -154,7 +158,8 @@ def divergence(
     )
     count = min(len(plain), len(ours))
     apart = _largest_distance(ours[:count] - plain[:count])
-    # A flock is chaotic: the fleet may not leave the simulated flight faster than nudges of 1 cm do by themselves.
+    # A flock is chaotic: the fleet may not leave the simulated flight faster than nudges of 1 cm do
+    # by themselves.
     chaos = np.max([_largest_distance(nudged(k) - plain) for k in range(NUDGE_COUNT)], axis=0)
     period = fleet.card.period
     kept = [t for t in times if round(t / period) < count]
@@ -188,7 +193,8 @@ def compare_scores(
         if not all(isinstance(v, (int, float)) and math.isfinite(v) for pair in pairs for v in pair):
             continue
         a, b = np.array(pairs, float).T
-        # Paired by seed: both flights share start and random numbers, so most of the spread between seeds cancels.
+        # Paired by seed: both flights share start and random numbers, so most of the spread between
+        # seeds cancels.
         spread = float(np.std(b - a, ddof=1)) if len(a) > 1 else math.nan
         error = spread / math.sqrt(len(a))
         gap = float(np.mean(b - a))

@@ -177,18 +177,18 @@ class DroneFaults:
             self._active[onset.agent, onset.kind] = ActiveFault(onset.step * self._dt, onset.lasts, numbers, began)
 
     def _active_with(self, drone: int, rule: str, now: float) -> list[tuple[Fault, ActiveFault]]:
-        found = [(kind, self._active.get((drone, kind.name))) for kind in self._kinds.values() if rule in kind.rules]
-        return [(kind, case) for kind, case in found if case and self._is_active(case, now)]
+        cases = [(kind, self._active.get((drone, kind.name))) for kind in self._kinds.values() if rule in kind.rules]
+        return [(kind, case) for kind, case in cases if case and self._is_active(case, now)]
 
     def _is_active(self, case: ActiveFault, now: float) -> bool:
-        # Half a step of tolerance: times are multiples of a step up to rounding, and a fault must begin and end at
-        # the step of the simulation.
+        # Half a step of tolerance: times are multiples of a step up to rounding, and a fault must
+        # begin and end at the step of the simulation.
         half = 0.5 * self._dt
         return case.begin - half <= now < case.begin + case.lasts - half
 
     def _call_rule(self, kind: Fault, rule: str, case: ActiveFault, now: float, **arguments: float) -> Any:
-        known = {**case.start_values, "since": max(now - case.begin, 0.0), "f": case.numbers, **arguments}
-        return call_rule(kind.rules[rule], rule, known, kind.name)
+        values = {**case.start_values, "since": max(now - case.begin, 0.0), "f": case.numbers, **arguments}
+        return call_rule(kind.rules[rule], rule, values, kind.name)
 
     def measured_state(self, drone: int, now: float, state: State) -> State:
         """Return the own state as the navigation of a drone measures it."""
@@ -208,10 +208,11 @@ class DroneFaults:
         lasting = dict(self._active_with(drone, rule, now))
         for kind in self._kinds.values():
             if kind in lasting:
-                # A frozen sensor repeats the last state before its fault, so the latest one is kept for each rule.
+                # A frozen sensor repeats the last state before its fault, so the latest one is kept
+                # for each rule.
                 last = self._last_states.setdefault((drone, kind.name, rule), state)
-                given = {f"at_{name}": value for name, value in last._asdict().items()} | state._asdict()
-                state = State(*self._call_rule(kind, rule, lasting[kind], now, **given))
+                values = {f"at_{name}": value for name, value in last._asdict().items()} | state._asdict()
+                state = State(*self._call_rule(kind, rule, lasting[kind], now, **values))
             elif rule in kind.rules:
                 self._last_states[drone, kind.name, rule] = state
         return state
@@ -224,11 +225,11 @@ class DroneFaults:
 
     def active_kinds(self, now: float) -> dict[str, set[int]]:
         """Return the kinds of fault that hold, each with the indices of the affected drones."""
-        found: dict[str, set[int]] = {}
+        affected: dict[str, set[int]] = {}
         for drone, kind in self._active:
             if self._is_active(self._active[drone, kind], now):
-                found.setdefault(kind, set()).add(drone)
-        return found
+                affected.setdefault(kind, set()).add(drone)
+        return affected
 
     def motor_command(self, drone: int, now: float, command: Sequence[float]) -> Velocity:
         """Return the velocity (m/s) that reaches the motors."""
@@ -242,9 +243,9 @@ class DroneFaults:
     ) -> Any:
         """Return the velocity after a motion step, m/s."""
         for kind, case in self._active_with(drone, "motion", now):
-            given = dict(zip(("vx", "vy", "vz"), state[3:], strict=True))
-            given |= dict(zip(("cx", "cy", "cz", "nx", "ny", "nz"), (*command, *velocity), strict=True))
-            velocity = self._call_rule(kind, "motion", case, now, dt=dt, **given)
+            values = dict(zip(("vx", "vy", "vz"), state[3:], strict=True))
+            values |= dict(zip(("cx", "cy", "cz", "nx", "ny", "nz"), (*command, *velocity), strict=True))
+            velocity = self._call_rule(kind, "motion", case, now, dt=dt, **values)
         return velocity
 
     def reach(self, sender: int, receiver: int, now: float) -> float:

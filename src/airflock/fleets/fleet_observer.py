@@ -109,8 +109,8 @@ class ObserverNote(NamedTuple):
     text: str
 
 
-# Reads broadcast packets only: the autopilot's client port belongs to a ground station, and over the air there is
-# none.
+# Reads broadcast packets only: the autopilot's client port belongs to a ground station, and over
+# the air there is none.
 class FleetObserver:
     """Listens to the fleet of a card.
 

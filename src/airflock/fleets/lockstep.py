@@ -70,8 +70,8 @@ class MotionNoise:
 
     def _drawn(self, first: int) -> tuple[list[float], list[float]]:
         """Draw the numbers of STEPS_PER_BLOCK steps: words as arrays, normal numbers by the scalar function."""
-        # Words come as arrays, 256 steps at once; the normal numbers are made by the scalar function of the
-        # simulator, because NumPy's functions may round differently.
+        # Words come as arrays, 256 steps at once; the normal numbers are made by the scalar
+        # function of the simulator, because NumPy's functions may round differently.
         steps = np.arange(first, first + STEPS_PER_BLOCK, 1 if self._in_space else 2, dtype=np.uint64)
         if not self._in_space:
             steps //= np.uint64(2)
@@ -130,11 +130,11 @@ def make_vehicle(
     at = (4.0 * (index % side) - 2.0 * (side - 1), 4.0 * (index // side) - 2.0 * (side - 1), 0.0)
     noisy = "noise" in number_names(body) and body.noise > 0.0
     draw = partial(noise, drone=index) if noisy else lambda step: (0.0, 0.0, 0.0)
-    made = SoftwareVehicle(
+    vehicle = SoftwareVehicle(
         card.autopilot.name, card.members[index], card.site, at, scenario.vehicle, body, draw, started
     )
-    made.place = index
-    return made
+    vehicle.place = index
+    return vehicle
 
 
 def write_card_and_key(path: Path, card: FlightCard) -> None:
@@ -198,7 +198,8 @@ class OperatorStation:
 START_TIME = 1_800_000_000_000_000  # virtual Unix time of 0 s, µs
 UNREAD_MESSAGES = ("attitude", "home", "battery")  # messages that no node reads; in lock-step nobody else is there
 ABSENT_ROW = (math.nan,) * 15  # a row of a drone that has dropped out
-# A peer that was never heard has the time -1e9 (its default), far below this bound whatever the clock offsets add.
+# A peer that was never heard has the time -1e9 (its default), far below this bound whatever the
+# clock offsets add.
 HEARD_SINCE = -1e8  # s; a peer whose last state held before this has not been heard
 
 
@@ -278,8 +279,8 @@ class LockstepFleet:
             node.autopilot(vehicle.due_telemetry(0.0), 0.0)
         delay, period = self.scenario.radio.delay, self.card.safety.status_period
         for who, (node, vehicle) in enumerate(zip(self.nodes, self.vehicles, strict=True)):
-            # At time 0 a simulated agent has already heard packets that were sent one delay ago: a node of its own
-            # sends them.
+            # At time 0 a simulated agent has already heard packets that were sent one delay ago: a
+            # node of its own sends them.
             early = Node(self.card, node.member, SOFTWARE_KEY, now=-delay, utc=START_TIME - round(1e6 * delay))
             early.phase = MissionPhase.FLOCK
             early.autopilot(vehicle.origin_frame(), -delay)
@@ -314,7 +315,8 @@ class LockstepFleet:
             if on_done is not None and self.steps % 100 == 0:
                 on_done()
 
-    # One loop on a virtual clock: sixty processes on two cores start late, tick late and give other bits each time.
+    # One loop on a virtual clock: sixty processes on two cores start late, tick late and give other
+    # bits each time.
     def _step(self) -> None:
         now = self.now
         if self._faults:
@@ -335,8 +337,8 @@ class LockstepFleet:
         if self.steps % self._steps_per_period == 0:
             self._measure(self.steps // self._steps_per_period)
         dead = [i in self.dropped_out or self._is_dead(node.member, now) for i, node in enumerate(self.nodes)]
-        # The order of the simulator: measure, receive, decide, move. A packet of this tick arrives at the next one at
-        # best.
+        # The order of the simulator: measure, receive, decide, move. A packet of this tick arrives
+        # at the next one at best.
         for node, vehicle, gone in zip(self.nodes, self.vehicles, dead, strict=True):
             telemetry = vehicle.due_telemetry(now)
             if not gone:

@@ -57,13 +57,14 @@ class PacketNumbers:
     def _drawn(self, first: int) -> list[list[list[float]]]:
         """Draw a table of receivers and senders for each of PERIODS_PER_BLOCK periods."""
         periods = np.arange(first, first + PERIODS_PER_BLOCK, dtype=np.uint64)[:, None, None]
-        # A Philox block has four words, which serve four receivers of one sender, as in the simulator.
+        # A Philox block has four words, which serve four receivers of one sender, as in the
+        # simulator.
         to = np.arange(0, self._count, 4, dtype=np.uint64)[None, :, None]  # four receivers share their words
         who = np.arange(self._count, dtype=np.uint64)[None, None, :]
         words = random.random_words(self._seed, random.PACKET, 0, periods, random.pair_number(to, who, self._count))
         table = random.uniform(np.stack(words, axis=2)).reshape(PERIODS_PER_BLOCK, -1, self._count)
-        found: list[list[list[float]]] = table[:, : self._count].tolist()
-        return found
+        tables: list[list[list[float]]] = table[:, : self._count].tolist()
+        return tables
 
 
 # ---- Attackers
@@ -114,7 +115,8 @@ TIME_TOLERANCE = 1e-6  # s
 Position = tuple[float, float, float]
 
 
-# Draws by the simulator's own functions and streams, so that a fleet and a simulation of one seed can be compared.
+# Draws by the simulator's own functions and streams, so that a fleet and a simulation of one seed
+# can be compared.
 class RadioChannel:
     """Datagrams between the members of a fleet.
 
@@ -156,8 +158,8 @@ class RadioChannel:
         )  # in range, nothing is lost
         self._queue: list[tuple[float, int, int, Sequence[int], bytes]] = []
         self._count = 0
-        # Injected faults have a generator of their own: they must not shift the losses of the scenario. The text is
-        # part of the seed, so it cannot be renamed.
+        # Injected faults have a generator of their own: they must not shift the losses of the
+        # scenario. The text is part of the seed, so it cannot be renamed.
         self._random = dice.Random(f"ether {seed}")
         self.sent = self.arrived_count = 0
 
@@ -182,22 +184,22 @@ class RadioChannel:
         """Return the delay of a packet by the rule of the radio, s."""
         if self._radio.late is None or not at:
             return 0.0
-        known = self._pair_arguments(sender, receiver, at, math.dist(at[receiver], at[sender]))
-        return self._reception.late(receiver, sender, round((now + self._k.delay) / self._period), known)
+        arguments = self._pair_arguments(sender, receiver, at, math.dist(at[receiver], at[sender]))
+        return self._reception.late(receiver, sender, round((now + self._k.delay) / self._period), arguments)
 
     def _pair_arguments(self, sender: int, receiver: int, at: Sequence[Position], distance: float) -> dict[str, float]:
         """Return the arguments of a pair for rules of the radio."""
-        known = {"distance": distance}
+        arguments = {"distance": distance}
         if not self._asked_arguments:
-            return known
+            return arguments
         here, there = at[receiver], at[sender]
-        known |= {name: b - a for name, a, b in zip(("dx", "dy", "dz"), here, there, strict=True)}
+        arguments |= {name: b - a for name, a, b in zip(("dx", "dy", "dz"), here, there, strict=True)}
         if "talkers" in self._asked_arguments:
             near = [math.dist(here, other) <= self._k.range for other in at]
-            known["talkers"] = float(sum(near)) - 1.0
+            arguments["talkers"] = float(sum(near)) - 1.0
         if "clear" in self._asked_arguments and self._clear is not None:
-            known["clear"] = 1.0 if self._clear(here, there) else 0.0
-        return known
+            arguments["clear"] = 1.0 if self._clear(here, there) else 0.0
+        return arguments
 
     def _queue_packet(self, due: float, sender: int, receivers: Sequence[int], datagram: bytes) -> None:
         heapq.heappush(self._queue, (round(due, 6), self._count, sender, receivers, datagram))
@@ -207,8 +209,8 @@ class RadioChannel:
         return sum(self._random.uniform(0.0, f.amount) for f in self._active_faults("jitter", to, now))
 
     def _active_faults(self, kind: str, to: int, now: float) -> Sequence[InjectedFault]:
-        found = self._faults.get(kind, ())
-        return found and [f for f in found if f.holds(self._members[to], now)]
+        faults = self._faults.get(kind, ())
+        return faults and [f for f in faults if f.holds(self._members[to], now)]
 
     def deliver(self, now: float, positions: Sequence[Position]) -> Iterator[tuple[int, bytes]]:
         """Yield datagrams that arrive by now, each with the index of its receiver; at: true positions, m."""
@@ -241,14 +243,14 @@ class RadioChannel:
             or any(self._random.random() < f.amount for f in self._active_faults("loss", receiver, now))
         ):
             return False
-        # Most flights lose no packet in range: no random number is drawn, and none of the rule's arguments is
-        # computed.
+        # Most flights lose no packet in range: no random number is drawn, and none of the rule's
+        # arguments is computed.
         if self._loses_nothing:
             return True
-        known = self._pair_arguments(sender, receiver, at, distance)
-        if not self._reception.packet_arrives(receiver, sender, number, known):
+        arguments = self._pair_arguments(sender, receiver, at, distance)
+        if not self._reception.packet_arrives(receiver, sender, number, arguments):
             return False
-        missed = loss_probability(self._radio, self._k, number, self._period, known)
+        missed = loss_probability(self._radio, self._k, number, self._period, arguments)
         return bool(missed <= 0.0 or self._packet_numbers(number, receiver, sender) >= missed)
 
     def _is_cut_off(self, now: float, sender: int, receiver: int) -> bool:

@@ -59,7 +59,7 @@ from airflock.support import LinkError, ScenarioError
 LOCAL_HOST = "127.0.0.1"
 HOVER_SECONDS = 1.0  # s beyond the radio's delay for which all hover before the flight begins
 MIN_LOOK_PERIOD = 0.02  # s; least time between two looks of a vehicle at its ports
-CHANNEL_PERIOD = 0.01  # s between two looks of the ether
+CHANNEL_PERIOD = 0.01  # s between two looks of the radio channel
 CLIENT_CALL_PERIOD = 0.5  # s between two calls of a vehicle at a port where nobody has answered yet
 NEVER_HEARD = -1e9
 ABSENT_VEHICLE_ROW = (math.nan,) * 6  # a row of a vehicle that has dropped out
@@ -188,7 +188,8 @@ def node_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResul
             plan.clock[2 + i] = 1.0
         if waits and wire.state is not None and wire.mode == card.autopilot.ours and wire.armed:
             waits, node.phase, node.home = False, MissionPhase.FLOCK, (wire.state.x, wire.state.y, card.layer(member))
-        # A late node fills the rows that it missed with its present state, so that all have as many.
+        # A late node fills the rows that it missed with its present state, so that all have as
+        # many.
         while now >= len(rows) * card.period:
             ages = [node.peers.all[m].at - plan.clock[0] if m != member else NEVER_HEARD for m in card.members]
             rows.append(((*node.command, *(wire.state or (0.0,) * 6)), ages))
@@ -290,17 +291,17 @@ class RealtimeVehicle:
 
 def vehicle_task(plan: RealtimePlan, i: int) -> Generator[TaskRest, None, TaskResult]:
     """Run a vehicle until the end of the flight."""
-    began, craft = time.process_time(), RealtimeVehicle(plan, i)
+    began, vehicle = time.process_time(), RealtimeVehicle(plan, i)
     count, late, worst, due = 0, 0, 0.0, time.monotonic()
     while not plan.over:
-        behind, period = time.monotonic() - due, craft.period
+        behind, period = time.monotonic() - due, vehicle.period
         count, late, worst = count + 1, late + (behind > 0.5 * period), max(worst, behind)
-        craft.look()
+        vehicle.look()
         # After a long delay it skips looks instead of running them all at once.
         due = max(due + period, time.monotonic() - period)
         yield TaskRest(due)
     return TaskResult(
-        craft.rows, craft.notes, TickCounts(count, late, worst), MissionPhase.DONE, time.process_time() - began
+        vehicle.rows, vehicle.notes, TickCounts(count, late, worst), MissionPhase.DONE, time.process_time() - began
     )
 
 
@@ -381,12 +382,12 @@ class ComputerLoad(NamedTuple):
 class RealtimeFleet:
     """A fleet that has flown on the real clock; recorded like one in lock-step."""
 
-    def __init__(self, plan: RealtimePlan, lives: Sequence[TaskResult], load: ComputerLoad):
+    def __init__(self, plan: RealtimePlan, results: Sequence[TaskResult], load: ComputerLoad):
         self.scenario, self.card, self.seed, self.faults = plan.scenario, plan.card, plan.seed, plan.faults
         self.load = load
         count = len(plan.card.members)
-        self._nodes, self._vehicles = lives[1 : 1 + count], lives[1 + count :]
-        self.log = sorted((t - plan.clock[0], who, note) for life in lives[1:] for t, who, note in life.notes)
+        self._nodes, self._vehicles = results[1 : 1 + count], results[1 + count :]
+        self.log = sorted((t - plan.clock[0], who, note) for result in results[1:] for t, who, note in result.notes)
 
     @property
     def law_zero_height(self) -> float:
@@ -394,7 +395,7 @@ class RealtimeFleet:
         return law_zero_height(self.card)
 
     def _frame_count(self) -> int:
-        return min(len(life.rows) for life in self._vehicles)
+        return min(len(result.rows) for result in self._vehicles)
 
     def array(self) -> NDArray[np.float64]:
         """Return (time, agent, 15): true position and velocity, setpoint, own position and velocity of the node.
@@ -404,9 +405,9 @@ class RealtimeFleet:
         frames = [
             [
                 ABSENT_ROW
-                if _has_dropped_out(craft, k)
-                else (*craft.rows[k], *_row_part_at(node.rows, k, 0, (0.0,) * 9))
-                for craft, node in self._pairs()
+                if _has_dropped_out(vehicle, k)
+                else (*vehicle.rows[k], *_row_part_at(node.rows, k, 0, (0.0,) * 9))
+                for vehicle, node in self._pairs()
             ]
             for k in range(self._frame_count())
         ]
@@ -418,8 +419,8 @@ class RealtimeFleet:
         stamps = np.array(
             [
                 [
-                    never if _has_dropped_out(craft, k) else _row_part_at(node.rows, k, 1, never)
-                    for craft, node in self._pairs()
+                    never if _has_dropped_out(vehicle, k) else _row_part_at(node.rows, k, 1, never)
+                    for vehicle, node in self._pairs()
                 ]
                 for k in range(self._frame_count())
             ]
@@ -436,7 +437,7 @@ class RealtimeFleet:
 
     def phases(self) -> list[MissionPhase]:
         """Return the last phase of every node."""
-        return [life.phase for life in self._nodes]
+        return [result.phase for result in self._nodes]
 
 
 def _row_part_at(rows: Sequence[Any], k: int, part: int, none: Any) -> Any:
@@ -444,9 +445,9 @@ def _row_part_at(rows: Sequence[Any], k: int, part: int, none: Any) -> Any:
     return rows[min(k, len(rows) - 1)][part] if rows else none
 
 
-def _has_dropped_out(craft: TaskResult, k: int) -> bool:
+def _has_dropped_out(vehicle: TaskResult, k: int) -> bool:
     """Return True if a vehicle has dropped out by period k."""
-    return bool(math.isnan(craft.rows[k][0]))
+    return bool(math.isnan(vehicle.rows[k][0]))
 
 
 # ---- Supervision
@@ -461,7 +462,7 @@ WATCH_PERIOD = 0.1  # s between two looks at how the fleet is doing
 ENDED_MESSAGE = "a process of the fleet ended with status {}"
 Task = Generator[TaskRest, None, TaskResult]
 Supervisor = Callable[[Callable[[], None]], Coroutine[Any, Any, None]]
-CHANNEL_TASK = 0  # place of the ether among the lives
+CHANNEL_TASK = 0  # index of the radio channel among the tasks
 
 
 def lockstep_only_errors(faults: Sequence[InjectedFault]) -> list[str]:
@@ -484,9 +485,9 @@ def fly_in_realtime(
 
     Raises ScenarioError for faults that need lock-step, LinkError where a process ends before its time.
     """
-    wrong = lockstep_only_errors(faults)
-    if wrong:
-        raise ScenarioError(wrong)
+    errors = lockstep_only_errors(faults)
+    if errors:
+        raise ScenarioError(errors)
     ports = FleetPorts.open(len(card.members), first_client)
     try:
         now = time.monotonic()
@@ -500,12 +501,12 @@ def fly_in_realtime(
         clock, seen = kept(first), kept([0.0] * (4 * len(card.members)))
         epoch = time.time_ns() // 1000 - round(now * 1e6)
         plan = RealtimePlan(scenario, card, seed, start, tuple(faults), ports, clock, seen, epoch, watcher)
-        lives: list[Callable[[], Task]] = [partial(channel_task, plan)]
-        lives += [partial(node_task, plan, i) for i in range(len(card.members))]
-        lives += [partial(vehicle_task, plan, i) for i in range(len(card.members))]
+        factories: list[Callable[[], Task]] = [partial(channel_task, plan)]
+        factories += [partial(node_task, plan, i) for i in range(len(card.members))]
+        factories += [partial(vehicle_task, plan, i) for i in range(len(card.members))]
         watching = partial(_watch, plan, operator, on_done)
         began = time.monotonic()
-        ended, all_ = asyncio.run(_tasks(lives, watching)) if mode == "tasks" else _forked(lives, watching)
+        ended, all_ = asyncio.run(_tasks(factories, watching)) if mode == "tasks" else _forked(factories, watching)
         return RealtimeFleet(
             plan, ended, _computer_load(ended, len(card.members), time.monotonic() - began, all_, mode == "tasks")
         )
@@ -513,25 +514,25 @@ def fly_in_realtime(
         ports.close()
 
 
-async def _tasks(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[list[TaskResult], float]:
+async def _tasks(factories: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[list[TaskResult], float]:
     """Run all tasks in one event loop; return their results and the processor time of all, s."""
     began = time.process_time()
     async with asyncio.TaskGroup() as group:
-        tasks = [group.create_task(run_in_event_loop(life())) for life in lives]
+        tasks = [group.create_task(run_in_event_loop(make_task())) for make_task in factories]
         await watching(lambda: None)
     return [task.result() for task in tasks], time.process_time() - began
 
 
-async def run_in_event_loop(life: Task) -> TaskResult:
+async def run_in_event_loop(task: Task) -> TaskResult:
     """Run a task among others in one event loop, as `run_alone` does in a process of its own."""
     loop, hears = asyncio.get_running_loop(), TaskRest(0.0).handlers
     try:
         while True:
             try:
-                rest = next(life)
+                rest = next(task)
             except StopIteration as end:
-                found: TaskResult = end.value
-                return found
+                result: TaskResult = end.value
+                return result
             if rest.handlers is not hears:
                 hears = rest.handlers
                 for port, hand in hears:
@@ -543,31 +544,32 @@ async def run_in_event_loop(life: Task) -> TaskResult:
 
 
 # Processes fork from a warm parent: sixty cold interpreters came up later than the flight ended.
-def _forked(lives: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[list[TaskResult], float]:
+def _forked(factories: Sequence[Callable[[], Task]], watching: Supervisor) -> tuple[list[TaskResult], float]:
     """Run each task in a process of its own; return their results and the processor time of all, s."""
     if not hasattr(os, "fork"):
         raise LinkError("mode = 'processes' forks, which this system does not do; give mode = 'tasks'")
     context, began = multiprocessing.get_context("fork"), time.process_time()
     common_dialect()  # once here, so that no process imports it for itself
-    pipes = [context.Pipe() for _ in lives]
+    pipes = [context.Pipe() for _ in factories]
     processes = [
-        context.Process(target=_process_main, args=(life, pipe[1]), daemon=True)
-        for life, pipe in zip(lives, pipes, strict=True)
+        context.Process(target=_process_main, args=(factory, pipe[1]), daemon=True)
+        for factory, pipe in zip(factories, pipes, strict=True)
     ]
     try:
         for process, (_, theirs) in zip(processes, pipes, strict=True):
             process.start()
             theirs.close()
         ours = [pipe[0] for pipe in pipes]
-        # Nobody may tick before all are there, or the first drones would fly among neighbours that do not exist yet.
+        # Nobody may tick before all are there, or the first drones would fly among neighbours that
+        # do not exist yet.
         _all(ours, processes)  # the barrier
         for pipe in ours:
             pipe.send("go")
         asyncio.run(watching(partial(_alive, processes)))
-        lives = _all(ours, processes)
+        results: list[TaskResult] = _all(ours, processes)
         for process in processes:
             process.join()
-        return lives, time.process_time() - began + sum(life.processor for life in lives)
+        return results, time.process_time() - began + sum(result.processor for result in results)
     finally:
         for process in processes:
             if process.is_alive():
@@ -596,13 +598,13 @@ def _alive(processes: Sequence[Any]) -> None:
             raise LinkError(ENDED_MESSAGE.format(process.exitcode))
 
 
-def _process_main(life: Callable[[], Task], pipe: Any) -> None:
+def _process_main(factory: Callable[[], Task], pipe: Any) -> None:
     """Report that the process is ready, wait for all others, run the task, and send its result."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the fleet, and says why
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     pipe.send("ready")
     pipe.recv()
-    pipe.send(run_alone(life()))
+    pipe.send(run_alone(factory()))
 
 
 async def _watch(
@@ -653,11 +655,11 @@ async def _from_the_ground(plan: RealtimePlan, station: OperatorStation, until: 
 
 
 def _computer_load(
-    lives: Sequence[TaskResult], count: int, seconds: float, all_: float, together: bool
+    results: Sequence[TaskResult], count: int, seconds: float, all_: float, together: bool
 ) -> ComputerLoad:
-    nodes, others = lives[1 : 1 + count], [lives[CHANNEL_TASK], *lives[1 + count :]]
-    by = [None if together else sum(life.processor for life in part) / seconds for part in (nodes, others)]
-    ticks = [life.ticks for life in nodes]
+    nodes, others = results[1 : 1 + count], [results[CHANNEL_TASK], *results[1 + count :]]
+    by = [None if together else sum(result.processor for result in part) / seconds for part in (nodes, others)]
+    ticks = [result.ticks for result in nodes]
     total, late = sum(t.total for t in ticks), sum(t.late for t in ticks)
     others_ = os.getloadavg()[0] if hasattr(os, "getloadavg") else math.nan  # Windows counts none
     return ComputerLoad(all_ / seconds, by[0], by[1], total, late, max(t.worst for t in ticks), others_)

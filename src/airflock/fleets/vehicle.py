@@ -45,7 +45,8 @@ LOST_STATION_MODES = {
 # ---- Holding a position
 
 STANDING_SPEED = 0.5  # m/s; our choice: slower than this it has come to stand, and holds that place
-# PX4's position gain is about twice this (MPC_XY_P 0.95 1/s); without holding, drones that hover drift by metres.
+# PX4's position gain is about twice this (MPC_XY_P 0.95 1/s); without holding, drones that hover
+# drift by metres.
 POSITION_GAIN = 0.5  # 1/s; our choice, about half of PX4's MPC_XY_P: a metre off is half a metre a second back
 MAX_RETURN_SPEED = 1.0  # m/s; our choice
 
@@ -340,22 +341,22 @@ class SoftwareVehicle:
 
     def _setpoint(self, v: dict[str, Any], sender: tuple[int, int]) -> list[Any]:
         mask, frame = v["type_mask"], v["coordinate_frame"]
-        wanted = (v["vx"], v["vy"], v["vz"])
+        velocity = (v["vx"], v["vy"], v["vz"])
         if v["target_system"] not in (0, self.system) or mask & POSITION_IGNORED_MASK != POSITION_IGNORED_MASK:
             return []
         if (
             mask & VELOCITY_IGNORED_MASK
             or frame not in (LOCAL_NED_FRAME, BODY_NED_FRAME)
-            or not all(map(math.isfinite, wanted))
+            or not all(map(math.isfinite, velocity))
         ):
             return []  # the nose points north, so that both frames are one
-        # ArduPilot ignores setpoints outside GUIDED; PX4 counts them before OFFBOARD, which it enters only while they
-        # stream.
+        # ArduPilot ignores setpoints outside GUIDED; PX4 counts them before OFFBOARD, which it
+        # enters only while they stream.
         if self.kind == "ardupilot" and self.mode != GUIDED:
             return []
         if self.now - self.setpoint_at > MAX_SETPOINT_GAP:
             self.stream_since = self.now
-        self.target, self.setpoint_at = swap_enu_ned(*wanted), self.now
+        self.target, self.setpoint_at = swap_enu_ned(*velocity), self.now
         return []
 
     def _set_mode(self, v: dict[str, Any], sender: tuple[int, int]) -> list[Any]:
@@ -380,8 +381,8 @@ class SoftwareVehicle:
             return RESULT_ACCEPTED, []
         if number == 176:
             main, sub = int(v["param2"]), int(v["param3"])
-            wanted = px4_mode(main, sub) if self.kind == "px4" else main
-            return (RESULT_ACCEPTED if self.set_mode(wanted) else RESULT_DENIED), []
+            mode = px4_mode(main, sub) if self.kind == "px4" else main
+            return (RESULT_ACCEPTED if self.set_mode(mode) else RESULT_DENIED), []
         if number in (512, 520):
             name = "version" if number == 520 else MESSAGE_NAMES.get(int(v["param1"]), "")
             return (RESULT_ACCEPTED, [MESSAGE_MAKERS[name](self)]) if name else (RESULT_UNSUPPORTED, [])
@@ -479,7 +480,8 @@ class SoftwareVehicle:
             self.memory = type(self.memory)() if self.memory is not None else None
             return
         (x, y, z, vx, vy, vz), c = self.state, self.autopilot_velocity()
-        # Without motors the body is given a velocity ever further down: it falls as fast as its dynamics let it.
+        # Without motors the body is given a velocity ever further down: it falls as fast as its
+        # dynamics let it.
         falls = self.off or not self.motor
         command = (vx, vy, vz - 5.0) if falls else c
         if self.faults is not None and not falls:
@@ -490,8 +492,8 @@ class SoftwareVehicle:
         self.last_command = command
         eu, ev, ew = self.error[3:]
         measured = vx + eu, vy + ev, vz + ew
-        known = (vx, vy, vz, *measured, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
-        moved = self.body.move(*self._pick_arguments(known))
+        values = (vx, vy, vz, *measured, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
+        moved = self.body.move(*self._pick_arguments(values))
         velocity, self.memory = moved[:3], moved[3] if self.memory is not None else None
         if self.faults is not None:
             velocity = self.faults.velocity_after_step(self.place, now, self.state, command, velocity, dt)

@@ -95,7 +95,8 @@ class Autopilot:
 
     def parameter_value(self, value: float, type_: int) -> float:
         """Return the value of a PARAM_VALUE, also where it holds the bytes of an integer."""
-        # PX4 puts the four bytes of an int32 into the float field, so 4 arrives as 5.6e-45; ArduPilot converts it.
+        # PX4 puts the four bytes of an int32 into the float field, so 4 arrives as 5.6e-45;
+        # ArduPilot converts it.
         if self.integers_as_bytes and type_ == INT32_TYPE:
             return float(struct.unpack("<i", struct.pack("<f", value))[0])
         return value
@@ -106,8 +107,8 @@ def px4_mode(main: int, sub: int = 0) -> int:
     return main << 16 | sub << 24
 
 
-# The ranges are ours where the manuals allow more: a drone that hovers after a lost link is hit by one that flies on,
-# so both autopilots must land.
+# The ranges are ours where the manuals allow more: a drone that hovers after a lost link is hit by
+# one that flies on, so both autopilots must land.
 AUTOPILOTS = {
     "px4": Autopilot(
         "px4",

@@ -74,24 +74,24 @@ def message_fields(message: int, payload: bytes) -> dict[str, Any]:
 
     Raises LinkError where the dialect does not know the message or the payload is too long for it.
     """
-    known = message_layout(message)
-    if known is None or len(payload) > known.size:
+    layout = message_layout(message)
+    if layout is None or len(payload) > layout.size:
         raise LinkError(f"message {message} with {len(payload)} bytes is not in the common dialect")
     # MAVLink 2 cuts trailing zeros off; the layout needs the full length.
-    flat = known.unpack(payload.ljust(known.size, b"\0"))
-    found: dict[str, Any] = {name: flat[index] for name, index in known.numbers}
-    for name, index, count in known.arrays:
-        found[name] = flat[index : index + count]
-    for name, index in known.texts:
-        found[name] = flat[index].split(b"\0", 1)[0].decode("ascii", "replace")
-    return found
+    flat = layout.unpack(payload.ljust(layout.size, b"\0"))
+    fields: dict[str, Any] = {name: flat[index] for name, index in layout.numbers}
+    for name, index, count in layout.arrays:
+        fields[name] = flat[index : index + count]
+    for name, index in layout.texts:
+        fields[name] = flat[index].split(b"\0", 1)[0].decode("ascii", "replace")
+    return fields
 
 
 def checksum(data: bytes, crc_extra: int) -> int:
     """Return the checksum of a frame's bytes after the first, with the message's extra byte (CRC-16/MCRF4XX)."""
-    found = common_dialect().x25crc(data)
-    found.accumulate(bytes((crc_extra,)))
-    return int(found.crc)
+    accumulator = common_dialect().x25crc(data)
+    accumulator.accumulate(bytes((crc_extra,)))
+    return int(accumulator.crc)
 
 
 # ---- Frames
@@ -145,32 +145,32 @@ def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
     head = data[start : start + HEADER_LENGTH]
     if len(head) < HEADER_LENGTH:
         return None, 0
-    length, flags, known = head[1], head[2], message_layout(message_number(head))
-    # An unknown message cannot be checked, because its extra byte is unknown: it is rubbish to us. A length of zero
-    # never occurs, for MAVLink 2 keeps at least one byte.
-    if known is None or length > known.size or length == 0 or flags & ~SIGNED_FLAG:
+    length, flags, layout = head[1], head[2], message_layout(message_number(head))
+    # An unknown message cannot be checked, because its extra byte is unknown: it is rubbish to us.
+    # A length of zero never occurs, for MAVLink 2 keeps at least one byte.
+    if layout is None or length > layout.size or length == 0 or flags & ~SIGNED_FLAG:
         return None, 1
     end = start + HEADER_LENGTH + length
     whole = end + CHECKSUM_LENGTH + (SIGNATURE_LENGTH if flags & SIGNED_FLAG else 0)
     if len(data) < whole:
         return None, 0
     sent_checksum = int.from_bytes(data[end : end + CHECKSUM_LENGTH], "little")
-    # Only the checksum tells a frame from a payload byte that happens to be 0xFD, so a mismatch costs one byte, not
-    # the length that the false header claims.
-    if sent_checksum != checksum(data[start + 1 : end], known.crc_extra):
+    # Only the checksum distinguishes a frame from a payload byte that happens to be 0xFD, so a mismatch
+    # costs one byte, not the length that the false header claims.
+    if sent_checksum != checksum(data[start + 1 : end], layout.crc_extra):
         return None, 1
     return MavlinkFrame(head[5], head[6], message_number(head), data[start + HEADER_LENGTH : end]), whole - start
 
 
 def frames_in(datagram: bytes) -> list[MavlinkFrame]:
     """Return all whole frames in one datagram; a partial frame is dropped."""
-    found, start = [], 0
+    frames, start = [], 0
     while start < len(datagram):
         frame, taken = frame_at(datagram, start)
         if frame is not None:
-            found.append(frame)
+            frames.append(frame)
         start += max(taken, 1)
-    return found
+    return frames
 
 
 class FrameStream:
@@ -189,13 +189,13 @@ class FrameStream:
 
     def _frames_and_bytes(self, data: bytes) -> list[tuple[MavlinkFrame, bytes]]:
         self._rest += data
-        found, start = [], 0
+        frames, start = [], 0
         while start < len(self._rest):
             frame, taken = frame_at(self._rest, start)
             if taken == 0:
                 break
             if frame is not None:
-                found.append((frame, self._rest[start : start + taken]))
+                frames.append((frame, self._rest[start : start + taken]))
             start += taken
         self._rest = self._rest[start:]
-        return found
+        return frames

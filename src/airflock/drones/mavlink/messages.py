@@ -21,8 +21,8 @@ from airflock.support import FlightSite, swap_enu_ned
 STATUS_MESSAGE = 340  # UTM_GLOBAL_POSITION
 STATUS_VERSION = 2  # version 1 had no parts of whole numbers
 EXTRA_FORMAT = struct.Struct("<BBI4sBBB5b")
-# Five spare bytes of uas_id carry what 1.1 cm and 1 cm/s lose: agents that turn round magnify a millimetre (0.29 m
-# after 5 s became 0.24 mm).
+# Five spare bytes of uas_id carry what 1.1 cm and 1 cm/s lose: agents that turn round magnify a
+# millimetre (0.29 m after 5 s became 0.24 mm).
 PARTS_PER_UNIT = 254  # of a whole number, so that a half of it, either way, fits into a byte
 ROUNDED_FIELDS = ("lat", "lon", "vx", "vy", "vz")
 ON_GROUND_STATE, AIRBORNE_STATE = 2, 3  # UTM_FLIGHT_STATE
@@ -63,7 +63,8 @@ def status_message(status: DroneStatus, site: FlightSite) -> Any:
     at = site.to_geodetic(*status.position)
     exact = at.latitude * 1e7, at.longitude * 1e7, *(100.0 * v for v in swap_enu_ned(*status.velocity))
     lat, lon, vx, vy, vz = whole = round(exact[0]), round(exact[1]), *(_clip(v, -32767, 32767) for v in exact[2:])
-    # What rounding took away, in 1/254 of the last digit: at most a half, either way, so it fits into a signed byte.
+    # What rounding took away, in 1/254 of the last digit: at most a half, either way, so it fits
+    # into a signed byte.
     parts = [_clip(PARTS_PER_UNIT * (a - b), -127, 127) for a, b in zip(exact, whole, strict=True)]
     extra = EXTRA_FORMAT.pack(
         STATUS_VERSION,
@@ -110,7 +111,8 @@ def parse_status(values: dict[str, Any], site: FlightSite) -> DroneStatus | None
     )
 
 
-# Thirty nodes of one process read the same packet: decoding it once is enough. A drone on its own gains nothing.
+# Thirty nodes of one process read the same packet: decoding it once is enough. A drone on its own
+# gains nothing.
 @lru_cache(maxsize=256)
 def parse_status_payload(payload: bytes, site: FlightSite) -> DroneStatus | None:
     """Return the status in a payload, cached: in a fleet in software many members read the same packet."""

@@ -93,8 +93,8 @@ class PacketSigner:
 
     def __call__(self, message: Any, utc: int) -> bytes:
         """Return the signed bytes of a message of the dialect, sent at utc (µs of Unix time)."""
-        # A clock that was set back must not repeat a stamp: receivers would refuse all packets until it has caught
-        # up.
+        # A clock that was set back must not repeat a stamp: receivers would refuse all packets
+        # until it has caught up.
         self.last = max(stamp_of_time(utc), self.last + 1)
         self.recent_stamps.append(self.last)
         self._mav.signing.timestamp = self.last
@@ -141,8 +141,8 @@ class PacketReceiver:
     ):
         self._key, self._own = key, own_id
         self._senders = {message: frozenset(systems) for message, systems in senders.items()}
-        # Nothing sent before the start is accepted, so a restart needs no file against replays. Time is never taken
-        # from a peer.
+        # Nothing sent before the start is accepted, so a restart needs no file against replays.
+        # Time is never taken from a peer.
         self._min_stamp, self._max_clock_difference = (
             stamp_of_time(started),
             round(max_clock_difference * STAMPS_PER_SECOND),
@@ -158,8 +158,8 @@ class PacketReceiver:
         reason = self._refusal_reason(datagram, utc)
         if reason:
             self.refused[reason] += 1
-            # A genuine frame with the own id is an echo of ours, or a second drone with our number: the node decides
-            # which.
+            # A genuine frame with the own id is an echo of ours, or a second drone with our number:
+            # the node decides which.
             if reason == "own":
                 self.own_id_stamp = _datagram_stamp(datagram)
             return None
@@ -172,18 +172,18 @@ class PacketReceiver:
 
     def _refusal_reason(self, data: bytes, utc: int) -> str:
         """Return the reason to refuse a datagram, or an empty text. Changes nothing."""
-        # The order is the point: nothing wrong may change state. pymavlink keeps the stamp before it compares the
-        # signature, so one forged datagram locks a neighbour out for good.
+        # The order is the point: nothing wrong may change state. pymavlink keeps the stamp before
+        # it compares the signature, so one forged datagram locks a neighbour out for good.
         if len(data) < HEADER_LENGTH + CHECKSUM_LENGTH + SIGNATURE_LENGTH + 1:
             return "short"
         message = message_number(data)
         if data[0] != FRAME_MAGIC or data[2] != SIGNED_FLAG or message not in self._senders:
             return "header"
-        known = message_layout(message)
+        layout = message_layout(message)
         length = data[1]
         if (
-            known is None
-            or not 0 < length <= known.size
+            layout is None
+            or not 0 < length <= layout.size
             or len(data) != HEADER_LENGTH + length + CHECKSUM_LENGTH + SIGNATURE_LENGTH
         ):
             return "length"

@@ -61,14 +61,14 @@ def read_record(record_class: Any, table: Any, section: str, errors: list[str]) 
     if not isinstance(table, dict):
         errors.append(f"{section} = {table!r} is not a table")
         return None
-    known = record_class.__dataclass_fields__
+    fields = record_class.__dataclass_fields__
     for key in table:
-        if key not in known:
+        if key not in fields:
             errors.append(
-                f"{section}.{key} is not known{suggest(key, known, lead='; ', prefix=f'{section}.', cutoff=0.6)}"
+                f"{section}.{key} is not known{suggest(key, fields, lead='; ', prefix=f'{section}.', cutoff=0.6)}"
             )
     try:
-        return record_class(**to_tuples({key: value for key, value in table.items() if key in known}))
+        return record_class(**to_tuples({key: value for key, value in table.items() if key in fields}))
     except ParameterError as error:
         errors += [f"{section}.{line.partition('.')[2]}" for line in str(error).splitlines()]
     except (TypeError, ValueError) as error:
@@ -91,7 +91,7 @@ def read_numbers(
     other_keys: tuple[str, ...] = (),
 ) -> dict[str, float]:
     """Read numbers of a table within their ranges; add the errors to the list."""
-    found = {}
+    numbers = {}
     if not isinstance(table, dict):
         errors.append(f"{key_prefix} = {table!r} is not a table")
         return {}
@@ -105,8 +105,8 @@ def read_numbers(
         elif not low <= value <= high:
             errors.append(f"{at}{key} = {value:g} lies outside [{low:g}, {high:g}]")
         else:
-            found[key] = value
-    return found
+            numbers[key] = value
+    return numbers
 
 
 def are_valid_shapes(rows: Any) -> bool:
@@ -268,14 +268,14 @@ class Fence:
         These are all sides of a convex fence; of any other, the sides that can be seen. From outside the nearest point
         counts, too.
         """
-        # A convex fence is a handful of planes, each valid everywhere. A polygon with a notch needs the sides that
-        # can be seen from here, or a side behind another one would push.
+        # A convex fence is a handful of planes, each valid everywhere. A polygon with a notch needs
+        # the sides that can be seen from here, or a side behind another one would push.
         if self.convex_planes:
             return [(a * x + b * y + d, a, b, 0.0) for a, b, _, d in self.convex_planes]
         count = len(self.edges)
-        found = [polygon.wall(x, y, 0.0, self.edges, e, count, FAR) for e in range(count)]
-        found.append(polygon.outside(x, y, 0.0, self.edges, count))
-        return [(s.distance, s.nx, s.ny, 0.0) for s in found if s.distance < FAR]
+        surfaces = [polygon.wall(x, y, 0.0, self.edges, e, count, FAR) for e in range(count)]
+        surfaces.append(polygon.outside(x, y, 0.0, self.edges, count))
+        return [(s.distance, s.nx, s.ny, 0.0) for s in surfaces if s.distance < FAR]
 
     def outside(self, x: float, y: float) -> float:
         """Return the distance beyond the fence, m; negative inside."""
@@ -291,7 +291,8 @@ MEMBER_PARTS = ("law", "body")  # of which members may have numbers of their own
 
 def law_of_package(name: str) -> Model:
     """Return a law of the package by its name."""
-    # A law is named, never carried as code: a card is data. Laws of a user's own fly from an installed package.
+    # A law is named, never carried as code: a card is data. Laws of a user's own fly from an
+    # installed package.
     if not name.isidentifier():
         raise CardError([f"law.kind = {name!r} is not a law of this version"])
     try:
@@ -331,7 +332,7 @@ def read_member_parts(
     if not isinstance(rows, list) or not isinstance(d["members"], list) or len(rows) != len(d["members"]):
         errors.append("own: give a table with law and body for each member, or an empty list")
         return ()
-    found = []
+    parts = []
     for number, row in enumerate(rows):
         sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in MEMBER_PARTS)
         if not sound:
@@ -349,8 +350,8 @@ def read_member_parts(
         else:
             other, p = law, read_record(law.Parameters, usual["law"] | row["law"], f"{where}.law", errors)
         if other is not None:
-            found.append((other, p, b))
-    return tuple(found)
+            parts.append((other, p, b))
+    return tuple(parts)
 
 
 def wall_reach(law: Model, p: Any) -> float:
@@ -445,8 +446,8 @@ class FlightCard:
 
     def sides(self, own: State) -> list[tuple[float, float, float, float]]:
         """Return distance (m, negative beyond) and inward normal of the fence's sides and of obstacles."""
-        found = self.fence.sides(own.x, own.y)
-        return found + [(s.distance, s.nx, s.ny, s.nz) for s in self.place.solid_surfaces(*self.law_state(own)[:3])]
+        surfaces = self.fence.sides(own.x, own.y)
+        return surfaces + [(s.distance, s.nx, s.ny, s.nz) for s in self.place.solid_surfaces(*self.law_state(own)[:3])]
 
     def outside(self, x: float, y: float, z: float) -> float:
         """Return the distance of a local position beyond the fence or its heights, m; negative inside."""
@@ -579,8 +580,8 @@ def _card_from_document(d: Mapping[str, Any], errors: list[str]) -> FlightCard |
 
 def _packet_policy(extrapolate: bool, max_age: float, once: bool = False, any_stamp: bool = False) -> PacketPolicy:
     """Return the use of neighbours' data; with any_stamp all times of packets are accepted."""
-    # In a simulation all agents share one clock, and packets of a jittering radio may overtake each other; believing
-    # any stamp is what the simulated agents do.
+    # In a simulation all agents share one clock, and packets of a jittering radio may overtake each
+    # other; believing any stamp is what the simulated agents do.
     if any_stamp:
         return PacketPolicy(extrapolate, max_age, once, early=FAR, drop_reordered=False)
     return PacketPolicy(extrapolate, max_age, once)
@@ -589,9 +590,9 @@ def _packet_policy(extrapolate: bool, max_age: float, once: bool = False, any_st
 def _member_errors(members: Any) -> list[str]:
     """Return the errors in the list of system ids."""
     listed = members if isinstance(members, list) else []
-    wrong = [m for m in listed if type(m) is not int or not 1 <= m <= MAX_SYSTEM_ID]
-    if wrong:
-        return [f"members: {wrong[0]!r} is none of the system ids from 1 to {MAX_SYSTEM_ID}"]
+    invalid = [m for m in listed if type(m) is not int or not 1 <= m <= MAX_SYSTEM_ID]
+    if invalid:
+        return [f"members: {invalid[0]!r} is none of the system ids from 1 to {MAX_SYSTEM_ID}"]
     if not listed:
         return [f"members = {members!r}: give a list of system ids from 1 to {MAX_SYSTEM_ID}"]
     return [f"members = {members}: a system id occurs twice"] if len(set(listed)) < len(listed) else []
@@ -638,7 +639,8 @@ def _geometry_errors(card: FlightCard) -> list[str]:
         errors.append(f"topology.kind = {kind.name!r}: works in a plane only; set world.dimensions = '2'")
     if world.edges != "open":
         errors.append(f"world.edges = {world.edges!r}: real space has no such edges; set world.edges = 'open'")
-    # A pilot is made here, on the ground, so that a law that cannot fly this card fails before take-off.
+    # A pilot is made here, on the ground, so that a law that cannot fly this card fails before
+    # take-off.
     for member in card.members if card.own else card.members[:1]:
         with collect_errors(errors):
             card.pilot(member)

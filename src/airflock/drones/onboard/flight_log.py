@@ -155,8 +155,8 @@ def replay(lines: Iterable[str], card: FlightCard, key: bytes) -> Iterator[Repla
 def _node_at_start(head: Mapping[str, Any], card: FlightCard, key: bytes) -> Node:
     """Make the node as it was at the start of the log; raise LinkError where the first line lacks it."""
     heard, radios = head.get("heard"), head.get("radios")
-    # A replay starts the node as it was: the same memory, clock and radios, or the first packet is judged
-    # differently.
+    # A replay starts the node as it was: the same memory, clock and radios, or the first packet is
+    # judged differently.
     stamps = [head.get(name) for name in ("sent", "order", "utc", "since")]
     stamps += list(heard.values()) if isinstance(heard, dict) else [None]
     periods: list[Any] = radios if isinstance(radios, list) and 0 < len(radios) <= MAX_RADIOS else [None]

@@ -43,8 +43,8 @@ FLYING_PHASES = frozenset(
 )
 FLOCKING_PHASES = frozenset({MissionPhase.FLOCK, MissionPhase.GOTO})
 AIRBORNE_PHASES = FLYING_PHASES | {MissionPhase.LAND, MissionPhase.MANUAL}
-# A lost neighbour that said so stands, so its reach grows half as fast: four of forty fleets with one wrong clock
-# came below 3 m at full speed, none so.
+# A lost neighbour that said so stands, so its reach grows half as fast: four of forty fleets with
+# one wrong clock came below 3 m at full speed, none so.
 NOT_FLOCKING_PHASES = frozenset(
     {MissionPhase.HOLD, MissionPhase.RETURN, MissionPhase.MANUAL}
 )  # they do not fly with the flock
@@ -129,8 +129,8 @@ def _phases(*phases: MissionPhase) -> frozenset[MissionPhase]:
 _P = MissionPhase
 PHASES_BEFORE_RETURN = _phases(_P.TAKEOFF, _P.GATHER, _P.FLOCK, _P.GOTO)
 
-# The first row that holds wins, so the order is the priority; each row can be fired alone in a test and read by a
-# safety officer.
+# The first row that holds wins, so the order is the priority; each row can be fired alone in a test
+# and read by a safety officer.
 MISSION_TABLE: tuple[Row, ...] = (
     Row(
         "1",

@@ -81,7 +81,8 @@ class NodeOutput(NamedTuple):
     notes: list[str]
 
 
-# Bytes and a clock in, bytes out: lock-step fleets, fuzzing and replay of a log run the code that flies.
+# Bytes and a clock in, bytes out: lock-step fleets, fuzzing and replay of a log run the code that
+# flies.
 class Node:
     """One member of a flock.
 
@@ -148,7 +149,8 @@ class Node:
         got = self._receiver(datagram, utc)
         if got is None:
             stamp = self._receiver.own_id_stamp
-            # A radio may repeat our own frames to us. Only a stamp that we never sent proves a second sender.
+            # A radio may repeat our own frames to us. Only a stamp that we never sent proves a
+            # second sender.
             if stamp is not None and stamp not in self._signer.recent_stamps and not self._has_twin:
                 self._has_twin = True
                 self._notes.append(f"another sender signs as member {self.member}")
@@ -202,11 +204,12 @@ class Node:
         step = next_step(self.phase, known, self.card.safety)
         if step.row is not None:
             self._enter(step.next_phase, step.row.event, now, out)
-            # The row that fired has changed the phase, and the order would be lost with this tick: give it to the
-            # next one.
+            # The row that fired has changed the phase, and the order would be lost with this tick:
+            # give it to the next one.
             if known.order in orders.CALL_OFF_ORDERS and step.row.number != "23" and self.phase in FLYING_PHASES:
                 self.operator.again(known.order)  # something else came first at this tick
-        # A kill that could not be done now must not strike later, when the pilot has given the drone back.
+        # A kill that could not be done now must not strike later, when the pilot has given the
+        # drone back.
         if known.kill_confirmed and self.phase != MissionPhase.DONE:
             self.operator.kill_confirmed = False
             self._notes.append(f"not killed: in {self.phase.name} this node does not fly the drone")
@@ -225,7 +228,7 @@ class Node:
         order = self.operator.next_order()
         if self.phase in PREFLIGHT_PHASES and self.operator.missed(self.utc(now), self.card.turn(self.member)):
             self._notes.append("not started: something was missing when its turn came; order the start once more")
-        # The limiter would stop at the fence anyway; refusing the order tells the operator why.
+        # The limiter would stop at the fence anyway; refusing the order gives the operator a reason.
         if order == OrderKind.GOTO and self._is_goal_outside():
             order = None
             self._notes.append("the point that was ordered lies outside the fence; not followed")
@@ -274,7 +277,8 @@ class Node:
             self._takeoff_at, self._overload_count = now, 0
         if to in (MissionPhase.FLOCK, MissionPhase.GOTO) and was not in (MissionPhase.FLOCK, MissionPhase.GOTO):
             self._phase_velocity.begin(now)
-        # A node that was restarted in flight does not know its home: the place where it begins to return has to do.
+        # A node that was restarted in flight does not know its home: the place where it begins to
+        # return has to do.
         if to == MissionPhase.RETURN and self.home is None and self.autopilot_link.state is not None:
             self.home = (self.autopilot_link.state.x, self.autopilot_link.state.y, self.card.layer(self.member))
         self.phase, self._phase_since, self._command_at = to, now, -1e9
@@ -298,14 +302,16 @@ class Node:
         """Send the autopilot the setpoint or the mode of the phase, or nothing."""
         phase, say = self.phase, self._speaker
         if phase == MissionPhase.DONE and self.operator.kill_confirmed:
-            # Once at least, even if the autopilot seems disarmed: its last heartbeat may be a second old.
+            # Once at least, even if the autopilot seems disarmed: its last heartbeat may be a
+            # second old.
             if (mission_facts.armed or now == self._phase_since) and self._may_retry(now):
                 out.autopilot.append(say.arm(False, force=True))
             elif not mission_facts.armed and now - self._phase_since > KILL_SECONDS:
-                self.operator.kill_confirmed = False  # whoever arms it later starts another flight
+                self.operator.kill_confirmed = False  # armed later, it starts another flight
         if phase == MissionPhase.LAND and not mission_facts.in_land_mode and self._may_retry(now):
             out.autopilot.append(say.set_mode(self.card.autopilot.land))
-        # PX4 leaves its mode when setpoints end, so they go on in every phase in which we fly, and before we arm.
+        # PX4 leaves its mode when setpoints end, so they go on in every phase in which we fly, and
+        # before we arm.
         streams = (
             phase in FLYING_PHASES
             or phase == MissionPhase.ARMING

@@ -128,7 +128,7 @@ class UdpPort:
         return self._socket.fileno()
 
     def aim(self, there: tuple[str, int]) -> None:
-        """Send to this address from now on, whoever sends to it."""
+        """Send to this address from now on, whatever arrives."""
         self._destination, self._answers_last_sender = there, False
 
     def read(self) -> list[bytes]:
@@ -137,16 +137,16 @@ class UdpPort:
 
     def read_from(self) -> list[tuple[bytes, tuple[str, int]]]:
         """Return the datagrams that have arrived, each with its sender; at most MAX_DATAGRAMS of them."""
-        found: list[tuple[bytes, tuple[str, int]]] = []
+        datagrams: list[tuple[bytes, tuple[str, int]]] = []
         take = self._socket.recvfrom
-        while len(found) < MAX_DATAGRAMS:
+        while len(datagrams) < MAX_DATAGRAMS:
             try:
-                found.append(take(MAX_DATAGRAM))
+                datagrams.append(take(MAX_DATAGRAM))
             except OSError:  # nothing more has arrived, or the network is down
                 break
-        if self._answers_last_sender and found:
-            self._destination = found[-1][1]
-        return found
+        if self._answers_last_sender and datagrams:
+            self._destination = datagrams[-1][1]
+        return datagrams
 
     def write(self, data: bytes) -> bool:
         """Send a datagram."""
@@ -246,8 +246,8 @@ def run_alone(task: Generator[TaskRest, None, Result]) -> Result:
         try:
             rest = next(task)
         except StopIteration as end:
-            found: Result = end.value
-            return found
+            result: Result = end.value
+            return result
         if rest.handlers is not hears:
             hears, poll, hands = (
                 rest.handlers,
@@ -289,21 +289,23 @@ class ArgumentParser(argparse.ArgumentParser):
 
 def make_parser() -> argparse.ArgumentParser:
     """Make the parser of the command."""
-    found = ArgumentParser(
+    parser = ArgumentParser(
         prog="python -m airflock.drones.onboard", description=COMMAND_HELP, epilog=COMMAND_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
     )  # fmt: skip
-    found.add_argument("card", type=Path, help="flight card, written by `airflock fly prepare`")
-    found.add_argument("--member", type=int, required=True, help="system id of this drone")
-    found.add_argument("--autopilot", required=True, metavar="PORT", help="udp:HOST:PORT or serial:/dev/NAME:BAUD")
-    found.add_argument(
+    parser.add_argument("card", type=Path, help="flight card, written by `airflock fly prepare`")
+    parser.add_argument("--member", type=int, required=True, help="system id of this drone")
+    parser.add_argument("--autopilot", required=True, metavar="PORT", help="udp:HOST:PORT or serial:/dev/NAME:BAUD")
+    parser.add_argument(
         "--radio", action="append", required=True, metavar="PORT", help="radio to the others; repeatable"
     )
-    found.add_argument("--key", type=Path, help="key of the mission (default: beside the card, ending .key)")
-    found.add_argument("--log", type=Path, help="log of the flight (default: beside the card, with the time)")
-    found.add_argument("--i-am-the-pilot", action="store_true", help="somebody holds the transmitter and may take over")
-    found.add_argument("--check", action="store_true", help="check card, key and ports, and stop")
-    return found
+    parser.add_argument("--key", type=Path, help="key of the mission (default: beside the card, ending .key)")
+    parser.add_argument("--log", type=Path, help="log of the flight (default: beside the card, with the time)")
+    parser.add_argument(
+        "--i-am-the-pilot", action="store_true", help="somebody holds the transmitter and may take over"
+    )
+    parser.add_argument("--check", action="store_true", help="check card, key and ports, and stop")
+    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -326,34 +328,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def check_arguments(arguments: argparse.Namespace) -> tuple[FlightCard, bytes, list[Port]]:
     """Return card, key and open ports; raise all errors together."""
-    faults: list[str] = []
+    errors: list[str] = []
     card, key = None, b""
-    with collect_errors(faults):
+    with collect_errors(errors):
         card = read_card(arguments.card)
         if arguments.member not in card.members:
-            faults.append(f"--member {arguments.member}: the card's members are {', '.join(map(str, card.members))}")
+            errors.append(f"--member {arguments.member}: the card's members are {', '.join(map(str, card.members))}")
         if time.time() >= card.expires:
-            faults.append(
+            errors.append(
                 f"{arguments.card}: expired at {time.strftime('%Y-%m-%d %H:%M UTC', time.gmtime(card.expires))}"
             )
-    with collect_errors(faults):
+    with collect_errors(errors):
         key = read_key(arguments.key or arguments.card.with_suffix(".key"))
     # Typing it is the point: nobody starts a node by accident or from a script that was copied.
     if not arguments.i_am_the_pilot and not arguments.check:
-        faults.append("--i-am-the-pilot is missing: somebody must hold the transmitter, know the law of the place, and "
+        errors.append("--i-am-the-pilot is missing: somebody must hold the transmitter, know the law of the place, and "
                       "be able to take over each drone at any time")  # fmt: skip
     if card is not None and find_spec("cryptography") is None:
         sys.stderr.write("airflock: note: cryptography is not installed, so no order can be checked or obeyed\n")
     ports: list[Port] = []
     for text in (arguments.autopilot, *arguments.radio):
-        with collect_errors(faults):
+        with collect_errors(errors):
             ports.append(open_port(text))
-    if faults or card is None:
+    if errors or card is None:
         for port in ports:
             port.close()
-        raise CardError(faults)
+        raise CardError(errors)
     for text in arguments.radio:
-        # A port without a destination answers whoever speaks first: two such ports wait for each other for ever.
+        # A port without a destination answers the first sender: two such ports wait for each
+        # other for ever.
         if text.startswith("udp:") and ">" not in text:
             sys.stderr.write(
                 f"airflock: note: --radio {text} sends to nobody before it has heard somebody; where no router speaks "
@@ -373,7 +376,8 @@ def _run(arguments: argparse.Namespace) -> int:
                 f"{arguments.card}: {card.name}, {len(card.members)} members, hash {card.hash[:8]}: fits\n"
             )
             return 0
-        # Mode x: a log is evidence and is never overwritten. The buffer keeps the disk out of the tick.
+        # Mode x: a log is evidence and is never overwritten. The buffer keeps the disk out of the
+        # tick.
         with open(log_file, "x", encoding="utf-8", buffering=1 << 16) as log:
             run_node(card, arguments.member, key, ports, memory_file, log, write_line=_write_line)
     except OSError as error:

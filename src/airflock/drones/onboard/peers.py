@@ -20,7 +20,8 @@ from airflock.support import FlightSite, LinkError, swap_enu_ned
 
 HEARD_WITHIN = 2.0  # s; a peer whose last status is younger is heard
 AGE_COUNT = 10  # packets whose ages reveal a wrong clock
-# s beyond the radio's delay; a member whose packets are all older seems to have a clock that is behind.
+# s beyond the radio's delay; a member whose packets are all older seems to have a clock that is
+# behind.
 MAX_PACKET_AGE = 1.0
 MAX_OUTSIDE = 100.0  # m; a member may be this far beyond the fence and still be believed
 PHASE_OF_NUMBER = {int(phase): phase for phase in MissionPhase}
@@ -109,8 +110,8 @@ class Peers:
         """Return True if at least two members, and all that are known, seem to have a wrong clock: then it is ours."""
         wrong, limit = 0, self._card.safety.clock_error
         for peer in self.all.values():
-            # The youngest of ten packets says most: delay only makes packets older, so a whole batch that is too old
-            # or from the future can only be a clock.
+            # The youngest of ten packets says most: delay only makes packets older, so a whole
+            # batch that is too old or from the future can only be a clock.
             if len(peer.packet_ages) == AGE_COUNT:
                 if -limit <= min(peer.packet_ages) <= self._card.delay + MAX_PACKET_AGE:
                     return False
@@ -155,7 +156,7 @@ class OperatorOrders:
             return self._refuse("mission")
         if abs(order.given_at - utc) > MAX_ORDER_AGE:
             return self._refuse("old")
-        # Orders grow in time, over restarts too; whoever records one cannot send it again.
+        # Orders grow in time, over restarts too: a recorded one cannot be sent again.
         if order.given_at <= self.last_order_time:
             return self._refuse("replay")
         # Also for orders to others: they prove that the operator is there, and use up their time.
@@ -257,7 +258,8 @@ class AutopilotLink:
         self._max_jump = max_jump
         for frame in self._stream(data):
             if frame.system != self._member:
-                # Another vehicle on this wire means a wrong cable or a wrong system id: noticed before take-off.
+                # Another vehicle on this wire means a wrong cable or a wrong system id: noticed
+                # before take-off.
                 if frame.message == 0 and frame.values()["autopilot"] != INVALID_AUTOPILOT:
                     self.other_systems.add(frame.system)
             elif frame.component == AUTOPILOT_COMPONENT:

@@ -60,66 +60,66 @@ def missing_before_start(
     card: FlightCard, member: int, link: AutopilotLink, peers: Peers, utc: int, now: float
 ) -> tuple[str, ...]:
     """Return the reasons for which a drone may not arm, one line each."""
-    found = []
+    missing = []
     if utc >= card.expires * 1_000_000:
-        found.append(f"the card expired at Unix time {card.expires} s; the clock says {utc // 1_000_000} s")
+        missing.append(f"the card expired at Unix time {card.expires} s; the clock says {utc // 1_000_000} s")
     if not card.operator:
-        found.append("operator: the card names no key, so nobody could start or stop the drone")
+        missing.append("operator: the card names no key, so nobody could start or stop the drone")
     if link.armed:
-        found.append("the autopilot is armed already; disarm it")
-    found += (
+        missing.append("the autopilot is armed already; disarm it")
+    missing += (
         _missing_parameters(card, member, link) + _missing_state(card, link, now) + _missing_clock(card, link, peers)
     )
-    return (*found, *_missing_peers(card, link, peers, now))
+    return (*missing, *_missing_peers(card, link, peers, now))
 
 
 def _missing_parameters(card: FlightCard, member: int, wire: AutopilotLink) -> list[str]:
     """Return the parameters of the autopilot that are unknown or unsafe."""
-    found = []
+    missing = []
     for guard in card.autopilot.parameter_checks:
         value = wire.parameters.get(guard.name)
         if value is None:
-            found.append(f"{guard.name}: the autopilot has not reported it")
+            missing.append(f"{guard.name}: the autopilot has not reported it")
             continue
         if not guard.safe(value, member):
             why = guard.reason(card.safety.speed_max, card.safety.response)
-            found.append(f"{guard.name} = {value:g} is not {guard.told(member)}: {why}")
-    return found
+            missing.append(f"{guard.name} = {value:g} is not {guard.told(member)}: {why}")
+    return missing
 
 
 def _missing_state(card: FlightCard, wire: AutopilotLink, now: float) -> list[str]:
     """Return the defects of the own position, battery or stand."""
-    s, found, own = card.safety, [], wire.state
+    s, missing, own = card.safety, [], wire.state
     far = (
         wire.far if wire.fix_type >= 3 else 0.0
     )  # without satellites it may say that it is at 0 degrees north and east
     if far:
-        found.append(
+        missing.append(
             f"the drone is {far * 1e-3:.0f} km away from the card's site: is the site right? It is latitude, "
             "longitude in degrees, altitude above mean sea level in m"
         )
     elif own is None or now - wire.state_at > s.stale:
-        found.append("no own position from the autopilot")
+        missing.append("no own position from the autopilot")
     elif card.outside(*own[:3]) > 0.0:
-        found.append(f"the drone is {card.outside(*own[:3]):.0f} m outside the fence: is the card's site right?")
+        missing.append(f"the drone is {card.outside(*own[:3]):.0f} m outside the fence: is the card's site right?")
     elif abs(own.z) > s.uneven:
-        found.append(
+        missing.append(
             f"the drone stands {abs(own.z):.1f} m {'above' if own.z > 0.0 else 'below'} the card's site, by which all "
             f"heights are told; at most {s.uneven:g} m (safety.uneven): is the site's altitude above mean sea level?"
         )
     elif wire.position_disagreement(now) > s.jump:
-        found.append(f"local and global position of the autopilot differ by {wire.position_disagreement(now):.0f} m")
+        missing.append(f"local and global position of the autopilot differ by {wire.position_disagreement(now):.0f} m")
     if wire.origin is None and not far:
-        found.append("GPS_GLOBAL_ORIGIN: the autopilot has not reported it")
+        missing.append("GPS_GLOBAL_ORIGIN: the autopilot has not reported it")
     if wire.fix_type < 3 or wire.horizontal_accuracy > s.h_acc:
         accuracy = f"accuracy {min(wire.horizontal_accuracy, 999.0):.1f} m"
-        found.append(f"navigation: fix {wire.fix_type}, {accuracy}; needs a 3-D fix and {s.h_acc:g} m")
+        missing.append(f"navigation: fix {wire.fix_type}, {accuracy}; needs a 3-D fix and {s.h_acc:g} m")
     if wire.battery is None or wire.battery <= s.battery_low:
         charge = "not told" if wire.battery is None else f"{wire.battery:.0f} %"
-        found.append(f"battery: {charge}; needs more than {s.battery_low:g} %")
+        missing.append(f"battery: {charge}; needs more than {s.battery_low:g} %")
     if wire.is_landed is not True:
-        found.append("the autopilot does not report that it is on the ground")
-    return found
+        missing.append("the autopilot does not report that it is on the ground")
+    return missing
 
 
 def _missing_clock(card: FlightCard, wire: AutopilotLink, peers: Peers) -> list[str]:
@@ -137,17 +137,17 @@ def _missing_clock(card: FlightCard, wire: AutopilotLink, peers: Peers) -> list[
 
 def _missing_peers(card: FlightCard, wire: AutopilotLink, peers: Peers, now: float) -> list[str]:
     """Return the members that are not heard, have another card, or stand too near."""
-    found = []
+    missing = []
     for who, peer in peers.all.items():
         if peer.has_other_card:
-            found.append(f"drone {who} has another card")
+            missing.append(f"drone {who} has another card")
         elif now - peer.heard_at > HEARD_WITHIN:
-            found.append(f"drone {who} is not heard")
+            missing.append(f"drone {who} is not heard")
         elif wire.state is not None and peer.state is not None:
             distance = state_distance(wire.state, peer.state)
             if distance < card.safety.start_apart:
-                found.append(f"drone {who} stands {distance:.1f} m away; needs {card.safety.start_apart:g} m")
-    return found
+                missing.append(f"drone {who} stands {distance:.1f} m away; needs {card.safety.start_apart:g} m")
+    return missing
 
 
 def state_distance(a: State, b: State) -> float:

@@ -41,14 +41,15 @@ def limit_velocity(
         wanted_velocity = NO_VELOCITY
     vx, vy, _ = shorten(wanted_velocity[0], wanted_velocity[1], 0.0, safety.speed_max)
     vz = clamp(wanted_velocity[2], -safety.climb_max, safety.climb_max)
-    # As far ahead of the own velocity as the drone can follow until the next setpoint, so that nothing is lost.
+    # As far ahead of the own velocity as the drone can follow until the next setpoint, so that
+    # nothing is lost.
     dx, dy, dz = shorten(vx - own.vx, vy - own.vy, vz - own.vz, safety.accel * (safety.response + safety.tick))
     vx, vy, vz = own.vx + dx, own.vy + dy, own.vz + dz
     fenced = False
     walls = list(surfaces)
     for _ in range(2):  # a corner: what one side turns, another may have to turn again
-        # Each side allows the outward speed from which the drone can still brake before the soft margin. Only the
-        # component across the side is cut, so that a drone slides along it.
+        # Each side allows the outward speed from which the drone can still brake before the soft
+        # margin. Only the component across the side is cut, so that a drone slides along it.
         for distance, nx, ny, nz in walls:
             outward = -(vx * nx + vy * ny + vz * nz)
             if outward <= 0.0:
@@ -179,7 +180,8 @@ class PhaseVelocity:
 
     def velocity(self, own: State, at: SteeringInput) -> Velocity:
         """Return the commanded velocity, m/s: the wanted one within the limits and the fence."""
-        # While it takes off it is still below the lowest height of the fence, which must not lift it at full speed.
+        # While it takes off it is still below the lowest height of the fence, which must not lift
+        # it at full speed.
         low = -1.0 if at.phase in (MissionPhase.ARMING, MissionPhase.TAKEOFF) else self._card.low
         wish = self._wanted_velocity(own, at)
         limited = limit_velocity(wish, own, self._card.sides(own), (low, self._card.high), self._card.safety)
@@ -190,7 +192,8 @@ class PhaseVelocity:
         """Return the velocity of the phase before the limiter, m/s."""
         s, phase = self._card.safety, at.phase
         if phase == MissionPhase.HOLD and at.has_navigation:
-            # First brake, then keep the place where it stopped: going back to where HOLD began would swing.
+            # First brake, then keep the place where it stopped: going back to where HOLD began
+            # would swing.
             if self._hold_position is None and norm(*own[3:]) < STANDING_SPEED:
                 self._hold_position = own[:3]
             return NO_VELOCITY if self._hold_position is None else velocity_to_stay(own, self._hold_position, s)
@@ -202,7 +205,8 @@ class PhaseVelocity:
             return wish if at.stay is None else (*at.stay[:2], wish[2])
         if phase not in (MissionPhase.FLOCK, MissionPhase.GOTO):
             return NO_VELOCITY
-        # The law decides once a period, as in the simulation; between two decisions its last velocity is flown.
+        # The law decides once a period, as in the simulation; between two decisions its last
+        # velocity is flown.
         if at.now >= self._next_decision - TIME_TOLERANCE:
             self._next_decision = max(self._next_decision + self._card.period, at.now)
             self._law_velocity = self._law(own, at.now, self.goal if phase == MissionPhase.GOTO else None)
