@@ -103,7 +103,7 @@ def _draws(seed: int, number: int) -> dict[str, float]:
 
 
 def _believed(found: Sensor, s: Any, track: Track, period: float, seed: int) -> Track:
-    """What the sensor makes of a track, measured from its first state on."""
+    """Return the states that a sensor makes of a track, relative to its first state."""
     made = np.empty_like(track)
     memory, off = (found.Memory() if found.Memory is not None else None), State(*(0.0,) * 6)
     for number, state in enumerate(track):

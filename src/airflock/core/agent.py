@@ -33,7 +33,7 @@ class HeardNeighbour(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """What one agent decides: its command (m/s, m/s² or a heading, as Model.command says) and its new Memory."""
+    """Decision of one agent: its command (m/s, m/s² or a heading, as Model.command says) and its new Memory."""
 
     command: tuple[float, float, float]
     memory: Any
@@ -173,7 +173,7 @@ class SightProtocol(Protocol):
     """A world that hides agents from each other."""
 
     def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
-        """Whether something stands between two places, m."""
+        """Return True if something stands between two positions, m."""
 
 
 def met_neighbours(
@@ -215,7 +215,7 @@ STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class WorldMap(Protocol):
-    """What a pilot asks of the world: `airflock.world.WorldMap` answers from a map."""
+    """Interface of a world as a pilot queries it; `airflock.world.WorldMap` implements it from a map."""
 
     def beside(self, own: State, other: State, /) -> State:
         """State of another agent at its image nearest to own: itself wherever space is not periodic."""
@@ -232,11 +232,11 @@ class WorldMap(Protocol):
         """Free distance of a sphere, m."""
 
     def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
-        """Whether an obstacle or the scene stands between two places, m."""
+        """Return True if an obstacle or the scene stands between two positions, m."""
 
 
 class BoundPercept(Percept):
-    """What one agent perceives at one decision, bound to a map of the world and to its own random numbers."""
+    """Percept of one agent at one decision, bound to a map of the world and to its own random numbers."""
 
     place: WorldMap
     at: State
@@ -280,7 +280,7 @@ class BoundPercept(Percept):
 
 @dataclass(frozen=True)
 class AgentView:
-    """What one agent perceived at a decision, and what came of it.
+    """Record of one decision: the perceptions of the agent, and the result.
 
     agent, time : its number; time of the decision, s
     true, own   : its state, and its state as it measured it: position (m) and velocity (m/s)

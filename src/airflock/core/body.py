@@ -66,7 +66,7 @@ RULES = {
 
 @dataclass(frozen=True)
 class Body:
-    """What turns a command into a motion, gathered from its module.
+    """Rules that turn a command into a motion, gathered from a module.
 
     accepts     : the COMMAND of the models that it can carry
     integration : "old" if a position moves by the velocity before `move`, "new" if by the one after it
@@ -93,17 +93,17 @@ class Body:
 
     @property
     def initial_memory(self) -> tuple[float, ...]:
-        """What each field of its Memory is at the start of a flight."""
+        """Return the value of each field of Memory at the start of a flight."""
         return initial_values(self.Memory)
 
     def lasts(self, **arguments: Any) -> float:
-        """How long its battery lasts at least, s; 0 once it is empty."""
+        """Return how long the battery lasts at least, s; 0 once it is empty."""
         if self.endures is None:
             return math.inf
         return float(call_rule(self.endures, "endures", arguments, self.name))
 
     def limit_errors(self, **arguments: Any) -> list[str]:
-        """What this body cannot fly, by what `limits` may ask for."""
+        """Return what this body cannot fly, one line each, from the arguments that `limits` may request."""
         return [] if self.limits is None else list(call_rule(self.limits, "limits", arguments, self.name))
 
 

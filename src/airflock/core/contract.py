@@ -32,7 +32,7 @@ class State(NamedTuple):
 
 
 def namespace_names(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:
-    """What a module, a class or a mapping of names holds, and what it is called: `name`, its NAME, or its module's.
+    """Return the names in a module, a class or a mapping, and its own name: `name`, its NAME, or that of its module.
 
     A static method is the function inside, so that the check of rules can name it and its decorator.
     """
@@ -75,7 +75,7 @@ def check_memory_record(
 
 
 def initial_values(record: type | None) -> tuple[float, ...]:
-    """What each field of such a record is at the start of a flight; nothing without one."""
+    """Return the value of each field of a record at the start of a flight; nothing without a record."""
     return tuple(getattr(record, "_field_defaults", {}).values())
 
 

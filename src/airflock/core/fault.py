@@ -97,7 +97,7 @@ class Fault:
         return number_names(self.Parameters)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled: not the record, which is made where it is asked for."""
+        """Return the state to pickle, without the record, which is built again on demand."""
         return {name: value for name, value in vars(self).items() if name != "record"}
 
     @cached_property
@@ -107,7 +107,7 @@ class Fault:
 
     @property
     def onset_names(self) -> tuple[str, ...]:
-        """What of the agent's true state and command its rules want to know as it was when the fault began."""
+        """Return the names of the true state and command at the onset of the fault that its rules request."""
         asked = {(kind, name) for kind, rule in self.rules.items() for name in argument_names(rule, kind, self.name)}
         asked -= {(kind, name) for kind in DISTURBED_STATES.values() for name in AT_NAMES}
         return tuple(sorted({name for _, name in asked if name.startswith("at_")}))
@@ -120,7 +120,7 @@ class Fault:
         return float(call_rule(self.leaves, "leaves", given, self.name))
 
     def kept(self, state: str) -> tuple[str, ...]:
-        """What of the state that a rule disturbs it wants to know as it was last before the fault, such as "at_x".
+        """Return the names of the disturbed state, as it was last before the fault, that a rule requests ("at_x").
 
         state : one of ASKED, as which the rule `sense` or `tell` is asked
         """

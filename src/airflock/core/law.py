@@ -91,12 +91,12 @@ def place_of(rule: Any, line: int = 0) -> str:
 
 
 def _finite(value: object) -> bool:
-    """Whether a global is no number, or a finite one."""
+    """Return True if a global is no number, or a finite one."""
     return not isinstance(value, float) or math.isfinite(value)
 
 
 def _instead(module: Any, name: str) -> str:
-    """What to write in place of a name of a module."""
+    """Return a hint what to write in place of a name of a module."""
     source = INSTEAD.get(module.__name__, INSTEAD["random"] if name == "random" else "")
     return f"; write {source}" if source else ""
 

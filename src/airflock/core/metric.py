@@ -141,7 +141,7 @@ class Metric:
         return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
 
     def absence(self, name: str) -> str:
-        """How one of its order parameters is taken while some agents are absent, for people to read."""
+        """Describe how an order parameter is computed while some agents are absent."""
         how = {self.over_time.get(field, "mean") for field in self.Sample._fields}
         how = {self.over_time.get(name, "mean")} if name in self.Sample._fields else how
         if name not in self.Sample._fields and "sum" in how:

@@ -273,7 +273,7 @@ def add_laws(base: Model, extra: Model) -> Model:
 
 
 def composition_errors(base: Model, extra: Model) -> list[str]:
-    """Why two laws cannot be added, one line each."""
+    """Return the reasons why two laws cannot be added, one line each."""
     found = []
     if base.command != extra.command:
         found.append(f"model {base.name} commands {base.command}, and {extra.name} {extra.command}: no sum of the two")

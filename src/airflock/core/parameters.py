@@ -18,7 +18,7 @@ MAX_COMPONENTS = 64  # components of one vector; a driver's text holds a line fo
 
 
 class VectorFields(NamedTuple):
-    """What `quantity(size=n)` leaves in the body of a class: the declared fields of its components."""
+    """Declared fields of the components of a vector, as `quantity(size=n)` leaves them in the body of a class."""
 
     fields: tuple[Any, ...]
 
@@ -89,7 +89,7 @@ class VectorMeta(type):
 
 
 def vector_error(value: Any, size: int) -> str:
-    """What is wrong with the components of a vector together, as the rest of a sentence; empty if nothing is."""
+    """Return the error of the components of a vector together, as the rest of a sentence; empty if valid."""
     if isinstance(value, str) or not isinstance(value, Sequence):
         return f"= {value!r} is not a list; give {size} numbers"
     count = len(value)
@@ -367,7 +367,7 @@ class Parameters(metaclass=VectorMeta):
 
 
 def quantity_error(value: Any, declared: Quantity) -> str:
-    """What is wrong with a value, as the rest of a sentence; empty if nothing is."""
+    """Return the error of a value, as the rest of a sentence; empty if valid."""
     if value is None and declared.optional:
         return ""
     if not isinstance(value, float):
@@ -378,13 +378,13 @@ def quantity_error(value: Any, declared: Quantity) -> str:
 
 
 def choice_error(value: Any, declared: Choice) -> str:
-    """What is wrong with a choice, as the rest of a sentence; empty if nothing is."""
+    """Return the error of a choice, as the rest of a sentence; empty if valid."""
     known = isinstance(value, str) and value in declared.options
     return "" if known else f"= {value!r} is none of {', '.join(declared.options)}"
 
 
 def points_error(value: Any, declared: Points) -> str:
-    """What is wrong with a list of points or polygons, as the rest of a sentence; empty if nothing is."""
+    """Return the error of a list of points or polygons, as the rest of a sentence; empty if valid."""
     try:
         sound = _are_points(_frozen(value), declared.depth, declared.axes)
     except (TypeError, ValueError, OverflowError, RecursionError):

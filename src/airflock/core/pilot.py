@@ -41,7 +41,7 @@ EARLY = 0.05  # s; how far in the future a neighbour's data may seem to be, by t
 
 @dataclass(frozen=True)
 class PacketPolicy:
-    """What is done with neighbours' data.
+    """Policy for the data of neighbours: how long they count, and how they are carried forward.
 
     extrapolate : carry them forward with their own velocity to the moment of the decision
     forget      : age (s) beyond which they say nothing; by the rule of silence they count up to its patience
@@ -92,7 +92,7 @@ def extrapolated_state(radio: Radio, k: Any, state: State, age: float) -> State:
 
 
 def packet_counts(radio: Radio, k: Any, age: float) -> bool:
-    """Whether the newest packet, of this age (s), counts by a radio's rule."""
+    """Return True if the newest packet, of this age (s), counts by the rule of a radio."""
     return radio.lasts is None or bool(call_rule(radio.lasts, "lasts", {"age": age, "k": k}, radio.name) > 0.5)
 
 
@@ -226,7 +226,7 @@ class Pilot:
         return found
 
     def lost_near(self, own: State, now: float) -> bool:
-        """Whether a neighbour that is not heard any more could be near by now."""
+        """Return True if a neighbour that is not heard any more could be near by now."""
         if self.silence is None:
             return False
         for packet in self.packets.values():

@@ -95,7 +95,7 @@ LINK_NAMES = ("fast", "slow")  # how `missed` asks how many packets the first an
 
 @dataclass(frozen=True, kw_only=True)
 class PacketParameters(Parameters):
-    """What every radio has: a delay, a range, and a loss that grows with the square of the distance."""
+    """Parameters of every radio: a delay, a range, and a loss that grows with the square of the distance."""
 
     delay: float = quantity(
         1.0, "s", low=0.0, high=30.0, source=S5, usual=(0.0, 5.0), meaning="age of neighbours' data on arrival"
@@ -131,7 +131,7 @@ def either(a, b):
 
 
 def packets(step, rate, period):
-    """How many packets a link of `rate` (1/s) sends in decision number `step` of length `period` (s)."""
+    """Number of packets that a link of `rate` (1/s) sends in decision number `step` of length `period` (s)."""
     return math.floor((step + 1.0) * rate * period + 1e-6) - math.floor(step * rate * period + 1e-6)
 
 
@@ -181,16 +181,16 @@ class Radio:
 
     @property
     def keeps_packets(self) -> bool:
-        """Whether the newest packet counts until the next one comes."""
+        """Return True if the newest packet counts until the next one comes."""
         return any(rule is not None for rule in (self.missed, self.receive, self.late, self.see))
 
     @property
     def initial_packet(self) -> tuple[float, ...]:
-        """What each field of its Packet is at the start of a flight."""
+        """Return the value of each field of Packet at the start of a flight."""
         return initial_values(self.Packet)
 
     def asks_for(self, *names: str) -> bool:
-        """Whether one of its rules asks for any of these names."""
+        """Return True if one of the rules requests any of these names."""
         found = {
             name for kind in RULES if (rule := getattr(self, kind)) for name in argument_names(rule, kind, self.name)
         }
@@ -257,7 +257,7 @@ FIRST = {  # before anything is known
 
 
 class PacketReception:
-    """Which packets pass between the members of a flock, and how late they come.
+    """Reception of the packets between the members of a flock: which arrive, and how late.
 
     radio, k     : kind of radio and its numbers
     seed, agents : by which its random numbers are drawn, those of the same pair in a flight of this seed and size
@@ -269,7 +269,7 @@ class PacketReception:
         self._kept: dict[tuple[int, int], Any] = {}
 
     def any_arrives(self, receiver: int, sender: int, decision: int, known: Mapping[str, float]) -> bool:
-        """Whether anything of what is sent in decision `number` arrives, where the sender is in range.
+        """Return True if any packet sent in a decision arrives, where the sender is in range.
 
         known : the distance (m), and what else of the vocabulary of `receive` is known
         """
@@ -279,13 +279,13 @@ class PacketReception:
         return bool(u >= loss_probability(self.radio, self.k, decision, self.period, known))
 
     def packet_arrives(self, receiver: int, sender: int, decision: int, known: Mapping[str, float]) -> bool:
-        """Whether a packet arrives by the radio's own rule `receive`, where it has one."""
+        """Return True if a packet arrives by the rule `receive` of the radio, where it has one."""
         if self.radio.receive is None:
             return True
         return self._received(receiver, sender, self._given(receiver, sender, decision, known))
 
     def late(self, receiver: int, sender: int, decision: int, known: Mapping[str, float]) -> float:
-        """How much later than its delay a packet of decision `number` comes, s."""
+        """Return how much later than its delay a packet of a decision comes, s."""
         if self.radio.late is None:
             return 0.0
         given = self._given(receiver, sender, decision, known)

@@ -64,7 +64,7 @@ def philox(c0, c1, c2, c3, k0, k1):
 
 
 def philox_of_words(c0, c1, c2, c3, k0, k1):
-    """The same by the primitives of a device, whose words have other operators: what a driver holds of `philox`."""
+    """Compute `philox` by the primitives of a device, whose words have other operators; drivers hold this form."""
     c0, c1, c2, c3, k0, k1 = word(c0), word(c1), word(c2), word(c3), word(k0), word(k1)
     for _ in range(10):
         h0 = multiply_high(0xD2511F53, c0)
@@ -84,7 +84,7 @@ COMPILED = {philox: philox_of_words}
 
 
 def draw(c0, c1, c2, c3, k0, k1):
-    """The same as philox: compiled once and called, where no loop over agents has to vectorise around it."""
+    """Compute philox, compiled once and called, where no loop over agents has to vectorise around it."""
     return philox(c0, c1, c2, c3, k0, k1)
 
 

@@ -83,7 +83,7 @@ def integer_names(rule: Callable[..., Any]) -> frozenset[str]:
 
 
 def is_integer(node: ast.expr, integers: set[str] | frozenset[str], rule: Callable[..., Any]) -> bool:
-    """Whether an expression is an integer, given the names that are."""
+    """Return True if an expression is an integer, given the names that hold integers."""
     if isinstance(node, ast.Constant):
         return type(node.value) is int
     if isinstance(node, ast.Name):
@@ -138,7 +138,7 @@ def _terms(node: ast.AST) -> Iterator[str]:
 
 
 def _pairs(item: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
-    """What is assigned to what, tuples taken apart."""
+    """Yield pairs of target and value of an assignment, tuples taken apart."""
     for target in item.targets:
         if isinstance(target, ast.Tuple) and isinstance(item.value, ast.Tuple):
             yield from zip(target.elts, item.value.elts, strict=False)
@@ -152,7 +152,7 @@ def _called(node: ast.AST) -> str:
 
 
 def resolve_global(name: str, rule: Callable[..., Any]) -> Any:
-    """What a free name of a rule stands for; None if for nothing."""
+    """Return the value of a free name of a rule; None if it has none."""
     closure = dict(zip(rule.__code__.co_freevars, rule.__closure__ or (), strict=True))
     return rule.__globals__.get(name, closure[name].cell_contents if name in closure else None)
 
@@ -165,7 +165,7 @@ def resolve_function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] 
 
 @cache
 def _gives_integer(rule: Callable[..., Any] | None) -> bool:
-    """Whether every value that a function returns is an integer."""
+    """Return True if every value that a function returns is an integer."""
     if rule is None:
         return False
     node = tree_of(rule)
@@ -199,7 +199,7 @@ def _is(node: ast.AST, name: str) -> bool:
 
 
 def _read_below(call: ast.Call, place: int, rule: Callable[..., Any]) -> frozenset[str] | None:
-    """What a function reads of the record that a rule hands it at this place."""
+    """Return the fields that a function reads of the record that a rule passes as this argument."""
     called = resolve_function(call.func.id, rule) if isinstance(call.func, ast.Name) else None
     if called is None or any(isinstance(given, ast.Starred) for given in call.args):
         return None

@@ -57,7 +57,7 @@ COMPONENTS = ("x", "y", "z", "vx", "vy", "vz")  # what `measure` returns, before
 
 @dataclass(frozen=True, kw_only=True)
 class SensorParameters(Parameters):
-    """What every sensor has: how often an agent measures, and so decides."""
+    """Parameters of every sensor: the period at which an agent measures, and so decides."""
 
     period: float = quantity(
         0.2,
@@ -101,15 +101,15 @@ class Sensor:
 
     @property
     def initial_memory(self) -> tuple[float, ...]:
-        """What each field of its Memory is at the start of a flight."""
+        """Return the value of each field of Memory at the start of a flight."""
         return initial_values(self.Memory)
 
     def is_exact(self, s: Any) -> bool:
-        """Whether it tells the truth with these numbers."""
+        """Return True if the sensor has no error with these parameters."""
         return self.exact is not None and bool(self.exact(s))
 
     def bound_errors(self, **arguments: Any) -> list[str]:
-        """What this sensor cannot measure, by what `bounds` may ask for."""
+        """Return what this sensor cannot measure, one line each, from the arguments that `bounds` may request."""
         return [] if self.bounds is None else list(call_rule(self.bounds, "bounds", arguments, self.name))
 
 
@@ -163,7 +163,7 @@ Words = Callable[[int, int], tuple[int, int, int, int]]
 
 
 class SensorState:
-    """What one agent's sensor makes of true states.
+    """Sensor of one agent, measurement after measurement.
 
     sensor, s   : kind of sensor and its numbers
     seed, agent : by which its random numbers are drawn, those of the same agent in a flight of this seed
@@ -214,7 +214,7 @@ def add_errors(sensor: Sensor, s: Any, errors: State, normal: Sequence[float], p
 def call_measure(
     sensor: Sensor, s: Any, true: Sequence[float], memory: Any, time: float, period: float, draws: Mapping[str, float]
 ) -> tuple[State, Any]:
-    """What the rule `measure` of a sensor believes of a true state (m, m/s), and what it then remembers."""
+    """Return the state that the rule `measure` of a sensor makes of a true one (m, m/s), and its new Memory."""
     assert sensor.measure is not None
     given = {**State(*true)._asdict(), **draws, "memory": memory, "time": time, "period": period, "s": s}
     found = call_rule(sensor.measure, "measure", given, sensor.name)

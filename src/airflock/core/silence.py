@@ -20,7 +20,7 @@ OURS = "our choice, from flights of 10 drones at 4 m/s with 15 s of silence"
 
 @dataclass(frozen=True, kw_only=True)
 class SilenceParameters(Record):
-    """When an agent stops because a neighbour that it has lost could be near."""
+    """Parameters of the rule by which an agent stops because a neighbour that it has lost could be near."""
 
     rule: str = choice(
         "fly_on", ("fly_on", "stop"), source=OURS,
@@ -56,7 +56,7 @@ Parameters = SilenceParameters  # the name under which a rule's file declares it
 
 
 def with_defaults(s: SilenceParameters, speed: float, delay: float = 0.0, rule: str | None = None) -> SilenceParameters:
-    """The same numbers with what was left to the scenario filled in, and another rule if one is given.
+    """Return a copy of the parameters with the defaults of the scenario filled in, and with `rule` if one is passed.
 
     speed : that the law prefers, m/s; 0 where it prefers none, which counts as 4 m/s
     delay : of the radio, s
@@ -67,7 +67,7 @@ def with_defaults(s: SilenceParameters, speed: float, delay: float = 0.0, rule: 
 
 
 def for_standing_neighbour(s: SilenceParameters) -> SilenceParameters:
-    """The same numbers for a lost neighbour that said that it holds or returns: its reach grows half as fast.
+    """Return the parameters for a lost neighbour that announced to hold or return: its reach grows half as fast.
 
     Its distance is measured from where an agent is now, so that half of twice the flock's speed still covers one that
     has flown on at the speed of the flock. At the full speed, four of forty

@@ -53,7 +53,7 @@ class Topology:
         return hash((self.name, self.meet))
 
     def asks_for(self, name: str) -> bool:
-        """Whether the rule asks for something by this name."""
+        """Return True if the rule requests an argument of this name."""
         return name in argument_names(self.meet, "meet", self.name)
 
 

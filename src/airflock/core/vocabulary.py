@@ -31,7 +31,7 @@ class Own(NamedTuple):
 
 
 class Percept(NamedTuple):
-    """What else an agent perceives: time (s), offsets to the arena's centre and to the goal (m), rays, noise.
+    """Percept of an agent beside its neighbours: time (s), offsets to the arena's centre and the goal (m), rays, noise.
 
     Without a goal its offset is zero. An engine binds the methods to its world and its streams; a drone passes a
     Percept of its own with a real range finder. As they stand here the world is empty and quiet.

@@ -62,7 +62,7 @@ def cast_near(x, y, z, ux, uy, uz, length, radius, shapes, near, n):
 
 
 def cast(x, y, z, ux, uy, uz, length, radius, shapes, nodes, links):
-    """The same against all shapes, through the tree."""
+    """Cast against all shapes, through the tree."""
     best = length
     ix = inverse(ux)
     iy = inverse(uy)
@@ -92,7 +92,7 @@ def nearest(x, y, z, reach, shapes, nodes, links):
 
 
 def nearest_of(x, y, z, reach, ground, shapes, nodes, links):
-    """The same among what stands on the ground (0.0), the ground alone (1.0), or all (2.0)."""
+    """Find the nearest surface of the shapes on the ground (0.0), the ground alone (1.0), or all (2.0)."""
     found = Surface(FAR, 0.0, 0.0, 1.0)
     best = reach
     i = 0

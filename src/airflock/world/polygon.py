@@ -46,7 +46,7 @@ def obstacle(x, y, z, edges, first, last):
 
 
 def prism(x, y, z, edges, first, last):
-    """The same of a prism that has ends in height: row `last` holds the lowest and the highest height, m."""
+    """Find the nearest point of a prism with ends in height: row `last` holds the lowest and the highest height, m."""
     beside = obstacle(x, y, z, edges, first, last)
     low = edges[last][0]
     high = edges[last][1]

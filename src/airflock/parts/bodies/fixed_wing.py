@@ -95,7 +95,7 @@ def drag_of(v, n, wing, b):
 
 
 def limits(b, speed, start, wing):
-    """What this body cannot fly, one line each: a law or a start slower than it stalls."""
+    """Return what this body cannot fly, one line each: a law or a start slower than the stall."""
     stall = stall_speed(wing, 1.0)
     least, told = b.margin * stall, f"body fixed_wing stalls at {stall:.3g} m/s and flies no slower than"
     found = []

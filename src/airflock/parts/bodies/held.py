@@ -20,7 +20,7 @@ def wander(tau, dt):
 
 
 def gap_left(gap, time, tau, rate, a_max):
-    """What is left of a velocity gap (m/s) after `time` (s), and for how long of it a_max limited the motion (s).
+    """Return the velocity gap (m/s) left after `time` (s), and for how long of it a_max limited the motion (s).
 
     Saturated while the gap exceeds a_max tau, where it falls by a_max; then exponential with `rate` (`decay_rate`).
     """

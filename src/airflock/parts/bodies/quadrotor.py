@@ -87,7 +87,7 @@ class Parameters(Record):
 
 
 class Memory(NamedTuple):
-    """What a quadrotor carries from step to step.
+    """State of a quadrotor from step to step.
 
     n : direction of thrust; w, a : its turning rate (rad/s) and angular acceleration (rad/s²), which the motors give
     thrust : over weight; i : integral of the velocity error, m/s²; used : energy drawn from the battery, J
@@ -110,7 +110,7 @@ class Memory(NamedTuple):
 
 
 def limits(b, dt):
-    """What this body cannot fly, one line each: steps in which its attitude would swing up."""
+    """Return what this body cannot fly, one line each: steps in which its attitude would swing up."""
     longest = min(1.0 / b.damping, 0.5 / math.sqrt(b.stiffness))
     if dt <= longest:
         return []

@@ -18,5 +18,5 @@ class Parameters(Record):
 
 
 def clock(f):
-    """How far it is ahead, s."""
+    """Offset of the clock, ahead of the true time, s."""
     return f.ahead

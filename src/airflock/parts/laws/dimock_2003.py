@@ -135,7 +135,7 @@ def neighbour(dx, dy, dz, r, r2, p):
 
 
 def divisor(weights, others, p):
-    """What the sum of weighted positions is divided by (Eq. 2)."""
+    """Divisor of the sum of weighted positions (Eq. 2)."""
     if p.centroid == "n":
         return others + 1.0
     if p.centroid == "others":

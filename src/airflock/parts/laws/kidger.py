@@ -137,7 +137,7 @@ def preferred_speed(p):
 
 
 def sight(p):
-    """How far a cast looks, m."""
+    """Largest distance of a cast, m."""
     return p.r_ray + p.radius + p.margin
 
 

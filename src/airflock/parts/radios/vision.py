@@ -75,7 +75,7 @@ class Parameters(PacketParameters):
 
 
 class Packet(NamedTuple):
-    """Where the observer of a pair looks, a horizontal unit vector; east before it has flown."""
+    """Line of sight of the observer of a pair, a horizontal unit vector; east before it has flown."""
 
     look_x: float = 1.0
     look_y: float = 0.0

@@ -48,7 +48,7 @@ class Memory(NamedTuple):
 
 
 def exact(s):
-    """Whether it tells the truth: without a delay."""
+    """Return True if the sensor has no error: without a delay."""
     return s.lag == 0.0
 
 

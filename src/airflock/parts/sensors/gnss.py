@@ -51,7 +51,7 @@ class Parameters(SensorParameters):
 
 
 class Memory(NamedTuple):
-    """What is kept of one receiver: errors (m, m/s) and times left (s)."""
+    """State of one receiver: errors (m, m/s) and times left (s)."""
 
     begun: float = 0.0
     bias_x: float = 0.0
@@ -74,7 +74,7 @@ class Memory(NamedTuple):
 
 
 def exact(s):
-    """Whether it tells the truth: without any error."""
+    """Return True if the sensor has no error."""
     quiet = s.sd == 0.0 and s.sd_up == 0.0 and s.white == 0.0 and s.bias == 0.0 and s.sd_velocity == 0.0
     jumps = s.jump_rate > 0.0 and s.jump_sd > 0.0
     outages = s.outage_rate > 0.0 and s.outage_time > 0.0 and s.coasting > 0.0
