@@ -68,6 +68,7 @@ def check_memory_record(
     asked : names that the rule asks for; record : what the file holds under `name`, if anything
     """
     word = name.lower()
+    # Without a start value the first call of a rule would read scratch of the driver, so every field needs one.
     if (word in argument_names) is (record is None):
         raise RuleError(f"{owner}: a rule {rule} that asks for {word} and a NamedTuple {name} come together")
     if record is not None and set(getattr(record, "_field_defaults", {})) != set(getattr(record, "_fields", "-")):
@@ -84,6 +85,7 @@ def argument_names(rule: Callable[..., Any], kind: str, owner: str = "") -> tupl
     """Names that a rule asks for, checked against the vocabulary of its kind."""
     asked = inspect.signature(rule).parameters
     names = tuple(asked)
+    # Signatures are cheap to check once; the cache keeps this off the path of a flight in plain Python.
     from airflock.core.vocabulary import VOCABULARY  # here, because the chapters of the kinds import this one
 
     known = VOCABULARY[kind]

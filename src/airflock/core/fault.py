@@ -170,6 +170,7 @@ def fault(namespace: Any, name: str = "") -> Fault:
     if taken:
         raise RuleError(f"fault {name}: Parameters.{taken[0]}: the name has a meaning of its own in [[faults]]")
     made = Fault(name, record, doc=str(found.get("__doc__") or ""), **rules)
+    # A driver keeps the onset and the disturbed states of an agent in columns of these names.
     kept = [
         key
         for key in number_names(record)
@@ -177,6 +178,7 @@ def fault(namespace: Any, name: str = "") -> Fault:
     ]
     if kept:
         raise RuleError(f"fault {name}: Parameters.{kept[0]}: a flight keeps something else of that name; give another")
+    # Numbers become columns of the table that a driver reads; a choice would need a driver of its own.
     if choices(record()):
         raise RuleError(f"fault {name}: Parameters holds a choice; make a kind of its own for each")
     return made

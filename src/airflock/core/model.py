@@ -261,6 +261,7 @@ def add_laws(base: Model, extra: Model) -> Model:
     """
     for fault in composition_errors(base, extra):
         raise RuleError(fault)
+    # A list of laws was rejected: two records of parameters would need names of their own in every rule.
     return replace(
         base,
         name=f"{base.name}_and_{extra.name}",

@@ -59,6 +59,8 @@ class PacketPolicy:
     radio: Radio | None = None
     k: Any = None
 
+    # A simulated agent differs from a drone by settings only: packets of a constant delay count once, and stamps of
+    # wrong clocks are believed.
     @classmethod
     def simulated(cls, radio: Radio, k: Any) -> "PacketPolicy":
         """As a simulated agent hears: packets of a plain radio count once, of one that keeps them until the next."""
@@ -102,6 +104,7 @@ def flattened(state: State) -> State:
     return State(x, y, 0.0, vx, vy, 0.0)
 
 
+# This class flies on board and is the reference of the tests: what the tests trust is what flies.
 class Pilot:
     """One agent's law, with the packets that it has heard and the memory of its model.
 

@@ -132,6 +132,8 @@ def either(a, b):
 
 def packets(step, rate, period):
     """Number of packets that a link of `rate` (1/s) sends in decision number `step` of length `period` (s)."""
+    # The difference of two rounded counts, so that a rate that does not divide the decision rate is met exactly on
+    # average; 1e-6 absorbs the rounding of step * rate * period.
     return math.floor((step + 1.0) * rate * period + 1e-6) - math.floor(step * rate * period + 1e-6)
 
 
@@ -234,6 +236,7 @@ def radio(namespace: Any, name: str = "") -> Radio:
         raise RuleError(f"radio {name} has no rule; give missed or receive, late, see, carry, lasts")
     if "missed" in rules and "receive" in rules:
         raise RuleError(f"radio {name} has missed and receive; give one of them")
+    # A camera has one delay for all pictures, so a delay of each packet has no meaning for it.
     if {"see", "late"} <= set(rules):
         raise RuleError(f"radio {name} has see and late; give one of them, as pictures all have the delay of the radio")
     if set(rules) <= {"carry", "lasts", "missed_few"}:

@@ -72,6 +72,7 @@ def topology(namespace: Any, name: str = "") -> Topology:
         raise RuleError(f"topology {name}: meet does not ask for met, the row that it fills")
     if not (isinstance(record, type) and issubclass(record, Parameters)):
         raise RuleError(f"topology {name}: Parameters is not a frozen dataclass derived from airflock.Parameters")
+    # The table of a driver holds numbers only.
     words = [word for word, declared, _ in declarations(record) if isinstance(declared, Choice)]
     if words:
         raise RuleError(f"topology {name}: Parameters.{words[0]} is a choice; a topology has numbers only")

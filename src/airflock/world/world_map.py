@@ -33,6 +33,7 @@ def polygon_error(corners: Corners) -> str:
     if len(corners) < 3:
         return f"has {len(corners)} corners; a polygon needs at least 3"
     n = len(corners)
+    # All pairs of edges: outlines have tens of corners, and a sweep line would need its own tests.
     for k in range(n):
         if tuple(corners[k][:2]) == tuple(corners[(k + 1) % n][:2]):
             return f"gives corner [{corners[k][0]:g}, {corners[k][1]:g}] twice in succession"
@@ -128,6 +129,8 @@ def edge_rows(world: arena.Parameters) -> tuple[list[list[float]], int, list[lis
     spans = []
 
     def add(corners: Corners) -> None:
+        # Counter-clockwise rings have their inner side on the left, which the sign of every surface function relies
+        # on.
         ring = counter_clockwise(corners)
         rows.extend([*a[:2], *b[:2]] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
 
