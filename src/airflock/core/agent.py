@@ -1,6 +1,6 @@
 """One agent, one decision, as plain Python: what a drone runs on board, and what the tests trust.
 
-A `Model` and what one agent perceives go in, a command comes out. Rules are called by the names that they ask for, in
+A `Model` and what one agent perceives go in, a command comes out. Rules are called by their argument names, in
 the order of the drivers: all neighbours, all surfaces, then the decision. In a plane every z is zero.
 """
 
@@ -185,12 +185,12 @@ def met_neighbours(
     heard: Iterable[HeardNeighbour],
     place: SightProtocol | None = None,
 ) -> list[HeardNeighbour]:
-    """Those among the heard whom an agent meets, in their order.
+    """Select the heard neighbours that an agent meets, in their order.
 
     topology, t : kind and its parameters; None: all
     own         : own state as measured
-    heard       : everybody whom it hears, at the image that it is met at
-    place       : the world, asked whether something stands in between; None: nothing stands anywhere
+    heard       : all heard neighbours, at the image at which the agent meets them
+    place       : the world, queried for what stands in between; None: nothing stands anywhere
     """
     found = list(heard)
     if topology is None or not found:
@@ -289,8 +289,8 @@ class AgentView:
     true, own   : its state, and its state as it measured it: position (m) and velocity (m/s)
     heard       : neighbours in range whose packets it has: who, state as heard (m, m/s), age (s)
     met         : of each of them, in the same order, whether the topology lets it meet that one
-    terms       : of each of them what the neighbour rule made of it; 0 of whom it does not meet or beyond its reach
-    alike       : of each of them what the rule would have made of it, had it flown as the agent does
+    terms       : result of the neighbour rule for each of them; 0 for those not met or beyond its reach
+    alike       : result of the rule for each of them, had it flown as the agent does
     sums, walls : what the law was given of all neighbours, and of all surfaces
     memory      : the law's memory after the decision
     command     : in the unit of the law's command

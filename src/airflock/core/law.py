@@ -30,10 +30,10 @@ def rule_errors(rule: Callable[..., Any]) -> list[str]:
         raise RuleError(f"{place_of(rule)}: rule {name} {what}; a rule is a plain function")
     node = tree_of(rule)
     # All errors of a rule are collected before one is raised, so that an author mends a file in one go.
-    told: list[tuple[ast.AST, str]] = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
+    errors: list[tuple[ast.AST, str]] = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
     for item in walk_tree(node):
-        told += [(item, text) for text in (*_of_text(item, node), *_of_numbers(item, rule), *_of_names(item, rule))]
-    return [f"{place_of(rule, getattr(item, 'lineno', 1) - 1)}: rule {rule.__name__}: {text}" for item, text in told]
+        errors += [(item, text) for text in (*_of_text(item, node), *_of_numbers(item, rule), *_of_names(item, rule))]
+    return [f"{place_of(rule, getattr(item, 'lineno', 1) - 1)}: rule {rule.__name__}: {text}" for item, text in errors]
 
 
 def _of_signature(node: ast.FunctionDef, variables: tuple[str, ...]) -> Iterator[str]:
@@ -103,12 +103,12 @@ def _instead(module: Any, name: str) -> str:
 
 
 @lru_cache(maxsize=4096)
-def _told(rule: Callable[..., Any]) -> tuple[str, ...]:
+def _rule_errors(rule: Callable[..., Any]) -> tuple[str, ...]:
     return tuple(rule_errors(rule))
 
 
 def check_rule(rule: Callable[..., Any]) -> None:
-    """Raise a RuleError that lists every fault of a rule; do nothing if it has none. Each is looked for once."""
-    found = _told(rule)
-    if found:
-        raise RuleError("\n".join(found))
+    """Raise a RuleError that lists every error of a rule; do nothing if it has none. Each rule is checked once."""
+    errors = _rule_errors(rule)
+    if errors:
+        raise RuleError("\n".join(errors))

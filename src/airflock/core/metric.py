@@ -163,7 +163,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
     ----------
     namespace : module, class or mapping
         Holds sample and Sample, and any of pair, agent, linked, member, cluster, survey, their records and REPORTS, as
-        `Metric` lists them. The argument names of a rule say what it asks for (`airflock.core.vocabulary`).
+        `Metric` lists them. The argument names of a rule are its requests (`airflock.core.vocabulary`).
     name : str, optional
         How it is called; by default the namespace's.
 
@@ -175,7 +175,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
     Raises
     ------
     RuleError
-        If something is missing, or a rule asks for what there is not.
+        If something is missing, or a rule requests an unknown argument.
 
     Examples
     --------

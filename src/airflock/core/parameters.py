@@ -83,9 +83,9 @@ class VectorMeta(type):
         """A record; a vector may be given whole, or by its components."""
         for key in cls.VECTORS.keys() & named.keys():
             value, size = named.pop(key), cls.VECTORS[key]
-            fault = vector_error(value, size)
-            if fault:
-                raise ParameterError(f"{cls.__name__}.{key} {fault}")
+            error = vector_error(value, size)
+            if error:
+                raise ParameterError(f"{cls.__name__}.{key} {error}")
             named |= dict(zip(component_names(key, size), value, strict=True))
         return super().__call__(*given, **named)
 
@@ -99,25 +99,25 @@ def vector_error(value: Any, size: int) -> str:
 
 
 def expand_vectors(section: str, table: Mapping[str, Any], record: Any) -> tuple[dict[str, Any], list[str]]:
-    """A table of a scenario with the components of its vectors, and faults; a component that is given goes before."""
-    found, faults = dict(table), []
+    """A table of a scenario with the components of its vectors, and the errors; explicit components take precedence."""
+    found, errors = dict(table), []
     for key, size in getattr(record, "VECTORS", {}).items():
         if key not in found:
             continue
         given = found.pop(key)
         long = dict(given) if isinstance(given, Mapping) and "value" in given else None
         value = given if long is None else long["value"]
-        fault = vector_error(value, size)
-        if fault:
-            faults.append(f"{section}.{key} {fault}")
+        error = vector_error(value, size)
+        if error:
+            errors.append(f"{section}.{key} {error}")
             continue
         for name, number in zip(component_names(key, size), value, strict=True):
             found.setdefault(name, number if long is None else long | {"value": number})
-    return found, faults
+    return found, errors
 
 
 def without_replaced(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """A table without the components of those vectors that `own` gives as a whole."""
+    """A table without the components of those vectors that `overrides` sets as a whole."""
     whole = {key for key, value in overrides.items() if isinstance(value, (list, tuple, Mapping))}
 
     def goes(key: str) -> bool:

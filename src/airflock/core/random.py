@@ -15,13 +15,13 @@ SENSOR = 1  # Langevin noise of own and of sent measurements
 OUTER = 2  # white outer noise on the acceleration
 START = 3  # where the agents start
 GUST = 6  # wind gusts, common to the flock
-MODEL = 7  # noise that a model asks for through percept.normal and percept.uniform
+MODEL = 7  # noise that a model requests through percept.normal and percept.uniform
 SCENE = 8  # the scene of a flight, where each flight has its own
-FAULT = 10  # when faults begin and whom they hit: step is the occurrence, agent the entry or the one who may be hit
+FAULT = 10  # onset and agents of faults: step is the occurrence, agent the entry or the one that may be hit
 SPREAD = 11  # tolerances of manufacture: step is the number's place in its record
-PACKET = 12  # whether anything of what one agent sends another arrives: agent is the number of the pair, `pair_number`
+PACKET = 12  # arrival of packets: agent is the number of the pair, `pair_number`
 FADE = 16  # strength of the signal between one pair, the same both ways
-AIR = 17  # what a radio's own rules ask for: agent is the number of the pair, receiver * agents + sender
+AIR = 17  # numbers of the rules of a radio: agent is the number of the pair, receiver * agents + sender
 
 # A device binds these, and compiles of each function in COMPILED the form that calls them.
 PRIMITIVES = ("word", "multiply_high", "multiply_low", "add32", "xor32", "uniform", "normal_pair")

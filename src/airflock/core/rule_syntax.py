@@ -54,8 +54,8 @@ def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
     """Syntax tree of a rule from its own source file or notebook cell."""
     try:
         text = _source(rule)
-    except (OSError, TypeError) as fault:
-        raise RuleError(f"the source of rule {rule.__name__} is not available: {fault}") from fault
+    except (OSError, TypeError) as error:
+        raise RuleError(f"the source of rule {rule.__name__} is not available: {error}") from error
     node = ast.parse(text).body[0]
     if not isinstance(node, ast.FunctionDef):
         raise RuleError(f"rule {getattr(rule, '__name__', rule)} is no plain function")
@@ -178,14 +178,14 @@ def _gives_integer(rule: Callable[..., Any] | None) -> bool:
 
 @cache
 def fields_read(rule: Callable[..., Any], record: str) -> frozenset[str] | None:
-    """Fields that a rule may read of the record that it calls by this name; None where its text does not tell."""
+    """Fields that a rule may read of the record that it calls by this name; None where its text leaves it open."""
     nodes = walk_tree(tree_of(rule))
     found: set[str] = set()
-    told = 0
+    followed = 0
     for item in nodes:
         if isinstance(item, ast.Attribute) and _is(item.value, record):
             found.add(item.attr)
-            told += 1
+            followed += 1
         elif isinstance(item, ast.Call):
             for place, given in enumerate(item.args):
                 if _is(given, record):
@@ -193,10 +193,10 @@ def fields_read(rule: Callable[..., Any], record: str) -> frozenset[str] | None:
                     if below is None:
                         return None
                     found |= below
-                    told += 1
+                    followed += 1
     # Every mention of the record must be an attribute or an argument that was followed; any other use may read all
     # fields.
-    return frozenset(found) if told == sum(_is(item, record) for item in nodes) else None
+    return frozenset(found) if followed == sum(_is(item, record) for item in nodes) else None
 
 
 def _is(node: ast.AST, name: str) -> bool:

@@ -1,8 +1,8 @@
 """The contract of a sensor: what an agent measures of its own position and velocity, as plain rules.
 
-A kind of sensor is a module with `Parameters` and one of two rules. `measure` makes of the true state the one that is
-believed. `error` is the shorter form for errors that are added to the truth, alike along each axis. The argument names
-are the declaration, as of every rule (`core.vocabulary`).
+A kind of sensor is a module with `Parameters` and one of two rules. `measure` turns the true state into the one
+that is believed. `error` is the shorter form for errors that are added to the truth in the same way along each axis.
+The argument names are the declaration, as of every rule (`core.vocabulary`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -77,12 +77,12 @@ class Sensor:
     name       : how scenarios refer to it
     Parameters : record of its numbers; `period` is among them
     measure    : true state, Memory and random numbers → position (m), velocity (m/s) and, behind them, Memory. It is
-                 asked once for each agent and decision; what an agent sends carries the errors of its last measurement
-    error      : error of position (m) and of velocity (m/s) along one axis → the same after one period. It is asked
+                 called once for each agent and decision; what an agent sends carries the errors of its last measurement
+    error      : error of position (m) and of velocity (m/s) along one axis → the same after one period. It is called
                  for each axis, and again for what is sent, whose errors are drawn apart (authors' program of
                  Vásárhelyi et al. 2018)
     Memory     : NamedTuple of what `measure` keeps of one agent, each field with its value at the start
-    exact      : `exact(s)`, whether it tells the truth with these numbers; a flight then spends nothing on it
+    exact      : `exact(s)`, True if it has no error with these numbers; a flight then spends nothing on it
     bounds     : `bounds` of any of s, period, dt → what of a scenario it cannot measure, one line each
     violates   : truths of `airflock.check_sensor` that do not hold for it, and why (VIOLATES)
     """
@@ -120,7 +120,7 @@ def sensor(namespace: Any, name: str = "") -> Sensor:
     ----------
     namespace : module, class or mapping
         Holds one of the rules measure and error; if it likes, Parameters, exact, bounds, and Memory (a NamedTuple
-        whose fields have the values of the start), which measure asks for as `memory` and returns behind the state.
+        whose fields have the values of the start), which measure takes as `memory` and returns behind the state.
     name : str, optional
         How the sensor is called; by default the namespace's.
 
@@ -132,7 +132,7 @@ def sensor(namespace: Any, name: str = "") -> Sensor:
     Raises
     ------
     RuleError
-        If it has no rule or both, or a rule asks for what there is not.
+        If it has no rule or both, or a rule requests an unknown argument.
 
     Examples
     --------

@@ -58,7 +58,7 @@ class Percept(NamedTuple):
         return length
 
     def normal(self, draw: int) -> float:
-        """Normal random number N(0, 1) of this agent and decision; `draw` from 0 to 255 tells several apart."""
+        """Normal random number N(0, 1) of this agent and decision; `draw` from 0 to 255 distinguishes several."""
         return 0.0
 
     def uniform(self, draw: int) -> float:

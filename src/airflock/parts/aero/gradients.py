@@ -1,6 +1,6 @@
 """Gradient of each wing's own induced drag with its own position, in four ways.
 
-cells         : central difference over one cell of the grid, all circulations solved anew (Dimock & Selig 2003, Eq. 8)
+cells         : central difference over one cell of the grid, all circulations solved again (Dimock & Selig 2003, Eq. 8)
 cells_frozen  : the same with the circulations of all other wings held
 analytic      : derivative of the linear system by its adjoint, all wings respond
 frozen        : derivative with the circulations of all other wings held

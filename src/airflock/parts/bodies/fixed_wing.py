@@ -120,9 +120,9 @@ def endures(memory, b):
 
 
 def climbing(up, v, drag, slow, possible, b):
-    """Sine of the climb angle that is asked: for a vertical speed `up` (m/s), within what thrust and speed allow.
+    """Sine of the commanded climb angle: for a vertical speed `up` (m/s), within what thrust and speed allow.
 
-    slow : acceleration that the speed controller asks for, over gravity; possible : largest thrust over weight
+    slow : acceleration that the speed controller demands, over gravity; possible : largest thrust over weight
     """
     spare = possible - drag - slow
     low = -math.sin(b.dive_max)

@@ -126,7 +126,7 @@ def endures(memory, b):
 
 
 def wanted(ex, ey, ez, ix, iy, iz, b):
-    """Acceleration that the velocity controller asks for (m/s²), and 1.0 if it was not limited, else 0.0.
+    """Acceleration that the velocity controller demands (m/s²), and 1.0 if it was not limited, else 0.0.
 
     e : velocity error, m/s; i : its integral, m/s². Limited to b.a_max.
     """
@@ -148,7 +148,7 @@ def tilted(ax, ay, az, b):
 def turned(m, fx, fy, fz, lag, dt, b):
     """Direction n of thrust after dt on its way to the direction of f, its turning rate and angular acceleration.
 
-    lag : share of the way to what is asked that the motors go in dt. Returns nx ny nz wx wy wz ax ay az.
+    lag : share of the way to the demand that the motors go in dt. Returns nx ny nz wx wy wz ax ay az.
     """
     k = b.stiffness / norm(fx, fy, fz)
     sx, sy, sz = shorten(

@@ -104,7 +104,7 @@ class Walls(NamedTuple):
 
 
 def preferred_speed(p):
-    """Speed that the fitness asks for, m/s."""
+    """Speed that the fitness prefers, m/s."""
     return p.v_flock
 
 

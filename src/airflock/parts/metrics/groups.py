@@ -1,6 +1,6 @@
-"""Sub-groups told apart: what Zapotecatl et al. 2016 leave as future work. Our definitions.
+"""Sub-groups as separate flocks: what Zapotecatl et al. 2016 leave as future work. Our definitions.
 
-Extension and quality of the whole cannot tell a flock that is dispersed from one that split into tight groups. Here
+Extension and quality of the whole cannot distinguish a dispersed flock from one that split into tight groups. Here
 agents nearer than r_cluster belong to one group. Distances and angles are taken from the own group, and an agent
 without companions costs as much as one in collision:
 

@@ -1,4 +1,4 @@
-"""GNSS: a satellite receiver as its data sheet tells it, by standard deviations; with multipath jumps and outages."""
+"""GNSS: a satellite receiver as in its data sheet, by standard deviations; with multipath jumps and outages."""
 
 import math
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Outlines of fields as people have them: polygons of GeoJSON and KML files, in local metres.
 
-A file is untrusted: it is read through `untrusted`, and everything that is wrong with it is told at once.
+A file is untrusted: it is read through `untrusted`, and all its errors are raised together.
 """
 
 import math
