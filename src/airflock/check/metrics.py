@@ -27,7 +27,7 @@ from airflock.scenarios import METRIC_SET_KIND, CallerParts, Scenario, build_sce
 
 AGENTS, INSTANTS, FLIGHTS = 6, 5, 8
 CLOSE = 1e-9
-CLOSE_IN_OTHER_UNITS = 1e-6  # guards such as TINY, and angles near zero, where a cosine tells little
+CLOSE_IN_OTHER_UNITS = 1e-6  # guards such as TINY, and angles near zero, where a cosine is insensitive
 RULES = ("pair", "linked", "agent", "member", "cluster", "sample", "survey")
 FlockTrack = NDArray[np.float64]  # (instant, agent, component): position (m) and velocity (m/s)
 
@@ -145,9 +145,9 @@ def _reports(scenario: Scenario, flock: FlockTrack) -> str:
 
 def _units_of(scenario: Scenario) -> dict[str, str]:
     """Name of each value → its unit."""
-    told = {name: unit for m in scenario.order_parameters for name, (unit, _) in m.reports.items()}
-    told |= {name: unit for name, (unit, _) in scenario.measures.reports.items()}
-    return {name: unit.split(" or ")[-1 if scenario.dimensions == 3 else 0] for name, unit in told.items()}
+    units = {name: unit for m in scenario.order_parameters for name, (unit, _) in m.reports.items()}
+    units |= {name: unit for name, (unit, _) in scenario.measures.reports.items()}
+    return {name: unit.split(" or ")[-1 if scenario.dimensions == 3 else 0] for name, unit in units.items()}
 
 
 def _same(scenario: Scenario, flocks: Sequence[FlockTrack], others: Sequence[FlockTrack], seed: int) -> str:

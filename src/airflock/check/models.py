@@ -270,7 +270,7 @@ def _units_in_flight(law: TestedLaw, seed: int) -> str:
 
 
 def _compiled(law: TestedLaw, seed: int) -> str:
-    """The same flight by a compiled driver, in double precision."""
+    """Fly the same flight by a compiled driver, in double precision."""
     start = _start(law, seed)
     plain = _flown(law.scenario, start, seed)
     driver = fly_world(law.scenario, seed, precision=64, record=True, start=start).frames

@@ -77,7 +77,7 @@ def check_radio(radio: Any, parameters: Mapping[str, Any] | None = None, *, seed
 
 
 def _pairs(found: Radio, seed: int) -> Iterator[dict[str, Any]]:
-    """What rules may be asked with of random pairs of agents."""
+    """Draw arguments of rules for random pairs of agents."""
     rng = np.random.default_rng(check_seed(seed))
     names = {name for kind in RULES for name in VOCABULARY[kind]}
     for number in range(TRIES):
@@ -157,12 +157,12 @@ def _units(found: Radio, k: Any, pairs: list[dict[str, Any]], seed: int) -> str:
 
 
 def _of_state(units: UnitScale) -> list[float]:
-    """What a position and a velocity are measured in."""
+    """Return the units of a position and a velocity."""
     return [units.metre] * 3 + [units.metre / units.second] * 3
 
 
 def _scaled(given: Mapping[str, Any], units: UnitScale) -> dict[str, Any]:
-    """The same pair in other units."""
+    """Convert the arguments of a pair to other units."""
     sizes = dict.fromkeys(LENGTHS, units.metre) | dict.fromkeys(TIMES, units.second)
     sizes |= dict.fromkeys(SPEEDS, units.metre / units.second)
     return {name: value * sizes[name] if name in sizes else value for name, value in given.items()}

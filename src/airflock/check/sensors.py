@@ -40,7 +40,7 @@ Track = NDArray[np.float64]  # (measurement, component) true position (m) and ve
 def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a sensor and return a report with one line a truth.
 
-    A track that is shifted is measured shifted; errors stay bounded; where `exact` says so the truth is told; in other
+    A track that is shifted is measured shifted; errors stay bounded; where `exact` says so there is no error; in other
     units it is the same measurement; the rule stays in single precision. A sensor that rightly breaks one of them says
     which and why: VIOLATES = {"place": "a beacon stands in the origin"}.
 
@@ -103,7 +103,7 @@ def _draws(seed: int, number: int) -> dict[str, float]:
 
 
 def _believed(found: Sensor, s: Any, track: Track, period: float, seed: int) -> Track:
-    """What the sensor makes of a track, measured from its first state on."""
+    """Return the states that a sensor makes of a track, relative to its first state."""
     made = np.empty_like(track)
     memory, off = (found.Memory() if found.Memory is not None else None), State(*(0.0,) * 6)
     for number, state in enumerate(track):

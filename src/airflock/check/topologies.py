@@ -1,4 +1,4 @@
-"""The standing list for a topology: whom it lets an agent meet, whatever the order, the direction and the unit."""
+"""Checks of a topology: its choice of neighbours does not depend on order, direction or unit."""
 
 import math
 from collections.abc import Iterator, Mapping

@@ -50,7 +50,7 @@ class Truth:
 
     @property
     def is_broken(self) -> bool:
-        """Whether it does not hold and nobody said so."""
+        """Return True if the truth is broken without being declared in VIOLATES."""
         return bool(self.fault) and not self.reason
 
     def __str__(self) -> str:
@@ -64,7 +64,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Report:
-    """What was checked of one law, order parameter, body, sensor or radio."""
+    """Report of the checks of one law, order parameter, body, sensor or radio."""
 
     name: str
     truths: tuple[Truth, ...]
@@ -80,7 +80,7 @@ class Report:
 
 
 def require_part(part_and_errors: tuple[Part | None, list[str]]) -> Part:
-    """What was found, of it and its faults; raises a ScenarioError if there are any."""
+    """Return the part that was read; raise a ScenarioError that lists the errors if there are any."""
     what, faults = part_and_errors
     if faults or what is None:
         raise ScenarioError(faults)
@@ -125,6 +125,7 @@ class UnitScale(NamedTuple):
     second: float
 
 
+# Powers of two round nothing, so only guards such as TINY and numbers with hidden units can tell the flights apart.
 UNIT_SCALES = (UnitScale(2.0, 4.0), UnitScale(0.5, 0.25))
 DIMENSIONS = {
     "": (0, 0), "1": (0, 0), "dB": (0, 0), "rad": (0, 0), "deg": (0, 0), "kg": (0, 0), "m": (1, 0), "cm": (1, 0),
@@ -177,6 +178,8 @@ def rescaled_scenario(scenario: Scenario, units: UnitScale) -> Scenario:
     return replace(scenario, **{section.field: records[section.key] for section in ORDER})
 
 
+# The generated text runs on numbers that refuse integers and uncast literals: `2 * k` is detected by running, not
+# guessed from the text.
 class SinglePrecision(float):
     """A number that only meets its like."""
 
@@ -213,7 +216,7 @@ MATHS = SimpleNamespace(
 def run_in_single_precision(
     rule: Callable[..., Any], constants: Mapping[str, Any], arguments: Mapping[str, Any], names: Any
 ) -> Any:
-    """What a rule's generated text gives on `given`, by names; raises RuleError where it would leave single precision.
+    """Run the generated text of a rule, arguments by name; raise RuleError where it would leave single precision.
 
     constants : choices by record name, as a plan has them
     """
@@ -277,6 +280,7 @@ def rule_solver(
     return solve
 
 
+# Four agents: the fewest with pairs that do not share an agent.
 AGENT_COUNT = 4  # in a flight
 Rotation = NDArray[np.float64]
 MIRROR: Rotation = np.diag([1.0, -1.0, 1.0])
@@ -302,7 +306,7 @@ class WallPercept(Percept):
 
 
 class Scene(NamedTuple):
-    """What one agent meets: positions and velocities (row 0 is its own), walls, its goal and the arena's centre."""
+    """Scene of one agent: positions and velocities (row 0 is its own), walls, its goal and the arena's centre."""
 
     states: NDArray[np.float64]
     walls: NDArray[np.float64]
@@ -351,7 +355,7 @@ class TestedLaw:
         return np.array(made.command) * (1.0, 1.0, float(self.scenario.dimensions == 3))
 
     def flock_solution(self, scene: Scene) -> Any:
-        """What the rule of the whole flock finds for agent 0."""
+        """Return the result of the rule of the whole flock for agent 0."""
         count = replace(self.scenario.flight, agents=float(len(scene.states)))
         solve = flock_solver(replace(self.scenario, flight=count))
         return solve([State(*row) for row in scene.states.tolist()])[0] if solve else None

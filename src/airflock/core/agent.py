@@ -1,6 +1,6 @@
 """One agent, one decision, as plain Python: what a drone runs on board, and what the tests trust.
 
-A `Model` and what one agent perceives go in, a command comes out. Rules are called by the names that they ask for, in
+A `Model` and what one agent perceives go in, a command comes out. Rules are called by their argument names, in
 the order of the drivers: all neighbours, all surfaces, then the decision. In a plane every z is zero.
 """
 
@@ -33,7 +33,7 @@ class HeardNeighbour(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """What one agent decides: its command (m/s, m/s² or a heading, as Model.command says) and its new Memory."""
+    """Decision of one agent: its command (m/s, m/s² or a heading, as Model.command says) and its new Memory."""
 
     command: tuple[float, float, float]
     memory: Any
@@ -110,6 +110,8 @@ def sum_neighbours(
     terms = []
     for heard in neighbours:
         given = pair_arguments(own, heard, index, group)
+        # The order of sums is that of a driver: neighbours by index, so that plain Python and a compiled driver agree
+        # to rounding.
         if given["r2"] <= near * near + TINY:  # which r2 carries as a guard: a neighbour at exactly the reach counts
             given["p"] = p
             terms.append(call_rule(model.neighbour, "neighbour", given, model.name))
@@ -173,7 +175,7 @@ class SightProtocol(Protocol):
     """A world that hides agents from each other."""
 
     def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
-        """Whether something stands between two places, m."""
+        """Return True if something stands between two positions, m."""
 
 
 def met_neighbours(
@@ -183,12 +185,12 @@ def met_neighbours(
     heard: Iterable[HeardNeighbour],
     place: SightProtocol | None = None,
 ) -> list[HeardNeighbour]:
-    """Those among the heard whom an agent meets, in their order.
+    """Select the heard neighbours that an agent meets, in their order.
 
     topology, t : kind and its parameters; None: all
     own         : own state as measured
-    heard       : everybody whom it hears, at the image that it is met at
-    place       : the world, asked whether something stands in between; None: nothing stands anywhere
+    heard       : all heard neighbours, at the image at which the agent meets them
+    place       : the world, queried for what stands in between; None: nothing stands anywhere
     """
     found = list(heard)
     if topology is None or not found:
@@ -196,6 +198,7 @@ def met_neighbours(
     x, y, z = own.x, own.y, own.z
     offsets = [(h.state.x - x, h.state.y - y, h.state.z - z) for h in found]
     count = len(found)
+    # TINY is added as in a driver, so that a rule which divides by r2 meets the same numbers in plain Python.
     squares = [dx * dx + dy * dy + dz * dz + TINY for dx, dy, dz in offsets]
     hidden = [0.0] * count
     if place is not None and topology.asks_for("hidden"):
@@ -215,7 +218,7 @@ STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class WorldMap(Protocol):
-    """What a pilot asks of the world: `airflock.world.WorldMap` answers from a map."""
+    """Interface of a world as a pilot queries it; `airflock.world.WorldMap` implements it from a map."""
 
     def beside(self, own: State, other: State, /) -> State:
         """State of another agent at its image nearest to own: itself wherever space is not periodic."""
@@ -232,11 +235,11 @@ class WorldMap(Protocol):
         """Free distance of a sphere, m."""
 
     def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
-        """Whether an obstacle or the scene stands between two places, m."""
+        """Return True if an obstacle or the scene stands between two positions, m."""
 
 
 class BoundPercept(Percept):
-    """What one agent perceives at one decision, bound to a map of the world and to its own random numbers."""
+    """Percept of one agent at one decision, bound to a map of the world and to its own random numbers."""
 
     place: WorldMap
     at: State
@@ -280,14 +283,14 @@ class BoundPercept(Percept):
 
 @dataclass(frozen=True)
 class AgentView:
-    """What one agent perceived at a decision, and what came of it.
+    """Record of one decision: the perceptions of the agent, and the result.
 
     agent, time : its number; time of the decision, s
     true, own   : its state, and its state as it measured it: position (m) and velocity (m/s)
     heard       : neighbours in range whose packets it has: who, state as heard (m, m/s), age (s)
     met         : of each of them, in the same order, whether the topology lets it meet that one
-    terms       : of each of them what the neighbour rule made of it; 0 of whom it does not meet or beyond its reach
-    alike       : of each of them what the rule would have made of it, had it flown as the agent does
+    terms       : result of the neighbour rule for each of them; 0 for those not met or beyond its reach
+    alike       : result of the rule for each of them, had it flown as the agent does
     sums, walls : what the law was given of all neighbours, and of all surfaces
     memory      : the law's memory after the decision
     command     : in the unit of the law's command

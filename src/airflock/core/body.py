@@ -66,12 +66,12 @@ RULES = {
 
 @dataclass(frozen=True)
 class Body:
-    """What turns a command into a motion, gathered from its module.
+    """Rules that turn a command into a motion, gathered from a module.
 
     accepts     : the COMMAND of the models that it can carry
     integration : "old" if a position moves by the velocity before `move`, "new" if by the one after it
-    Memory      : NamedTuple of what a body keeps from step to step, each field with its value at the start; `move` asks
-                  for it as `memory` and returns it behind the velocity
+    Memory      : NamedTuple of what a body keeps from step to step, each field with its value at the start; `move`
+                  takes it as `memory` and returns it behind the velocity
     limits      : `limits` of any of b, dt, speed, start, wing → what of a scenario the body cannot fly, one line each
     endures     : `endures` of any of memory, b, wing → how long (s) a battery lasts at least, 0 once it is empty; then
                   an agent that comes to the ground is absent
@@ -93,17 +93,17 @@ class Body:
 
     @property
     def initial_memory(self) -> tuple[float, ...]:
-        """What each field of its Memory is at the start of a flight."""
+        """Return the value of each field of Memory at the start of a flight."""
         return initial_values(self.Memory)
 
     def lasts(self, **arguments: Any) -> float:
-        """How long its battery lasts at least, s; 0 once it is empty."""
+        """Return how long the battery lasts at least, s; 0 once it is empty."""
         if self.endures is None:
             return math.inf
         return float(call_rule(self.endures, "endures", arguments, self.name))
 
     def limit_errors(self, **arguments: Any) -> list[str]:
-        """What this body cannot fly, by what `limits` may ask for."""
+        """Return what this body cannot fly, one line each, from the arguments that `limits` may request."""
         return [] if self.limits is None else list(call_rule(self.limits, "limits", arguments, self.name))
 
 
@@ -115,7 +115,7 @@ def body(namespace: Any, name: str = "") -> Body:
     namespace : module, class or mapping
         Holds ACCEPTS (the command that it takes: velocity, acceleration or heading), INTEGRATION (whether positions
         move with the "old" or the "new" velocity) and the rule move; if it likes, Parameters, and Memory (a NamedTuple
-        whose fields have the values of the start), which move asks for as `memory` and returns as x, y, z, Memory(...).
+        whose fields have the values of the start), which move takes as `memory` and returns as x, y, z, Memory(...).
     name : str, optional
         How the body is called; by default the namespace's.
 
@@ -127,7 +127,7 @@ def body(namespace: Any, name: str = "") -> Body:
     Raises
     ------
     RuleError
-        If something is missing, or the rule asks for what there is not.
+        If something is missing, or the rule requests an unknown argument.
 
     Examples
     --------
@@ -143,11 +143,11 @@ def body(namespace: Any, name: str = "") -> Body:
     for needed in ("ACCEPTS", "INTEGRATION", "move"):
         if needed not in found:
             raise RuleError(f"body {name} lacks {needed}")
-    asked = argument_names(found["move"], "move", name)
+    arguments = argument_names(found["move"], "move", name)
     if found["ACCEPTS"] not in COMMANDS or found["INTEGRATION"] not in ("old", "new"):
         raise RuleError(f"body {name}: ACCEPTS is one of {', '.join(COMMANDS)}; INTEGRATION is old or new")
     memory = found.get("Memory")
-    check_memory_record(f"body {name}", "move", asked, memory)
+    check_memory_record(f"body {name}", "move", arguments, memory)
     for optional in ("limits", "endures"):
         if found.get(optional) is not None:
             argument_names(found[optional], optional, name)

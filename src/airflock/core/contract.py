@@ -21,7 +21,7 @@ CLOCKS = ("sample", "collision")  # metrics.period and metrics.collision_period
 
 
 class State(NamedTuple):
-    """Position (m) and velocity (m/s), as whoever holds the record knows them; local east-north-up."""
+    """Position (m) and velocity (m/s), as the holder of the record knows them; local east-north-up."""
 
     x: float
     y: float
@@ -32,20 +32,20 @@ class State(NamedTuple):
 
 
 def namespace_names(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:
-    """What a module, a class or a mapping of names holds, and what it is called: `name`, its NAME, or its module's.
+    """Return the names in a module, a class or a mapping, and its own name: `name`, its NAME, or that of its module.
 
     A static method is the function inside, so that the check of rules can name it and its decorator.
     """
     if not isinstance(namespace, Mapping) and not hasattr(namespace, "__dict__"):
-        told = shortened(repr(namespace), 80)
-        raise RuleError(f"{told} holds no rules; give a module, a class, or names such as globals()")
+        text = shortened(repr(namespace), 80)
+        raise RuleError(f"{text} holds no rules; give a module, a class, or names such as globals()")
     found = dict(namespace) if isinstance(namespace, Mapping) else dict(vars(namespace))
     found = {key: value.__func__ if isinstance(value, staticmethod) else value for key, value in found.items()}
     return found, name or str(found.get("NAME") or found.get("__name__", "own")).rpartition(".")[2].strip("_")
 
 
 def merge_parameters(common: type, record: Any, owner: str) -> type:
-    """Parameters of a file's own together with the numbers that all of its kind have.
+    """Merge the Parameters of a file with the numbers that all parts of its kind have.
 
     common : record of those numbers; record : the file's, None where it has none; owner : such as "radio mine"
     """
@@ -63,11 +63,12 @@ def merge_parameters(common: type, record: Any, owner: str) -> type:
 def check_memory_record(
     owner: str, rule: str, argument_names: Collection[str], record: Any, name: str = "Memory"
 ) -> None:
-    """Refuse what a rule keeps from call to call, where it is no NamedTuple with the values of the start, or not asked.
+    """Check the record that a rule keeps from call to call: a NamedTuple with start values, which the rule requests.
 
-    asked : names that the rule asks for; record : what the file holds under `name`, if anything
+    argument_names : names that the rule requests; record : what the file defines under `name`, if anything
     """
     word = name.lower()
+    # Without a start value the first call of a rule would read scratch of the driver, so every field needs one.
     if (word in argument_names) is (record is None):
         raise RuleError(f"{owner}: a rule {rule} that asks for {word} and a NamedTuple {name} come together")
     if record is not None and set(getattr(record, "_field_defaults", {})) != set(getattr(record, "_fields", "-")):
@@ -75,22 +76,23 @@ def check_memory_record(
 
 
 def initial_values(record: type | None) -> tuple[float, ...]:
-    """What each field of such a record is at the start of a flight; nothing without one."""
+    """Return the value of each field of a record at the start of a flight; nothing without a record."""
     return tuple(getattr(record, "_field_defaults", {}).values())
 
 
 @cache
 def argument_names(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...]:
-    """Names that a rule asks for, checked against the vocabulary of its kind."""
-    asked = inspect.signature(rule).parameters
-    names = tuple(asked)
+    """Return the argument names of a rule, checked against the vocabulary of its kind."""
+    arguments = inspect.signature(rule).parameters
+    names = tuple(arguments)
+    # Signatures are cheap to check once; the cache keeps this off the path of a flight in plain Python.
     from airflock.core.vocabulary import VOCABULARY  # here, because the chapters of the kinds import this one
 
     known = VOCABULARY[kind]
     for name in names:
         if name not in known:
             hint = suggest(name, known, ".", lead="; ", cutoff=0.6)
-            if asked[name].default is not inspect.Parameter.empty:
+            if arguments[name].default is not inspect.Parameter.empty:
                 hint = f"; a number of the rule's own is declared in Parameters, and read as p.{name}."
             elif name == "self":
                 hint = "; a rule is a plain function."
@@ -100,7 +102,7 @@ def argument_names(rule: Callable[..., Any], kind: str, owner: str = "") -> tupl
 
 
 def call_rule(rule: Callable[..., Any], kind: str, arguments: Mapping[str, Any], owner: str = "") -> Any:
-    """Call a rule with what it asks for by name."""
+    """Call a rule with the arguments that it requests by name; raise RuleError where one is missing."""
     names = argument_names(rule, kind, owner)
     values = [arguments.get(name) for name in names]
     for place, value in enumerate(values):

@@ -1,8 +1,8 @@
 """The contract of a fault: plain rules, each for the stage of a flight that it disturbs.
 
 A kind of fault is a module with `Parameters` and one or more of seven rules. Its argument names are the declaration, as
-of every rule (`core.vocabulary`). A driver asks a rule only while the fault lasts, and holds it only if a scenario
-names its kind.
+of every rule (`core.vocabulary`). A driver calls a rule only while the fault lasts, and contains it only if a
+scenario names its kind.
 """
 
 from collections import namedtuple
@@ -52,7 +52,7 @@ FAULT_RULES: Mapping[str, tuple[int, str]] = {
     "leaves": (1, "time from the fault's beginning until it is absent, s"),
 }
 AT_NAMES = tuple(f"at_{letter}{axis}" for letter in ("", "v") for axis in "xyz")  # "at_x" to "at_vz"
-# who asks `sense` or `tell`, and for which state: the one believed, the one sent of it, and that which is told instead
+# State that `sense` or `tell` disturbs: the one believed, the one sent of it, and the one sent instead.
 DISTURBED_STATES: Mapping[str, str] = {"believed": "sense", "sent": "sense", "told": "tell"}
 ENTRY_KEYS = ("kind", "at", "until", "lasts", "per_hour", "agents", "group", "number")  # of an entry of [[faults]]
 
@@ -66,7 +66,7 @@ class Fault:
     sense      : what it makes of the own state as measured, which the law acts on and others are sent
     tell       : what it makes of the state that is sent, after `sense`
     radio      : what is left of the radio's range, outwards and inwards
-    clock      : how far the clock is ahead, which stamps packets and tells the age of others'
+    clock      : how far the clock is ahead, which stamps packets and dates the packets of others
     overrule   : what it makes of a command, after the law
     motion     : what it makes of a motion step, after the body
     leaves     : when the agent drops out of the flight for good
@@ -88,7 +88,7 @@ class Fault:
 
     @property
     def rules(self) -> dict[str, Callable[..., Any]]:
-        """Its rules by the stage that asks them."""
+        """Rules by the stage that calls them."""
         return {kind: getattr(self, kind) for kind in FAULT_RULES if getattr(self, kind) is not None}
 
     @property
@@ -97,7 +97,7 @@ class Fault:
         return number_names(self.Parameters)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled: not the record, which is made where it is asked for."""
+        """Return the state to pickle, without the record, which is built again on demand."""
         return {name: value for name, value in vars(self).items() if name != "record"}
 
     @cached_property
@@ -107,10 +107,10 @@ class Fault:
 
     @property
     def onset_names(self) -> tuple[str, ...]:
-        """What of the agent's true state and command its rules want to know as it was when the fault began."""
-        asked = {(kind, name) for kind, rule in self.rules.items() for name in argument_names(rule, kind, self.name)}
-        asked -= {(kind, name) for kind in DISTURBED_STATES.values() for name in AT_NAMES}
-        return tuple(sorted({name for _, name in asked if name.startswith("at_")}))
+        """Return the names of the true state and command at the onset of the fault that its rules request."""
+        requests = {(kind, name) for kind, rule in self.rules.items() for name in argument_names(rule, kind, self.name)}
+        requests -= {(kind, name) for kind in DISTURBED_STATES.values() for name in AT_NAMES}
+        return tuple(sorted({name for _, name in requests if name.startswith("at_")}))
 
     def time_to_absence(self, numbers: Any) -> float:
         """Time from its beginning until the agent leaves the flight, s; inf for never. numbers : its `Parameters`."""
@@ -120,9 +120,9 @@ class Fault:
         return float(call_rule(self.leaves, "leaves", given, self.name))
 
     def kept(self, state: str) -> tuple[str, ...]:
-        """What of the state that a rule disturbs it wants to know as it was last before the fault, such as "at_x".
+        """Return the names of the disturbed state, as it was last before the fault, that a rule requests ("at_x").
 
-        state : one of ASKED, as which the rule `sense` or `tell` is asked
+        state : a key of DISTURBED_STATES
         """
         rule = self.rules.get(DISTURBED_STATES[state])
         names = () if rule is None else argument_names(rule, DISTURBED_STATES[state], self.name)
@@ -148,7 +148,7 @@ def fault(namespace: Any, name: str = "") -> Fault:
     Raises
     ------
     RuleError
-        If it has no rule, or a rule asks for what there is not.
+        If it has no rule, or a rule requests an unknown argument.
 
     Examples
     --------
@@ -170,6 +170,7 @@ def fault(namespace: Any, name: str = "") -> Fault:
     if taken:
         raise RuleError(f"fault {name}: Parameters.{taken[0]}: the name has a meaning of its own in [[faults]]")
     made = Fault(name, record, doc=str(found.get("__doc__") or ""), **rules)
+    # A driver keeps the onset and the disturbed states of an agent in columns of these names.
     kept = [
         key
         for key in number_names(record)
@@ -177,6 +178,7 @@ def fault(namespace: Any, name: str = "") -> Fault:
     ]
     if kept:
         raise RuleError(f"fault {name}: Parameters.{kept[0]}: a flight keeps something else of that name; give another")
+    # Numbers become columns of the table that a driver reads; a choice would need a driver of its own.
     if choices(record()):
         raise RuleError(f"fault {name}: Parameters holds a choice; make a kind of its own for each")
     return made

@@ -29,10 +29,11 @@ def rule_errors(rule: Callable[..., Any]) -> list[str]:
         what = "has a decorator" if hasattr(rule, "__wrapped__") or hasattr(rule, "py_func") else "is an object"
         raise RuleError(f"{place_of(rule)}: rule {name} {what}; a rule is a plain function")
     node = tree_of(rule)
-    told: list[tuple[ast.AST, str]] = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
+    # All errors of a rule are collected before one is raised, so that an author mends a file in one go.
+    errors: list[tuple[ast.AST, str]] = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
     for item in walk_tree(node):
-        told += [(item, text) for text in (*_of_text(item, node), *_of_numbers(item, rule), *_of_names(item, rule))]
-    return [f"{place_of(rule, getattr(item, 'lineno', 1) - 1)}: rule {rule.__name__}: {text}" for item, text in told]
+        errors += [(item, text) for text in (*_of_text(item, node), *_of_numbers(item, rule), *_of_names(item, rule))]
+    return [f"{place_of(rule, getattr(item, 'lineno', 1) - 1)}: rule {rule.__name__}: {text}" for item, text in errors]
 
 
 def _of_signature(node: ast.FunctionDef, variables: tuple[str, ...]) -> Iterator[str]:
@@ -91,23 +92,23 @@ def place_of(rule: Any, line: int = 0) -> str:
 
 
 def _finite(value: object) -> bool:
-    """Whether a global is no number, or a finite one."""
+    """Return True if a global is no number, or a finite one."""
     return not isinstance(value, float) or math.isfinite(value)
 
 
 def _instead(module: Any, name: str) -> str:
-    """What to write in place of a name of a module."""
+    """Return a hint what to write in place of a name of a module."""
     source = INSTEAD.get(module.__name__, INSTEAD["random"] if name == "random" else "")
     return f"; write {source}" if source else ""
 
 
 @lru_cache(maxsize=4096)
-def _told(rule: Callable[..., Any]) -> tuple[str, ...]:
+def _rule_errors(rule: Callable[..., Any]) -> tuple[str, ...]:
     return tuple(rule_errors(rule))
 
 
 def check_rule(rule: Callable[..., Any]) -> None:
-    """Raise a RuleError that lists every fault of a rule; do nothing if it has none. Each is looked for once."""
-    found = _told(rule)
-    if found:
-        raise RuleError("\n".join(found))
+    """Raise a RuleError that lists every error of a rule; do nothing if it has none. Each rule is checked once."""
+    errors = _rule_errors(rule)
+    if errors:
+        raise RuleError("\n".join(errors))

@@ -123,6 +123,7 @@ class Metric:
     cluster: Callable[..., Any] | None = None
     Cluster: type[Any] | None = None
     Memory: type[Any] | None = None
+    # A promise, not a hint: a metric that contributes beyond it is measured wrongly without any error.
     within: Callable[..., float] | None = None
     settled: Callable[..., bool] | None = None
     linked_within: Callable[..., float] | None = None
@@ -141,7 +142,7 @@ class Metric:
         return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
 
     def absence(self, name: str) -> str:
-        """How one of its order parameters is taken while some agents are absent, for people to read."""
+        """Describe how an order parameter is computed while some agents are absent."""
         how = {self.over_time.get(field, "mean") for field in self.Sample._fields}
         how = {self.over_time.get(name, "mean")} if name in self.Sample._fields else how
         if name not in self.Sample._fields and "sum" in how:
@@ -162,7 +163,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
     ----------
     namespace : module, class or mapping
         Holds sample and Sample, and any of pair, agent, linked, member, cluster, survey, their records and REPORTS, as
-        `Metric` lists them. The argument names of a rule say what it asks for (`airflock.core.vocabulary`).
+        `Metric` lists them. The argument names of a rule are its requests (`airflock.core.vocabulary`).
     name : str, optional
         How it is called; by default the namespace's.
 
@@ -174,7 +175,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
     Raises
     ------
     RuleError
-        If something is missing, or a rule asks for what there is not.
+        If something is missing, or a rule requests an unknown argument.
 
     Examples
     --------

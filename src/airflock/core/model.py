@@ -104,7 +104,7 @@ class Model:
     boundary     : surface rule → Walls
     flock        : the one rule of the whole flock: fills the columns of Shared, which `decide` may read as `shared`
     workspace    : `workspace` of any of n, p, wing, aero → NamedTuple of (rows, columns), the scratch of `flock`
-    wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away say nothing; without it all are asked
+    wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away have no effect; without it all are evaluated
     decide       : → command x, y, z and a Memory if the model declares one
     added        : a law whose command is added to that of `decide` (`add_laws`)
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
@@ -159,7 +159,7 @@ def model(namespace: Any, name: str = "") -> Model:
     ----------
     namespace : module, class or mapping
         Holds COMMAND, Parameters, decide, and any of neighbour, Sums, boundary, Walls, reach and the others that
-        `Model` lists. The argument names of a rule say what it asks for (`airflock.core.vocabulary`).
+        `Model` lists. The argument names of a rule are its requests (`airflock.core.vocabulary`).
     name : str, optional
         How the model is called; by default the namespace's.
 
@@ -171,7 +171,7 @@ def model(namespace: Any, name: str = "") -> Model:
     Raises
     ------
     RuleError
-        If something is missing, or a rule asks for what there is not; names the nearest word.
+        If something is missing, or a rule requests an unknown argument; names the nearest word.
 
     Examples
     --------
@@ -259,8 +259,9 @@ def add_laws(base: Model, extra: Model) -> Model:
     only records that a scenario has once. Raises RuleError where the two do not fit. Equal arguments give the same
     rules, and so the same driver.
     """
-    for fault in composition_errors(base, extra):
-        raise RuleError(fault)
+    for error in composition_errors(base, extra):
+        raise RuleError(error)
+    # A list of laws was rejected: two records of parameters would need names of their own in every rule.
     return replace(
         base,
         name=f"{base.name}_and_{extra.name}",
@@ -273,7 +274,7 @@ def add_laws(base: Model, extra: Model) -> Model:
 
 
 def composition_errors(base: Model, extra: Model) -> list[str]:
-    """Why two laws cannot be added, one line each."""
+    """Return the reasons why two laws cannot be added, one line each."""
     found = []
     if base.command != extra.command:
         found.append(f"model {base.name} commands {base.command}, and {extra.name} {extra.command}: no sum of the two")

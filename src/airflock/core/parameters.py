@@ -18,7 +18,7 @@ MAX_COMPONENTS = 64  # components of one vector; a driver's text holds a line fo
 
 
 class VectorFields(NamedTuple):
-    """What `quantity(size=n)` leaves in the body of a class: the declared fields of its components."""
+    """Declared fields of the components of a vector, as `quantity(size=n)` leaves them in the body of a class."""
 
     fields: tuple[Any, ...]
 
@@ -63,6 +63,8 @@ class VectorMeta(type):
         cls.VECTORS = known | {key: len(fields) for key, fields in declared.items()}
         if not declared:
             return
+        # Components take the place of the vector before the record becomes a dataclass, so that units, ranges, keys,
+        # searches, columns and GPU registers know scalars only.
         notes: dict[str, Any] = {}
         for key, note in inspect.get_annotations(cls).items():
             parts = component_names(key, len(declared[key])) if key in declared else (key,)
@@ -81,15 +83,15 @@ class VectorMeta(type):
         """A record; a vector may be given whole, or by its components."""
         for key in cls.VECTORS.keys() & named.keys():
             value, size = named.pop(key), cls.VECTORS[key]
-            fault = vector_error(value, size)
-            if fault:
-                raise ParameterError(f"{cls.__name__}.{key} {fault}")
+            error = vector_error(value, size)
+            if error:
+                raise ParameterError(f"{cls.__name__}.{key} {error}")
             named |= dict(zip(component_names(key, size), value, strict=True))
         return super().__call__(*given, **named)
 
 
 def vector_error(value: Any, size: int) -> str:
-    """What is wrong with the components of a vector together, as the rest of a sentence; empty if nothing is."""
+    """Return the error of the components of a vector together, as the rest of a sentence; empty if valid."""
     if isinstance(value, str) or not isinstance(value, Sequence):
         return f"= {value!r} is not a list; give {size} numbers"
     count = len(value)
@@ -97,25 +99,25 @@ def vector_error(value: Any, size: int) -> str:
 
 
 def expand_vectors(section: str, table: Mapping[str, Any], record: Any) -> tuple[dict[str, Any], list[str]]:
-    """A table of a scenario with the components of its vectors, and faults; a component that is given goes before."""
-    found, faults = dict(table), []
+    """A table of a scenario with the components of its vectors, and the errors; explicit components take precedence."""
+    found, errors = dict(table), []
     for key, size in getattr(record, "VECTORS", {}).items():
         if key not in found:
             continue
         given = found.pop(key)
         long = dict(given) if isinstance(given, Mapping) and "value" in given else None
         value = given if long is None else long["value"]
-        fault = vector_error(value, size)
-        if fault:
-            faults.append(f"{section}.{key} {fault}")
+        error = vector_error(value, size)
+        if error:
+            errors.append(f"{section}.{key} {error}")
             continue
         for name, number in zip(component_names(key, size), value, strict=True):
             found.setdefault(name, number if long is None else long | {"value": number})
-    return found, faults
+    return found, errors
 
 
 def without_replaced(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """A table without the components of those vectors that `own` gives as a whole."""
+    """A table without the components of those vectors that `overrides` sets as a whole."""
     whole = {key for key, value in overrides.items() if isinstance(value, (list, tuple, Mapping))}
 
     def goes(key: str) -> bool:
@@ -367,7 +369,7 @@ class Parameters(metaclass=VectorMeta):
 
 
 def quantity_error(value: Any, declared: Quantity) -> str:
-    """What is wrong with a value, as the rest of a sentence; empty if nothing is."""
+    """Return the error of a value, as the rest of a sentence; empty if valid."""
     if value is None and declared.optional:
         return ""
     if not isinstance(value, float):
@@ -378,13 +380,13 @@ def quantity_error(value: Any, declared: Quantity) -> str:
 
 
 def choice_error(value: Any, declared: Choice) -> str:
-    """What is wrong with a choice, as the rest of a sentence; empty if nothing is."""
+    """Return the error of a choice, as the rest of a sentence; empty if valid."""
     known = isinstance(value, str) and value in declared.options
     return "" if known else f"= {value!r} is none of {', '.join(declared.options)}"
 
 
 def points_error(value: Any, declared: Points) -> str:
-    """What is wrong with a list of points or polygons, as the rest of a sentence; empty if nothing is."""
+    """Return the error of a list of points or polygons, as the rest of a sentence; empty if valid."""
     try:
         sound = _are_points(_frozen(value), declared.depth, declared.axes)
     except (TypeError, ValueError, OverflowError, RecursionError):

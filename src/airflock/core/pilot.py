@@ -1,6 +1,6 @@
 """The pilot of one agent, in plain Python: it hears its neighbours, decides, and says at which velocity to fly.
 
-Checked once, when it is made: a law that asks for what a drone does not have is refused then, never in flight.
+A pilot checks its law once, when it is built: a law that requests what a drone lacks is refused then, not in flight.
 """
 
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
@@ -41,7 +41,7 @@ EARLY = 0.05  # s; how far in the future a neighbour's data may seem to be, by t
 
 @dataclass(frozen=True)
 class PacketPolicy:
-    """What is done with neighbours' data.
+    """Policy for the data of neighbours: how long they count, and how they are carried forward.
 
     extrapolate : carry them forward with their own velocity to the moment of the decision
     forget      : age (s) beyond which they say nothing; by the rule of silence they count up to its patience
@@ -59,6 +59,8 @@ class PacketPolicy:
     radio: Radio | None = None
     k: Any = None
 
+    # A simulated agent differs from a drone by settings only: packets of a constant delay count once, and stamps of
+    # wrong clocks are believed.
     @classmethod
     def simulated(cls, radio: Radio, k: Any) -> "PacketPolicy":
         """As a simulated agent hears: packets of a plain radio count once, of one that keeps them until the next."""
@@ -92,7 +94,7 @@ def extrapolated_state(radio: Radio, k: Any, state: State, age: float) -> State:
 
 
 def packet_counts(radio: Radio, k: Any, age: float) -> bool:
-    """Whether the newest packet, of this age (s), counts by a radio's rule."""
+    """Return True if the newest packet, of this age (s), counts by the rule of a radio."""
     return radio.lasts is None or bool(call_rule(radio.lasts, "lasts", {"age": age, "k": k}, radio.name) > 0.5)
 
 
@@ -102,11 +104,12 @@ def flattened(state: State) -> State:
     return State(x, y, 0.0, vx, vy, 0.0)
 
 
+# This class flies on board and is the reference of the tests: what the tests trust is what flies.
 class Pilot:
     """One agent's law, with the packets that it has heard and the memory of its model.
 
     model, p : flocking law and its parameters
-    place    : the world, asked for surfaces, rays and casts
+    place    : the world, queried for surfaces, rays and casts
     index    : own index in the flock; period : between two decisions, s
     hearing  : what is done with neighbours' data
     body, b  : of a law that commands an acceleration or a heading: what turns it into a velocity
@@ -114,8 +117,8 @@ class Pilot:
     flat     : fly in a plane: every z is zero
     seed     : of the random numbers that a law may ask for
     wing, aero : parameters of the wing and of drag descent, for laws that ask for them
-    told     : the law decides for the whole flock; somebody who knows all states tells `decide` what it found
-    topology, t : whom of those whom it hears it meets, and the numbers of that; None: all
+    gets_flock_solution : the law decides for the whole flock; the caller passes its solution to `decide`
+    topology, t : kind of topology, which selects among the heard, and its parameters; None: all
     groups   : of each agent the number of its group, -1 in none; empty where nobody is in one
 
     Raises RuleError where the law asks for what a drone does not have, or gives what is no velocity.
@@ -148,7 +151,7 @@ class Pilot:
             with_defaults(silence, model.speed(p)) if silence is not None and silence.rule == "stop" else None
         )
         self._of_standing = for_standing_neighbour(self.silence) if self.silence is not None else None
-        self.body, self.b, self.wing, self.aero, self.told = body, b, wing, aero, gets_flock_solution
+        self.body, self.b, self.wing, self.aero, self.gets_flock_solution = body, b, wing, aero, gets_flock_solution
         self.topology, self.t, self.groups = topology, t, groups
         self.memory = initial_memory(model)
         self.stopped: Vector | None = None
@@ -160,8 +163,8 @@ class Pilot:
 
     def _check(self) -> None:
         """Refuse the law now rather than in flight: one decision with a neighbour and a wall, which must be finite."""
-        asked = [name for rule in self.model.decide_rules for name in argument_names(rule, "decide", self.model.name)]
-        if not self.told and (self.model.flock is not None or "shared" in asked):
+        names = [name for rule in self.model.decide_rules for name in argument_names(rule, "decide", self.model.name)]
+        if not self.gets_flock_solution and (self.model.flock is not None or "shared" in names):
             raise RuleError(f"{self.model.name} decides for the whole flock at once; no single drone can fly it")
         if self.model.command != "velocity" and (self.body is None or self.body.accepts != self.model.command):
             raise RuleError(
@@ -203,7 +206,7 @@ class Pilot:
             packet.sent_at -= ahead
 
     def forget(self, neighbour: int) -> None:
-        """Drop what is known of a neighbour: it has told that it is on the ground, or has left the flock."""
+        """Drop the data of a neighbour that has announced to be on the ground, or has left the flock."""
         self.packets.pop(neighbour, None)
 
     def heard(self, now: float) -> list[HeardNeighbour]:
@@ -214,10 +217,10 @@ class Pilot:
             over = rule.once and (
                 self.silence is not None or packet.arrived_at < self.decisions
             )  # by silence: `counts`
-            told = age <= rule.forget and not over
+            fresh = age <= rule.forget and not over
             if rule.radio is not None and not packet_counts(rule.radio, rule.k, age):
                 continue
-            if told or (self.silence is not None and counts(age, self.silence) > 0.5):
+            if fresh or (self.silence is not None and counts(age, self.silence) > 0.5):
                 state = packet.extrapolated(now) if rule.extrapolate else packet.state
                 state = state if rule.radio is None else extrapolated_state(rule.radio, rule.k, state, age)
                 found.append(
@@ -226,7 +229,7 @@ class Pilot:
         return found
 
     def lost_near(self, own: State, now: float) -> bool:
-        """Whether a neighbour that is not heard any more could be near by now."""
+        """Return True if a neighbour that is not heard any more could be near by now."""
         if self.silence is None:
             return False
         for packet in self.packets.values():

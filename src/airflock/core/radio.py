@@ -1,6 +1,6 @@
 """The contract of a radio: which packets of others arrive, when, and where their senders are believed to be since.
 
-A kind of radio is a module with `Parameters` and plain rules. `missed` tells the probability that nothing of what one
+A kind of radio is a module with `Parameters` and plain rules. `missed` returns the probability that nothing of what one
 agent sends another in a decision arrives; a random number then decides, for all pairs in vectors. `receive` is the
 longer form: it is handed random numbers and what is kept of the pair, and decides itself. The argument names are the
 declaration, as of every rule (`core.vocabulary`).
@@ -90,12 +90,15 @@ RULES = {
 
 S5 = "Vásárhelyi et al. 2018, Table S5"
 FEW_PACKETS = 3  # packets of each rate in a decision, up to which `missed_few` serves
-LINK_NAMES = ("fast", "slow")  # how `missed` asks how many packets the first and the second of RATES send in a decision
+LINK_NAMES = (
+    "fast",
+    "slow",
+)  # arguments of `missed`: packets in a decision by the first and second of RATES
 
 
 @dataclass(frozen=True, kw_only=True)
 class PacketParameters(Parameters):
-    """What every radio has: a delay, a range, and a loss that grows with the square of the distance."""
+    """Parameters of every radio: a delay, a range, and a loss that grows with the square of the distance."""
 
     delay: float = quantity(
         1.0, "s", low=0.0, high=30.0, source=S5, usual=(0.0, 5.0), meaning="age of neighbours' data on arrival"
@@ -131,7 +134,9 @@ def either(a, b):
 
 
 def packets(step, rate, period):
-    """How many packets a link of `rate` (1/s) sends in decision number `step` of length `period` (s)."""
+    """Number of packets that a link of `rate` (1/s) sends in decision number `step` of length `period` (s)."""
+    # The difference of two rounded counts, so that a rate that does not divide the decision rate is met exactly on
+    # average; 1e-6 absorbs the rounding of step * rate * period.
     return math.floor((step + 1.0) * rate * period + 1e-6) - math.floor(step * rate * period + 1e-6)
 
 
@@ -148,11 +153,11 @@ class Radio:
     Parameters : record of its numbers; delay, range, loss and loss_at are among them
     missed     : probability that nothing of what an agent sends another in one decision arrives
     missed_few : the same where each of RATES sends at most FEW packets in a decision; quicker
-    receive    : 1.0 if a packet arrives, else 0.0, and behind it Packet where there is one. It is asked once for each
+    receive    : 1.0 if a packet arrives, else 0.0, and behind it Packet where there is one. It is called once for each
                  pair in range and decision
     late       : how much later than `delay` a packet comes, s. While one is under way, those behind it are dropped
     see        : instead of what is sent, what an agent sees itself: offset (m) and velocity (m/s) at which it believes
-                 another after a picture. Its own errors of position, and what the other one tells, do not matter
+                 another after a picture. Its own errors of position, and the packets of the other one, do not matter
     carry      : where the sender of the newest packet is believed to be now, m; without it, where it was then
     lasts      : 1.0 while the newest packet counts, by its age; without it, until the next one comes
     Packet     : NamedTuple of what `receive` keeps of one pair, each field with its value at the start
@@ -181,16 +186,16 @@ class Radio:
 
     @property
     def keeps_packets(self) -> bool:
-        """Whether the newest packet counts until the next one comes."""
+        """Return True if the newest packet counts until the next one comes."""
         return any(rule is not None for rule in (self.missed, self.receive, self.late, self.see))
 
     @property
     def initial_packet(self) -> tuple[float, ...]:
-        """What each field of its Packet is at the start of a flight."""
+        """Return the value of each field of Packet at the start of a flight."""
         return initial_values(self.Packet)
 
     def asks_for(self, *names: str) -> bool:
-        """Whether one of its rules asks for any of these names."""
+        """Return True if one of the rules requests any of these names."""
         found = {
             name for kind in RULES if (rule := getattr(self, kind)) for name in argument_names(rule, kind, self.name)
         }
@@ -204,7 +209,7 @@ def radio(namespace: Any, name: str = "") -> Radio:
     ----------
     namespace : module, class or mapping
         Holds at least one of the rules missed, receive, late and see, and if it likes carry, lasts, Parameters, RATES,
-        and Packet (a NamedTuple whose fields have the values of the start), which receive asks for and returns.
+        and Packet (a NamedTuple whose fields have the values of the start), which receive takes and returns.
     name : str, optional
         How the radio is called; by default the namespace's.
 
@@ -216,7 +221,7 @@ def radio(namespace: Any, name: str = "") -> Radio:
     Raises
     ------
     RuleError
-        If it has no rule, or both missed and receive, or a rule asks for what there is not.
+        If it has no rule, or both missed and receive, or a rule requests an unknown argument.
 
     Examples
     --------
@@ -229,23 +234,24 @@ def radio(namespace: Any, name: str = "") -> Radio:
     """
     found, name = namespace_names(namespace, name)
     rules = {kind: found[kind] for kind in RULES if callable(found.get(kind))}
-    asked = {kind: argument_names(rule, kind, name) for kind, rule in rules.items()}
+    arguments = {kind: argument_names(rule, kind, name) for kind, rule in rules.items()}
     if not rules:
         raise RuleError(f"radio {name} has no rule; give missed or receive, late, see, carry, lasts")
     if "missed" in rules and "receive" in rules:
         raise RuleError(f"radio {name} has missed and receive; give one of them")
+    # A camera has one delay for all pictures, so a delay of each packet has no meaning for it.
     if {"see", "late"} <= set(rules):
         raise RuleError(f"radio {name} has see and late; give one of them, as pictures all have the delay of the radio")
     if set(rules) <= {"carry", "lasts", "missed_few"}:
         raise RuleError(f"radio {name} has only {' and '.join(rules)}; give missed, receive, late or see as well")
     packet = found.get("Packet")
-    check_memory_record(f"radio {name}", "receive", asked.get("receive", ()), packet, "Packet")
+    check_memory_record(f"radio {name}", "receive", arguments.get("receive", ()), packet, "Packet")
     record = merge_parameters(PacketParameters, found.get("Parameters"), f"radio {name}")
     rates = tuple(found.get("RATES", ()))
     unknown = [rate for rate in rates if rate not in number_names(record)]
     if unknown or len(rates) > len(LINK_NAMES):
         raise RuleError(f"radio {name}: RATES = {rates} are not at most two numbers of Parameters")
-    wanted = set(asked.get("missed", ())) & set(LINK_NAMES) - set(LINK_NAMES[: len(rates)])
+    wanted = set(arguments.get("missed", ())) & set(LINK_NAMES) - set(LINK_NAMES[: len(rates)])
     if wanted:
         raise RuleError(f"radio {name}: missed asks for {sorted(wanted)[0]}, which RATES does not name")
     return Radio(name, record, Packet=packet, rates=rates, violates=dict(found.get("VIOLATES", {})), **rules)
@@ -257,7 +263,7 @@ FIRST = {  # before anything is known
 
 
 class PacketReception:
-    """Which packets pass between the members of a flock, and how late they come.
+    """Reception of the packets between the members of a flock: which arrive, and how late.
 
     radio, k     : kind of radio and its numbers
     seed, agents : by which its random numbers are drawn, those of the same pair in a flight of this seed and size
@@ -269,7 +275,7 @@ class PacketReception:
         self._kept: dict[tuple[int, int], Any] = {}
 
     def any_arrives(self, receiver: int, sender: int, decision: int, known: Mapping[str, float]) -> bool:
-        """Whether anything of what is sent in decision `number` arrives, where the sender is in range.
+        """Return True if any packet sent in a decision arrives, where the sender is in range.
 
         known : the distance (m), and what else of the vocabulary of `receive` is known
         """
@@ -279,13 +285,13 @@ class PacketReception:
         return bool(u >= loss_probability(self.radio, self.k, decision, self.period, known))
 
     def packet_arrives(self, receiver: int, sender: int, decision: int, known: Mapping[str, float]) -> bool:
-        """Whether a packet arrives by the radio's own rule `receive`, where it has one."""
+        """Return True if a packet arrives by the rule `receive` of the radio, where it has one."""
         if self.radio.receive is None:
             return True
         return self._received(receiver, sender, self._given(receiver, sender, decision, known))
 
     def late(self, receiver: int, sender: int, decision: int, known: Mapping[str, float]) -> float:
-        """How much later than its delay a packet of decision `number` comes, s."""
+        """Return how much later than its delay a packet of a decision comes, s."""
         if self.radio.late is None:
             return 0.0
         given = self._given(receiver, sender, decision, known)

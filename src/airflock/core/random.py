@@ -9,17 +9,19 @@ device binds its own form of the same arithmetic (`airflock.engine.primitives`).
 import math
 
 # Every stream of the project; each may draw 256 times per step. Numbers are never reused: 4, 5 and 9 are taken.
+# Streams 4 and 5 were the loss and the link of each packet; one draw replaced both. A number is never used again, so
+# that no old and new flight share noise by accident.
 SENSOR = 1  # Langevin noise of own and of sent measurements
 OUTER = 2  # white outer noise on the acceleration
 START = 3  # where the agents start
 GUST = 6  # wind gusts, common to the flock
-MODEL = 7  # noise that a model asks for through percept.normal and percept.uniform
+MODEL = 7  # noise that a model requests through percept.normal and percept.uniform
 SCENE = 8  # the scene of a flight, where each flight has its own
-FAULT = 10  # when faults begin and whom they hit: step is the occurrence, agent the entry or the one who may be hit
+FAULT = 10  # onset and agents of faults: step is the occurrence, agent the entry or the one that may be hit
 SPREAD = 11  # tolerances of manufacture: step is the number's place in its record
-PACKET = 12  # whether anything of what one agent sends another arrives: agent is the number of the pair, `pair_number`
+PACKET = 12  # arrival of packets: agent is the number of the pair, `pair_number`
 FADE = 16  # strength of the signal between one pair, the same both ways
-AIR = 17  # what a radio's own rules ask for: agent is the number of the pair, receiver * agents + sender
+AIR = 17  # numbers of the rules of a radio: agent is the number of the pair, receiver * agents + sender
 
 # A device binds these, and compiles of each function in COMPILED the form that calls them.
 PRIMITIVES = ("word", "multiply_high", "multiply_low", "add32", "xor32", "uniform", "normal_pair")
@@ -56,6 +58,8 @@ def xor32(a, b):
 def philox(c0, c1, c2, c3, k0, k1):
     """Four random words of 32 bits from a counter of four words and a key of two."""
     c0, c1, c2, c3, k0, k1 = c0 & MASK, c1 & MASK, c2 & MASK, c3 & MASK, k0 & MASK, k1 & MASK
+    # Ten rounds, as in the paper. The rounds are written twice: with operators they take 0.6 of the time in plain
+    # Python, by primitives a device binds its own words.
     for _ in range(10):
         a, b = 0xD2511F53 * c0, 0xCD9E8D57 * c2
         c0, c1, c2, c3 = (b >> 32) ^ c1 ^ k0, b & MASK, (a >> 32) ^ c3 ^ k1, a & MASK
@@ -64,7 +68,7 @@ def philox(c0, c1, c2, c3, k0, k1):
 
 
 def philox_of_words(c0, c1, c2, c3, k0, k1):
-    """The same by the primitives of a device, whose words have other operators: what a driver holds of `philox`."""
+    """Compute `philox` by the primitives of a device, whose words have other operators; drivers hold this form."""
     c0, c1, c2, c3, k0, k1 = word(c0), word(c1), word(c2), word(c3), word(k0), word(k1)
     for _ in range(10):
         h0 = multiply_high(0xD2511F53, c0)
@@ -84,7 +88,7 @@ COMPILED = {philox: philox_of_words}
 
 
 def draw(c0, c1, c2, c3, k0, k1):
-    """The same as philox: compiled once and called, where no loop over agents has to vectorise around it."""
+    """Compute philox, compiled once and called, where no loop over agents has to vectorise around it."""
     return philox(c0, c1, c2, c3, k0, k1)
 
 
@@ -95,6 +99,7 @@ def random_words(seed, stream, world, step, agent, draw=0):
 
 def pair_number(receiver, sender, agents):
     """Number of a pair among so many agents. Four receivers share one: the word of each is receiver & 3 of the four."""
+    # Four receivers share the four words of one call. The number does not depend on who draws or in which order.
     return (receiver >> 2) * agents + sender
 
 
@@ -111,6 +116,8 @@ def uniform(word):
 def normal_pair(a, b):
     """Two independent normal numbers N(0, 1) from two words (Box and Muller); at most 5.8 standard deviations."""
     radius = math.sqrt(-2.0 * math.log(uniform(a)))
+    # The angle lies within a quarter turn, where a polynomial for sine and cosine is short; two further bits choose
+    # the quarter, so that no bit of the word is used twice.
     angle = (((b << 2) & MASK) ^ 0x80000000) - 0x80000000  # the lower 30 bits as a signed word
     s = math.sin(angle * (QUARTER_PI / 2147483648.0))
     c = math.cos(angle * (QUARTER_PI / 2147483648.0))

@@ -17,6 +17,7 @@ WORDS = {"ctx", "op", "ops", "id", "attr", "name", "asname", "module", "level", 
 def walk_tree(tree: ast.AST) -> list[ast.AST]:
     """All nodes of a tree in the order of `ast.walk`, without contexts (`Load`), operators and what is imported."""
     found = [tree]
+    # The list grows while the loop reads it: that is the breadth-first order of `ast.walk`, without its queue.
     for node in found:  # which grows
         for name in _FIELDS[type(node)]:
             below = getattr(node, name, None)
@@ -53,8 +54,8 @@ def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
     """Syntax tree of a rule from its own source file or notebook cell."""
     try:
         text = _source(rule)
-    except (OSError, TypeError) as fault:
-        raise RuleError(f"the source of rule {rule.__name__} is not available: {fault}") from fault
+    except (OSError, TypeError) as error:
+        raise RuleError(f"the source of rule {rule.__name__} is not available: {error}") from error
     node = ast.parse(text).body[0]
     if not isinstance(node, ast.FunctionDef):
         raise RuleError(f"rule {getattr(rule, '__name__', rule)} is no plain function")
@@ -67,6 +68,8 @@ def integer_names(rule: Callable[..., Any]) -> frozenset[str]:
     node = tree_of(rule)
     found = {name for name, value in rule.__globals__.items() if type(value) is int}
     found -= set(rule.__code__.co_varnames)
+    # A fixed point: a name that turns out to hold an integer may make others integers, so passes repeat until nothing
+    # is new. Rules are short; two or three passes are enough.
     while True:
         known = len(found)
         for item in walk_tree(node):
@@ -83,7 +86,7 @@ def integer_names(rule: Callable[..., Any]) -> frozenset[str]:
 
 
 def is_integer(node: ast.expr, integers: set[str] | frozenset[str], rule: Callable[..., Any]) -> bool:
-    """Whether an expression is an integer, given the names that are."""
+    """Return True if an expression is an integer, given the names that hold integers."""
     if isinstance(node, ast.Constant):
         return type(node.value) is int
     if isinstance(node, ast.Name):
@@ -138,7 +141,7 @@ def _terms(node: ast.AST) -> Iterator[str]:
 
 
 def _pairs(item: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
-    """What is assigned to what, tuples taken apart."""
+    """Yield pairs of target and value of an assignment, tuples taken apart."""
     for target in item.targets:
         if isinstance(target, ast.Tuple) and isinstance(item.value, ast.Tuple):
             yield from zip(target.elts, item.value.elts, strict=False)
@@ -152,7 +155,7 @@ def _called(node: ast.AST) -> str:
 
 
 def resolve_global(name: str, rule: Callable[..., Any]) -> Any:
-    """What a free name of a rule stands for; None if for nothing."""
+    """Return the value of a free name of a rule; None if it has none."""
     closure = dict(zip(rule.__code__.co_freevars, rule.__closure__ or (), strict=True))
     return rule.__globals__.get(name, closure[name].cell_contents if name in closure else None)
 
@@ -165,7 +168,7 @@ def resolve_function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] 
 
 @cache
 def _gives_integer(rule: Callable[..., Any] | None) -> bool:
-    """Whether every value that a function returns is an integer."""
+    """Return True if every value that a function returns is an integer."""
     if rule is None:
         return False
     node = tree_of(rule)
@@ -175,14 +178,14 @@ def _gives_integer(rule: Callable[..., Any] | None) -> bool:
 
 @cache
 def fields_read(rule: Callable[..., Any], record: str) -> frozenset[str] | None:
-    """Fields that a rule may read of the record that it calls by this name; None where its text does not tell."""
+    """Fields that a rule may read of the record that it calls by this name; None where its text leaves it open."""
     nodes = walk_tree(tree_of(rule))
     found: set[str] = set()
-    told = 0
+    followed = 0
     for item in nodes:
         if isinstance(item, ast.Attribute) and _is(item.value, record):
             found.add(item.attr)
-            told += 1
+            followed += 1
         elif isinstance(item, ast.Call):
             for place, given in enumerate(item.args):
                 if _is(given, record):
@@ -190,8 +193,10 @@ def fields_read(rule: Callable[..., Any], record: str) -> frozenset[str] | None:
                     if below is None:
                         return None
                     found |= below
-                    told += 1
-    return frozenset(found) if told == sum(_is(item, record) for item in nodes) else None
+                    followed += 1
+    # Every mention of the record must be an attribute or an argument that was followed; any other use may read all
+    # fields.
+    return frozenset(found) if followed == sum(_is(item, record) for item in nodes) else None
 
 
 def _is(node: ast.AST, name: str) -> bool:
@@ -199,7 +204,7 @@ def _is(node: ast.AST, name: str) -> bool:
 
 
 def _read_below(call: ast.Call, place: int, rule: Callable[..., Any]) -> frozenset[str] | None:
-    """What a function reads of the record that a rule hands it at this place."""
+    """Return the fields that a function reads of the record that a rule passes as this argument."""
     called = resolve_function(call.func.id, rule) if isinstance(call.func, ast.Name) else None
     if called is None or any(isinstance(given, ast.Starred) for given in call.args):
         return None

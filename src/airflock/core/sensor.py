@@ -1,8 +1,8 @@
 """The contract of a sensor: what an agent measures of its own position and velocity, as plain rules.
 
-A kind of sensor is a module with `Parameters` and one of two rules. `measure` makes of the true state the one that is
-believed. `error` is the shorter form for errors that are added to the truth, alike along each axis. The argument names
-are the declaration, as of every rule (`core.vocabulary`).
+A kind of sensor is a module with `Parameters` and one of two rules. `measure` turns the true state into the one
+that is believed. `error` is the shorter form for errors that are added to the truth in the same way along each axis.
+The argument names are the declaration, as of every rule (`core.vocabulary`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -57,7 +57,7 @@ COMPONENTS = ("x", "y", "z", "vx", "vy", "vz")  # what `measure` returns, before
 
 @dataclass(frozen=True, kw_only=True)
 class SensorParameters(Parameters):
-    """What every sensor has: how often an agent measures, and so decides."""
+    """Parameters of every sensor: the period at which an agent measures, and so decides."""
 
     period: float = quantity(
         0.2,
@@ -77,12 +77,12 @@ class Sensor:
     name       : how scenarios refer to it
     Parameters : record of its numbers; `period` is among them
     measure    : true state, Memory and random numbers → position (m), velocity (m/s) and, behind them, Memory. It is
-                 asked once for each agent and decision; what an agent sends carries the errors of its last measurement
-    error      : error of position (m) and of velocity (m/s) along one axis → the same after one period. It is asked
+                 called once for each agent and decision; what an agent sends carries the errors of its last measurement
+    error      : error of position (m) and of velocity (m/s) along one axis → the same after one period. It is called
                  for each axis, and again for what is sent, whose errors are drawn apart (authors' program of
                  Vásárhelyi et al. 2018)
     Memory     : NamedTuple of what `measure` keeps of one agent, each field with its value at the start
-    exact      : `exact(s)`, whether it tells the truth with these numbers; a flight then spends nothing on it
+    exact      : `exact(s)`, True if it has no error with these numbers; a flight then spends nothing on it
     bounds     : `bounds` of any of s, period, dt → what of a scenario it cannot measure, one line each
     violates   : truths of `airflock.check_sensor` that do not hold for it, and why (VIOLATES)
     """
@@ -101,15 +101,15 @@ class Sensor:
 
     @property
     def initial_memory(self) -> tuple[float, ...]:
-        """What each field of its Memory is at the start of a flight."""
+        """Return the value of each field of Memory at the start of a flight."""
         return initial_values(self.Memory)
 
     def is_exact(self, s: Any) -> bool:
-        """Whether it tells the truth with these numbers."""
+        """Return True if the sensor has no error with these parameters."""
         return self.exact is not None and bool(self.exact(s))
 
     def bound_errors(self, **arguments: Any) -> list[str]:
-        """What this sensor cannot measure, by what `bounds` may ask for."""
+        """Return what this sensor cannot measure, one line each, from the arguments that `bounds` may request."""
         return [] if self.bounds is None else list(call_rule(self.bounds, "bounds", arguments, self.name))
 
 
@@ -120,7 +120,7 @@ def sensor(namespace: Any, name: str = "") -> Sensor:
     ----------
     namespace : module, class or mapping
         Holds one of the rules measure and error; if it likes, Parameters, exact, bounds, and Memory (a NamedTuple
-        whose fields have the values of the start), which measure asks for as `memory` and returns behind the state.
+        whose fields have the values of the start), which measure takes as `memory` and returns behind the state.
     name : str, optional
         How the sensor is called; by default the namespace's.
 
@@ -132,7 +132,7 @@ def sensor(namespace: Any, name: str = "") -> Sensor:
     Raises
     ------
     RuleError
-        If it has no rule or both, or a rule asks for what there is not.
+        If it has no rule or both, or a rule requests an unknown argument.
 
     Examples
     --------
@@ -163,7 +163,7 @@ Words = Callable[[int, int], tuple[int, int, int, int]]
 
 
 class SensorState:
-    """What one agent's sensor makes of true states.
+    """Sensor of one agent, measurement after measurement.
 
     sensor, s   : kind of sensor and its numbers
     seed, agent : by which its random numbers are drawn, those of the same agent in a flight of this seed
@@ -194,6 +194,8 @@ class SensorState:
             normal = (*random.normal_pair(low[0], low[1]), random.normal_pair(high[0], high[1])[0])
             off = add_errors(self.sensor, self.s, self.off, normal, period)
             return off[:3], off[3:]
+        # All numbers are drawn whether the rule requests them or not: a draw is a function of its counter, so an
+        # unused one shifts nothing.
         draws = draw_numbers(self.seed, number, self.agent)
         time = number * period
         found, self._memory = call_measure(self.sensor, self.s, true, self._memory, time, period, draws)
@@ -214,7 +216,7 @@ def add_errors(sensor: Sensor, s: Any, errors: State, normal: Sequence[float], p
 def call_measure(
     sensor: Sensor, s: Any, true: Sequence[float], memory: Any, time: float, period: float, draws: Mapping[str, float]
 ) -> tuple[State, Any]:
-    """What the rule `measure` of a sensor believes of a true state (m, m/s), and what it then remembers."""
+    """Return the state that the rule `measure` of a sensor makes of a true one (m, m/s), and its new Memory."""
     assert sensor.measure is not None
     given = {**State(*true)._asdict(), **draws, "memory": memory, "time": time, "period": period, "s": s}
     found = call_rule(sensor.measure, "measure", given, sensor.name)

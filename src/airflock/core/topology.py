@@ -1,4 +1,4 @@
-"""The contract of a topology, and its use on board: which of those whom an agent hears it meets."""
+"""The contract of a topology: the rule that selects, among the heard neighbours of an agent, those that it meets."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -32,12 +32,12 @@ class NoParameters(Parameters):
 
 @dataclass(frozen=True)
 class Topology:
-    """A kind of topology: one plain function over rows, that asks by name (`core.vocabulary`).
+    """A kind of topology: one plain function over rows, whose argument names are its requests (`core.vocabulary`).
 
     name : how scenarios refer to it
-    meet : fills the row `met` with 1.0 for whom the agent meets
+    meet : fills the row `met` with 1.0 for each neighbour that the agent meets
     flat : it is defined in a plane only
-    near : whom it lets through within any distance depends on nobody farther: then cells as wide as a law's reach do
+    near : its choice within any distance depends on no agent farther away: then cells as wide as the reach of a law do
     Parameters : record of its numbers; those that a scenario can name share one
     violates   : truths of `airflock.check_topology` that do not hold for it, and why (VIOLATES)
     """
@@ -53,7 +53,7 @@ class Topology:
         return hash((self.name, self.meet))
 
     def asks_for(self, name: str) -> bool:
-        """Whether the rule asks for something by this name."""
+        """Return True if the rule requests an argument of this name."""
         return name in argument_names(self.meet, "meet", self.name)
 
 
@@ -72,6 +72,7 @@ def topology(namespace: Any, name: str = "") -> Topology:
         raise RuleError(f"topology {name}: meet does not ask for met, the row that it fills")
     if not (isinstance(record, type) and issubclass(record, Parameters)):
         raise RuleError(f"topology {name}: Parameters is not a frozen dataclass derived from airflock.Parameters")
+    # The table of a driver holds numbers only.
     words = [word for word, declared, _ in declarations(record) if isinstance(declared, Choice)]
     if words:
         raise RuleError(f"topology {name}: Parameters.{words[0]} is a choice; a topology has numbers only")

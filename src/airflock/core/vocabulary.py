@@ -31,7 +31,7 @@ class Own(NamedTuple):
 
 
 class Percept(NamedTuple):
-    """What else an agent perceives: time (s), offsets to the arena's centre and to the goal (m), rays, noise.
+    """Percept of an agent beside its neighbours: time (s), offsets to the arena's centre and the goal (m), rays, noise.
 
     Without a goal its offset is zero. An engine binds the methods to its world and its streams; a drone passes a
     Percept of its own with a real range finder. As they stand here the world is empty and quiet.
@@ -58,7 +58,7 @@ class Percept(NamedTuple):
         return length
 
     def normal(self, draw: int) -> float:
-        """Normal random number N(0, 1) of this agent and decision; `draw` from 0 to 255 tells several apart."""
+        """Normal random number N(0, 1) of this agent and decision; `draw` from 0 to 255 distinguishes several."""
         return 0.0
 
     def uniform(self, draw: int) -> float:

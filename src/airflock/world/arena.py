@@ -13,7 +13,7 @@ from airflock.core import Parameters as Record, choice, points, quantity, text
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Where flying is allowed. Positions are relative to the arena's centre; corners are given where they are.
+    """Region where flying is allowed. Positions are relative to the arena's centre; corners are absolute.
 
     In 3-D an arena reaches from -height/2 to height/2, or from floor to ceiling.
     """

@@ -29,6 +29,8 @@ def gather(x, y, z, sight, shapes, nodes, links, near):
     """
     n = 0
     i = 0
+    # The tree lies in depth-first order with the number of the next node to visit where a box is missed, so that no
+    # stack is needed: kernels on a GPU have none.
     while i < len(nodes):
         if beside(x, y, z, nodes, i) <= sight * sight:
             for k in range(links[i][1], links[i][2]):
@@ -62,12 +64,13 @@ def cast_near(x, y, z, ux, uy, uz, length, radius, shapes, near, n):
 
 
 def cast(x, y, z, ux, uy, uz, length, radius, shapes, nodes, links):
-    """The same against all shapes, through the tree."""
+    """Cast against all shapes, through the tree."""
     best = length
     ix = inverse(ux)
     iy = inverse(uy)
     iz = inverse(uz)
     i = 0
+    # `best` shrinks with each hit, so later boxes are skipped by the same test that skips those out of the way.
     while i < len(nodes):
         s = entry(
             x, y, z, ix, iy, iz, nodes[i][0], nodes[i][1], nodes[i][2], nodes[i][3], nodes[i][4], nodes[i][5], radius
@@ -92,7 +95,7 @@ def nearest(x, y, z, reach, shapes, nodes, links):
 
 
 def nearest_of(x, y, z, reach, ground, shapes, nodes, links):
-    """The same among what stands on the ground (0.0), the ground alone (1.0), or all (2.0)."""
+    """Find the nearest surface of the shapes on the ground (0.0), the ground alone (1.0), or all (2.0)."""
     found = Surface(FAR, 0.0, 0.0, 1.0)
     best = reach
     i = 0

@@ -1,4 +1,4 @@
-"""What happens to an agent beyond the faces of a box, one coordinate at a time; and offsets across a periodic box."""
+"""Edges of a box: motion beyond its faces, one coordinate at a time, and offsets across a periodic box."""
 
 import math
 

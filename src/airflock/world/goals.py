@@ -11,7 +11,7 @@ OURS = "our choice, because the thesis shows moving goals without numbers"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Where the flock should go. A goal is reached when the flock's centre is within `radius`; then the next counts."""
+    """Goals of the flock. A goal is reached when the flock's centre is within `radius`; then the next counts."""
 
     kind: str = choice(
         "none",
@@ -62,7 +62,7 @@ class Parameters(Record):
 
 
 class Aim(NamedTuple):
-    """Where the goal is, m; 1.0 if it has just been reached."""
+    """Position of the goal, m, and 1.0 if it has just been reached."""
 
     x: float
     y: float

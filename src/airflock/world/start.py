@@ -96,5 +96,5 @@ def in_echelon(i, sx, sy, sz):
 
 
 def in_ball(x, y, z, radius):
-    """Whether a position lies in the ball of this radius (m) about the origin."""
+    """Return True if a position lies in the ball of this radius (m) about the origin."""
     return x * x + y * y + z * z <= radius * radius

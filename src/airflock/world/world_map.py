@@ -29,10 +29,11 @@ def counter_clockwise(corners: Corners) -> list[Sequence[float]]:
 
 
 def polygon_error(corners: Corners) -> str:
-    """Why a list of corners is no simple polygon; empty if it is one."""
+    """Return the reason why a list of corners is no simple polygon; empty if it is one."""
     if len(corners) < 3:
         return f"has {len(corners)} corners; a polygon needs at least 3"
     n = len(corners)
+    # All pairs of edges: outlines have tens of corners, and a sweep line would need its own tests.
     for k in range(n):
         if tuple(corners[k][:2]) == tuple(corners[(k + 1) % n][:2]):
             return f"gives corner [{corners[k][0]:g}, {corners[k][1]:g}] twice in succession"
@@ -47,7 +48,7 @@ def polygon_error(corners: Corners) -> str:
 
 
 def is_convex(corners: Corners) -> bool:
-    """Whether a simple polygon turns one way only."""
+    """Return True if a simple polygon turns one way only."""
     ring = counter_clockwise(corners)
     n = len(ring)
     return all(_turn(ring[k], ring[(k + 1) % n], ring[(k + 2) % n]) >= -1e-9 * abs(signed_area(ring)) for k in range(n))
@@ -65,19 +66,19 @@ def without_straight_corners(corners: Corners) -> list[Sequence[float]]:
 
 
 def _turns(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> bool:
-    """Whether the way a b c does not go straight on at b."""
+    """Return True if the path a b c turns at b."""
     across = abs(_turn(a, b, c))
     along = (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1])
     return along <= 0.0 or across > STRAIGHT * along
 
 
 def _folds(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> bool:
-    """Whether the way a b c goes back over itself."""
+    """Return True if the path a b c goes back over itself."""
     return _turn(a, b, c) == 0.0 and (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0.0
 
 
 def _meet(a: Sequence[float], b: Sequence[float], c: Sequence[float], d: Sequence[float]) -> bool:
-    """Whether the segments a b and c d have a point in common."""
+    """Return True if the segments a b and c d have a point in common."""
     for k in (0, 1):
         if max(a[k], b[k]) < min(c[k], d[k]) or max(c[k], d[k]) < min(a[k], b[k]):
             return False
@@ -100,7 +101,7 @@ def half_sizes(world: arena.Parameters) -> tuple[float, float, float]:
 
 
 def is_off_centre(world: arena.Parameters) -> bool:
-    """Whether the middle of an arena between floor and ceiling lies elsewhere than at height 0."""
+    """Return True if the middle of an arena between floor and ceiling is not at height 0."""
     return world.dimensions == "3" and world.arena != "none" and middle_height(world) != 0.0
 
 
@@ -128,6 +129,8 @@ def edge_rows(world: arena.Parameters) -> tuple[list[list[float]], int, list[lis
     spans = []
 
     def add(corners: Corners) -> None:
+        # Counter-clockwise rings have their inner side on the left, which the sign of every surface function relies
+        # on.
         ring = counter_clockwise(corners)
         rows.extend([*a[:2], *b[:2]] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
 
@@ -186,7 +189,7 @@ CLEAR = {"square": rays.to_box, "circle": rays.to_cylinder, "polygon": rays.to_p
 
 @dataclass(frozen=True)
 class Shapes:
-    """What stands in the world: rows of `world.shapes` and the tree over them, as `world.bvh` reads it."""
+    """Shapes of a world: rows of `world.shapes` and the tree over them, as `world.bvh` reads it."""
 
     shapes: Any = ()
     nodes: Any = ()
@@ -215,7 +218,7 @@ class WorldMap:
         self._obstacle, self._middle = obstacle_rule(world), middle_height(world) if is_off_centre(world) else 0.0
 
     def seen(self, look: float) -> Self:
-        """The same world, shapes that appear and all, for an agent to whom shapes say something up to `look`, m."""
+        """Return a copy of this map, with its shapes that appear, for an agent that feels shapes up to `look`, m."""
         found = copy(self)
         found._look = look
         return found
@@ -294,7 +297,7 @@ class WorldMap:
         return float(bvh.cast(x, y, z, ux, uy, uz, free, 0.0, *self._scene))
 
     def is_blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float) -> bool:
-        """Whether an obstacle or the scene stands between two places, m; the walls of an arena hide nothing."""
+        """Return True if an obstacle or the scene stands between two positions, m; walls of an arena do not hide."""
         dx, dy, dz = to_x - x, to_y - y, to_z - z
         length = norm(dx, dy, dz)
         ux, uy, uz = dx / length, dy / length, dz / length

@@ -40,7 +40,7 @@ def substitute(a, pivots, b, row, n):
 
 
 def substitute_transposed(a, pivots, b, row, n):
-    """The same for the transposed matrix."""
+    """Substitute with the transposed matrix."""
     for i in range(n):
         s = b[row][i]
         for k in range(i):

@@ -1,6 +1,6 @@
 """Gradient of each wing's own induced drag with its own position, in four ways.
 
-cells         : central difference over one cell of the grid, all circulations solved anew (Dimock & Selig 2003, Eq. 8)
+cells         : central difference over one cell of the grid, all circulations solved again (Dimock & Selig 2003, Eq. 8)
 cells_frozen  : the same with the circulations of all other wings held
 analytic      : derivative of the linear system by its adjoint, all wings respond
 frozen        : derivative with the circulations of all other wings held
@@ -42,7 +42,7 @@ def slope_of(i, n, work, wing, gradient):
 
 
 def level(i, n, work):
-    """Whether all wings fly at the height of wing i: then no drag changes to first order with it."""
+    """Return True if all wings fly at the height of wing i: then no drag changes to first order with it."""
     place = work.place
     far = 0.0
     for j in range(n):
@@ -156,7 +156,7 @@ def own_part(i, work, wing):
 
 
 def sensitivities(i, n, work, wing):
-    """How the drag of wing i depends on the wash on every wing: rows of `adjoint`, solved with the mirrored tables."""
+    """Solve for the dependence of the drag of wing i on the wash on every wing: rows of `adjoint`, mirrored tables."""
     m = segments_of(wing)
     adjoint = work.adjoint
     source = work.source
@@ -188,7 +188,7 @@ def sensitivities(i, n, work, wing):
 
 
 def back_wash(j, n, m, mirror, adjoint, wash):
-    """What the sensitivities of all other wings make of a unit circulation on wing j."""
+    """Sum the sensitivities of all other wings to a unit circulation on wing j."""
     for k in range(m):
         wash[j][k] = 0.0
     for i in range(n):
@@ -197,7 +197,7 @@ def back_wash(j, n, m, mirror, adjoint, wash):
 
 
 def unspread(i, n, m, work):
-    """The same from the factors of the dense system: one factorisation serves all right-hand sides."""
+    """Solve from the factors of the dense system: one factorisation serves all right-hand sides."""
     column = work.column
     adjoint = work.adjoint
     wash = work.wash
@@ -220,7 +220,7 @@ def unspread(i, n, m, work):
 
 
 def bilinear(weights, i, slopes, row, circulation, j, m, spare):
-    """What the circulations of wing j induce by one row of slopes, weighted over the control points of wing i."""
+    """Weight what the circulations of wing j induce by one row of slopes over the control points of wing i."""
     for k in range(m):
         spare[0][k] = 0.0
     add_wash(spare, 0, slopes, row, circulation, j, m)

@@ -1,6 +1,6 @@
 """Wing: one rectangular untwisted wing and how its vorticity is cut into filaments.
 
-Axes of a formation: x forward, y across, z up; the wake goes to -x. All wings of a flock are alike.
+Axes of a formation: x forward, y across, z up; the wake goes to -x. All wings of a flock are equal.
 """
 
 import math

@@ -16,6 +16,7 @@ from airflock.core import FAR, choice, quantity
 
 def battery_kind() -> Any:
     """Parameter `battery` of a body."""
+    # A choice of the body, not a body of its own: two texts of each rule would drift apart.
     said = "energy that never ends, or does"
     return choice("endless", ("endless", "lithium"), source="our choice", meaning=said)
 

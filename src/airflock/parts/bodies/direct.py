@@ -1,4 +1,4 @@
-"""Direct body: a point that flies as told at once (the thesis of Kidger; any law without inertia)."""
+"""Direct body: a point that follows its command at once (the thesis of Kidger; any law without inertia)."""
 
 from dataclasses import dataclass
 

@@ -19,7 +19,7 @@ FOOT = 0.3048  # m
 
 
 class Numbers(NamedTuple):
-    """What a driver reads: lengths (m), standard deviations (m/s), airspeed (m/s), unit vector of the mean wind."""
+    """Numbers of a driver: lengths (m), standard deviations (m/s), airspeed (m/s), unit vector of the mean wind."""
 
     length: float
     length_up: float

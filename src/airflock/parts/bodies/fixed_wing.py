@@ -95,7 +95,7 @@ def drag_of(v, n, wing, b):
 
 
 def limits(b, speed, start, wing):
-    """What this body cannot fly, one line each: a law or a start slower than it stalls."""
+    """Return what this body cannot fly, one line each: a law or a start slower than the stall."""
     stall = stall_speed(wing, 1.0)
     least, told = b.margin * stall, f"body fixed_wing stalls at {stall:.3g} m/s and flies no slower than"
     found = []
@@ -120,9 +120,9 @@ def endures(memory, b):
 
 
 def climbing(up, v, drag, slow, possible, b):
-    """Sine of the climb angle that is asked: for a vertical speed `up` (m/s), within what thrust and speed allow.
+    """Sine of the commanded climb angle: for a vertical speed `up` (m/s), within what thrust and speed allow.
 
-    slow : acceleration that the speed controller asks for, over gravity; possible : largest thrust over weight
+    slow : acceleration that the speed controller demands, over gravity; possible : largest thrust over weight
     """
     spare = possible - drag - slow
     low = -math.sin(b.dive_max)
@@ -170,6 +170,8 @@ def move(vx, vy, vz, cx, cy, cz, wx, wy, wz, memory, dt, b, wing):
     speed = max(v + b.gravity * (thrust - drag - sine) * dt, 0.1 * v)
     climb = clamp(angle + b.gravity / v * (n * math.cos(bank) - math.cos(angle)) * dt, -1.5, 1.5)
     turn = b.gravity * n * math.sin(bank) / (v * math.cos(angle)) * dt
+    # The state is turned by angles, not pushed by forces, which would gain 0.18 m/s each second in a turn of 1 g at
+    # 14 m/s with steps of 0.05 s.
     across = speed * math.cos(climb)
     c = math.cos(turn)
     s = math.sin(turn)

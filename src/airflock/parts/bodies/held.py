@@ -16,11 +16,13 @@ def wander(tau, dt):
 
     A step keeps the share 1 - dt/tau of the gap and adds 2 dt; for dt = 0 this is tau.
     """
+    # Noise is drawn at every motion step, so the variance is larger than tau by dt / (2 tau); the continuous form
+    # biased the outer noise by 0.9 %.
     return tau / (1.0 - 0.5 * dt / tau)
 
 
 def gap_left(gap, time, tau, rate, a_max):
-    """What is left of a velocity gap (m/s) after `time` (s), and for how long of it a_max limited the motion (s).
+    """Return the velocity gap (m/s) left after `time` (s), and for how long of it a_max limited the motion (s).
 
     Saturated while the gap exceeds a_max tau, where it falls by a_max; then exponential with `rate` (`decay_rate`).
     """

@@ -1,4 +1,4 @@
-"""Jostled body: flies as told at once, and turbulence pushes each one about by itself."""
+"""Jostled body: follows its command at once, and turbulence pushes each one about by itself."""
 
 import math
 from dataclasses import dataclass

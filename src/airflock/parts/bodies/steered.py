@@ -1,4 +1,4 @@
-"""Steered body: a point that accelerates as told, up to a largest speed (Zapotecatl et al. 2016, Eqs 11-12)."""
+"""Steered body: a point that accelerates as commanded, up to a largest speed (Zapotecatl et al. 2016, Eqs 11-12)."""
 
 from dataclasses import dataclass
 

@@ -39,7 +39,7 @@ class Parameters(Record):
 
 
 class Steady(NamedTuple):
-    """What a driver reads of the wind and its simple gusts, m/s and s."""
+    """Numbers of the wind and its simple gusts that a driver reads, m/s and s."""
 
     east: float
     north: float

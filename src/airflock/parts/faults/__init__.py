@@ -1,4 +1,4 @@
-"""Layer 2: faults of one agent, one kind per file: plain rules that a flight asks while the fault lasts.
+"""Layer 2: faults of one agent, one kind per file: plain rules that a flight calls while the fault lasts.
 
 All kinds are our own definitions; sources of their numbers stand beside them.
 Copy the shape of `motor.py` for a kind of your own; docs/faults.md shows one.

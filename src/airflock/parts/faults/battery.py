@@ -30,5 +30,5 @@ def motion(vx, vy, vz, nx, ny, nz, since, f):
 
 
 def leaves(f):
-    """When it lands, s."""
+    """Time from the onset until the drone lands, s."""
     return f.endurance

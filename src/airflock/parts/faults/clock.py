@@ -1,6 +1,6 @@
-"""Clock: the agent's clock is ahead. It stamps its packets, and tells how old those of others are, by it.
+"""Clock: the agent's clock is ahead. It stamps its packets, and dates those of others, by it.
 
-Only who asks for ages can tell: extrapolation over two links (radio.kind = "links"), and laws that ask for `age`.
+Only rules that use ages are affected: extrapolation over two links (radio.kind = "links"), and laws that request `age`.
 """
 
 from dataclasses import dataclass
@@ -18,5 +18,5 @@ class Parameters(Record):
 
 
 def clock(f):
-    """How far it is ahead, s."""
+    """Offset of the clock, ahead of the true time, s."""
     return f.ahead

@@ -7,7 +7,7 @@ from airflock.core import Parameters as Record, quantity
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Where it pretends to be, from where it is."""
+    """Offset of the pretended position from the true one."""
 
     east: float = quantity(
         20.0, "m", low=-1e4, high=1e4, usual=(-50.0, 50.0), source="our choice", meaning="pretended offset, east"

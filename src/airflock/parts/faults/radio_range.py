@@ -7,7 +7,7 @@ from airflock.core import Parameters as Record, quantity
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """What is left of the range."""
+    """Share of the range that is left."""
 
     share: float = quantity(0.25, "1", low=0.0, high=1.0, source="our choice", meaning="share of radio.range")
 

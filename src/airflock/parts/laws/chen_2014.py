@@ -66,7 +66,7 @@ class Sums(NamedTuple):
 
 
 def neighbour(dx, dy, dz, r, r2, kin, p):
-    """What one neighbour does to prey (its fellows, and predators), or to a predator (prey), m/s."""
+    """Effect of one neighbour on prey (its fellows, and predators), or on a predator (prey), m/s."""
     other = 1.0 - kin
     if p.role == "prey":
         k = kin * (p.k_att - p.k_rep / r2)

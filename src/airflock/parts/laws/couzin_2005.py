@@ -74,7 +74,7 @@ def interaction_range(p):
 
 
 def neighbour(dx, dy, dz, r, nhx, nhy, nhz, p):
-    """What one neighbour adds: to be avoided within alpha, else to be followed within rho."""
+    """Contribution of one neighbour: avoided within alpha, else followed within rho."""
     close = 1.0 if r < p.alpha else 0.0
     o = 1.0 if (r >= p.alpha) & (r <= p.rho) else 0.0
     k = -close / r

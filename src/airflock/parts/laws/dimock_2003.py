@@ -14,7 +14,7 @@ The paper survives as a damaged scan; Eqs 1 and 2 are reconstructions, fitted to
   (default: only so do the published gains hold a V), by the n - 1 others, or by the sum of weights.
 * Eq. 4 as printed has no direction between two symmetric neighbours, and full strength towards birds at infinity;
   `avoidance` offers it weighted by presence, summed over pairs, and as a barrier that grows without bound.
-* Eq. 8: `gradient` is the paper's central difference over one grid cell with all circulations solved anew (cells), the
+* Eq. 8: `gradient` is the paper's central difference over one grid cell with all circulations solved again (cells), the
   same with the others' circulations held (cells_frozen, four times faster), or analytic (analytic, frozen), or none.
 * `steps = snapped` moves birds by whole cells of the grid: one reading of "P and Q are constrained to a grid".
 * The system is linear and solved so: the paper's fitness of -1000 for divergence never occurs.
@@ -135,7 +135,7 @@ def neighbour(dx, dy, dz, r, r2, p):
 
 
 def divisor(weights, others, p):
-    """What the sum of weighted positions is divided by (Eq. 2)."""
+    """Divisor of the sum of weighted positions (Eq. 2)."""
     if p.centroid == "n":
         return others + 1.0
     if p.centroid == "others":

@@ -11,7 +11,7 @@ Differences from the thesis, each because its text leaves the point open or its 
 * Cohesion and goal suggest movements at p.speed towards a point. The listing of cohesion returns the bare offset of up
   to 40 m, beside a cap of 1 m per frame (cohesion = "printed"): goal and alignment are then cut off.
 * Cohesion goes to the mean position as the text says; the listing has the sign reversed and divides by the neighbours
-  without the agent itself. Alignment divides by all whom it adds up.
+  without the agent itself. Alignment divides by the number of neighbours in the sum.
 * The ray ahead lies along what the other oracles suggest together, as the comment of the 3-D listing says, so that
   nothing is flown that was not looked at; ahead = "movement" casts along the own movement, as the 2-D listing does.
 * The cast is one of a sphere (radius + margin) against everything, and the nearest hit counts (the thesis's bug 2 was
@@ -137,7 +137,7 @@ def preferred_speed(p):
 
 
 def sight(p):
-    """How far a cast looks, m."""
+    """Largest distance of a cast, m."""
     return p.r_ray + p.radius + p.margin
 
 

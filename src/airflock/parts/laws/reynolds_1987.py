@@ -9,7 +9,7 @@ paper → the authors' program, which decides here because the printed equations
 `form = "printed"` is Eqs 2-10 as they stand (quality then stays below 0.76 instead of 0.93):
 
 * Eqs 5-7 are vectors of any length; the program takes unit vectors, and separation falls with 1/d, not rises with d.
-* Eq. 4 asks d < r; in the program any neighbour nearer than 1.5 cm acts in every behaviour, `r_floor`, even at r = 0.
+* Eq. 4 has d < r; in the program any neighbour nearer than 1.5 cm acts in every behaviour (`r_floor`), even for r = 0.
 * Eq. 10 is used directly; the program smooths the acceleration by k = clip(9 dt, 0.15, 0.4) at each step.
 * Field of view: Eq. 4 compares the angle with theta; here theta is the full angle, seen up to half of it (360°: all).
 * The wall rule is in the program only: a ray ahead, shorter than one second of flight, steers sideways to the centre.

@@ -8,7 +8,7 @@ Differences
 The text of 2014 was not at hand, and no check against it is claimed. The transfer function, the wall law, the half
 spring and the order of the terms are those of the authors' later program; the friction kernel with its lower bound
 r_min_frict is the form that the caption of Fig. 1 implies (C_frict in m², r_min_frict in m). The caption gives
-c_frict, r_min_frict, r0_rep and p_rep only; c_shill, v_shill and d_wall are open. Our choice, fixed beforehand:
+c_frict, r_min_frict, r0_rep and p_rep only; c_shill, v_shill and d_wall are open. Our choice, fixed in advance:
 c_shill = 1 as in the 2018 paper, v_shill = v_flock as in 2014, d_wall = 25 m, a tenth of the arena; `papers/` shows how
 the result depends on them. The ramp ends at the wall, as in the later program. The sum is limited to v_max (no
 rescaling).
@@ -65,7 +65,7 @@ class Walls(NamedTuple):
 
 
 def preferred_speed(p):
-    """Speed that the fitness asks for, m/s."""
+    """Speed that the fitness prefers, m/s."""
     return p.v_flock
 
 

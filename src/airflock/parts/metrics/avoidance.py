@@ -1,4 +1,4 @@
-"""How often agents avoid what is ahead, and what it costs in rays (Kidger, section 4.6.2).
+"""Avoidance: how often agents avoid what is ahead, and its cost in rays (Kidger, section 4.6.2).
 
 An agent avoids when its ray ahead is not free, so that it casts more than one.
 """

@@ -53,7 +53,7 @@ def pair(r2, lower, q):
 
 
 def settled(beyond, q):
-    """Whether nobody farther than this (m) is in contact."""
+    """Return True if no agent beyond this distance (m) can be in contact."""
     return q.r_coll <= beyond
 
 

@@ -25,7 +25,7 @@ class Sample(NamedTuple):
 
 
 def linked(r2, q):
-    """Whether two agents at a squared distance r2 (m²) belong to one cluster."""
+    """Return True if two agents at a squared distance r2 (m²) belong to one cluster."""
     return r2 < q.r_cluster * q.r_cluster
 
 

@@ -1,7 +1,7 @@
 """Excursion beyond walls and into obstacles (Vásárhelyi et al. 2018, Eq. 15), and clearance, the room that is left.
 
-phi_wall is the mean over those outside, and 0 if nobody is: it tells nothing of flights that stayed inside. The
-smallest clearance tells how near the nearest of them came; it is below 0 where somebody was outside.
+phi_wall is the mean over those outside, and 0 if nobody is: it says nothing about flights that stayed inside. The
+smallest clearance says how near the nearest of them came; it is below 0 where somebody was outside.
 """
 
 import math
@@ -37,6 +37,8 @@ class Sample(NamedTuple):
 
 def agent(excursion):
     """Distance outside (m) of one agent, and its clearance (m)."""
+    # The clearance is a distance so that a search can see how near a flight came: contacts are 0 in every good
+    # flight.
     return Agent(max(excursion, 0.0), 1.0 if excursion > 0.0 else 0.0, -excursion)
 
 

@@ -30,7 +30,7 @@ class Sample(NamedTuple):
 
 
 def agent(x, y, z, mean, q):
-    """Whether one agent is within q.r_flock of the centre of mass."""
+    """Count one agent if it is within q.r_flock of the centre of mass."""
     dx = x - mean.x
     dy = y - mean.y
     dz = z - mean.z

@@ -1,6 +1,6 @@
-"""Sub-groups told apart: what Zapotecatl et al. 2016 leave as future work. Our definitions.
+"""Sub-groups as separate flocks: what Zapotecatl et al. 2016 leave as future work. Our definitions.
 
-Extension and quality of the whole cannot tell a flock that is dispersed from one that split into tight groups. Here
+Extension and quality of the whole cannot distinguish a dispersed flock from one that split into tight groups. Here
 agents nearer than r_cluster belong to one group. Distances and angles are taken from the own group, and an agent
 without companions costs as much as one in collision:
 
@@ -91,12 +91,12 @@ def pair(r2, q):
 
 
 def settled(pair, beyond, q):
-    """Whether nobody farther than this (m) is nearer than the nearest one, or within r_cluster."""
+    """Return True if no agent beyond this distance (m) can be the nearest one, or within r_cluster."""
     return (pair.nearest2 <= beyond * beyond) & (q.r_cluster <= beyond)
 
 
 def linked(r2, q):
-    """Whether two agents at a squared distance r2 (m²) belong to one group."""
+    """Return True if two agents at a squared distance r2 (m²) belong to one group."""
     return r2 < q.r_cluster * q.r_cluster
 
 

@@ -140,7 +140,7 @@ def metric_set(namespace: Any, name: str = "") -> MetricSet:
     Raises
     ------
     RuleError
-        If it measures nothing, or a rule asks for what there is not.
+        If it measures nothing, or a rule requests an unknown argument.
 
     Examples
     --------
@@ -159,8 +159,8 @@ def metric_set(namespace: Any, name: str = "") -> MetricSet:
     if not metrics:
         raise RuleError(f"metric set {name} measures nothing; give METRICS = [...], or a rule sample")
     fitness = found.get("fitness")
-    told = found.get("REPORTS", {}) if fitness else {}
-    reports = {key: about for key, about in told.items() if "sample" not in found or key.startswith(("f_", "fitness"))}
+    own = found.get("REPORTS", {}) if fitness else {}
+    reports = {key: about for key, about in own.items() if "sample" not in found or key.startswith(("f_", "fitness"))}
     if fitness and "fitness" not in reports:
         reports["fitness"] = ("", (fitness.__doc__ or "fitness").partition("\n")[0])
     best = str(found.get("BEST") or ("fitness" if "fitness" in reports else ""))

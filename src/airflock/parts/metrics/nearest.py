@@ -44,7 +44,7 @@ def pair(r2):
 
 
 def settled(pair, beyond):
-    """Whether nobody farther than this (m) is nearer than the nearest one."""
+    """Return True if no agent beyond this distance (m) can be the nearest one."""
     return pair.nearest2 <= beyond * beyond
 
 

@@ -10,7 +10,7 @@ METHODS = "Vásárhelyi et al. 2018, Methods"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """What the order parameters need; None means "from the scenario"."""
+    """Parameters of the order parameters; None means "from the scenario"."""
 
     kind: str = text(
         "vasarhelyi",

@@ -59,7 +59,7 @@ def pair(r2):
 
 
 def settled(pair, beyond):
-    """Whether nobody farther than this (m) is nearer than the nearest one."""
+    """Return True if no agent beyond this distance (m) can be the nearest one."""
     return pair.nearest2 <= beyond * beyond
 
 
@@ -99,7 +99,7 @@ def total(over_time):
 
 
 def faults(q, largest, edges):
-    """What is wrong with the parameters of the set beyond single ranges; largest: extension of the arena, m."""
+    """Return the errors of the parameters of the set beyond single ranges; largest: extension of the arena, m."""
     most = q.max_e if q.max_e is not None else largest
     if not most:
         return ["metrics.max_e is missing: without an arena the largest extension is unknown; give metrics.max_e in m"]

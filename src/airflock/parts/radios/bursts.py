@@ -28,7 +28,7 @@ class Parameters(PacketParameters):
 
 
 class Packet(NamedTuple):
-    """Whether the link of one pair is bad, 1 or 0."""
+    """State of the link of one pair: 1 if it is bad, else 0."""
 
     bad: float = 0.0
 

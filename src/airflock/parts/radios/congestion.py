@@ -38,7 +38,7 @@ def missed(talkers, fast, k):
 
 
 def missed_few(talkers, fast, k):
-    """The same for at most three packets."""
+    """Probability that nothing arrives, for at most three packets."""
     return thrice(collided(talkers, k), fast)
 
 

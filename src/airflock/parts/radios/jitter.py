@@ -21,7 +21,7 @@ class Parameters(PacketParameters):
 
 
 def late(u0, k):
-    """How much later than the delay a packet comes, s: exponential, cut off at `longest`."""
+    """Time by which a packet comes later than the delay, s: exponential, cut off at `longest`."""
     return min(-k.jitter * math.log(u0), k.longest)
 
 

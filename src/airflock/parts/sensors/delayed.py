@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 from airflock.core import SensorParameters, quantity
 
+# The states are kept in the Memory of the sensor, four measurements back, with cubic interpolation, since a ring of
+# states for one sensor would be one more mechanism.
 LONGEST = 4.0  # periods that the Memory reaches back
 
 
@@ -48,7 +50,7 @@ class Memory(NamedTuple):
 
 
 def exact(s):
-    """Whether it tells the truth: without a delay."""
+    """Return True if the sensor has no error: without a delay."""
     return s.lag == 0.0
 
 

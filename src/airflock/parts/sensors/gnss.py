@@ -1,4 +1,4 @@
-"""GNSS: a satellite receiver as its data sheet tells it, by standard deviations; with multipath jumps and outages."""
+"""GNSS: a satellite receiver as in its data sheet, by standard deviations; with multipath jumps and outages."""
 
 import math
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class Parameters(SensorParameters):
 
 
 class Memory(NamedTuple):
-    """What is kept of one receiver: errors (m, m/s) and times left (s)."""
+    """State of one receiver: errors (m, m/s) and times left (s)."""
 
     begun: float = 0.0
     bias_x: float = 0.0
@@ -74,7 +74,7 @@ class Memory(NamedTuple):
 
 
 def exact(s):
-    """Whether it tells the truth: without any error."""
+    """Return True if the sensor has no error."""
     quiet = s.sd == 0.0 and s.sd_up == 0.0 and s.white == 0.0 and s.bias == 0.0 and s.sd_velocity == 0.0
     jumps = s.jump_rate > 0.0 and s.jump_sd > 0.0
     outages = s.outage_rate > 0.0 and s.outage_time > 0.0 and s.coasting > 0.0
@@ -92,6 +92,8 @@ def measure(
     """
     sound = memory.begun > 0.5  # at the first measurement, the drift is drawn from its stationary distribution
     keep = math.exp(-period / s.drift_time) if sound else 0.0
+    # The exact factor for any period, and a first value from the stationary distribution: shares of time then have
+    # closed forms that tests compare with.
     push = math.sqrt(1.0 - keep * keep)
     dx = keep * memory.drift_x + s.sd * push * g0
     dy = keep * memory.drift_y + s.sd * push * g1
@@ -102,6 +104,7 @@ def measure(
     white = s.white if sound else 0.0
 
     left = max(memory.jump_left - period, 0.0)
+    # Half a period as the limit, so that rounding of the time left neither adds nor drops a measurement.
     if left < 0.5 * period:
         jumps = u0 < 1.0 - math.exp(-s.jump_rate * period) and sound
         left = s.jump_time if jumps else 0.0

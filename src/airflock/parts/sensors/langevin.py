@@ -25,7 +25,7 @@ class Parameters(SensorParameters):
 
 
 def exact(s):
-    """Whether it tells the truth: without noise."""
+    """Return True if the sensor has no error: without noise."""
     return s.noise == 0.0
 
 

@@ -11,7 +11,7 @@ class Parameters(SensorParameters):
 
 
 def exact(s):
-    """Whether it tells the truth: always."""
+    """Return True: this sensor has no error."""
     return True
 
 

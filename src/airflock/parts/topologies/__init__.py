@@ -1,4 +1,6 @@
-"""Topology: which of those whom an agent hears it meets. One kind per file, each a plain function over rows.
+"""Topologies: rules that select, among the heard neighbours of an agent, those that it meets.
+
+One kind per file, each a plain function over rows.
 
 A kind is handed, of all others, their offsets as the agent believes them and the squares of their distances, FAR (1e30)
 of whom it does not hear; it fills a row with 1.0 for whom it meets. All is judged by what the agent knows: its own

@@ -1,4 +1,4 @@
-"""What the section [topology] of a scenario holds."""
+"""Parameters of the section [topology] of a scenario."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ STARLINGS = "Ballerini et al. 2008: 6.5 ± 0.9 in flocks of starlings"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Which of the agents it hears an agent meets: all, the nearest, adjacent ones, visible ones, the strongest."""
+    """Selection of the heard agents that an agent meets: all, the nearest, adjacent, visible ones, the strongest."""
 
     kind: str = choice(
         "range",

@@ -1,4 +1,4 @@
-"""The topologies that a scenario can name: the key topology.kind. Whoever meets all whom it hears has none."""
+"""The topologies that a scenario can name: the key topology.kind. An agent that meets all it hears has none."""
 
 from airflock.core import Topology
 from airflock.parts.topologies import nearest, strongest, visible, voronoi

@@ -1,4 +1,4 @@
-"""Who can be seen: no other body, and nothing that stands in the world, lies on the straight way to its centre.
+"""Visible neighbours: no other body, and no shape of the world, lies on the straight path to their centre.
 
 Bodies are balls of one radius at the places where they are believed to be. One hides another if its centre is nearer
 and the way to the other's centre passes through it; a way that only touches is free. Our definition.

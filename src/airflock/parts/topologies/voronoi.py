@@ -11,7 +11,7 @@ side of the hull is no corner. Those at the very same place are met together. Ea
 
 from airflock.parts.topologies.ranking import HEARD_LIMIT
 
-STRAIGHT = 1e-5  # rad; what single precision can tell
+STRAIGHT = 1e-5  # rad; resolution of single precision
 SAME = 1e-9  # m²; so near that no cell divides the two
 
 
@@ -56,6 +56,8 @@ def meet(n, dx, dy, r2, met):
 
     dx, dy : offsets, m; r2 : their squares, m²
     """
+    # Neighbours are the corners of the convex hull of the inverted offsets d / |d|², the polar dual of the cell: open
+    # cells need no box, and nothing is sorted (gift wrapping, n steps for each neighbour).
     first = n
     for j in range(n):
         met[j] = 1.0 if r2[j] <= SAME else 0.0
@@ -65,6 +67,7 @@ def meet(n, dx, dy, r2, met):
         ax, ay = corner(first, n, dx, dy, r2)
         at = first
         turns = 0
+        # At most n turns, so that rounding cannot wrap round the hull for ever.
         while turns <= n:
             turns = turns + 1
             if at < n:

@@ -1,6 +1,6 @@
 """Outlines of fields as people have them: polygons of GeoJSON and KML files, in local metres.
 
-A file is untrusted: it is read through `untrusted`, and everything that is wrong with it is told at once.
+A file is untrusted: it is read through `untrusted`, and all its errors are raised together.
 """
 
 import math
@@ -220,7 +220,7 @@ def load_field(path: Path, *, simplify: float = 0.0, space: bool = False) -> Fie
 
 
 def _left_out(others: Sequence[Outline]) -> str:
-    """What a note says of shapes without an area, such as a tree that is a point."""
+    """Return a note on shapes without an area, such as a tree that is a point."""
     if not others:
         return ""
     several = f" and {len(others) - 1} more, no polygons, are" if len(others) > 1 else ", no polygon, is"
@@ -228,7 +228,7 @@ def _left_out(others: Sequence[Outline]) -> str:
 
 
 def _degrees(one: Outline) -> Iterator[str]:
-    """What is wrong with the rings of an outline as degrees."""
+    """Yield the errors of the rings of an outline as degrees."""
     for ring in (one.shell, *one.holes):
         if len(ring) < 3:
             yield f"{one.name}: a ring of {len(ring)} corners; a polygon needs at least 3"
@@ -293,7 +293,7 @@ def _ground(outlines: list[Outline], where: str, simplify: float, space: bool, l
 
 
 def _cut(shape: Polygon, plan: Polygon, most: float) -> Polygon:
-    """What must not be entered, cut off where it reaches outside of a field by no more than `most`, m.
+    """Cut a forbidden shape off where it reaches outside of a field by no more than `most`, m.
 
     A wood that ends where the field does is outside by the rounding of its coordinates, or by what corners moved.
     """
@@ -305,7 +305,7 @@ def _cut(shape: Polygon, plan: Polygon, most: float) -> Polygon:
 
 
 def _many(plan: Polygon) -> str:
-    """What a note says of an outline of many short sides, each of which laws feel for itself."""
+    """Return a note on an outline of many short sides, each of which laws feel for itself."""
     count, fewer = (len(shape.exterior.coords) - 1 for shape in (plan, plan.simplify(COARSE)))
     if count < MANY or 2 * fewer > count:
         return ""
@@ -313,7 +313,7 @@ def _many(plan: Polygon) -> str:
 
 
 def _faults(name: str, plan: Polygon, holes: Sequence[Polygon], solid: Sequence[Solid]) -> list[str]:
-    """What is wrong with the shapes of a field: of the arena and its plan, and of what must not be entered in it."""
+    """Return the errors of the shapes of a field: of the arena, its plan, and the forbidden shapes in it."""
     faults = [f"{name} {fault}" for fault in _shape_faults(plan)]
     for own, shape, _ in solid:
         of = "a hole of " if any(shape is hole for hole in holes) else ""

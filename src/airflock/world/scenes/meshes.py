@@ -116,7 +116,7 @@ def _loaded(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64]
 
 
 def closed_faces(mesh: Any) -> NDArray[np.bool_]:
-    """Which faces (face,) of a mesh belong to a closed surface: to a connected part without a free edge."""
+    """Return a mask (face,) of the faces of closed surfaces: of connected parts without a free edge."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -182,7 +182,7 @@ def read_mesh(path: Path) -> Any:
 
 
 def mesh_size_errors(p: scenery.Parameters, corners: NDArray[np.float64]) -> list[str]:
-    """What is wrong with the size of a mesh, one line each."""
+    """Return the errors of the size of a mesh, one line each."""
     size = float(np.ptp(corners, axis=0).max())
     if LEAST <= size <= MOST:
         return []

@@ -20,7 +20,7 @@ TALL_HEIGHT = 1e6  # m; half height of what has no end in height
 
 @dataclass(frozen=True)
 class Scene:
-    """What stands in a world.
+    """Shapes that stand in a world, with the tree over them.
 
     shapes : (shape, 18) rows as in `world.shapes`, in the order of the tree's leaves
     nodes  : (node, 6) bounds, m; links : (node, 3) skip, first, last as in `world.bvh`
@@ -39,7 +39,7 @@ class Scene:
 
     @cached_property
     def has_closed_surface(self) -> bool:
-        """Whether any surface closes around a position."""
+        """Return True if any surface can close around a position."""
         return bool((self.shapes[:, CLOSED] > 0.0).any())
 
     @property
@@ -260,7 +260,7 @@ def _faces(ring: tuple[tuple[float, ...], ...], low: float, high: float) -> list
 
 
 def appearance_times(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
-    """When each of so many shapes appears, s; 0: it stands from the start. A tree's trunk and crown come together."""
+    """Draw when each shape appears, s; 0 for the start. Trunk and crown of a tree come together."""
     parts = 2 if p.kind == "forest" else 1
     rng = np.random.default_rng([int(p.seed), 2])
     late, when = rng.uniform(0.0, 1.0, (2, count // parts))
@@ -274,7 +274,7 @@ def clearance(scene: Scene, position: Any, within: float = 1e6) -> float:
 
 
 def in_mesh(scene: Scene, position: Any) -> bool:
-    """Whether a position lies inside a closed mesh, in a plane inside its cut at height 0."""
+    """Return True if a position lies inside a closed mesh, in a plane inside its cut at height 0."""
     x, y, z = (float(c) for c in position)
     return scene.has_closed_surface and bool(inside(x, y, z, *_tables(scene)) > 0.5)
 
