@@ -181,7 +181,7 @@ class CudaBuilder(Builder):
         return super().kind(letter, fields)
 
     def named(self, letter: str) -> str:
-        """What the kernel calls a record of numbers; each law of the flock has its own p."""
+        """Name of a record of numbers in the kernel; each law of the flock has its own p."""
         return f"row_p{self.plan.law}" if letter == "p" and self.plan.law else f"row_{letter}"
 
     def cells(self) -> tuple[str, ...]:
@@ -198,7 +198,7 @@ class CudaBuilder(Builder):
         return shared_noise(lines) if self.draws_two_steps(name) and shared else lines
 
     def draws_two_steps(self, name: str) -> bool:
-        """Whether a stage draws the outer noise of two steps at once: in a plane four words are two steps."""
+        """Return True if a stage draws the outer noise of two steps at once: in a plane four words are two steps."""
         plan = self.plan
         return name == "move" and plan.dimensions == 2 and self.rule_asks(plan.body.move, "move", "gx", "gy", "gz")
 
@@ -254,6 +254,7 @@ class CudaBuilder(Builder):
         free = (free - set(tables)) | ({"work"} if tables else set())
         order = tuple(sorted(free))
         text = [*lines, *(line for s in body for line in ast.unparse(s).splitlines())]
+        # Threads of the last stage may still read the table of parts that this one writes.
         if "reduced" in read:
             text = ["cuda.syncthreads()", *text]
         if results:

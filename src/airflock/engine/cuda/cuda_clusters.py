@@ -1,4 +1,4 @@
-"""Clusters on a GPU: all agents of a block look at once who is linked to the cluster that grows.
+"""Clusters on a GPU: all agents of a block check at once if they are linked to the growing cluster.
 
 A cluster grows from its first agent, one hop per round, until a round brings nobody. Where states lie in registers each
 thread keeps the links of its agent as bits, so that a round reads a few words; else a round looks at all pairs.
@@ -119,7 +119,7 @@ def _grow_by_masks() -> list[str]:
 
 
 def _grow_by_pairs(build: Builder, metric: Metric) -> list[str]:
-    """The same from the rows of the table."""
+    """Lines that grow one cluster by all pairs of rows of the table."""
     axes = build.plan.axes
     root, link = _linked(build, metric)
     pair = [*_offset(build, "{a}[j]"), *root, f"hit = most(hit, (ONE if {link} & (mine[j] > HALF) else ZERO))"]
@@ -141,7 +141,7 @@ def _grow_by_pairs(build: Builder, metric: Metric) -> list[str]:
 def grown(
     mine: Any, size: Any, mean: Any, flock: FlockRows, numbers: Any, n: int, *, plan: Plan, metric: Metric
 ) -> Any:  # fmt: skip
-    """What the cluster rule says of the agents that `mine` marks with 1; mean : over the flock."""
+    """Call the cluster rule for the agents that `mine` marks with 1; mean : over the flock."""
     axes, h = range(plan.dimensions), flock.heading
     s, cx, cv, ch = vector(), vector(), vector(), vector()
     for a in axes:

@@ -59,7 +59,7 @@ def _hash(usual: Callable[..., int], flags: Any) -> int:
 
 
 def _equal(usual: Callable[..., Any], flags: Any, other: Any) -> Any:
-    """Whether all flags are the same."""
+    """Return True if all flags are equal."""
     return flags is other or usual(flags, other)
 
 

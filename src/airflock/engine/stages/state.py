@@ -120,7 +120,7 @@ class FlockRows:
 
     @cached_property
     def as_sent(self) -> "FlockRows":
-        """This flock with the faults of the moment when the data heard now were sent."""
+        """The flock with the faults of the moment when the data heard now were sent."""
         return FlockRows(self.take, self.dimensions, self.number, then=True)
 
     def fault(self, kind: str, column: str) -> Row:
