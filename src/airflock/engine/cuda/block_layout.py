@@ -6,7 +6,8 @@ WARP = 32
 MOST_THREADS = 1024  # of one block, on every GPU so far
 MOST_REGISTERED = 1024  # agents whose state stays in registers; more are kept in a table in the GPU's memory
 REGISTERS = 65_536  # of a multiprocessor, on every GPU so far
-# Measured on an H200: 128 registers spill nothing; 96 pay where a multiprocessor flies more than 16 flocks.
+# Measured on an H200: 128 registers spill nothing; 96 pay where a multiprocessor flies more than 16
+# flocks.
 ROOMY = 128  # of a thread where a multiprocessor has few flocks: nothing is spilled
 SATURATED = 96  # of a thread where flocks fill a GPU: some are spilled, none in a pair loop (counted for sm_90)
 MANY = 16  # blocks of 128 threads for a multiprocessor from which more warps are worth more than more registers

@@ -29,8 +29,8 @@ STAGES = (
     "snapshot", "perceive", "tune", "neighbours", "boundaries", "flock", "decide", "stop", "overrule", "move", "aim_",
     "glide_", "appear_", "measure_",
 )  # fmt: skip
-# Stages that a kernel has within others: in `move`, so that registers carry them over; in `neighbours`, whose rows of
-# one agent they read and write.
+# Stages that a kernel has within others: in `move`, so that registers carry them over; in
+# `neighbours`, whose rows of one agent they read and write.
 WITHIN = {"noise": "move", "gusts": "move", "meet": "neighbours"}
 PAIR_ROWS = ("away0", "away1", "away2", "square", "hidden", "fade", "met", "heap", "weak")  # rows over the others
 MAX_TOTALS = 24  # totals that one stage reduces at once, at most
@@ -84,7 +84,7 @@ class CudaBuilder(Builder):
             "four_high",
         }
 
-    # -------------------------------------------------------------------------------- what the passes call
+    # ------------------------------------------------------------------------- what the passes call
 
     def bind_rows(self, names: Iterable[str]) -> list[str]:
         """Rows are registers, or bound by the stage."""
@@ -145,7 +145,7 @@ class CudaBuilder(Builder):
         """Clusters are found by all threads of a block together."""
         return cluster_lines(self, metric)
 
-    # ---------------------------------------------------------------------------------------------- lowering
+    # ------------------------------------------------------------------------------------- lowering
 
     def module_names(self) -> set[str]:
         """Names of the driver module."""

@@ -28,7 +28,7 @@ from airflock.engine.stages.words import REDUCTION_START, ZERO
 from airflock.engine.tables import WorldTables
 from airflock.scenarios import FORMATIONS
 
-# ------------------------------------------------------------------------------------------------------- the start
+# ---------------------------------------------------------------------------------------- the start
 
 
 def table_widths(build: CudaBuilder) -> dict[str, int]:
@@ -68,7 +68,8 @@ def begin_lines(build: CudaBuilder) -> list[str]:
     gap = " + ".join(
         f"(s_{a} - {position_text(build, 'j', a)}) * (s_{a} - {position_text(build, 'j', a)})" for a in axes
     )
-    # Agents take places one after another, but all threads test one place against those before it, and vote.
+    # Agents take places one after another, but all threads test one place against those before it,
+    # and vote.
     near = loop_lines(
         "j in range(tid, e, THREADS)",
         branch_lines(f"{gap} < row_w.separation * row_w.separation", ["crowded = integer(1)"]),
@@ -129,7 +130,7 @@ def _heard_at_start(build: CudaBuilder) -> list[str]:
     return loop_lines("slot in range(slots)", [build.stages["snapshot"].call()])
 
 
-# --------------------------------------------------------------------------------------------- what a thread holds
+# ------------------------------------------------------------------------------ what a thread holds
 
 
 def memory_lines(build: CudaBuilder) -> list[str]:
@@ -181,8 +182,8 @@ def _across(build: CudaBuilder) -> list[str]:
 
 def _scratch(plan: Plan) -> list[str]:
     """Scratch of the rules of the whole flock: rows of one table, each array the rows from its first on; zeros."""
-    # Kernels have few arguments: all scratch of a flock lies in one table as wide as the widest array, 82 kB for five
-    # wings.
+    # Kernels have few arguments: all scratch of a flock lies in one table as wide as the widest
+    # array, 82 kB for five wings.
     sizes = flock.scratch_sizes(plan, None, 1)
     if not sizes:
         return []
@@ -248,7 +249,7 @@ def _first_value(build: CudaBuilder, name: str) -> str:
     return f"real({starts[int(kept[2])]})"
 
 
-# ----------------------------------------------------------------------------- faults, and agents that come and go
+# -------------------------------------------------------------- faults, and agents that come and go
 
 
 STEP, KIND, AGENT, LEAVES = range(4)  # columns of the table of whole numbers; that of reals: how long, then numbers
@@ -286,8 +287,8 @@ def begin_fault_lines(build: CudaBuilder) -> list[str]:
     """Lines that let begin what is due before a step."""
     if not build.plan.faults:
         return []
-    # A launch flies the whole flight, so there is no place between two steps for Python: onsets are drawn before the
-    # launch.
+    # A launch flies the whole flight, so there is no place between two steps for Python: onsets are
+    # drawn before the launch.
     number = f"integer({own_row(build, 'order')})" if build.slots else "i"
     hit: list[str] = []
     for place, kind in enumerate(build.plan.faults):
@@ -323,8 +324,8 @@ def _leave(build: CudaBuilder) -> list[str]:
         *agent_loop(build, find),
     ]
     lines += ["cuda.syncthreads()", "gone = integer(found[0])", "last = integer(n - 1)"]
-    # As on a CPU, agents behind the one that leaves move up by one. A mark tested in every loop would touch each
-    # metric.
+    # As on a CPU, agents behind the one that leaves move up by one. A mark tested in every loop
+    # would touch each metric.
     up = _in_registers(build) if registers else _in_tables()
     up += _shifted("past", "slots * past.shape[1]", "e // past.shape[1], e % past.shape[1], {c}") if plan.late else []
     if plan.packets:
@@ -370,7 +371,7 @@ def _shifted(table: str, rows: str, place: str) -> list[str]:
     return loop_lines(f"e in range(tid, {rows}, THREADS)", body)
 
 
-# ------------------------------------------------------------------------------------------------------ the kernel
+# --------------------------------------------------------------------------------------- the kernel
 
 
 ARGUMENTS = (
@@ -393,7 +394,7 @@ def flight_text(plan: Plan, shape: BlockLayout) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-# ------------------------------------------------------------------------------------------------------------ time
+# --------------------------------------------------------------------------------------------- time
 
 
 def _time(build: CudaBuilder) -> list[str]:
@@ -429,7 +430,8 @@ def _time(build: CudaBuilder) -> list[str]:
 
 def _next(build: CudaBuilder) -> list[str]:
     """The next step at which anything is due but motion, and a look for collisions."""
-    # A step tests once if anything is due: four counters with a branch each were a fifth of a motion step.
+    # A step tests once if anything is due: four counters with a branch each were a fifth of a
+    # motion step.
     due = ["next_sample"] if build.plan.sequential else ["next_decide", "next_sample"]
     found = due[0]
     for other in [*due[1:], *["next_hear"] * build.plan.late]:
@@ -574,8 +576,8 @@ def _added(build: CudaBuilder, clock: str) -> list[str]:
     lines = []
     for c, (_, how, when) in enumerate(sampled_columns(build.plan.metrics)):
         if when == clock:
-            # Sums over a flight go to two numbers (Kahan): in single precision a plain sum of many samples loses
-            # digits.
+            # Sums over a flight go to two numbers (Kahan): in single precision a plain sum of many
+            # samples loses digits.
             add = f"totals[{c}, 0], totals[{c}, 1] = add_exactly(totals[{c}, 0], totals[{c}, 1], value{c})"
             kept = f"totals[{c}, 0] = {'least' if how == 'min' else 'most'}(totals[{c}, 0], value{c})"
             lines += [add if how in ("mean", "sum") else kept]

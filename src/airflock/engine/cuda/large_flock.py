@@ -36,11 +36,12 @@ from airflock.engine.totals import combine_sums
 from airflock.scenarios import FORMATIONS, Scenario, step_counts
 from airflock.support import DeviceError, cuda_runtime, free_gpu_memory, is_simulated, require_gpu
 
-# ---------------------------------------------------------------------------------------------- sorting into cells
+# ------------------------------------------------------------------------------- sorting into cells
 
 
-# Rows of near are two vectors of four. A compiler that knows nothing of their place loads number by number, seven times
-# as often: one instruction of the GPU loads four. (Tables begin at multiples of 256 bytes.)
+# Rows of near are two vectors of four. A compiler that knows nothing of their place loads number by
+# number, seven times as often: one instruction of the GPU loads four. (Tables begin at multiples of
+# 256 bytes.)
 LOAD_FOURS_TEXT = """
 from llvmlite import ir
 from numba.cuda import types
@@ -79,8 +80,8 @@ def four_low(table, row):
 def four_high(table, row):
     return table[row, 4], table[row, 5], table[row, 6], table[row, 7]
 """
-# An agent's place in its cell is the number of lower-numbered agents there: atomic ranks would change last bits from
-# run to run. A loop over one cell is short.
+# An agent's place in its cell is the number of lower-numbered agents there: atomic ranks would
+# change last bits from run to run. A loop over one cell is short.
 SORT_TEXT = """
 @njit()
 def cell_along(x, low, size, count):
@@ -173,7 +174,7 @@ def copy_agents(near, rest, cell, starts, listed, sorted_, rest_sorted):
 """
 
 
-# ---------------------------------------------------------------------------------------------- text of the driver
+# ------------------------------------------------------------------------------- text of the driver
 
 
 NEIGHBOUR_COLUMNS = 8  # columns of the table that neighbours read: x y z number, vx vy vz nothing
@@ -188,9 +189,9 @@ AROUND = (
     "first = low_x; last = high_x; base_x = own_x",
     "{across}",
 )
-# Across a face of a periodic box neighbours are met at their image: where the agent would be, seen from there.
-# The agent is moved by a box once per row of cells instead of folding every offset: a quarter of a pair's
-# instructions.
+# Across a face of a periodic box neighbours are met at their image: where the agent would be, seen
+# from there. The agent is moved by a box once per row of cells instead of folding every offset: a
+# quarter of a pair's instructions.
 IMAGE = (
     "base_{a} = own_{a} + (row_w.half_{a} * real(2.0) if q{a} < count[{c}] else "
     "(row_w.half_{a} * real(-2.0) if q{a} >= 2 * count[{c}] else ZERO))"
@@ -316,8 +317,8 @@ def _advance(build: CellBuilder) -> list[str]:
     body += [f"{r} = {'u32(0)' if r[0] == 'u' and r[1].isdigit() else 'ZERO'}" for r in registers if r not in state]
     load = [f"{name} = {table}[slot, {c}]" for name, (table, c) in state.items()]
     fetch = [f"{name} = {sorted_[table]}[slot, {c}]" for name, (table, c) in state.items()]
-    # Between decisions agents stay where the last sort put them: only a decision reads the sorted tables and writes
-    # back in their order.
+    # Between decisions agents stay where the last sort put them: only a decision reads the sorted
+    # tables and writes back in their order.
     meet = ["i = integer(sorted_[slot, 3])", *fetch, *_edges(build)]
     meet += ["number = step // decide_every"]
     meet += [build.stages[name].call(k_="number") for name in _stages(build)[:-1]]
@@ -365,7 +366,7 @@ def signatures(bits: int) -> dict[str, tuple[Any, ...]]:
     }
 
 
-# --------------------------------------------------------------------------------------------------------- flights
+# ------------------------------------------------------------------------------------------ flights
 
 
 CELLS = 4  # at most so many cells per agent, as on the CPU
@@ -505,8 +506,8 @@ class LargeFlock:
             for name, grid in (("count_agents", each), ("sum_within", scan), ("sum_before", scan),
                                ("list_agents", most), ("copy_agents", each), ("advance", each))
         )  # fmt: skip
-        # Five small kernels sort at each decision; launches follow each other on one stream, so nothing waits on the
-        # host.
+        # Five small kernels sort at each decision; launches follow each other on one stream, so
+        # nothing waits on the host.
         for _ in range(steps):
             meet = self.step % self.times["decide_every"] == 0
             if meet:

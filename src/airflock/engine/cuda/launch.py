@@ -25,7 +25,7 @@ from airflock.engine.totals import combine_sums, goal_times
 from airflock.scenarios import largest_fitting
 from airflock.support import DeviceError, cuda_runtime, free_gpu_memory, is_simulated, multiprocessor_count, require_gpu
 
-# ---------------------------------------------------------------------------------------------------------- memory
+# ------------------------------------------------------------------------------------------- memory
 
 
 MAX_MEMORY_SHARE = 0.9  # of the free memory that may be used
@@ -86,8 +86,8 @@ def lacking(plan: Plan, rows: int, tables: WorldTables, free: int) -> str | None
     def bytes_of(n: int) -> int:
         return needed_bytes(plan, rows, layout_of(plan, n, 1), tables.changed(agents=n))
 
-    # Memory is computed before anything flies, with the sizes that a launch allocates, so a refusal can say what
-    # fits.
+    # Memory is computed before anything flies, with the sizes that a launch allocates, so a refusal
+    # can say what fits.
     if bytes_of(agents) <= room:
         return None
     return memory_message(agents, bytes_of(agents), room, largest_fitting(agents, lambda n: bytes_of(n) <= room))
@@ -101,7 +101,7 @@ def memory_message(agents: int, bytes_: int, room: int, fitting_agents: int) -> 
     )
 
 
-# -------------------------------------------------------------------------------------------------------- launches
+# ----------------------------------------------------------------------------------------- launches
 
 
 AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress
@@ -130,7 +130,8 @@ def fly_many(
     """
     require_gpu(shape is not None and shape.simulated)
     groups: dict[Any, list[int]] = {}
-    # One launch flies flocks of one shape; jobs are sorted into such groups and results put back in their order.
+    # One launch flies flocks of one shape; jobs are sorted into such groups and results put back in
+    # their order.
     for number, tables in enumerate(jobs):
         groups.setdefault(_alike(plan, tables), []).append(number)
     flown_by: dict[int, DriverResult] = {}

@@ -21,7 +21,7 @@ from airflock.engine.replace import ReplacementError
 from airflock.engine.specialise.local_names import read_names, written_names
 from airflock.engine.stages.words import REDUCTION_START
 
-# ------------------------------------------------------------------------------------------------------------ rows
+# --------------------------------------------------------------------------------------------- rows
 
 
 PER_AGENT_TABLES = {"mem": "mem", "memory": "kept"}  # second index is the agent
@@ -198,7 +198,7 @@ class OwnRegisters(ast.NodeTransformer):
         return node
 
 
-# ------------------------------------------------------------------------------------------------ loops and totals
+# --------------------------------------------------------------------------------- loops and totals
 
 
 NEUTRAL = {how: start.spelled for how, start in REDUCTION_START.items()}
@@ -256,9 +256,9 @@ class _Totals:
             self.waiting |= totals
         if context.turn:
             return body
-        # One thread per agent wherever a flock is larger than a warp: threads that share pairs cost more than they
-        # save. A layout whose threads reach a sum in different turns is refused: on a card they wait for ever, which
-        # the simulator does not show.
+        # One thread per agent wherever a flock is larger than a warp: threads that share pairs cost
+        # more than they save. A layout whose threads reach a sum in different turns is refused: on
+        # a card they wait for ever, which the simulator does not show.
         if shape.registers:
             if not paired:
                 masked = parse_lines(f"{t} = {t} if sub == 0 else {NEUTRAL[totals[t]]}" for t in totals)
@@ -280,7 +280,8 @@ class _Totals:
         """Reduce all waiting totals over the block, so that every thread holds them."""
         if not self.waiting:
             return []
-        # Totals wait and are reduced together when one is read: each reduction costs a barrier for the whole block.
+        # Totals wait and are reduced together when one is read: each reduction costs a barrier for
+        # the whole block.
         shape, names = self.context.shape, list(self.waiting)
         lane, side = ("tid & 31", "tid >> 5") if not shape.simulated else ("0", "tid")
         side_ = self.count % 2  # one half is read while the other is written
@@ -338,7 +339,8 @@ class _Pairs:
             inner += [*(f"    {line}" for line in _by_fours(text)), "    j = np.uint32(j + np.uint32(1))"]
             return parse_lines([*around, *(f"{depth}{line}" for line in inner)])
         step = "j = np.uint32(j + np.uint32(PER_AGENT))"
-        # Unrolled by hand: two pairs a turn hide the wait for the shared table, four cost registers and were slower.
+        # Unrolled by hand: two pairs a turn hide the wait for the shared table, four cost registers
+        # and were slower.
         turns = max(1, min(UNROLL, shape.lanes // shape.per_agent))
         once = [f"    {line}" for line in [*text.splitlines(), step]]
         loops = ["j = np.uint32(sub)", "while j < np.uint32(n):", *(once * turns)]
@@ -366,8 +368,8 @@ def carried_totals(body: list[ast.stmt]) -> dict[str, str]:
     """Scalars that a loop carries from turn to turn, and how: sum, min or max."""
     found: dict[str, str] = {}
     stored: set[str] = set()
-    # A scalar is carried if its first use in the loop adds to itself; one that is assigned before belongs to the
-    # turn.
+    # A scalar is carried if its first use in the loop adds to itself; one that is assigned before
+    # belongs to the turn.
     for statement in body:
         if isinstance(statement, ast.AugAssign) and isinstance(statement.target, ast.Name):
             if statement.target.id not in stored:
@@ -408,7 +410,7 @@ def used_names(statements: list[ast.stmt]) -> tuple[set[str], set[str]]:
     return read_names(statements) | written_names(sums), written_names(statements)
 
 
-# ----------------------------------------------------------------------------------------------------- reciprocals
+# -------------------------------------------------------------------------------------- reciprocals
 
 
 PREFIX = "per_"
@@ -557,7 +559,8 @@ def with_reciprocals(
     records : names of the records of numbers that the stage reads
     """
     roots = {name for s in body for item in walk_tree(s) if (name := root_name(item)) is not None}
-    # A name that is a root in one place and something else in another is left alone: its reciprocal was stale once.
+    # A name that is a root in one place and something else in another is left alone: its reciprocal
+    # was stale once.
     roots -= {name for s in body for item in walk_tree(s) for name in otherwise_assigned(item)}
 
     def known(expression: ast.expr) -> str | None:

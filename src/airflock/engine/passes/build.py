@@ -16,7 +16,8 @@ from airflock.engine.text.rewrite import law_suffix
 
 JIT_DECORATOR = "@njit(**JIT)"
 ONCE = "@njit(**ONCE)"
-# what names of rows begin with that only numbers that differ need, and faults of motion, radio and clock
+# what names of rows begin with that only numbers that differ need, and faults of motion, radio and
+# clock
 FEW = (FAULT_PREFIX, NUMBER_PREFIX, "unhindered_", "reach_", "clock", "sent_clock")
 
 
@@ -69,7 +70,8 @@ class Builder:
             name = name[1:]
         if not plan.told and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
             name = name[1:]
-        # Negative numbers count from the end of the table, whose length is known only when all stages are made.
+        # Negative numbers count from the end of the table, whose length is known only when all
+        # stages are made.
         if self.puts_rare_rows_last and (name.startswith(FEW) or (name == "order" and not plan.grid)):
             return self.last.setdefault(name, -1 - len(self.last))
         return self.first.setdefault(name, len(self.first))
@@ -166,8 +168,9 @@ class Builder:
 
         apart : the rows that it reads once become arguments, which the compiler then knows to lie apart in memory
         """
-        # Most stages are one function. Two cases split them: rows as arguments that lie apart, and turns, where the
-        # bindings are shared by all agents and only the body is called once for each.
+        # Most stages are one function. Two cases split them: rows as arguments that lie apart, and
+        # turns, where the bindings are shared by all agents and only the body is called once for
+        # each.
         if not self.plan.sequential and not (apart and self.apart):
             spread = self.plan.grid and name == f"decide{self.mark}"
             body = checked_replace(body, "i in range(n)", "i in prange(n)") if spread else body

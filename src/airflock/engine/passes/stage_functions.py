@@ -41,7 +41,7 @@ from airflock.engine.stages.near import ROUNDING_MARGIN, pairs_by_cells
 from airflock.engine.stages.words import IdentityRow, nonzero_fields, rule_asks
 from airflock.scenarios import FORMATIONS
 
-# -------------------------------------------------------------------- whether a driver looks for collisions at all
+# ----------------------------------------------------- whether a driver looks for collisions at all
 
 
 def skippable_metrics(plan: Plan) -> tuple[MeasuredMetric, ...]:
@@ -67,7 +67,7 @@ def add_nearest(build: Builder) -> None:
         build.function("nearest(n, m, row, whole, work)", made.lines, f"return {made.answer}", once=True)
 
 
-# --------------------------------------------------------------------------------- random words and normal numbers
+# ------------------------------------------------------------------ random words and normal numbers
 
 
 def add_draw(build: Builder) -> noise.Draw:
@@ -101,7 +101,7 @@ def _draw(build: Builder, name: str, by_place: bool) -> None:
     )
 
 
-# -------------------------------------------------------------------------------- what an agent measures and hears
+# ----------------------------------------------------------------- what an agent measures and hears
 
 
 MEET_ARGUMENTS = "i, k_, n, m, row, whole, work"  # what the stage is called with
@@ -156,7 +156,7 @@ def add_receive(build: Builder) -> None:
     build.function(RECEIVE_CALLS[build.draws_per_pair], made.lines, f"return {made.answer}")
 
 
-# ------------------------------------------------------------------------ the record that a law reads of its world
+# --------------------------------------------------------- the record that a law reads of its world
 
 
 FIELDS = ("half_x", "half_y", "half_z", "agent", "step", "world", "seed_low", "seed_high", "corners", "obstacles")
@@ -185,7 +185,7 @@ def add_methods(build: Builder) -> None:
         build.function(f"{marked[name]}({arguments})", made.lines, f"return {made.answer}")
 
 
-# --------------------------------------------------------------------------------------------- neighbours and laws
+# ------------------------------------------------------------------------------ neighbours and laws
 
 
 def add_neighbours(build: Builder) -> None:
@@ -245,7 +245,7 @@ def _asked(build: Builder, sums: list[int]) -> list[int]:
     return [c for c in sums if f".{fields[c]}" in text] if "sums[" not in text and "*sums" not in text else sums
 
 
-# ------------------------------------------------------------------------------------------------ start and motion
+# --------------------------------------------------------------------------------- start and motion
 
 
 NOISE, GUSTS = "step, m, row, whole, work, words", "step, row, whole, gust"  # what these stages are called with
@@ -303,15 +303,16 @@ def add_move(build: Builder) -> None:
         else:
             once = inline_lines(once, name, lines)
     lanes = ", hurt_first, hurt_end" * struck
-    # Rows are parts of one table, so LLVM compares the places of all rows before each loop (217 instructions before a
-    # loop of 59). As arguments marked noalias they need no comparison: 120 s of 30 drones, 3.9 -> 2.9 ms.
+    # Rows are parts of one table, so LLVM compares the places of all rows before each loop (217
+    # instructions before a loop of 59). As arguments marked noalias they need no comparison: 120 s
+    # of 30 drones, 3.9 -> 2.9 ms.
     many = bool(plan.suffers("motion")) and not plan.body.Memory
     held = "held, " * uses_drift(build)
     head = f"step, n, m, {held}row, whole, work, words, gust{lanes}"
     build.stage("move", head, once, made.body, made.answer, apart=many)
 
 
-# ------------------------------------------------------------------------------------------------ order parameters
+# --------------------------------------------------------------------------------- order parameters
 
 
 AVERAGED = {"x": {"x", "y", "z"}, "v": {"vx", "vy", "vz"}, "h": {"hx", "hy", "hz"}}  # fields of a mean
@@ -350,8 +351,8 @@ def add_measure(build: Builder, clock: str) -> None:
         clustered=clustered,
     )
     lines = made.lines
-    # A metric with a rule for the whole flock stands in the lines of the stage, in place of its call, so that a
-    # kernel keeps its rows in registers.
+    # A metric with a rule for the whole flock stands in the lines of the stage, in place of its
+    # call, so that a kernel keeps its rows in registers.
     for name, part in parts.items():
         lines = inline_lines(lines, name, part)
     cells = near or any(links_by_cells(build, one.metric) for one in metrics)
@@ -370,7 +371,8 @@ def needs_headings(metrics: tuple[MeasuredMetric, ...]) -> bool:
 
 def needed_means(metrics: tuple[MeasuredMetric, ...]) -> str:
     """Of what rules read a mean over the flock: position x, velocity v, heading h."""
-    # Reads the text of rules to find which means are used: on a GPU each unread mean is a shuffle in every sample.
+    # Reads the text of rules to find which means are used: on a GPU each unread mean is a shuffle
+    # in every sample.
     found: set[str] = set()
     for one in metrics:
         for rule in (one.metric.agent, one.metric.member, one.metric.cluster, one.metric.sample):
@@ -398,8 +400,8 @@ def links_by_cells(build: Builder, metric: Metric) -> bool:
 def add_clusters(build: Builder, metric: Metric, parts: dict[str, list[str]]) -> Any:
     """Return the stage or the call that finds the clusters of a metric; lines in place of a call go to `parts`."""
     name = f"clusters_{metric.name}"
-    # Three ways to the same clusters: by cells in a large flock, by all threads of a block on a GPU, else agent by
-    # agent.
+    # Three ways to the same clusters: by cells in a large flock, by all threads of a block on a
+    # GPU, else agent by agent.
     if links_by_cells(build, metric):
         assert metric.linked_within is not None
         reach = f"least({build.call(metric.linked_within, 'linked_within', {})} / real({ROUNDING_MARGIN}), LIMIT)"
@@ -414,7 +416,7 @@ def add_clusters(build: Builder, metric: Metric, parts: dict[str, list[str]]) ->
     return sum_clusters
 
 
-# ---------------------------------------------------------------------- stages that become functions as they stand
+# ------------------------------------------------------- stages that become functions as they stand
 
 
 class PlainStage(NamedTuple):

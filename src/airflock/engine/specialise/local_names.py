@@ -13,7 +13,7 @@ from typing import Any
 from airflock.core import walk_tree
 from airflock.engine.specialise.known_values import FunctionSyntax, name_kind
 
-# -------------------------------------------------------------------------------- names that two texts would share
+# ----------------------------------------------------------------- names that two texts would share
 
 
 TABLES = frozenset({"work", "row", "whole", "words", "store", "scene", "scratch"})  # what bindings of a driver read
@@ -49,8 +49,8 @@ class LocalOwners:
         parts: list[ast.AST] = [*statements, *([] if answer is None else [answer])]
         names = [item for part in parts for item in walk_tree(part) if isinstance(item, ast.Name)]
         bound = {item.id for item in names if name_kind(item) not in (None, "rule")} | TABLES
-        # A helper's statements stand in place of its call; a local that the driver binds itself would silently
-        # overwrite it.
+        # A helper's statements stand in place of its call; a local that the driver binds itself
+        # would silently overwrite it.
         clash = sorted(bound.intersection(item.id for item in names if isinstance(item.ctx, ast.Store)))
         if clash:
             raise make_error(f"{clash[0]} is what the driver itself calls here; give the local another name")
@@ -60,8 +60,8 @@ class LocalOwners:
         for name in marked:
             if found[name] in bound:
                 found[name] = self._free(name, taken)
-        # One name at a time gets its owner behind it, and the walk begins again: renaming one local may settle
-        # several clashes, and short names stay short.
+        # One name at a time gets its owner behind it, and the walk begins again: renaming one local
+        # may settle several clashes, and short names stay short.
         while overwritten := _Order(found).overwritten(statements, answer):
             name = max(overwritten, key=lambda each: int((MARK.findall(each) or ["0"])[-1]))
             found[name] = self._free(name, taken)
@@ -114,7 +114,8 @@ class _Order:
     def _loop(self, loop: ast.For | ast.While, written: LastWriters) -> None:
         """A loop, done never, once, or again after itself."""
         outside, self.left = self.left, []
-        # Twice, as the second turn reads what the first has written; a third would find nothing new.
+        # Twice, as the second turn reads what the first has written; a third would find nothing
+        # new.
         for _ in range(2):
             again = {name: {*who} for name, who in written.items()}
             if isinstance(loop, ast.For):
@@ -187,7 +188,7 @@ def _copies(statement: ast.stmt, to: str, name: str) -> bool:
     return names == [to, name]
 
 
-# ------------------------------------------------------------------------------------ statements that nobody reads
+# --------------------------------------------------------------------- statements that nobody reads
 
 
 def read_names(nodes: Iterable[ast.AST]) -> set[str]:
@@ -212,7 +213,8 @@ def without_dead(statements: list[ast.stmt], kept: set[str]) -> list[ast.stmt]:
 
     kept : names that are read elsewhere
     """
-    # A variable may be read only by a statement that is itself dead, so passes go on until one removes nothing.
+    # A variable may be read only by a statement that is itself dead, so passes go on until one
+    # removes nothing.
     while True:
         needed, count = read_names(statements) | kept, [0]
         statements = _without(statements, needed, count)

@@ -48,7 +48,7 @@ from airflock.engine.stages.records import SortedCells, WorldArrays
 from airflock.engine.stages.state import SCENE_ARRAYS, FlockRows, own_row
 from airflock.engine.stages.words import IdentityRow, NamedConstant, ZeroRow
 
-# ----------------------------------------------------------------------------------------------------- expressions
+# -------------------------------------------------------------------------------------- expressions
 
 
 # of the driver, whatever they are called with
@@ -175,7 +175,8 @@ class ExpressionSpecialiser:
         ends = isinstance(node.op, ast.Or)  # a known value that ends it
         left: list[ast.expr] = []
         value: object = not ends
-        # Known operands vanish as Python would stop or go on at them; what is left is a test of the driver.
+        # Known operands vanish as Python would stop or go on at them; what is left is a test of the
+        # driver.
         for part in node.values:
             value = self.value(part, scope)
             if is_syntax(value):
@@ -345,7 +346,7 @@ def _record(value: object) -> bool:
     return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields")
 
 
-# ------------------------------------------------------------------------------------------------------ statements
+# --------------------------------------------------------------------------------------- statements
 
 
 TABLE_PREFIXES = {
@@ -472,8 +473,8 @@ class StatementSpecialiser(ExpressionSpecialiser):
         """Statements of a helper in place of its call, and the expression that it returns, as the helper knows it."""
         inner = self.helper_scope(called, node, self._items(node.args, scope), scope)
         *body, last = inner.text.body
-        # The result is not a variable of its own where it need not be: the caller looks at the returned expression in
-        # the scope of the helper.
+        # The result is not a variable of its own where it need not be: the caller looks at the
+        # returned expression in the scope of the helper.
         done = self.copied_variables(inner)
         if isinstance(last, ast.Return) and last.value is not None:
             done, answer = done + self.block(body, inner), (last.value, inner)
@@ -496,8 +497,8 @@ class StatementSpecialiser(ExpressionSpecialiser):
     def loop(self, node: ast.For, scope: Scope) -> list[ast.stmt]:
         """A loop: unrolled where it is known, over agents, or as it stands."""
         over = self.value(node.iter, scope)
-        # Loops over axes and fields are written out, loops over agents never: what the plan fixes must not cost at
-        # run time.
+        # Loops over axes and fields are written out, loops over agents never: what the plan fixes
+        # must not cost at run time.
         if isinstance(over, UNROLLED):
             done: list[ast.stmt] = []
             for item in over:
@@ -527,7 +528,8 @@ class StatementSpecialiser(ExpressionSpecialiser):
             first, end = within
             inside: list[ast.expr] = [ast.Compare(first, [ast.LtE()], [lane]), ast.Compare(lane, [ast.Lt()], [end])]
             return _loop(target, [ast.Name(over.bound, LOAD)], [ast.If(ast.BoolOp(ast.And(), inside), done, [])])
-        # a lane that cannot be negative is not asked whether it counts from a row's end: else no loop is a vector's
+        # a lane that cannot be negative is not asked whether it counts from a row's end: else no
+        # loop is a vector's
         return _loop(target, [ast.Call(ast.Name("u64", LOAD), [each], []) for each in within], done)
 
     def loop_over_law(self, over: AgentLoop, node: ast.For, scope: Scope) -> list[ast.stmt]:
@@ -604,7 +606,7 @@ def _name(node: ast.expr) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-# --------------------------------------------------------------------------------------------- the text of a stage
+# ------------------------------------------------------------------------------ the text of a stage
 
 
 @dataclass(frozen=True)
@@ -643,7 +645,7 @@ def lines_of(statements: list[ast.stmt]) -> list[str]:
     return [line for statement in statements for line in ast.unparse(statement).splitlines()]
 
 
-# --------------------------------------------------------------------------------------------------- a whole stage
+# ------------------------------------------------------------------------------------ a whole stage
 
 
 def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> SpecialisedText:
@@ -657,8 +659,8 @@ def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> Sp
     made.owners.assign_names([*once, *body], answer, lambda told: StageError(f"{where}: {stage.__name__}: {told}"))
     kept = read_names([answer]) if answer is not None else set()
     kept |= {name for value in known.values() if isinstance(value, LocalVector) for name in value.set.values()}
-    # Tests of the plan leave variables that nobody reads; a compiler would drop them, but a reader of a driver and a
-    # GPU kernel's argument list would not.
+    # Tests of the plan leave variables that nobody reads; a compiler would drop them, but a reader
+    # of a driver and a GPU kernel's argument list would not.
     whole = without_dead([*once, *body], kept)
     first = {id(statement) for statement in once}
     parts = whole if answer is None else [*whole, answer]

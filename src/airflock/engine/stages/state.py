@@ -12,10 +12,11 @@ from airflock.engine.stages.words import ZERO_ROW, IdentityRow, field_indices
 Row = Any  # one number per agent: row[i]
 FAULT_PREFIX = "fault_"  # what names of rows with numbers of a fault begin with
 NUMBER_PREFIX = "number_"  # those of rows with a number that differs among agents
-# The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts
-# (rays cast at this decision, whether positions before are known); goals, aim (where the goal is, its number) and
-# reached (time of each, s; -1 before); later (bounds, time and number of each shape that is yet to appear; time -1 once
-# it has). A shape that is not there yet has its bounds far away, so that nothing meets it.
+# The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered
+# shapes; counts (rays cast at this decision, whether positions before are known); goals, aim (where
+# the goal is, its number) and reached (time of each, s; -1 before); later (bounds, time and number
+# of each shape that is yet to appear; time -1 once it has). A shape that is not there yet has its
+# bounds far away, so that nothing meets it.
 SCENE_ARRAYS = ("shapes", "nodes", "links", "near", "counts", "goals", "aim", "reached", "later")
 
 

@@ -94,8 +94,8 @@ class TextCache:
             known = self._kept.get(key, ())
             if known:
                 self._kept.move_to_end(key)
-        # Answers are compared outside the lock: a comparison may write texts of called rules, which takes the lock
-        # again.
+        # Answers are compared outside the lock: a comparison may write texts of called rules, which
+        # takes the lock again.
         return next((text for asked, text in known if recorder.hold(asked)), None)
 
     def keep(self, key: Hashable, recorder: DependencyRecorder, text: str) -> None:

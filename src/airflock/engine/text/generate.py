@@ -67,7 +67,8 @@ class DriverSource:
         chosen : arguments of the function that are choices, by name; they become constants of its text
         """
         key = (item, *chosen.items()) if chosen else item
-        # Two laws share the texts of rules, except of those that read their own parameters or percept.
+        # Two laws share the texts of rules, except of those that read their own parameters or
+        # percept.
         if self.law and inspect.isfunction(item) and {"p", "percept"} & set(item.__code__.co_varnames):
             key = (self.law, key)
         if key in self._names:
@@ -138,11 +139,13 @@ class DriverSource:
             node.body.pop(0)
         rewritten = RuleRewriter(rule, self, chosen, notes).visit(node)
         _end_at_return(rewritten)
-        # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
-        # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
+        # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is
+        # unrolled and vectorised across its few scalars, and the loop over agents around it no
+        # longer is (philox: 4 times slower).
         loops = any(isinstance(item, (ast.For, ast.While)) for item in walk_tree(node))
         decorator = INLINED if loops and self.decorator and not self._apart else self.decorator
-        # Deep loops, and rules with scratch, are compiled once on their own: inlined at each call they took minutes.
+        # Deep loops, and rules with scratch, are compiled once on their own: inlined at each call
+        # they took minutes.
         if self._apart and (_depth(node) > 2 or "work" in {argument.arg for argument in node.args.args}):
             decorator = ALONE
         return f"{decorator}\n{ast.unparse(rewritten)}"

@@ -16,7 +16,7 @@ from airflock.core import component_names, law, walk_tree
 from airflock.engine.text.copies import DependencyRecorder
 from airflock.support import RuleError
 
-# ------------------------------------------------------------------------------------------- vectors of parameters
+# ---------------------------------------------------------------------------- vectors of parameters
 
 
 class VectorUnroller(ast.NodeTransformer):
@@ -134,7 +134,7 @@ def _left(node: ast.For) -> bool:
     return bool(node.orelse) or any(isinstance(item, (ast.Break, ast.Continue)) for item in walk_tree(node))
 
 
-# ----------------------------------------------------------------------------------------------------------- rules
+# -------------------------------------------------------------------------------------------- rules
 
 
 GIVEN = law.ALLOWED_CALLS | {law.CAST_NAME, *law.RENAMED_BUILTINS.values()}  # what every driver has
