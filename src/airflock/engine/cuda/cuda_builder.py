@@ -212,7 +212,7 @@ class CudaBuilder(Builder):
         context.cells, context.across = self.cells(), self.across
         context.exact = name.startswith("measure_") or bool(
             self.across
-        )  # nobody says whom an agent beyond the last met
+        )  # no row says which agents one beyond the last met
         context.alone = name == "appear_" or (name == "aim_" and self.plan.is_shepherd)
         body = lower_statements(statements, context)
         body = [_Renamed(self).visit(s) for s in body]

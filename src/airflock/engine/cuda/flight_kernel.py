@@ -147,6 +147,8 @@ def memory_lines(build: CudaBuilder) -> list[str]:
     lines += ["later = all_later[block]; shapes = all_shapes[block % all_shapes.shape[0]]"]
     lines += [*number_lines(build), "late = real(delay) * row_c.dt"]
     kind, align = f"np.float{plan.bits}", "" if shape.simulated else ", alignment=16"
+    # States that other threads read lie in shared memory; all else of an agent is registers, as
+    # long as a block has a thread per agent.
     if shape.registers:
         for table, width in table_widths(build).items():
             lines += [f"{table} = cuda.shared.array((LANES, {width}), {kind}{align})"]
@@ -335,7 +337,7 @@ def _leave(build: CudaBuilder) -> list[str]:
         for table, width in table_widths(build).items():
             blank = [f"{table}[last, {c}] = {'AWAY' if c < len(plan.axes) else 'ZERO'}" for c in range(width)]
             up += branch_lines("tid == 0", blank)
-    if flock_rules(plan):  # what rules of the whole flock go on from is found anew
+    if flock_rules(plan):  # rules of the whole flock start again
         up += loop_lines(
             "e in range(tid, room.shape[0], THREADS)", loop_lines("c in range(room.shape[1])", ["room[e, c] = ZERO"])
         )
@@ -414,7 +416,7 @@ def _time(build: CudaBuilder) -> list[str]:
         lines += ["slot_in = integer(((delay + decide_every - 1) // decide_every) % slots)"]
     lines += ["begun = integer(0)"] * bool(plan.faults)
     step = ["time = real(step) * row_c.dt", *begin_fault_lines(build)]
-    if plan.struck:  # once anything has begun all are asked: a thread asks for its own agent at no one's cost
+    if plan.struck:  # once any fault has begun, all lanes are tested: each thread tests its own agent
         step += ["hurt_first = integer(0)", "hurt_end = integer(n) if begun > 0 else integer(0)"]
     if plan.absence:  # an instant of one of several agents, or of none, is not counted
         step += ["counted = integer(1) if n >= least(integer(2), born) else integer(0)"]
@@ -540,7 +542,7 @@ def _choose(build: CudaBuilder) -> list[str]:
     lines = []
     for name in stages_of_events(build.plan)["decide"][1:]:
         if name == "tune":
-            continue  # told to the others before they meet
+            continue  # runs before, in _perceived
         lines += [build.stages[name].call(k_="k"), *barrier]
     lines += ["k = integer(k + 1); next_decide = integer(step + decide_every)"]
     return [*lines, "slot_out = integer(slot_out + 1) if slot_out + 1 < slots else integer(0)"]

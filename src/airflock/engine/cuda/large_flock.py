@@ -381,6 +381,8 @@ def large_flock_driver(plan: Plan, simulated: bool) -> ModuleType:
 
 def cell_plan_error(plan: Plan, agents: int) -> str | None:
     """Why a plan cannot be flown by cells on a GPU; None if it can."""
+    # The kernel of one large flock knows a part of the plan only; each refusal names the part, and
+    # the CPU flies the rest.
     if not plan.grid:
         return "cells need at least 1000 agents, a model of finite reach and perception without noise or delay"
     if plan.columns:

@@ -122,7 +122,7 @@ def fly_many(
 ) -> list[DriverResult]:
     """Fly many worlds of one plan, each from its tables; results in the order of the jobs.
 
-    starts : (component, agent) of each world where the plan asks for it
+    starts : (component, agent) of each world where the plan needs it
     done   : called once per flight as results come in
     shape  : layout of a flock instead of the one that suits population, flock size and GPU
 

@@ -37,7 +37,7 @@ class LoweringContext:
     turn     : one agent i at a time, for all threads
     carried  : totals stay with each thread instead of being reduced over the block
     cells    : lines around a pair loop over cells, from outside in, instead of one loop over all pairs
-    exact    : an unrolled pair loop meets nobody beyond the last agent (who would be far away)
+    exact    : an unrolled pair loop stops at the last agent (those beyond would be far away)
     alone    : loops that keep one agent of all (the farthest, say) are run in full by every thread
     across   : rows over the others that each agent has to itself, and their places in the table that holds them
     """

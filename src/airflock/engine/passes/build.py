@@ -32,7 +32,7 @@ class Builder:
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
     drifts   : whether agents may be watched by how fast they are beside the drift of the flock
     trails   : whether rows of faults and of agents that differ come last in the work table
-    drops    : whether the compiler drops a sum over agents that nobody reads
+    drops    : whether the compiler drops an unread sum over agents
     """
 
     clusters: Callable[[Metric], list[str]] | None = None

@@ -107,6 +107,7 @@ def flight_stages(plan: Plan, lenient: bool = False) -> Builder:
     build.source.allow_builtins = lenient
     build.slots = grid.uses_slots(plan)
     events = stages_of_events(plan)
+    # Stages come first: they number the rows, and `advance` calls them.
     make_stages(build)
     add_begin(build)
     if plan.sequential:

@@ -1,7 +1,7 @@
 """Cell grid: memory and functions of a flock that finds neighbours by cells; for many agents that see a short way.
 
 Data that lie at random in memory (the agents of a cell, their sums) are kept in rows of one agent, so that they cost
-one cache line and not one per number; slots keep them from lying far apart. All that is kept from stage to stage lies in
+one cache line and not one per number; slots keep them from lying far apart. What stages keep for each other lies in
 memory that lasts for a flight. Where groups have laws of their own, each law sorts the flock again, into cells of its
 own reach, and goes through its own agents. Only for perception without noise, delay and loss; there it equals all
 pairs but for rounding and the order of sums.
@@ -50,7 +50,7 @@ def grid_memory(
         ((agents,), whole), ((agents, _width(plan)), real), ((components, agents + BLOCK), real),
         ((agents * max(1, fields),), real),
     )  # fmt: skip
-    # not made anew at each step: the pages of what is given back must be zeroed again before they
+    # not made again at each step: the pages of what is given back must be zeroed again before they
     # are used Allocated once per flight: allocation at every step was part of the 203 ns of an
     # agent-step.
     return (tuple(rows(shape, kind) for shape, kind in shapes),)

@@ -195,6 +195,8 @@ def add_neighbours(build: Builder) -> None:
     sums = tuple(
         (c, model.reduce.get(fields[c], "sum")) for c in _asked(build, nonzero_fields(model.Sums, plan.dimensions))
     )
+    # Four receivers share a draw on a CPU; on a GPU each thread draws for its own pair, as no row
+    # per agent would fit.
     draw, drawn = (
         (None, StageCall(pair_word(plan))) if build.draws_per_pair else (StageCall(RECEIVE_CALLS[False]), None)
     )

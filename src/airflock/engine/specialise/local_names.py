@@ -2,7 +2,7 @@
 
 A helper's statements take the place of its call, so that its locals lie beside the stage's. While statements are made,
 a local of a helper is spelled with a mark of the helper (`near@2`), which no name of Python can have. In the end each
-has its own name, unless somebody would then read what another has written: that one has the helper's name behind it.
+has its own name, unless one would then read what another has written: that one gets the helper's name as a suffix.
 """
 
 import ast

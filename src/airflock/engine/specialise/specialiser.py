@@ -89,6 +89,8 @@ class ExpressionSpecialiser:
         """A value as syntax of the driver."""
         if isinstance(value, ast.expr):
             return value
+        # Constants go by name, since a literal would be in double precision in a driver of single
+        # precision.
         if isinstance(value, NamedConstant):
             name = ast.Name(value.spelled.lstrip("-"), LOAD)
             return ast.UnaryOp(ast.USub(), name) if value.spelled[0] == "-" else name
@@ -528,7 +530,7 @@ class StatementSpecialiser(ExpressionSpecialiser):
             first, end = within
             inside: list[ast.expr] = [ast.Compare(first, [ast.LtE()], [lane]), ast.Compare(lane, [ast.Lt()], [end])]
             return _loop(target, [ast.Name(over.bound, LOAD)], [ast.If(ast.BoolOp(ast.And(), inside), done, [])])
-        # a lane that cannot be negative is not asked whether it counts from a row's end: else no
+        # a lane that cannot be negative is not tested whether it counts from a row's end: else no
         # loop is a vector's
         return _loop(target, [ast.Call(ast.Name("u64", LOAD), [each], []) for each in within], done)
 

@@ -63,6 +63,7 @@ def is_clear(
     for a in range(plan.dimensions):
         o[a] = apart(x[a][j], x[a][i], a, w, plan=plan)
     apart2 = sum(o[a] * o[a] for a in range(plan.dimensions))
+    # A cast is dear: only pairs in range of each other are cast at.
     if (apart2 <= range2) & (integer(j) != integer(i)):
         r = math.sqrt(apart2 + TINY)
         ux = o[X] / r

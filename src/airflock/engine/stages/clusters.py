@@ -59,6 +59,7 @@ def expand_agent(
 def first_unexpanded(state: Any, expanded: Any, n: int) -> Any:
     """The first member of the cluster that grows whose links have not been looked at; -1 if there is none."""
     e = -1
+    # A short scan with a break, once per member; it is no part of the loop over pairs.
     for j in range(n):
         if state[j] == 1 and expanded[j] == 0:
             e = j
@@ -133,6 +134,8 @@ def sum_members(mean: Any, state: Any, flock: FlockRows, numbers: Any, n: int, *
     k = totals()
     if metric.member is not None:
         clear_totals(k, metric.Member, metric)
+        # Runs only for metrics with a rule for members, whose terms need the mean of the cluster
+        # first.
         for j in range(n):
             if state[j] == 1:
                 t = call_member(j, mean, flock, numbers, metric=metric)

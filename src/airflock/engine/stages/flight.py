@@ -11,7 +11,7 @@ from airflock.engine.stages.measure import MeasuredMetric
 from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import HALF, ONE, ZERO, call_rule, most, real, row_index
 
-Stages = Mapping[str, Callable[..., Any]]  # by name: each takes what it asks for, of the rest it knows
+Stages = Mapping[str, Callable[..., Any]]  # by name, called with their arguments by name
 Order = Mapping[str, tuple[str, ...]]  # stages of each event that a plan has (`engine.schedule`)
 Sampled = Iterable[tuple[int, str]]  # places among all values, and how they add up over time
 # Measured at 1,000,000 boids: rearranging every 16 decisions costs 3 % more, every 256 the same as
@@ -187,7 +187,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
                         - SLACK
                     )
                     travelled = ZERO
-                if watched and travelled < gap:  # nobody can have come near enough since pairs were last looked at
+                if watched and travelled < gap:  # no pair can have come near enough since the last check
                     # The instant counts although no pair was looked at: `within` promises that
                     # metrics contribute nothing beyond it.
                     sums[sampled[name][1]] += 1
@@ -214,7 +214,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
             # Columns of faults are written between two calls and agents change places at decisions
             # only, so it is enough to search the affected lanes here; searching at every step cost
             # two passes over the flock.
-            if plan.struck and (step == first or step % whole.decide_every == 0):  # between, nobody changes places
+            if plan.struck and (step == first or step % whole.decide_every == 0):  # between, agents keep their places
                 hurt_first, hurt_end = call_rule(stages["struck"], time=time)
             fastest = call_rule(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
             if drifts:  # noqa: SIM108 - a helper of several lines stands where it is assigned

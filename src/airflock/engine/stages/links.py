@@ -127,6 +127,7 @@ def sum_members(
     k = totals()
     if metric.member is not None:
         clear_totals(k, metric.Member, metric)
+        # Members lie side by side in `reached`: no other agent is visited.
         for e in range(done, tail):
             j = whose[reached[e]]
             t = call_member(j, mean, flock, numbers, metric=metric)

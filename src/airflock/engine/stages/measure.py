@@ -50,6 +50,8 @@ class MeasuredMetric(NamedTuple):
 def measured_metrics(plan: Plan, clock: str) -> tuple[MeasuredMetric, ...]:
     """Metrics of a clock, and where their numbers lie."""
     found, value, row, total = [], 0, 0, 0
+    # Values and memories are numbered over all metrics, pair totals only among those of one clock,
+    # since only these share a loop.
     for metric in plan.metrics:
         if metric.clock == clock:
             found.append(MeasuredMetric(metric, value, row, total))
@@ -107,6 +109,7 @@ def reductions(record: Any, metric: Metric) -> list[str]:
 
 def clear_totals(total: Any, record: Any, metric: Metric) -> None:
     """Totals of a record before its first term."""
+    # Written out: one variable of the driver for each field.
     for c, way in enumerate(reductions(record, metric)):
         total[c] = REDUCTION_START[way]
 

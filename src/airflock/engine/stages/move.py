@@ -70,6 +70,8 @@ def apply_body(
 ) -> None:
     """Advance velocities by the rule of the body."""
     v, command = flock.velocity, flock.command
+    # One call of the rule per lane, whatever the body: what it needs of wind, noise or memory is
+    # decided when the driver is made, so that the loop has no branch.
     for i in lanes:
         t = call_rule(
             plan.body.move,

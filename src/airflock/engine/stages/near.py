@@ -61,6 +61,7 @@ def wrap_cell(c: Any, count: Any, *, plan: Plan) -> Any:
 
 def apart(d: Any, own: Any, flat: Any, f: int, w: Any, *, plan: Plan) -> Any:
     """Put the offset from a place to the agent at place f into the vector d, m; returns its square, m²."""
+    # Reads sorted rows by component and place, so that a run of places is read in order.
     for a in range(plan.dimensions):
         d[a] = flat[a, f] - own[a]
     if plan.periodic:

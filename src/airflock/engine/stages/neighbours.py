@@ -28,7 +28,7 @@ from airflock.engine.stages.words import (
     vector,
 )  # fmt: skip
 
-SMALLEST = 1e-3  # m; width of the cells of a law that nobody flies by
+SMALLEST = 1e-3  # m; width of the cells of a law without agents
 
 
 def own_state(i: int, own: Any, v: Any, h: Any, true: Any, flock: FlockRows, *, plan: Plan) -> None:
@@ -50,6 +50,7 @@ def fill_heading(v: Any, h: Any, *, plan: Plan) -> None:
     if plan.dimensions == 2:
         v[Z] = ZERO
     f = ONE / norm(v[X], v[Y], v[Z])
+    # All three axes: a law may read the heading along z in a plane, where it is zero.
     for a in (X, Y, Z):
         h[a] = f * v[a]
 
@@ -141,7 +142,7 @@ def neighbours(
             draw_words(i, flock, draw, plan=plan)
             lot = words[flock.number[i] & 3]
         else:
-            lot = ZERO  # nobody asks for it
+            lot = ZERO  # no rule reads it
         own, v, true, h, total = vector(), vector(), vector(), vector(), totals()
         own_state(i, own, v, h, true, flock, plan=plan)
         # Totals live in registers during the pair loop and go to their rows once, after it.

@@ -1,7 +1,7 @@
 """Neighbours by cells: sum a law's rule over those in the cells around each agent, as `neighbours` does over all pairs.
 
 Cells are no smaller than the law reaches. Candidates of a cell are three slabs of agents that lie side by side, so that
-the loop over them runs in whole vectors; the last of these holds some that are nobody. Lines of cells are gone through
+the loop over them runs in whole vectors; the last of these ends with empty places. Lines of cells are gone through
 side by side. The order of every sum is that of slabs and places, whatever the number of threads.
 """
 
@@ -91,7 +91,7 @@ def make_line(
         carried=carried,
     )  # fmt: skip
     pad_candidates(found, h, hv, plan=plan, carried=carried)
-    # of what an agent makes of its candidates, a driver has the rows that its topology asks for
+    # a driver keeps only those of these rows that its topology reads
     square = np.zeros(room + 2 * BLOCK, work.dtype)
     met = np.zeros(room + 2 * BLOCK, work.dtype)
     heap = np.zeros(room + 2 * BLOCK, work.dtype)

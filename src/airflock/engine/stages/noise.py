@@ -40,7 +40,7 @@ def draw(
 def fill_words(u: Columns, flock: FlockRows, whole: Any, step: Any, stream: int, m: int, drawn: Draw) -> None:
     """Draw four random words of a stream for all agents of this world.
 
-    Until somebody leaves each agent lies at its own number, and a loop that counts takes a tenth less than one that
+    Until an agent leaves, each lies at its own number, and a loop that counts takes a tenth less than one that
     looks the number up. The two are functions of their own: beside the other, either is compiled to a slower one.
     """
     # A draw of 100 agents takes 147 ns by counting and 162 ns by looking up numbers. Both in one
@@ -92,6 +92,7 @@ def uniforms(flock: FlockRows, rows: Columns, whole: Any, step: Any, stream: int
     """Four uniform numbers of a stream per agent, between 0 and 1, in four rows."""
     u = flock.words
     fill_words(u, flock, whole, step, stream, m, drawn)
+    # Four loops over agents, one for each row, which compilers turn into vectors.
     for c in range(4):
         for i in range(m):
             rows[c][i] = random.uniform(u[c][i])

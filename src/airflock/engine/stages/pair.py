@@ -48,8 +48,8 @@ from airflock.engine.stages.words import (
 )  # fmt: skip
 from airflock.world import nearest_image
 
-# Where an agent meets but some of whom it hears, its others are gone through twice: who is heard,
-# and, of those whom it meets, what they say.
+# Where a topology chooses, the pair loop runs twice: first to find the agents that are heard, then
+# to add the terms of those that are met.
 HEAR_AND_ADD, HEAR, ADD = "both", "hear", "add"
 
 
@@ -203,6 +203,8 @@ def receive_packet(
 ) -> None:
     """Let an agent hear what agent j has sent, and put the newest of it into `packet`, where packets are kept."""
     if plan.packets and part != ADD:
+        # Everything that a rule of the radio may take is offered by name; a driver computes only
+        # the arguments of its rule.
         carried2 = squared_range(me.i, j, reach.radio, flock, plan=plan)
         known = {
             "distance": math.sqrt(apart2 + TINY), "dx": o[X], "dy": o[Y], "dz": o[Z], "talkers": me.talkers,

@@ -88,7 +88,7 @@ def move_own_goals(flock: FlockRows, numbers: Any, time: float, n: int, scene: A
 def let_appear(flock: FlockRows, numbers: Any, time: float, n: int, scene: Any) -> int:
     """Let stand what is due, as soon as nobody is in its place.
 
-    A shape waits until every agent is at start.clearance from its bounds, as nobody builds onto a drone in flight.
+    A shape waits until every agent is at start.clearance from its bounds, so that nothing appears on top of a drone.
     """
     x, w, later = flock.position, numbers.w, scene.later
     for r in range(len(later)):

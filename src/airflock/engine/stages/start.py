@@ -14,7 +14,7 @@ from airflock.world import bvh, inside, start as places
 
 START = random.START
 SPEEDS, OFFSETS = START + 256, START + 512  # further draws of the same agent
-ATTEMPTS = 20_000  # draws per agent before a start is given up; the border refuses crowded arenas beforehand
+ATTEMPTS = 20_000  # draws per agent before a start fails; validation refuses crowded arenas before
 EXTENTS = ("extent_x", "extent_y", "extent_z")
 
 
@@ -26,6 +26,7 @@ def excursion(
         x, y, height_above_middle(z, edges, corners, plan=plan), w.half_x, w.half_y, w.half_z, edges, corners
     )
     if plan.obstacles:
+        # The deepest of all: outside the arena, inside an obstacle, inside a shape of the scene.
         for o in range(obstacles):
             e = most(e, -plan.obstacle(x, y, z, edges, spans[o, 0], spans[o, 1]).distance)
     if plan.scene:
@@ -81,6 +82,8 @@ def place_in_formation(i: int, s: Any, w: Any, whole: Any, *, plan: Plan) -> Non
     w0, w1, w2, w3 = random.draw(i, 0, OFFSETS, whole.world, whole.seed_low, whole.seed_high)
     g[X], g[Y] = random.normal_pair(w0, w1)
     g[Z], _ = random.normal_pair(w2, w3)
+    # Jitter is a normal offset from the own place, drawn by number, so that a formation is the same
+    # for every size of flock.
     for a in range(plan.dimensions):
         s[a] = f[a] + w.jitter * g[a]
 

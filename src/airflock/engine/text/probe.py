@@ -40,6 +40,7 @@ def probe_model(model: Model, parameters: Any) -> None:
     given: dict[str, Any] = {**VALUES, "p": parameters, "period": 0.2, "percept": Percept(1.0, 10.0, 20.0, 0.0)}
     given["wing"], given["aero"] = wings.Parameters(segments="5"), descent.Parameters()
     given["own"] = Own(1.0, 2.0, 0.0, 0.4472, 0.8944, 0.0)
+    # Neighbour and boundary rules first: their answers are what the deciding rule is called with.
     for kind, rule in (("reach", model.reach), ("neighbour", model.neighbour), ("boundary", model.boundary)):
         if rule is not None:
             law.check_rule(rule)
