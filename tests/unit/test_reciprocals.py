@@ -83,7 +83,7 @@ def test_second_forms_are_called_where_they_stand_and_handed_to_nobody(name):
     """A function that is handed to another one as an argument is one that Numba warns of."""
     one = load(name)
     plan = plan_of(one, precision=32).built(grid=False)
-    shape = shape_of(one.agents, 1, whole=bool(plan.model.flock))
+    shape = shape_of(one.agents, 1, whole_flock=bool(plan.model.flock))
     tree = ast.parse(kernel.flight_text(plan, shape))
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     forms = {node.name for node in functions if node.name.endswith("_per")}

@@ -66,7 +66,7 @@ def test_a_driver_calls_its_stages_in_the_order_of_a_step(name, keys):
 def test_a_kernel_calls_them_in_the_same_order(name):
     one = load(name)
     plan = plan_of(one, precision=32).built(grid=False)
-    text = kernel.flight_text(plan, shape_of(one.agents, 1, whole=bool(plan.model.flock)))
+    text = kernel.flight_text(plan, shape_of(one.agents, 1, whole_flock=bool(plan.model.flock)))
     assert calls(text, "fly", due(plan)) == due(plan)
 
 

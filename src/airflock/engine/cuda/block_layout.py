@@ -6,6 +6,8 @@ WARP = 32
 MOST_THREADS = 1024  # of one block, on every GPU so far
 MOST_REGISTERED = 1024  # agents whose state stays in registers; more are kept in a table in the GPU's memory
 REGISTERS = 65_536  # of a multiprocessor, on every GPU so far
+# Measured on an H200: 128 registers spill nothing; 96 pay where a multiprocessor flies more than 16
+# flocks.
 ROOMY = 128  # of a thread where a multiprocessor has few flocks: nothing is spilled
 SATURATED = 96  # of a thread where flocks fill a GPU: some are spilled, none in a pair loop (counted for sm_90)
 MANY = 16  # blocks of 128 threads for a multiprocessor from which more warps are worth more than more registers
@@ -69,10 +71,10 @@ def block_layout(
     agents for 60 s, one flock on an H200: 5.4 ms with one thread per agent, 6.0 with two; 30 agents, a hundred flocks:
     5.2 ms with one, 4.3 with two, 3.9 with four; a thousand: 5.6, 8.6 and 11.8).
 
-    sequential : one agent after another
-    whole      : some rule solves for the whole flock, which one thread does
-    apart      : agents fly by several laws, where threads of one warp part, so that none hands another a sum; or each
-                 ranks those whom it hears, which one thread does
+    sequential  : one agent after another
+    whole_flock : some rule solves for the whole flock, which one thread does
+    apart       : agents fly by several laws, where threads of one warp part, so that none hands another a sum; or each
+                  ranks the agents that it hears, which one thread does
     """
     lanes = -(-agents // WARP) * WARP
     if sequential:  # one agent after another: a warp shares its pairs
@@ -82,6 +84,7 @@ def block_layout(
     if agents > MOST_REGISTERED:
         return BlockLayout(lanes, 1, MOST_THREADS, registers=False)
     per_agent, busy = 1, flocks * lanes / (processors * 128.0)  # 1.0: a warp for each that can run at once
+    # Only a flock of one warp shares its pairs among threads; the docstring has the times.
     while not apart and lanes == WARP and per_agent < 4 and busy * per_agent < 1.0:
         per_agent *= 2
     return BlockLayout(lanes, per_agent, lanes * per_agent, is_crowded=busy > MANY)

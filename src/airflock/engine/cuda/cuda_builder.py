@@ -29,8 +29,8 @@ STAGES = (
     "snapshot", "perceive", "tune", "neighbours", "boundaries", "flock", "decide", "stop", "overrule", "move", "aim_",
     "glide_", "appear_", "measure_",
 )  # fmt: skip
-# Stages that a kernel has within others: in `move`, so that registers carry them over; in `neighbours`, whose rows of
-# one agent they read and write.
+# Stages that a kernel has within others: in `move`, so that registers carry them over; in
+# `neighbours`, whose rows of one agent they read and write.
 WITHIN = {"noise": "move", "gusts": "move", "meet": "neighbours"}
 PAIR_ROWS = ("away0", "away1", "away2", "square", "hidden", "fade", "met", "heap", "weak")  # rows over the others
 MAX_TOTALS = 24  # totals that one stage reduces at once, at most
@@ -84,7 +84,7 @@ class CudaBuilder(Builder):
             "four_high",
         }
 
-    # -------------------------------------------------------------------------------- what the passes call
+    # ------------------------------------------------------------------------- what the passes call
 
     def bind_rows(self, names: Iterable[str]) -> list[str]:
         """Rows are registers, or bound by the stage."""
@@ -145,7 +145,7 @@ class CudaBuilder(Builder):
         """Clusters are found by all threads of a block together."""
         return cluster_lines(self, metric)
 
-    # ---------------------------------------------------------------------------------------------- lowering
+    # ------------------------------------------------------------------------------------- lowering
 
     def module_names(self) -> set[str]:
         """Names of the driver module."""
@@ -181,7 +181,7 @@ class CudaBuilder(Builder):
         return super().kind(letter, fields)
 
     def named(self, letter: str) -> str:
-        """What the kernel calls a record of numbers; each law of the flock has its own p."""
+        """Name of a record of numbers in the kernel; each law of the flock has its own p."""
         return f"row_p{self.plan.law}" if letter == "p" and self.plan.law else f"row_{letter}"
 
     def cells(self) -> tuple[str, ...]:
@@ -198,7 +198,7 @@ class CudaBuilder(Builder):
         return shared_noise(lines) if self.draws_two_steps(name) and shared else lines
 
     def draws_two_steps(self, name: str) -> bool:
-        """Whether a stage draws the outer noise of two steps at once: in a plane four words are two steps."""
+        """Return True if a stage draws the outer noise of two steps at once: in a plane four words are two steps."""
         plan = self.plan
         return name == "move" and plan.dimensions == 2 and self.rule_asks(plan.body.move, "move", "gx", "gy", "gz")
 
@@ -212,7 +212,7 @@ class CudaBuilder(Builder):
         context.cells, context.across = self.cells(), self.across
         context.exact = name.startswith("measure_") or bool(
             self.across
-        )  # nobody says whom an agent beyond the last met
+        )  # no row says which agents one beyond the last met
         context.alone = name == "appear_" or (name == "aim_" and self.plan.is_shepherd)
         body = lower_statements(statements, context)
         body = [_Renamed(self).visit(s) for s in body]
@@ -254,6 +254,7 @@ class CudaBuilder(Builder):
         free = (free - set(tables)) | ({"work"} if tables else set())
         order = tuple(sorted(free))
         text = [*lines, *(line for s in body for line in ast.unparse(s).splitlines())]
+        # Threads of the last stage may still read the table of parts that this one writes.
         if "reduced" in read:
             text = ["cuda.syncthreads()", *text]
         if results:

@@ -1,6 +1,6 @@
-"""Clusters on a GPU: all agents of a block look at once who is linked to the cluster that grows.
+"""Clusters on a GPU: all agents of a block check at once if they are linked to the growing cluster.
 
-A cluster grows from its first agent, one hop per round, until a round brings nobody. Where states lie in registers each
+A cluster grows from its first agent, one hop per round, until a round adds none. Where states lie in registers each
 thread keeps the links of its agent as bits, so that a round reads a few words; else a round looks at all pairs.
 """
 
@@ -93,6 +93,8 @@ def _links(build: Builder, metric: Metric) -> list[str]:
 
 def _grow_by_masks() -> list[str]:
     """One cluster, from the first agent that no earlier one holds."""
+    # A round is a bitwise and of the own links with the members found so far: 32 agents in one
+    # instruction.
     find = [f"left = np.uint32(~seen[part] & ({VALID}))"]
     find += branch_lines("(first < 0) and (left != np.uint32(0))", ["first = integer(32 * part + cuda.ffs(left) - 1)"])
     put = ["grown[part] = np.uint32(1) << np.uint32(first & 31) if part == (first >> 5) else np.uint32(0)"]
@@ -119,7 +121,7 @@ def _grow_by_masks() -> list[str]:
 
 
 def _grow_by_pairs(build: Builder, metric: Metric) -> list[str]:
-    """The same from the rows of the table."""
+    """Lines that grow one cluster by all pairs of rows of the table."""
     axes = build.plan.axes
     root, link = _linked(build, metric)
     pair = [*_offset(build, "{a}[j]"), *root, f"hit = most(hit, (ONE if {link} & (mine[j] > HALF) else ZERO))"]
@@ -141,12 +143,14 @@ def _grow_by_pairs(build: Builder, metric: Metric) -> list[str]:
 def grown(
     mine: Any, size: Any, mean: Any, flock: FlockRows, numbers: Any, n: int, *, plan: Plan, metric: Metric
 ) -> Any:  # fmt: skip
-    """What the cluster rule says of the agents that `mine` marks with 1; mean : over the flock."""
+    """Call the cluster rule for the agents that `mine` marks with 1; mean : over the flock."""
     axes, h = range(plan.dimensions), flock.heading
     s, cx, cv, ch = vector(), vector(), vector(), vector()
     for a in axes:
         s[a] = ZERO
     hh = ZERO
+    # Each thread adds its own agent, times one or zero; the lowering reduces the sums over the
+    # block.
     for i in range(n):
         for a in axes:
             s[a] = s[a] + mine[i] * h[a][i]

@@ -9,7 +9,7 @@ from typing import Any
 from airflock.engine.compile_shortcuts import Replacement, cached_call_type, patched, post_processed, rename_in_blocks
 from airflock.engine.cuda.flight_kernel import ARGUMENTS
 
-# --------------------------------------------------------------------------------------- what compiling leaves out
+# ------------------------------------------------------------------------ what compiling leaves out
 
 
 TRIED = (0, 30), (0, 30)  # first and last version of numba-cuda of which this was tried
@@ -59,11 +59,11 @@ def _hash(usual: Callable[..., int], flags: Any) -> int:
 
 
 def _equal(usual: Callable[..., Any], flags: Any, other: Any) -> Any:
-    """Whether all flags are the same."""
+    """Return True if all flags are equal."""
     return flags is other or usual(flags, other)
 
 
-# ---------------------------------------------------------------------------------------------- PTX without a card
+# ------------------------------------------------------------------------------- PTX without a card
 
 
 # dimensions and kind of every argument: r real, i 64-bit and s 32-bit whole numbers, u words

@@ -28,7 +28,7 @@ from airflock.engine.stages.words import REDUCTION_START, ZERO
 from airflock.engine.tables import WorldTables
 from airflock.scenarios import FORMATIONS
 
-# ------------------------------------------------------------------------------------------------------- the start
+# ---------------------------------------------------------------------------------------- the start
 
 
 def table_widths(build: CudaBuilder) -> dict[str, int]:
@@ -40,7 +40,7 @@ def table_widths(build: CudaBuilder) -> dict[str, int]:
 
 
 def position_text(build: CudaBuilder, agent: str, row: str) -> str:
-    """Where the position of an agent stands for the others."""
+    """Text of the position of an agent as other threads read it."""
     return f"truth[{agent}, {build.columns()[row][1]}]" if build.shape.registers else f"work[{build.row(row)}, {agent}]"
 
 
@@ -68,6 +68,8 @@ def begin_lines(build: CudaBuilder) -> list[str]:
     gap = " + ".join(
         f"(s_{a} - {position_text(build, 'j', a)}) * (s_{a} - {position_text(build, 'j', a)})" for a in axes
     )
+    # Agents take places one after another, but all threads test one place against those before it,
+    # and vote.
     near = loop_lines(
         "j in range(tid, e, THREADS)",
         branch_lines(f"{gap} < row_w.separation * row_w.separation", ["crowded = integer(1)"]),
@@ -99,7 +101,7 @@ def helper_lines(build: CudaBuilder, helper: Callable[..., Any], **known: object
 
 
 def try_place_lines(build: CudaBuilder, agent: str) -> list[str]:
-    """Lines that draw a place s_x s_y s_z of an agent, and find whether it is `free`, whoever else is there."""
+    """Lines that draw a place s_x s_y s_z of an agent, and find out if it is `free`, other agents aside."""
     s = LocalVector("s", "vector")
     lines, _ = helper_lines(build, start.try_place, i=driver_argument(agent), s=s, excursion=add_excursion(build))
     room, _ = helper_lines(build, start.is_free, s=s)
@@ -128,11 +130,11 @@ def _heard_at_start(build: CudaBuilder) -> list[str]:
     return loop_lines("slot in range(slots)", [build.stages["snapshot"].call()])
 
 
-# --------------------------------------------------------------------------------------------- what a thread holds
+# ------------------------------------------------------------------------------ what a thread holds
 
 
 def memory_lines(build: CudaBuilder) -> list[str]:
-    """Where everything of this flock and this thread lies."""
+    """Lines that name all memory of this flock and this thread."""
     plan, shape = build.plan, build.shape
     lines = ["block = cuda.blockIdx.x; tid = integer(cuda.threadIdx.x)"]
     lines += ["i = integer(tid // PER_AGENT); sub = integer(tid % PER_AGENT)"]
@@ -145,6 +147,8 @@ def memory_lines(build: CudaBuilder) -> list[str]:
     lines += ["later = all_later[block]; shapes = all_shapes[block % all_shapes.shape[0]]"]
     lines += [*number_lines(build), "late = real(delay) * row_c.dt"]
     kind, align = f"np.float{plan.bits}", "" if shape.simulated else ", alignment=16"
+    # States that other threads read lie in shared memory; all else of an agent is registers, as
+    # long as a block has a thread per agent.
     if shape.registers:
         for table, width in table_widths(build).items():
             lines += [f"{table} = cuda.shared.array((LANES, {width}), {kind}{align})"]
@@ -180,6 +184,8 @@ def _across(build: CudaBuilder) -> list[str]:
 
 def _scratch(plan: Plan) -> list[str]:
     """Scratch of the rules of the whole flock: rows of one table, each array the rows from its first on; zeros."""
+    # Kernels have few arguments: all scratch of a flock lies in one table as wide as the widest
+    # array, 82 kB for five wings.
     sizes = flock.scratch_sizes(plan, None, 1)
     if not sizes:
         return []
@@ -245,7 +251,7 @@ def _first_value(build: CudaBuilder, name: str) -> str:
     return f"real({starts[int(kept[2])]})"
 
 
-# ----------------------------------------------------------------------------- faults, and agents that come and go
+# -------------------------------------------------------------- faults, and agents that come and go
 
 
 STEP, KIND, AGENT, LEAVES = range(4)  # columns of the table of whole numbers; that of reals: how long, then numbers
@@ -283,6 +289,8 @@ def begin_fault_lines(build: CudaBuilder) -> list[str]:
     """Lines that let begin what is due before a step."""
     if not build.plan.faults:
         return []
+    # A launch flies the whole flight, so there is no place between two steps for Python: onsets are
+    # drawn before the launch.
     number = f"integer({own_row(build, 'order')})" if build.slots else "i"
     hit: list[str] = []
     for place, kind in enumerate(build.plan.faults):
@@ -318,6 +326,8 @@ def _leave(build: CudaBuilder) -> list[str]:
         *agent_loop(build, find),
     ]
     lines += ["cuda.syncthreads()", "gone = integer(found[0])", "last = integer(n - 1)"]
+    # As on a CPU, agents behind the one that leaves move up by one. A mark tested in every loop
+    # would touch each metric.
     up = _in_registers(build) if registers else _in_tables()
     up += _shifted("past", "slots * past.shape[1]", "e // past.shape[1], e % past.shape[1], {c}") if plan.late else []
     if plan.packets:
@@ -327,7 +337,7 @@ def _leave(build: CudaBuilder) -> list[str]:
         for table, width in table_widths(build).items():
             blank = [f"{table}[last, {c}] = {'AWAY' if c < len(plan.axes) else 'ZERO'}" for c in range(width)]
             up += branch_lines("tid == 0", blank)
-    if flock_rules(plan):  # what rules of the whole flock go on from is found anew
+    if flock_rules(plan):  # rules of the whole flock start again
         up += loop_lines(
             "e in range(tid, room.shape[0], THREADS)", loop_lines("c in range(room.shape[1])", ["room[e, c] = ZERO"])
         )
@@ -349,7 +359,7 @@ def _in_registers(build: CudaBuilder) -> list[str]:
 
 
 def _in_tables() -> list[str]:
-    """The same of rows of tables, each by one thread."""
+    """Lines that move rows of tables up, each by one thread."""
     lines = []
     for table in ("work", "mem", "memory"):
         lines += _shifted(table, f"{table}.shape[0]", "e, {c}")
@@ -363,7 +373,7 @@ def _shifted(table: str, rows: str, place: str) -> list[str]:
     return loop_lines(f"e in range(tid, {rows}, THREADS)", body)
 
 
-# ------------------------------------------------------------------------------------------------------ the kernel
+# --------------------------------------------------------------------------------------- the kernel
 
 
 ARGUMENTS = (
@@ -386,11 +396,11 @@ def flight_text(plan: Plan, shape: BlockLayout) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-# ------------------------------------------------------------------------------------------------------------ time
+# --------------------------------------------------------------------------------------------- time
 
 
 def _time(build: CudaBuilder) -> list[str]:
-    """The loop over time. Most steps only move: what happens now and then is asked for together."""
+    """Lines of the loop over time. Most steps only move: one test covers all that happens now and then."""
     plan = build.plan
     count = len(sampled_columns(plan.metrics))
     first = [REDUCTION_START.get(how, ZERO).spelled for _, how, _ in sampled_columns(plan.metrics)]
@@ -406,7 +416,7 @@ def _time(build: CudaBuilder) -> list[str]:
         lines += ["slot_in = integer(((delay + decide_every - 1) // decide_every) % slots)"]
     lines += ["begun = integer(0)"] * bool(plan.faults)
     step = ["time = real(step) * row_c.dt", *begin_fault_lines(build)]
-    if plan.struck:  # once anything has begun all are asked: a thread asks for its own agent at no one's cost
+    if plan.struck:  # once any fault has begun, all lanes are tested: each thread tests its own agent
         step += ["hurt_first = integer(0)", "hurt_end = integer(n) if begun > 0 else integer(0)"]
     if plan.absence:  # an instant of one of several agents, or of none, is not counted
         step += ["counted = integer(1) if n >= least(integer(2), born) else integer(0)"]
@@ -422,6 +432,8 @@ def _time(build: CudaBuilder) -> list[str]:
 
 def _next(build: CudaBuilder) -> list[str]:
     """The next step at which anything is due but motion, and a look for collisions."""
+    # A step tests once if anything is due: four counters with a branch each were a fifth of a
+    # motion step.
     due = ["next_sample"] if build.plan.sequential else ["next_decide", "next_sample"]
     found = due[0]
     for other in [*due[1:], *["next_hear"] * build.plan.late]:
@@ -452,7 +464,7 @@ def _world(build: CudaBuilder) -> list[str]:
 
 
 def _decide(build: CudaBuilder) -> list[str]:
-    """What is due of all that looks at the others, who show themselves for it once; then a decision."""
+    """Lines that publish the states of agents if anything of this step reads them; then a decision."""
     meets, watched = not build.plan.sequential, bool(stages_of_events(build.plan)["watch"])
     lines = ["meet = step == next_decide" if meets else "meet = False", "take = step == next_sample"]
     shown = [*branch_lines("meet", _perceived(build))] if meets else []
@@ -475,7 +487,7 @@ def _sample(build: CudaBuilder) -> list[str]:
 
 
 def _look(build: CudaBuilder) -> list[str]:
-    """Whether to look for collisions: while nobody can have come near enough, a vote of all threads says no."""
+    """Lines that decide if pairs are checked for collisions: a vote of all threads, by how far agents have moved."""
     if not stages_of_events(build.plan)["watch"]:
         return []
     watched = _within(build) is not None
@@ -530,14 +542,14 @@ def _choose(build: CudaBuilder) -> list[str]:
     lines = []
     for name in stages_of_events(build.plan)["decide"][1:]:
         if name == "tune":
-            continue  # told to the others before they meet
+            continue  # runs before, in _perceived
         lines += [build.stages[name].call(k_="k"), *barrier]
     lines += ["k = integer(k + 1); next_decide = integer(step + decide_every)"]
     return [*lines, "slot_out = integer(slot_out + 1) if slot_out + 1 < slots else integer(0)"]
 
 
 def _looked(build: CudaBuilder) -> list[str]:
-    """Contacts at this instant. Who was not looked at since an earlier one was in none: memories begin anew."""
+    """Lines that measure contacts at this instant. After instants that were skipped, memories start from zero."""
     lines = [build.stages["measure_collision"].call(), *_added(build, "collision")]
     width = _within(build)
     if width is None:
@@ -566,6 +578,8 @@ def _added(build: CudaBuilder, clock: str) -> list[str]:
     lines = []
     for c, (_, how, when) in enumerate(sampled_columns(build.plan.metrics)):
         if when == clock:
+            # Sums over a flight go to two numbers (Kahan): in single precision a plain sum of many
+            # samples loses digits.
             add = f"totals[{c}, 0], totals[{c}, 1] = add_exactly(totals[{c}, 0], totals[{c}, 1], value{c})"
             kept = f"totals[{c}, 0] = {'least' if how == 'min' else 'most'}(totals[{c}, 0], value{c})"
             lines += [add if how in ("mean", "sum") else kept]
@@ -574,7 +588,7 @@ def _added(build: CudaBuilder, clock: str) -> list[str]:
 
 
 def _one(build: CudaBuilder) -> str:
-    """What an instant counts."""
+    """Text of the weight of an instant."""
     return "counted" if build.plan.absence else "1"
 
 
@@ -602,7 +616,7 @@ def _advance(build: CudaBuilder) -> list[str]:
 
 
 def _end(build: CudaBuilder) -> list[str]:
-    """What a flight leaves behind."""
+    """Lines that write the results of a flight."""
     who = _number(build)
     left = [f"states[block, {c}, {who}] = {own_row(build, name)}" for c, name in enumerate(build.plan.motion)]
     lines = agent_loop(build, left)

@@ -36,11 +36,12 @@ from airflock.engine.totals import combine_sums
 from airflock.scenarios import FORMATIONS, Scenario, step_counts
 from airflock.support import DeviceError, cuda_runtime, free_gpu_memory, is_simulated, require_gpu
 
-# ---------------------------------------------------------------------------------------------- sorting into cells
+# ------------------------------------------------------------------------------- sorting into cells
 
 
-# Rows of near are two vectors of four. A compiler that knows nothing of their place loads number by number, seven times
-# as often: one instruction of the GPU loads four. (Tables begin at multiples of 256 bytes.)
+# Rows of near are two vectors of four. A compiler that knows nothing of their place loads number by
+# number, seven times as often: one instruction of the GPU loads four. (Tables begin at multiples of
+# 256 bytes.)
 LOAD_FOURS_TEXT = """
 from llvmlite import ir
 from numba.cuda import types
@@ -79,6 +80,8 @@ def four_low(table, row):
 def four_high(table, row):
     return table[row, 4], table[row, 5], table[row, 6], table[row, 7]
 """
+# An agent's place in its cell is the number of lower-numbered agents there: atomic ranks would
+# change last bits from run to run. A loop over one cell is short.
 SORT_TEXT = """
 @njit()
 def cell_along(x, low, size, count):
@@ -171,7 +174,7 @@ def copy_agents(near, rest, cell, starts, listed, sorted_, rest_sorted):
 """
 
 
-# ---------------------------------------------------------------------------------------------- text of the driver
+# ------------------------------------------------------------------------------- text of the driver
 
 
 NEIGHBOUR_COLUMNS = 8  # columns of the table that neighbours read: x y z number, vx vy vz nothing
@@ -186,7 +189,9 @@ AROUND = (
     "first = low_x; last = high_x; base_x = own_x",
     "{across}",
 )
-# Across a face of a periodic box neighbours are met at their image: where the agent would be, seen from there.
+# Across a face of a periodic box neighbours are met at their image: where the agent would be, seen
+# from there. The agent is moved by a box once per row of cells instead of folding every offset: a
+# quarter of a pair's instructions.
 IMAGE = (
     "base_{a} = own_{a} + (row_w.half_{a} * real(2.0) if q{a} < count[{c}] else "
     "(row_w.half_{a} * real(-2.0) if q{a} >= 2 * count[{c}] else ZERO))"
@@ -219,7 +224,7 @@ def large_flock_text(plan: Plan, simulated: bool = False) -> str:
 
 
 def _stages(build: CudaBuilder) -> tuple[str, ...]:
-    """What an agent does in a step: nobody is told anything but the truth, so nothing is perceived."""
+    """Return the stages of a step; perception is exact here, so the stage `perceive` is left out."""
     events = stages_of_events(build.plan)
     return tuple(name for name in (*events["decide"], *events["move"]) if name != "perceive")
 
@@ -237,7 +242,7 @@ class CellBuilder(CudaBuilder):
     """Pair loops run over the cells around an agent; agent i has the number that the table gives it."""
 
     def columns(self) -> dict[str, tuple[str, int]]:
-        """What neighbours read of each other."""
+        """Columns of the table that neighbours read of each other."""
         found = {name: ("sorted_", c) for c, a in enumerate("xyz") for name in (a, f"h{a}")}
         return found | {f"hv{a}": ("sorted_", 4 + c) for c, a in enumerate("xyz")}
 
@@ -270,7 +275,7 @@ def _kernel(options: str, name: str, *arguments: str, body: list[str]) -> list[s
 
 
 def _common(build: CellBuilder) -> list[str]:
-    """What every kernel of a flock knows."""
+    """Lines at the head of every kernel of a flock."""
     lines, local = number_lines(build), f"np.float{build.plan.bits}"
     lines += ["sub = integer(0); tid = integer(0); slot = integer(cuda.grid(1)); late = ZERO"]
     lines += [f"gust = cuda.local.array({GUSTS}, {local})", f"aim = cuda.local.array(4, {local})"]
@@ -280,7 +285,7 @@ def _common(build: CellBuilder) -> list[str]:
 
 
 def _begin(build: CellBuilder) -> list[str]:
-    """Every agent at a random place, whoever else is there."""
+    """Lines that put every agent at a random place, without regard to the others."""
     plan = build.plan
     draw = try_place_lines(build, "i")
     draw += branch_lines("free", ["placed = True", "break"])
@@ -312,6 +317,8 @@ def _advance(build: CellBuilder) -> list[str]:
     body += [f"{r} = {'u32(0)' if r[0] == 'u' and r[1].isdigit() else 'ZERO'}" for r in registers if r not in state]
     load = [f"{name} = {table}[slot, {c}]" for name, (table, c) in state.items()]
     fetch = [f"{name} = {sorted_[table]}[slot, {c}]" for name, (table, c) in state.items()]
+    # Between decisions agents stay where the last sort put them: only a decision reads the sorted
+    # tables and writes back in their order.
     meet = ["i = integer(sorted_[slot, 3])", *fetch, *_edges(build)]
     meet += ["number = step // decide_every"]
     meet += [build.stages[name].call(k_="number") for name in _stages(build)[:-1]]
@@ -359,7 +366,7 @@ def signatures(bits: int) -> dict[str, tuple[Any, ...]]:
     }
 
 
-# --------------------------------------------------------------------------------------------------------- flights
+# ------------------------------------------------------------------------------------------ flights
 
 
 CELLS = 4  # at most so many cells per agent, as on the CPU
@@ -374,6 +381,8 @@ def large_flock_driver(plan: Plan, simulated: bool) -> ModuleType:
 
 def cell_plan_error(plan: Plan, agents: int) -> str | None:
     """Why a plan cannot be flown by cells on a GPU; None if it can."""
+    # The kernel of one large flock knows a part of the plan only; each refusal names the part, and
+    # the CPU flies the rest.
     if not plan.grid:
         return "cells need at least 1000 agents, a model of finite reach and perception without noise or delay"
     if plan.columns:
@@ -409,6 +418,7 @@ def cell_grid(scenario: Scenario, plan: Plan, tables: WorldTables) -> tuple[list
         half = [h if 0.0 < h < 1e7 else float(row[f"w.extent_{a}"]) for h, a in zip(half, "xyz", strict=True)]
     width = [2.0 * h for h in half]
     volume = math.prod(max(w / near, 1.0) for w in width)
+    # As on the CPU: cells grow where a wide arena would have more of them than memory is meant for.
     side = near * max(1.0, (volume / (CELLS * scenario.agents)) ** (1.0 / plan.dimensions))
     count = [max(1, int(w / side)) for w in width]
     size = [w / c if w > 0.0 else 1.0 for w, c in zip(width, count, strict=True)]
@@ -498,6 +508,8 @@ class LargeFlock:
             for name, grid in (("count_agents", each), ("sum_within", scan), ("sum_before", scan),
                                ("list_agents", most), ("copy_agents", each), ("advance", each))
         )  # fmt: skip
+        # Five small kernels sort at each decision; launches follow each other on one stream, so
+        # nothing waits on the host.
         for _ in range(steps):
             meet = self.step % self.times["decide_every"] == 0
             if meet:

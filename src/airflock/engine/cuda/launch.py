@@ -25,7 +25,7 @@ from airflock.engine.totals import combine_sums, goal_times
 from airflock.scenarios import largest_fitting
 from airflock.support import DeviceError, cuda_runtime, free_gpu_memory, is_simulated, multiprocessor_count, require_gpu
 
-# ---------------------------------------------------------------------------------------------------------- memory
+# ------------------------------------------------------------------------------------------- memory
 
 
 MAX_MEMORY_SHARE = 0.9  # of the free memory that may be used
@@ -86,6 +86,8 @@ def lacking(plan: Plan, rows: int, tables: WorldTables, free: int) -> str | None
     def bytes_of(n: int) -> int:
         return needed_bytes(plan, rows, layout_of(plan, n, 1), tables.changed(agents=n))
 
+    # Memory is computed before anything flies, with the sizes that a launch allocates, so a refusal
+    # can say what fits.
     if bytes_of(agents) <= room:
         return None
     return memory_message(agents, bytes_of(agents), room, largest_fitting(agents, lambda n: bytes_of(n) <= room))
@@ -99,7 +101,7 @@ def memory_message(agents: int, bytes_: int, room: int, fitting_agents: int) -> 
     )
 
 
-# -------------------------------------------------------------------------------------------------------- launches
+# ----------------------------------------------------------------------------------------- launches
 
 
 AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress
@@ -120,7 +122,7 @@ def fly_many(
 ) -> list[DriverResult]:
     """Fly many worlds of one plan, each from its tables; results in the order of the jobs.
 
-    starts : (component, agent) of each world where the plan asks for it
+    starts : (component, agent) of each world where the plan needs it
     done   : called once per flight as results come in
     shape  : layout of a flock instead of the one that suits population, flock size and GPU
 
@@ -128,6 +130,8 @@ def fly_many(
     """
     require_gpu(shape is not None and shape.simulated)
     groups: dict[Any, list[int]] = {}
+    # One launch flies flocks of one shape; jobs are sorted into such groups and results put back in
+    # their order.
     for number, tables in enumerate(jobs):
         groups.setdefault(_alike(plan, tables), []).append(number)
     flown_by: dict[int, DriverResult] = {}
@@ -155,7 +159,7 @@ def _alike(plan: Plan, tables: WorldTables) -> tuple[Any, ...]:
 
 
 def _batch(plan: Plan, driver: ModuleType, shape: BlockLayout, jobs: Sequence[WorldTables]) -> int:
-    """How many flocks one launch takes; raises DeviceError if not even one fits."""
+    """Return the number of flocks for one launch; raises DeviceError if not even one fits."""
     if shape.simulated:
         return len(jobs)
     free = free_gpu_memory()
@@ -269,6 +273,7 @@ def read_results(plan: Plan, jobs: Sequence[WorldTables], own: dict[str, Any]) -
         n = tables.integers["agents"]
         exact = left["all_sums"][flock].astype(np.float64)
         sums = exact[:, 0].copy()
+        # The second number of each sum is what rounding has taken from the first.
         sums[:count] -= exact[:count, 1]  # what Kahan's sum has lost so far
         values = combine_sums(plan, sums) | goal_times(
             plan, left["all_reached"][flock][: len(tables.goals)] if plan.goals else tables.goals
@@ -301,13 +306,13 @@ def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:
 
 
 def _wide(own: NDArray[Any], size: tuple[int, ...], real: Any) -> NDArray[Any]:
-    """What differs among agents, with the last one's numbers where nobody is."""
+    """Return the numbers that differ among agents, padded with those of the last agent."""
     if not len(own):
         return np.zeros(size, real)
     return np.pad(own, ((0, 0), (0, size[1] - own.shape[1])), mode="edge").astype(real)
 
 
 def _remembered(plan: Plan, tables: WorldTables, size: tuple[int, ...], real: Any) -> NDArray[Any]:
-    """What laws remember at the start, of each lane what its law does."""
+    """Return the memory of laws at the start, for each lane by its law."""
     laws = _wide(tables.own, (len(plan.columns), size[1]), np.float64)[plan.columns.index(("", "law"))]
     return law_memories(plan, laws.astype(np.int64), real)[: size[0]]

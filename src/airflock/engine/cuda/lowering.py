@@ -21,7 +21,7 @@ from airflock.engine.replace import ReplacementError
 from airflock.engine.specialise.local_names import read_names, written_names
 from airflock.engine.stages.words import REDUCTION_START
 
-# ------------------------------------------------------------------------------------------------------------ rows
+# --------------------------------------------------------------------------------------------- rows
 
 
 PER_AGENT_TABLES = {"mem": "mem", "memory": "kept"}  # second index is the agent
@@ -29,7 +29,7 @@ PER_AGENT_TABLES = {"mem": "mem", "memory": "kept"}  # second index is the agent
 
 @dataclass
 class LoweringContext:
-    """What lowering has to know.
+    """Settings of the lowering of one stage.
 
     shape    : layout of a flock
     rows     : names that stand for rows of the work table
@@ -37,7 +37,7 @@ class LoweringContext:
     turn     : one agent i at a time, for all threads
     carried  : totals stay with each thread instead of being reduced over the block
     cells    : lines around a pair loop over cells, from outside in, instead of one loop over all pairs
-    exact    : an unrolled pair loop meets nobody beyond the last agent (who would be far away)
+    exact    : an unrolled pair loop stops at the last agent (those beyond would be far away)
     alone    : loops that keep one agent of all (the farthest, say) are run in full by every thread
     across   : rows over the others that each agent has to itself, and their places in the table that holds them
     """
@@ -198,7 +198,7 @@ class OwnRegisters(ast.NodeTransformer):
         return node
 
 
-# ------------------------------------------------------------------------------------------------ loops and totals
+# --------------------------------------------------------------------------------- loops and totals
 
 
 NEUTRAL = {how: start.spelled for how, start in REDUCTION_START.items()}
@@ -256,6 +256,9 @@ class _Totals:
             self.waiting |= totals
         if context.turn:
             return body
+        # One thread per agent wherever a flock is larger than a warp: threads that share pairs cost
+        # more than they save. A layout whose threads reach a sum in different turns is refused: on
+        # a card they wait for ever, which the simulator does not show.
         if shape.registers:
             if not paired:
                 masked = parse_lines(f"{t} = {t} if sub == 0 else {NEUTRAL[totals[t]]}" for t in totals)
@@ -277,6 +280,8 @@ class _Totals:
         """Reduce all waiting totals over the block, so that every thread holds them."""
         if not self.waiting:
             return []
+        # Totals wait and are reduced together when one is read: each reduction costs a barrier for
+        # the whole block.
         shape, names = self.context.shape, list(self.waiting)
         lane, side = ("tid & 31", "tid >> 5") if not shape.simulated else ("0", "tid")
         side_ = self.count % 2  # one half is read while the other is written
@@ -334,6 +339,8 @@ class _Pairs:
             inner += [*(f"    {line}" for line in _by_fours(text)), "    j = np.uint32(j + np.uint32(1))"]
             return parse_lines([*around, *(f"{depth}{line}" for line in inner)])
         step = "j = np.uint32(j + np.uint32(PER_AGENT))"
+        # Unrolled by hand: two pairs a turn hide the wait for the shared table, four cost registers
+        # and were slower.
         turns = max(1, min(UNROLL, shape.lanes // shape.per_agent))
         once = [f"    {line}" for line in [*text.splitlines(), step]]
         loops = ["j = np.uint32(sub)", "while j < np.uint32(n):", *(once * turns)]
@@ -361,6 +368,8 @@ def carried_totals(body: list[ast.stmt]) -> dict[str, str]:
     """Scalars that a loop carries from turn to turn, and how: sum, min or max."""
     found: dict[str, str] = {}
     stored: set[str] = set()
+    # A scalar is carried if its first use in the loop adds to itself; one that is assigned before
+    # belongs to the turn.
     for statement in body:
         if isinstance(statement, ast.AugAssign) and isinstance(statement.target, ast.Name):
             if statement.target.id not in stored:
@@ -382,12 +391,12 @@ def _over_agents(statement: ast.stmt) -> ast.For | None:
 
 
 def _of_one_thread(statement: ast.stmt) -> bool:
-    """Whether only the first thread runs a statement, so that no barrier may stand in it."""
+    """Return True if only the first thread runs a statement, so that no barrier may stand in it."""
     return isinstance(statement, ast.If) and ast.unparse(statement.test) == "tid == 0"
 
 
 def _by_law(statement: ast.If) -> bool:
-    """Whether only the agents of one law run a statement: one thread serves each of them."""
+    """Return True if only the agents of one law run a statement: one thread serves each of them."""
     return ast.unparse(statement.test).startswith("law[i] == ")
 
 
@@ -401,7 +410,7 @@ def used_names(statements: list[ast.stmt]) -> tuple[set[str], set[str]]:
     return read_names(statements) | written_names(sums), written_names(statements)
 
 
-# ----------------------------------------------------------------------------------------------------- reciprocals
+# -------------------------------------------------------------------------------------- reciprocals
 
 
 PREFIX = "per_"
@@ -435,6 +444,7 @@ class SecondForms:
     def keys(self, name: str) -> list[str] | None:
         """Reciprocals that the second form of a rule takes after its arguments; None if it has no such form."""
         if name not in self._keys:
+            # Set before the form is made: a rule that calls itself would otherwise never end.
             self._keys[name] = None
             rule = self.rule(name)
             if rule is not None:
@@ -464,7 +474,7 @@ class SecondForms:
         self.made.append(f"{self.decorator}\n{ast.unparse(ast.fix_missing_locations(node))}")
 
     def is_root(self, name: str) -> bool:
-        """Whether a rule is nothing but a root; its second form is the reciprocal."""
+        """Return True if a rule is nothing but a root; its second form is the reciprocal."""
         rule = self.rule(name)
         if rule is None or single_root(rule) is None:
             return False
@@ -526,7 +536,7 @@ class DivisionsToProducts(ast.NodeTransformer):
 
 
 class RootsToReciprocals(ast.NodeTransformer):
-    """x = sqrt(s) as per_x = 1 / sqrt(s), x = s · per_x, for the names that are asked for; s is never zero."""
+    """Rewrites x = sqrt(s) as per_x = 1 / sqrt(s), x = s · per_x, for these names; s is never zero."""
 
     def __init__(self, names: Iterable[str]):
         self.names = set(names)
@@ -549,6 +559,8 @@ def with_reciprocals(
     records : names of the records of numbers that the stage reads
     """
     roots = {name for s in body for item in walk_tree(s) if (name := root_name(item)) is not None}
+    # A name that is a root in one place and something else in another is left alone: its reciprocal
+    # was stale once.
     roots -= {name for s in body for item in walk_tree(s) for name in otherwise_assigned(item)}
 
     def known(expression: ast.expr) -> str | None:
@@ -573,7 +585,7 @@ def reciprocal_name(key: str) -> str:
 
 
 def single_root(rule: ast.FunctionDef) -> ast.expr | None:
-    """What a rule takes the root of, if it does nothing else."""
+    """Return the argument of the root if a rule is nothing but a root, else None."""
     last = rule.body[-1]
     if len(rule.body) != 1 or not isinstance(last, ast.Return) or not isinstance(last.value, ast.Call):
         return None

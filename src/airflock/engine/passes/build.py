@@ -16,7 +16,8 @@ from airflock.engine.text.rewrite import law_suffix
 
 JIT_DECORATOR = "@njit(**JIT)"
 ONCE = "@njit(**ONCE)"
-# what names of rows begin with that only numbers that differ need, and faults of motion, radio and clock
+# what names of rows begin with that only numbers that differ need, and faults of motion, radio and
+# clock
 FEW = (FAULT_PREFIX, NUMBER_PREFIX, "unhindered_", "reach_", "clock", "sent_clock")
 
 
@@ -31,7 +32,7 @@ class Builder:
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
     drifts   : whether agents may be watched by how fast they are beside the drift of the flock
     trails   : whether rows of faults and of agents that differ come last in the work table
-    drops    : whether the compiler drops a sum over agents that nobody reads
+    drops    : whether the compiler drops an unread sum over agents
     """
 
     clusters: Callable[[Metric], list[str]] | None = None
@@ -69,6 +70,8 @@ class Builder:
             name = name[1:]
         if not plan.told and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
             name = name[1:]
+        # Negative numbers count from the end of the table, whose length is known only when all
+        # stages are made.
         if self.puts_rare_rows_last and (name.startswith(FEW) or (name == "order" and not plan.grid)):
             return self.last.setdefault(name, -1 - len(self.last))
         return self.first.setdefault(name, len(self.first))
@@ -93,7 +96,7 @@ class Builder:
 
     @property
     def mark(self) -> str:
-        """What functions and records end in that are of one law of several."""
+        """Suffix of functions and records of one law of several."""
         return law_suffix(self.plan.law)
 
     def kind(self, letter: str, fields: tuple[str, ...]) -> str:
@@ -102,12 +105,12 @@ class Builder:
 
     @property
     def is_sequential(self) -> bool:
-        """Whether a loop over all agents is the body alone, for the agent in turn."""
+        """Return True if a loop over all agents is its body alone, for the agent in turn."""
         return self.plan.sequential
 
     @property
     def images(self) -> bool:
-        """Whether a stage takes offsets between agents to the nearest image."""
+        """Return True if a stage takes offsets between agents to the nearest image."""
         return self.plan.periodic
 
     def order(self) -> list[str]:
@@ -119,7 +122,7 @@ class Builder:
         return self.numbers(letters.split())
 
     def numbers(self, letters: Iterable[str], prefix: str = "") -> list[str]:
-        """The same under names that begin with a prefix."""
+        """Lines that read records of numbers under names that begin with a prefix."""
         spans, wanted = self.plan.spans, set(letters)
         return [
             f"{prefix}{letter} = {self.kind(letter, fields)}({', '.join(f'row[{c}]' for c in _places(spans[letter]))})"
@@ -136,12 +139,12 @@ class Builder:
         return [f"{name} = scene[{SCENE_ARRAYS.index(name)}]" for name in names]
 
     def call(self, rule: Callable[..., Any], kind: str, arguments: Mapping[str, str], owner: str = "") -> str:
-        """Text of a call of a rule with what it asks for."""
+        """Text of a call of a rule with the arguments that it takes."""
         names = argument_names(rule, kind, owner)
         return f"{self.source.name(rule)}({', '.join(arguments.get(name, name) for name in names)})"
 
     def rule_asks(self, rule: Callable[..., Any] | None, kind: str, *names: str) -> bool:
-        """Whether a rule exists and asks for any of these names."""
+        """Return True if a rule exists and takes an argument of any of these names."""
         return rule is not None and bool(set(argument_names(rule, kind)) & set(names))
 
     def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False, once: bool = False) -> None:
@@ -165,6 +168,9 @@ class Builder:
 
         apart : the rows that it reads once become arguments, which the compiler then knows to lie apart in memory
         """
+        # Most stages are one function. Two cases split them: rows as arguments that lie apart, and
+        # turns, where the bindings are shared by all agents and only the body is called once for
+        # each.
         if not self.plan.sequential and not (apart and self.apart):
             spread = self.plan.grid and name == f"decide{self.mark}"
             body = checked_replace(body, "i in range(n)", "i in prange(n)") if spread else body

@@ -1,9 +1,9 @@
-"""Cell grid: memory and functions of a flock whose neighbours are found by cells; for many agents that see a short way.
+"""Cell grid: memory and functions of a flock that finds neighbours by cells; for many agents that see a short way.
 
-Whatever lies at random in memory (the agents of a cell, their sums) is kept in rows of one agent, so that it costs one
-cache line and not one per number; `slots` keeps it from lying far apart. All that is kept from stage to stage lies in
-memory that lasts for a flight. Where groups have laws of their own, each law sorts the flock anew, into cells of its
-own reach, and goes through those who fly by it. Only for perception without noise, delay and loss; there it equals all
+Data that lie at random in memory (the agents of a cell, their sums) are kept in rows of one agent, so that they cost
+one cache line and not one per number; slots keep them from lying far apart. What stages keep for each other lies in
+memory that lasts for a flight. Where groups have laws of their own, each law sorts the flock again, into cells of its
+own reach, and goes through its own agents. Only for perception without noise, delay and loss; there it equals all
 pairs but for rounding and the order of sums.
 """
 
@@ -24,7 +24,7 @@ from airflock.engine.stages.neighbours import widest_reach
 from airflock.engine.stages.neighbours_by_cells import neighbours_by_cells
 from airflock.engine.stages.words import BLOCK
 
-# ----------------------------------------------------------------------------------------------------------- cells
+# -------------------------------------------------------------------------------------------- cells
 
 
 SORT = StageFunction("sort", ("n", "near", "most_cells", "row", "work", "cells"))
@@ -34,11 +34,11 @@ KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
 def grid_memory(
     plan: Plan, agents: int, rows: Callable[[tuple[int, ...], Any], Any]
 ) -> tuple[tuple[NDArray[Any], ...], ...]:
-    """What the grid keeps of n agents during a flight, as one argument or none; `rows` makes zeros on cache lines.
+    """Make the memory of the grid for n agents, as one argument or none; `rows` makes zeros on cache lines.
 
     starts : first place of each cell; tally : agents by chunk and cell, in one row; cell_of : of each agent
     packed : (place, component) states and, as an integer, the slot; flat : (component, place) states; ident : agents
-    Between two sorts, `tally` and `ident` are scratch of whoever looks for links by cells.
+    Between two sorts, `tally` and `ident` are scratch of the search for links by cells.
     """
     if not plan.grid:
         return ()
@@ -50,7 +50,9 @@ def grid_memory(
         ((agents,), whole), ((agents, _width(plan)), real), ((components, agents + BLOCK), real),
         ((agents * max(1, fields),), real),
     )  # fmt: skip
-    # not made anew at each step: the pages of what is given back must be zeroed again before they are used
+    # not made again at each step: the pages of what is given back must be zeroed again before they
+    # are used Allocated once per flight: allocation at every step was part of the 203 ns of an
+    # agent-step.
     return (tuple(rows(shape, kind) for shape, kind in shapes),)
 
 
@@ -95,21 +97,24 @@ def sort_lines(build: Builder, min_width: str, max_cells: str) -> list[str]:
     return [*bind_lines(build), f"sides, count = sort(n, {min_width}, {max_cells}, row, work, cells)"]
 
 
-# ----------------------------------------------------------------------------------------------------------- slots
+# -------------------------------------------------------------------------------------------- slots
 
 
 def uses_slots(plan: Plan) -> bool:
-    """Whether agents have slots: where they are sorted, and where some may be absent, who lie behind the others."""
+    """Return True if agents have slots: where they are sorted, or some may be absent and then lie behind the others."""
     return plan.absence or sorts_by_cells(plan)
 
 
 def sorts_by_cells(plan: Plan) -> bool:
-    """Whether agents are put beside those they meet: not where rules of the whole flock know them by number."""
+    """Return True if agents are sorted by cells: not where rules of the whole flock know them by number."""
     return plan.grid and not plan.sequential and not flock_rules(plan)
 
 
 def add_rearrange(build: Builder) -> None:
     """Function rearrange: moves all agents to where they were just sorted to; sums lend their memory meanwhile."""
+    # Agents numbered regardless of place make every sorted access random over tens of megabytes:
+    # 199 -> 162 ns per agent-step at a million boids. Prefetching (172 ns) gains nothing once
+    # agents have slots.
     rows = ["lane = table[c]", *_spread("kept[i] = lane[whose[i]]"), *_spread("lane[i] = kept[i]")]
     build.function(
         "put(n, table, kept, whose)", loop_lines("c in range(table.shape[0])", rows), "return 0", parallel=True

@@ -41,7 +41,7 @@ class StageCall:
 
 @dataclass(frozen=True)
 class StageFunction:
-    """Another stage as a function of the driver, to be asked: what it is not given it takes under the name it has."""
+    """Another stage as a function of the driver; arguments that a call leaves out go by their own names."""
 
     name: str
     parameters: tuple[str, ...]
@@ -101,7 +101,7 @@ class FunctionSyntax:
 
     local : names that it binds, parameters among them
     once  : those that it binds in one place only
-    again : parameters that it binds anew
+    again : parameters that it assigns to
     """
 
     node: ast.FunctionDef
@@ -146,7 +146,7 @@ def function_syntax(function: Callable[..., Any]) -> FunctionSyntax:
 
 @dataclass
 class Scope:
-    """What the names of a stage, or of a helper in it, stand for."""
+    """Values of the names of a stage, or of a helper in it."""
 
     text: FunctionSyntax
     known: dict[str, object] = field(default_factory=dict)
@@ -158,10 +158,10 @@ class Scope:
 
 
 def is_syntax(value: object) -> bool:
-    """Whether a value is syntax of the driver."""
+    """Return True if a value is syntax of the driver."""
     return isinstance(value, ast.expr)
 
 
 def needs_no_variable(value: object) -> bool:
-    """Whether a local of this value needs no variable: it is known, or a name that the driver binds anyway."""
+    """Return True if a local of this value needs no variable: it is known, or a name that the driver binds anyway."""
     return not is_syntax(value) or name_kind(value) not in (None, "rule")

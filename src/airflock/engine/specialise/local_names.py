@@ -1,8 +1,8 @@
-"""Apart: no local of a helper overwrites what a stage, or another helper in it, still reads.
+"""Local names: no local of a helper overwrites a value that a stage, or another helper, still reads; dead ones go.
 
 A helper's statements take the place of its call, so that its locals lie beside the stage's. While statements are made,
 a local of a helper is spelled with a mark of the helper (`near@2`), which no name of Python can have. In the end each
-has its own name, unless somebody would then read what another has written: that one has the helper's name behind it.
+has its own name, unless one would then read what another has written: that one gets the helper's name as a suffix.
 """
 
 import ast
@@ -13,7 +13,7 @@ from typing import Any
 from airflock.core import walk_tree
 from airflock.engine.specialise.known_values import FunctionSyntax, name_kind
 
-# -------------------------------------------------------------------------------- names that two texts would share
+# ----------------------------------------------------------------- names that two texts would share
 
 
 TABLES = frozenset({"work", "row", "whole", "words", "store", "scene", "scratch"})  # what bindings of a driver read
@@ -22,7 +22,7 @@ LastWriters = dict[str, set[str]]  # of each name in the driver, who may have wr
 
 
 class LocalOwners:
-    """Whose the locals of a stage are: the stage's, or those of a helper by its number."""
+    """Owners of the locals of a stage: the stage itself, or a helper by its number."""
 
     def __init__(self, stage: FunctionSyntax):
         self.texts = [stage]
@@ -36,7 +36,7 @@ class LocalOwners:
         return f"{name}@{number}" if number else name
 
     def is_taken(self, vector: str, target: str) -> bool:
-        """Whether a vector that a helper returns has another name in its caller already, which it would overwrite."""
+        """Return True if a vector that a helper returns has another name in its caller, which it would overwrite."""
         return self.returned.setdefault(vector, target) != target
 
     def assign_names(
@@ -49,6 +49,8 @@ class LocalOwners:
         parts: list[ast.AST] = [*statements, *([] if answer is None else [answer])]
         names = [item for part in parts for item in walk_tree(part) if isinstance(item, ast.Name)]
         bound = {item.id for item in names if name_kind(item) not in (None, "rule")} | TABLES
+        # A helper's statements stand in place of its call; a local that the driver binds itself
+        # would silently overwrite it.
         clash = sorted(bound.intersection(item.id for item in names if isinstance(item.ctx, ast.Store)))
         if clash:
             raise make_error(f"{clash[0]} is what the driver itself calls here; give the local another name")
@@ -58,6 +60,8 @@ class LocalOwners:
         for name in marked:
             if found[name] in bound:
                 found[name] = self._free(name, taken)
+        # One name at a time gets its owner behind it, and the walk begins again: renaming one local
+        # may settle several clashes, and short names stay short.
         while overwritten := _Order(found).overwritten(statements, answer):
             name = max(overwritten, key=lambda each: int((MARK.findall(each) or ["0"])[-1]))
             found[name] = self._free(name, taken)
@@ -74,7 +78,7 @@ class LocalOwners:
 
 
 class _Order:
-    """Goes through statements as they are done, and notes by whom each shared name may have been written last."""
+    """A walk through statements in their order, which keeps the possible last writers of each shared name."""
 
     def __init__(self, found: dict[str, str]):
         self.found = found
@@ -110,6 +114,8 @@ class _Order:
     def _loop(self, loop: ast.For | ast.While, written: LastWriters) -> None:
         """A loop, done never, once, or again after itself."""
         outside, self.left = self.left, []
+        # Twice, as the second turn reads what the first has written; a third would find nothing
+        # new.
         for _ in range(2):
             again = {name: {*who} for name, who in written.items()}
             if isinstance(loop, ast.For):
@@ -132,7 +138,7 @@ class _Order:
             written[self.found.get(name, name)] = {name}
 
     def _names(self, node: ast.AST) -> tuple[list[str], list[str]]:
-        """What a statement or an expression reads, and which shared names it writes; looked for once."""
+        """Return the names that a statement or an expression reads, and the shared names that it writes; found once."""
         if id(node) not in self.names:
             items = walk_tree(node)
             named = [item for item in items if isinstance(item, ast.Name)]
@@ -144,7 +150,7 @@ class _Order:
 
 
 def _adds(node: ast.AST) -> bool:
-    """Whether a statement reads what it assigns to."""
+    """Return True if a statement reads the name that it assigns to."""
     return isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name)
 
 
@@ -155,7 +161,7 @@ def _join(written: LastWriters, other: LastWriters) -> None:
 
 
 def can_share_name(statements: list[ast.stmt], marked: Any, name: str) -> bool:
-    """Whether what a helper returns can be called what its caller calls it.
+    """Return True if the result of a helper can have the name that its caller gives it.
 
     So it is where both use one word, and the helper reads nothing else by that name, but to begin with.
     """
@@ -175,14 +181,14 @@ def rename_local(statements: list[ast.stmt], old: str, new: str) -> list[ast.stm
 
 
 def _copies(statement: ast.stmt, to: str, name: str) -> bool:
-    """Whether a statement gives one name the value of another, and does nothing else."""
+    """Return True if a statement only copies one name to another."""
     if not isinstance(statement, ast.Assign) or len(statement.targets) > 1:
         return False
     names = [node.id for node in (*statement.targets, statement.value) if isinstance(node, ast.Name)]
     return names == [to, name]
 
 
-# ------------------------------------------------------------------------------------ statements that nobody reads
+# --------------------------------------------------------------------- statements that nobody reads
 
 
 def read_names(nodes: Iterable[ast.AST]) -> set[str]:
@@ -207,6 +213,8 @@ def without_dead(statements: list[ast.stmt], kept: set[str]) -> list[ast.stmt]:
 
     kept : names that are read elsewhere
     """
+    # A variable may be read only by a statement that is itself dead, so passes go on until one
+    # removes nothing.
     while True:
         needed, count = read_names(statements) | kept, [0]
         statements = _without(statements, needed, count)

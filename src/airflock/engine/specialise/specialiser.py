@@ -1,4 +1,7 @@
-"""Expressions of a stage: each is either known while the driver is made, or syntax of the driver."""
+"""Specialiser: expressions, statements and whole stages, evaluated for a plan as far as it decides them.
+
+An expression of a stage is either known while the driver is made, or syntax of the driver.
+"""
 
 import ast
 import builtins
@@ -45,7 +48,7 @@ from airflock.engine.stages.records import SortedCells, WorldArrays
 from airflock.engine.stages.state import SCENE_ARRAYS, FlockRows, own_row
 from airflock.engine.stages.words import IdentityRow, NamedConstant, ZeroRow
 
-# ----------------------------------------------------------------------------------------------------- expressions
+# -------------------------------------------------------------------------------------- expressions
 
 
 # of the driver, whatever they are called with
@@ -86,6 +89,8 @@ class ExpressionSpecialiser:
         """A value as syntax of the driver."""
         if isinstance(value, ast.expr):
             return value
+        # Constants go by name, since a literal would be in double precision in a driver of single
+        # precision.
         if isinstance(value, NamedConstant):
             name = ast.Name(value.spelled.lstrip("-"), LOAD)
             return ast.UnaryOp(ast.USub(), name) if value.spelled[0] == "-" else name
@@ -172,6 +177,8 @@ class ExpressionSpecialiser:
         ends = isinstance(node.op, ast.Or)  # a known value that ends it
         left: list[ast.expr] = []
         value: object = not ends
+        # Known operands vanish as Python would stop or go on at them; what is left is a test of the
+        # driver.
         for part in node.values:
             value = self.value(part, scope)
             if is_syntax(value):
@@ -239,6 +246,7 @@ class ExpressionSpecialiser:
         arguments = self._items(node.args, scope)
         if called is words.lanes_between:
             return replace(arguments[0], within=tuple(arguments[1:]))
+        # Written out from left to right, as Python adds: the order of a sum decides its last bits.
         if called is sum:
             total, *terms = [self.to_syntax(term, node, scope) for term in arguments[0]]
             for term in terms:
@@ -265,7 +273,7 @@ class ExpressionSpecialiser:
         )
 
     def _asked(self, node: ast.Call, scope: Scope) -> ast.expr:
-        """A call of a rule with what it asks for, in its order; nothing else that is offered is looked at."""
+        """Call of a rule with its arguments, in its order; other arguments on offer are never evaluated."""
         rule = self.value(node.args[0], scope)
         offered: dict[str, Any] = {k.arg: k.value for k in node.keywords if k.arg}
         known: dict[str, Any] = {}
@@ -336,11 +344,11 @@ BY_TYPE: dict[type, Callable[..., Any]] = {
 
 
 def _record(value: object) -> bool:
-    """Whether a value is a class of records of numbers, which a driver makes."""
+    """Return True if a value is a class of records of numbers, which a driver makes."""
     return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields")
 
 
-# ------------------------------------------------------------------------------------------------------ statements
+# --------------------------------------------------------------------------------------- statements
 
 
 TABLE_PREFIXES = {
@@ -361,7 +369,7 @@ class StatementSpecialiser(ExpressionSpecialiser):
     def run(
         self, stage: Callable[..., Any], known: dict[str, object]
     ) -> tuple[list[ast.stmt], list[ast.stmt], ast.expr | None]:
-        """What is done once, what is done for agents, and the answer."""
+        """Specialise a stage; returns the statements done once, those done for agents, and the answer."""
         standing = self.standing()
         text = function_syntax(stage)
         self.owners = LocalOwners(text)
@@ -383,7 +391,7 @@ class StatementSpecialiser(ExpressionSpecialiser):
         return [s for s in once if s not in first], [*first, *body], answer
 
     def standing(self) -> dict[str, object]:
-        """What parameters of stages stand for wherever they have these names."""
+        """Values that parameters of stages have wherever they bear these names."""
         plan = self.build.plan
         rows: dict[str, ast.Name] = {}
 
@@ -467,6 +475,8 @@ class StatementSpecialiser(ExpressionSpecialiser):
         """Statements of a helper in place of its call, and the expression that it returns, as the helper knows it."""
         inner = self.helper_scope(called, node, self._items(node.args, scope), scope)
         *body, last = inner.text.body
+        # The result is not a variable of its own where it need not be: the caller looks at the
+        # returned expression in the scope of the helper.
         done = self.copied_variables(inner)
         if isinstance(last, ast.Return) and last.value is not None:
             done, answer = done + self.block(body, inner), (last.value, inner)
@@ -477,7 +487,7 @@ class StatementSpecialiser(ExpressionSpecialiser):
         return done, answer
 
     def copied_variables(self, inner: Scope) -> list[ast.stmt]:
-        """Variables of a helper for what it is handed and binds anew."""
+        """Make variables for the arguments that a helper assigns to."""
         done: list[ast.stmt] = []
         for name in sorted(inner.text.again & inner.known.keys()):
             value = inner.known[name]
@@ -489,6 +499,8 @@ class StatementSpecialiser(ExpressionSpecialiser):
     def loop(self, node: ast.For, scope: Scope) -> list[ast.stmt]:
         """A loop: unrolled where it is known, over agents, or as it stands."""
         over = self.value(node.iter, scope)
+        # Loops over axes and fields are written out, loops over agents never: what the plan fixes
+        # must not cost at run time.
         if isinstance(over, UNROLLED):
             done: list[ast.stmt] = []
             for item in over:
@@ -518,11 +530,12 @@ class StatementSpecialiser(ExpressionSpecialiser):
             first, end = within
             inside: list[ast.expr] = [ast.Compare(first, [ast.LtE()], [lane]), ast.Compare(lane, [ast.Lt()], [end])]
             return _loop(target, [ast.Name(over.bound, LOAD)], [ast.If(ast.BoolOp(ast.And(), inside), done, [])])
-        # a lane that cannot be negative is not asked whether it counts from a row's end: else no loop is a vector's
+        # a lane that cannot be negative is not tested whether it counts from a row's end: else no
+        # loop is a vector's
         return _loop(target, [ast.Call(ast.Name("u64", LOAD), [each], []) for each in within], done)
 
     def loop_over_law(self, over: AgentLoop, node: ast.For, scope: Scope) -> list[ast.stmt]:
-        """What a loop does for an agent; where laws differ, for an agent of this one."""
+        """Body of a loop for an agent; where laws differ, for an agent of this law."""
         done = self.block(node.body, scope)
         if over.law is None:
             return done
@@ -549,6 +562,7 @@ class StatementSpecialiser(ExpressionSpecialiser):
             self.bind(target, value, scope)
             return before
         made, stored = self.to_syntax(value, node, scope), self.target(target, scope)
+        # A helper and its caller often use one word for one thing; then no copy is written.
         if helper is not None and isinstance(stored, ast.Name) and can_share_name(before, made, stored.id):
             return rename_local(before, made.id, stored.id)  # type: ignore[attr-defined]
         sum_ = made if isinstance(made, ast.BinOp) and isinstance(made.op, ast.Add) else None
@@ -586,7 +600,7 @@ def _loop(target: ast.expr, ends: list[ast.expr], body: list[ast.stmt]) -> ast.s
 
 
 def _ends(statements: list[ast.stmt]) -> bool:
-    """Whether nothing after these statements would be reached."""
+    """Return True if nothing after these statements would be reached."""
     return bool(statements) and isinstance(statements[-1], (ast.Return, ast.Break, ast.Continue))
 
 
@@ -594,7 +608,7 @@ def _name(node: ast.expr) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-# --------------------------------------------------------------------------------------------- the text of a stage
+# ------------------------------------------------------------------------------ the text of a stage
 
 
 @dataclass(frozen=True)
@@ -633,7 +647,7 @@ def lines_of(statements: list[ast.stmt]) -> list[str]:
     return [line for statement in statements for line in ast.unparse(statement).splitlines()]
 
 
-# --------------------------------------------------------------------------------------------------- a whole stage
+# ------------------------------------------------------------------------------------ a whole stage
 
 
 def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> SpecialisedText:
@@ -647,6 +661,8 @@ def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> Sp
     made.owners.assign_names([*once, *body], answer, lambda told: StageError(f"{where}: {stage.__name__}: {told}"))
     kept = read_names([answer]) if answer is not None else set()
     kept |= {name for value in known.values() if isinstance(value, LocalVector) for name in value.set.values()}
+    # Tests of the plan leave variables that nobody reads; a compiler would drop them, but a reader
+    # of a driver and a GPU kernel's argument list would not.
     whole = without_dead([*once, *body], kept)
     first = {id(statement) for statement in once}
     parts = whole if answer is None else [*whole, answer]

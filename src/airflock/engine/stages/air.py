@@ -31,8 +31,8 @@ def apart(there: Any, here: Any, a: int, w: Any, *, plan: Plan) -> Any:
 def talkers_in_range(i: int, others: Iterable[int], range2: Any, flock: FlockRows, w: Any, *, plan: Plan) -> Any:
     """Count the other agents that are truly within the range of the radio of agent i."""
     talkers = ZERO
-    # Counted over true places and before the pair loop, as a radio that shares its channel needs the number for every
-    # pair.
+    # Counted over true places and before the pair loop, as a radio that shares its channel needs
+    # the number for every pair.
     for j in others:
         o = vector()
         for a in range(plan.dimensions):
@@ -46,7 +46,8 @@ def fill_clear(
     i: int, others: Iterable[int], range2: Any, flock: FlockRows, w: Any, whole: Any, around: WorldArrays, *, plan: Plan
 ) -> None:
     """Fill the row `clear`: 1 where nothing stands between the true places of agent i and another one."""
-    # A cast branches; its answers go to a row first, so that the pair loop itself stays one of vectors.
+    # A cast branches; its answers go to a row first, so that the pair loop itself stays one of
+    # vectors.
     for j in others:
         open_way = is_clear(i, j, range2, flock, w, whole, around, plan=plan)
         flock.clear[j] = open_way
@@ -62,6 +63,7 @@ def is_clear(
     for a in range(plan.dimensions):
         o[a] = apart(x[a][j], x[a][i], a, w, plan=plan)
     apart2 = sum(o[a] * o[a] for a in range(plan.dimensions))
+    # A cast is dear: only pairs in range of each other are cast at.
     if (apart2 <= range2) & (integer(j) != integer(i)):
         r = math.sqrt(apart2 + TINY)
         ux = o[X] / r

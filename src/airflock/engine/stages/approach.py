@@ -18,10 +18,11 @@ from airflock.engine.stages.words import FAR, ONE, ZERO, choose, integer, lanes_
 TRAVELLED, GAP, CALM, ENDED, BEGUN, DRIFT, PACE, REACH = 0, 1, 2, 3, 4, 5, 8, 9
 HELD_SIZE = 10
 BLOCK = 32  # lanes that loops take at a time (`passes.driver.SPAN`)
-# Covers rounding of the distances themselves; a pair of agents closer than the bound by less than 1 cm is looked at.
+# Covers rounding of the distances themselves; a pair of agents closer than the bound by less than 1
+# cm is looked at.
 SLACK = 0.01  # m
-# Single precision loses up to 5e-7 of the coordinate in a step. Slow changes of shape take many steps between two
-# looks, and far from the origin the slack of 1 cm alone would not cover the sum.
+# Single precision loses up to 5e-7 of the coordinate in a step. Slow changes of shape take many
+# steps between two looks, and far from the origin the slack of 1 cm alone would not cover the sum.
 ROUNDING = 5e-7  # how much nearer two agents come in a step by rounding in single precision, for each m from the origin
 
 
@@ -31,8 +32,9 @@ def start_drift(held: Any, flock: FlockRows, n: int, *, plan: Plan) -> None:
     for a in range(plan.dimensions):
         mean[a] = ZERO
     far2 = ZERO
-    # A flock flies together: relative to its mean velocity agents hardly approach each other. Counting absolute
-    # speeds looked for pairs at 16 and 32 m/s so often that flights took 1.09 and 1.07 times as long.
+    # A flock flies together: relative to its mean velocity agents hardly approach each other.
+    # Counting absolute speeds looked for pairs at 16 and 32 m/s so often that flights took 1.09 and
+    # 1.07 times as long.
     for i in range(n):
         for a in range(plan.dimensions):
             mean[a] = mean[a] + flock.velocity[a][i]
@@ -49,7 +51,8 @@ def approach_bound(held: Any, fastest: Any, dt: Any) -> Any:
     fastest : largest squared speed beside the drift, m²/s²
     """
     held[REACH] = held[REACH] + (held[PACE] + math.sqrt(fastest)) * dt
-    # Factor 2: both agents of a pair may move towards each other at the largest speed beside the drift.
+    # Factor 2: both agents of a pair may move towards each other at the largest speed beside the
+    # drift.
     return 2.0 * math.sqrt(fastest) * dt + ROUNDING * held[REACH]
 
 
@@ -67,8 +70,9 @@ def nearest(lanes: Iterable[int], flock: FlockRows, numbers: Any, n: int, m: int
         for a in range(plan.dimensions):
             own[a] = flock.position[a][i]
         near2 = FAR
-        # One minimum only: two minima over the same squares in one loop are not vectorised. The loop begins at a
-        # whole block of lanes and masks the rest, since a loop that begins at i + 1 has no vector form.
+        # One minimum only: two minima over the same squares in one loop are not vectorised. The
+        # loop begins at a whole block of lanes and masks the rest, since a loop that begins at i +
+        # 1 has no vector form.
         for j in lanes_between(lanes, i // BLOCK * BLOCK, m):
             r2 = offset(d, own, flock.position, j, numbers.w, plan=plan)
             near2 = least(near2, choose((integer(j) > integer(i)) & (integer(j) < nn), r2, FAR))

@@ -32,10 +32,12 @@ from airflock.engine.stages.words import (
     vector,
 )  # fmt: skip
 
-# A dispersed flock must not fill the memory with empty cells: at most four cells per agent, then cells grow.
+# A dispersed flock must not fill the memory with empty cells: at most four cells per agent, then
+# cells grow.
 MAX_CELLS_PER_AGENT = 4  # at most so many cells per agent: a flock that has dispersed widely does not fill the memory
 SPARE = 8  # cells of the smallest periodic box
-# Counted in eight chunks whose order is that of the agents, so that the number of threads changes no bit.
+# Counted in eight chunks whose order is that of the agents, so that the number of threads changes
+# no bit.
 CHUNKS = 8  # parts of the flock that are counted side by side; their order is that of the agents
 # The order of lines decides what stays in the second-level cache; results do not depend on it.
 STRIP = 16  # lines side by side before those above them: three layers of so many stay in the second-level cache
@@ -66,11 +68,12 @@ def cell_box(n: int, near: Any, most_cells: int, flock: FlockRows, numbers: Any,
             low[a] = lowest
             width[a] = most(highest - lowest, near)
         volume *= most(width[a] / near, ONE)
-    # The first guess spreads the intended number of cells over the volume, never below the width that the search
-    # needs.
+    # The first guess spreads the intended number of cells over the volume, never below the width
+    # that the search needs.
     side = near * most(ONE, (volume / real(most_cells)) ** (1.0 / plan.dimensions))
     fewest = 2 if plan.periodic else 1  # an agent is met at two images of which at most one is in reach
-    # Cells grow by a quarter until there are few enough; the loop has a bound because a driver cannot raise an error.
+    # Cells grow by a quarter until there are few enough; the loop has a bound because a driver
+    # cannot raise an error.
     for _ in repeat(1000):
         for a in range(plan.dimensions):
             count[a] = max(fewest, int(width[a] / side))
@@ -105,8 +108,8 @@ def sort_by_cells(
     states = [*[flock.position[a] for a in axes], *[flock.velocity[a] for a in axes]]
     low, size, count = boxed()
     total = count[X] * count[Y] * count[Z]
-    # A counting sort. Ranks from atomic counters would make the order within a cell, hence the last bits of every
-    # sum, differ from run to run.
+    # A counting sort. Ranks from atomic counters would make the order within a cell, hence the last
+    # bits of every sum, differ from run to run.
     for chunk in parallel(CHUNKS):
         head = chunk * total
         for cell in range(total):
@@ -124,8 +127,8 @@ def sort_by_cells(
             ) * count[X] + cell_along(X, i, flock, first, per, last)
             cell_of[i] = cell
             tally[head + cell] += 1
-    # Counts become first places: cell by cell and, within a cell, chunk by chunk. One thread, as each sum follows the
-    # last.
+    # Counts become first places: cell by cell and, within a cell, chunk by chunk. One thread, as
+    # each sum follows the last.
     before = 0
     for cell in range(total):
         starts[cell] = before
@@ -140,10 +143,12 @@ def sort_by_cells(
             place = tally[head + cell_of[i]]
             tally[head + cell_of[i]] = place + 1
             whose[place] = i
-            # By place and component first, since sorted access is random: one cache line per agent instead of eleven.
+            # By place and component first, since sorted access is random: one cache line per agent
+            # instead of eleven.
             for c, row in enumerate(states):
                 packed[place, c] = row[i]
-    # Now by component and place, which is what vector loops read; both sides of this copy run in order.
+    # Now by component and place, which is what vector loops read; both sides of this copy run in
+    # order.
     for chunk in parallel(CHUNKS):
         for e in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS):
             for c in range(2 * plan.dimensions):
@@ -192,7 +197,8 @@ def agents_around(oy: int, oz: int, starts: Any, count: Any, *, plan: Plan) -> A
 
 def image_shift(q: Any, c: Any, count: Any, width: Any) -> Any:
     """Return the shift (m) along an axis of the image q of cell c, in a periodic box of this width (m)."""
-    # Agents are copied at the image where they are met, so that the pair loop knows no periodic box.
+    # Agents are copied at the image where they are met, so that the pair loop knows no periodic
+    # box.
     return real((q - c) // count) * width
 
 
@@ -201,8 +207,8 @@ def copy_cell(
     *, plan: Plan, carried: tuple[tuple[str, Any], ...],
 ) -> None:  # fmt: skip
     """Copy the agents at places from `origin` on to `cell_box`, behind those found so far, shifted to their image."""
-    # Copied in vectors of eight past the end of the cell, where the next cell overwrites them: copying one number at
-    # a time took 40 % of an agent-step (203 ns, 159 ns with vectors).
+    # Copied in vectors of eight past the end of the cell, where the next cell overwrites them:
+    # copying one number at a time took 40 % of an agent-step (203 ns, 159 ns with vectors).
     for s in range(0, inside, BLOCK):  # past the end of a cell, where the next ones overwrite it
         for a in range(plan.dimensions):
             copy_block(box, a, found + s, flat, origin + s, shift[a])
@@ -243,8 +249,9 @@ def copy_line(
     shift = vector()
     if plan.periodic:
         width_x = w.half_x + w.half_x
-    # Slab by slab around a whole line of cells: each agent is copied nine times, not 27 as around each cell, and the
-    # candidates of a cell are three slabs in a row. 534 -> 231 ns per agent-step at 100,000 boids.
+    # Slab by slab around a whole line of cells: each agent is copied nine times, not 27 as around
+    # each cell, and the candidates of a cell are three slabs in a row. 534 -> 231 ns per agent-step
+    # at 100,000 boids.
     for qx in range(-1, count[X] + 1) if plan.periodic else range(0, count[X]):
         slab[qx + 1] = found
         cx = wrap_cell(qx, count[X], plan=plan)
@@ -273,7 +280,8 @@ def copy_line(
 
 def pad_candidates(found: int, h: Any, hv: Any, *, plan: Plan, carried: tuple[tuple[str, Any], ...]) -> None:
     """Nobody, behind the last candidate: loops take them in whole blocks. h, hv : rows of positions and velocities."""
-    # Vector loops run past the last candidate; those lanes must lie beyond every reach, not at the origin.
+    # Vector loops run past the last candidate; those lanes must lie beyond every reach, not at the
+    # origin.
     for s in range(found, found + BLOCK):
         for a in range(plan.dimensions):
             h[a][s] = AWAY

@@ -48,7 +48,8 @@ def expand_agent(
         d = vector()
         r2 = offset(d, own, flock.position, j, numbers.w, plan=plan)
         r = math.sqrt(r2)
-        # No branch: `state` and `fresh` are updated by masks, so that the loop over all agents stays a vector loop.
+        # No branch: `state` and `fresh` are updated by masks, so that the loop over all agents
+        # stays a vector loop.
         joins = integer(call_rule(metric.linked, r=r, r2=r2, q=numbers.q) & (state[j] == 0))
         state[j] |= joins
         fresh += joins
@@ -58,6 +59,7 @@ def expand_agent(
 def first_unexpanded(state: Any, expanded: Any, n: int) -> Any:
     """The first member of the cluster that grows whose links have not been looked at; -1 if there is none."""
     e = -1
+    # A short scan with a break, once per member; it is no part of the loop over pairs.
     for j in range(n):
         if state[j] == 1 and expanded[j] == 0:
             e = j
@@ -132,6 +134,8 @@ def sum_members(mean: Any, state: Any, flock: FlockRows, numbers: Any, n: int, *
     k = totals()
     if metric.member is not None:
         clear_totals(k, metric.Member, metric)
+        # Runs only for metrics with a rule for members, whose terms need the mean of the cluster
+        # first.
         for j in range(n):
             if state[j] == 1:
                 t = call_member(j, mean, flock, numbers, metric=metric)
@@ -157,11 +161,11 @@ def sum_clusters(
             expanded[i] = 0
         done = 0
         first = 0
-        # Clusters are found one after another, from the lowest agent in none yet: their order, and so that of all
-        # sums, does not depend on who is linked.
+        # Clusters are found one after another, from the lowest agent in none yet: their order, and
+        # so that of all sums, does not depend on who is linked.
         while done < n:
-            # `first` never goes back: all before it are in clusters, so looking for starts costs one pass over the
-            # flock in all.
+            # `first` never goes back: all before it are in clusters, so looking for starts costs
+            # one pass over the flock in all.
             while state[first] != 0:
                 first += 1
             size = grow_cluster(first, done, state, expanded, flock, numbers, n, plan=plan, metric=metric)
@@ -169,13 +173,15 @@ def sum_clusters(
             for a in axes:
                 s[a] = ZERO
             hh = ZERO
-            # A mask, not a branch: agents outside the cluster add zero, and the loop over all stays one of vectors.
+            # A mask, not a branch: agents outside the cluster add zero, and the loop over all stays
+            # one of vectors.
             for j in range(n):
                 inside = ONE if state[j] == 1 else ZERO
                 for a in axes:
                     s[a] = s[a] + inside * h[a][j]
                 hh += inside * sum(h[a][j] * h[a][j] for a in axes)
-                # Members are marked as done in this pass, unless their own rule still has to find them by state 1.
+                # Members are marked as done in this pass, unless their own rule still has to find
+                # them by state 1.
                 if metric.member is None:
                     state[j] = integer(2) if state[j] != 0 else integer(0)
             own_mean = cluster_mean(size, mean, state, flock, n, plan=plan, metric=metric)

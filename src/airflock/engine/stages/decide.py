@@ -52,8 +52,8 @@ def add_command(
         model.added.decide, own=own, shared=shared, percept=percept, period=numbers.c.period, wing=numbers.wing,  # type: ignore[union-attr]
         aero=numbers.aero,
     )  # fmt: skip
-    # A law plus another one is the sum of two commands. Only the first has parameters p, so `aero` is a section of
-    # its own, and drivers without it keep their text.
+    # A law plus another one is the sum of two commands. Only the first has parameters p, so `aero`
+    # is a section of its own, and drivers without it keep their text.
     for a in range(plan.dimensions):
         flock.command[a][i] += more[a]
 
@@ -71,8 +71,8 @@ def decide(
     """
     axes, m, w, scene = range(plan.dimensions), flock.measured_position, numbers.w, around.scene
     perceives = law_asks(model, "percept")
-    # One agent after another: laws branch, cast rays and remember, so this loop is no vector loop, and by cells
-    # threads share it.
+    # One agent after another: laws branch, cast rays and remember, so this loop is no vector loop,
+    # and by cells threads share it.
     for i in agents:
         own_p = agent_numbers(i, "p", flock, numbers, plan=plan)
         v = vector()
@@ -85,8 +85,8 @@ def decide(
         shared = shared_record(i, flock, model=model) if law_asks(model, "shared") else None
         memory = record_from_table(i, model.Memory, mem, 0) if law_asks(model, "memory") else None
         if perceives and model.sight is not None:
-            # decided side by side, each agent gathers into memory of its own
-            # Shapes in sight are gathered once per decision for all rays; beyond 64 each cast walks the tree.
+            # decided side by side, each agent gathers into memory of its own Shapes in sight are
+            # gathered once per decision for all rays; beyond 64 each cast walks the tree.
             near = np.empty(MAX_GATHERED, np.int64) if plan.grid else scene.near
             counts = np.zeros(2, np.int64) if plan.grid else scene.counts
             counts[0] = 0
@@ -99,7 +99,8 @@ def decide(
         if perceives:
             casts = (near, counts, gathered) if model.sight is not None else ()
             seen = scene_tree(scene) if model.sight is not None or plan.scene else ()
-            # What a percept holds depends on the driver only; a rule calls its methods as functions of the driver.
+            # What a percept holds depends on the driver only; a rule calls its methods as functions
+            # of the driver.
             percept = percept_of(
                 time, *[-m[a][i] if a in axes else ZERO for a in (X, Y, Z)],
                 *[goal_offset(i, a, flock, scene, plan=plan) for a in (X, Y, Z)], w.half_x, w.half_y, w.half_z,

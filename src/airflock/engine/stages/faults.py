@@ -15,8 +15,9 @@ from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, call_r
 
 def has_fault(i: int, kind: Fault, time: Any, flock: FlockRows, numbers: Any) -> Any:
     """Return True if agent i has a kind of fault at a time (s), within half a step."""
-    # The driver only compares times. Which agent has a fault, and when, is decided between two steps, so a fault
-    # needs no memory of its own, a snapshot holds it, and any cuts give the same bits.
+    # The driver only compares times. Which agent has a fault, and when, is decided between two
+    # steps, so a fault needs no memory of its own, a snapshot holds it, and any cuts give the same
+    # bits.
     return (time - flock.fault(kind.name, "onset")[i] > -HALF * numbers.c.dt) & (
         time - flock.fault(kind.name, "onset")[i] < flock.fault(kind.name, "lasts")[i] - HALF * numbers.c.dt
     )
@@ -31,14 +32,15 @@ def struck(
 
     kept : whether velocities before a step are kept until the next call; else each step copies its own
     """
-    # Velocities before a step are copied at decisions, not at each step: a copy a step became two calls of memcpy, a
-    # hundredth of a flight.
+    # Velocities before a step are copied at decisions, not at each step: a copy a step became two
+    # calls of memcpy, a hundredth of a flight.
     for a in range(plan.dimensions) if kept else ():
         for i in lanes:
             flock.before_step[a][i] = flock.velocity[a][i]
     lowest = LIMIT
     highest = ZERO
-    # Lanes are found as reals, by masks: a minimum of integers behind a branch would not become vectors.
+    # Lanes are found as reals, by masks: a minimum of integers behind a branch would not become
+    # vectors.
     for i in lanes:
         until = ZERO
         for kind in plan.suffers("motion"):
@@ -78,8 +80,9 @@ def apply_state_faults(
     """
     for i in lanes:
         on = has_fault(i, kind, time, flock, numbers)
-        # A frozen receiver repeats the last position that it reported, errors included, not the true one, which it
-        # never knew. So each decision keeps what the rule last returned for a state without this fault.
+        # A frozen receiver repeats the last position that it reported, errors included, not the
+        # true one, which it never knew. So each decision keeps what the rule last returned for a
+        # state without this fault.
         for rows, at in ((position, "at_"), (velocity, "at_v")):
             for a in [a for a in range(plan.dimensions) if at + "xyz"[a] in kind.kept(state)]:
                 flock.kept(kind.name, state, at + "xyz"[a])[i] = choose(
@@ -119,8 +122,8 @@ def tune(lanes: Iterable[int], decision: int, flock: FlockRows, numbers: Any, wh
                 t = call_rule(kind.radio, reach=reach, **fault_arguments(i, kind, time, flock, plan=plan))
                 out = least(out, choose(on, t[0], reach))
                 into = least(into, choose(on, t[1], reach))
-            # Squares, because the pair loop compares squares; negative stands for "not at all", which no square can
-            # be.
+            # Squares, because the pair loop compares squares; negative stands for "not at all",
+            # which no square can be.
             flock.reach_out[i] = choose(out < ZERO, -ONE, out * out)
             flock.reach_in[i] = choose(into < ZERO, -ONE, into * into)
     if plan.suffers("clock"):

@@ -11,16 +11,18 @@ from airflock.engine.stages.measure import MeasuredMetric
 from airflock.engine.stages.state import FlockRows
 from airflock.engine.stages.words import HALF, ONE, ZERO, call_rule, most, real, row_index
 
-Stages = Mapping[str, Callable[..., Any]]  # by name: each takes what it asks for, of the rest it knows
+Stages = Mapping[str, Callable[..., Any]]  # by name, called with their arguments by name
 Order = Mapping[str, tuple[str, ...]]  # stages of each event that a plan has (`engine.schedule`)
 Sampled = Iterable[tuple[int, str]]  # places among all values, and how they add up over time
-# Measured at 1,000,000 boids: rearranging every 16 decisions costs 3 % more, every 256 the same as every 64.
+# Measured at 1,000,000 boids: rearranging every 16 decisions costs 3 % more, every 256 the same as
+# every 64.
 EVERY = 64  # decisions from one rearrangement to the next; a boid crosses about a cell meanwhile
 
 
 def add_up(sums: Any, values: Any, sampled: Sampled, count: int) -> None:
     """Add the values of one instant to the sums over time; sums[count] counts instants."""
-    # Which value adds up in which way is known when the driver is made: the loop is written out, without a test.
+    # Which value adds up in which way is known when the driver is made: the loop is written out,
+    # without a test.
     for c, way in sampled:
         if way in ("mean", "sum"):
             sums[c] += values[c]
@@ -31,13 +33,15 @@ def add_up(sums: Any, values: Any, sampled: Sampled, count: int) -> None:
 
 def metric_range(metrics: tuple[Metric, ...], q: Any) -> Any:
     """Return the distance beyond which pairs contribute to no metric, m."""
-    # The widest radius of all metrics on this clock: one loop serves all of them, so the least eager one decides.
+    # The widest radius of all metrics on this clock: one loop serves all of them, so the least
+    # eager one decides.
     return most(metric_range(metrics[:-1], q), call_rule(metrics[-1].within, q=q)) if metrics else ZERO
 
 
 def reset_metric_memory(metrics: tuple[MeasuredMetric, ...], memory: Any, n: int) -> None:
     """Reset the memory of metrics to its start values."""
-    # Metrics and fields are written out; the loop over agents is the one that remains in the driver.
+    # Metrics and fields are written out; the loop over agents is the one that remains in the
+    # driver.
     for one in metrics:
         for c, start in enumerate(getattr(one.metric.Memory, "_field_defaults", {}).values()):
             for i in range(n):
@@ -60,8 +64,8 @@ def keep_frame(step: int, first: int, frames: Any, whole: Any, *, stages: Stages
     The first frame is that of the first sample at or after the step `first`. The size of the
     array decides whether a flight is recorded, not the plan: one driver flies with and without a recording.
     """
-    # A driver with and one without frames would be two compilations for `run --save`; one comparison a sample is
-    # cheaper.
+    # A driver with and one without frames would be two compilations for `run --save`; one
+    # comparison a sample is cheaper.
     if frames.shape[0] > 0:
         frame = step // whole.sample_every - (first + whole.sample_every - 1) // whole.sample_every
         call_rule(stages["keep"], frame=frame)
@@ -73,8 +77,8 @@ def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
     Returns the largest squared speed.
     """
     fastest = ZERO
-    # Each agent senses, decides and moves before the next one: the authors' boids update in turn, and the order
-    # shows.
+    # Each agent senses, decides and moves before the next one: the authors' boids update in turn,
+    # and the order shows.
     for i in range(n):
         for name in order[:-1]:
             call_rule(stages[name], i=i)
@@ -98,8 +102,8 @@ def prepare(
         for i in range(m):
             flock.number[i] = i
     if order["send"]:
-        # Before the first step all packets in the ring are the state at the start, so that an agent hears its
-        # neighbours from the first decision on.
+        # Before the first step all packets in the ring are the state at the start, so that an agent
+        # hears its neighbours from the first decision on.
         for slot in range(whole.ring):
             call_rule(stages["snapshot"], slot=slot, ring=past)
     held[BEGUN] = ONE
@@ -109,7 +113,8 @@ def sense(
     step: int, time: Any, late: Any, numbers: Any, whole: Any, past: Any, *, plan: Plan, stages: Stages, order: Order
 ) -> None:
     """Do the first half of a step: send, change the world and, unless agents take turns, decide."""
-    # The ring holds what is under way: slot k of the ring is heard at decision k, `delay` steps after it was sent.
+    # The ring holds what is under way: slot k of the ring is heard at decision k, `delay` steps
+    # after it was sent.
     for name in order["send"]:
         if (step + whole.delay) % whole.decide_every == 0:
             call_rule(stages[name], slot=((step + whole.delay) // whole.decide_every) % whole.ring, ring=past)
@@ -118,8 +123,8 @@ def sense(
     if not plan.sequential and step % whole.decide_every == 0:
         k = step // whole.decide_every
         for name in order["decide"]:
-            # Rearranging moves every row of the work table, so it waits for EVERY decisions; cells stay nearly sorted
-            # meanwhile.
+            # Rearranging moves every row of the work table, so it waits for EVERY decisions; cells
+            # stay nearly sorted meanwhile.
             if name != "rearrange" or k % EVERY == 0:
                 call_rule(stages[name], k=k, k_=k, slot=k % whole.ring, ring=past, time=time, late=late)
 
@@ -159,20 +164,22 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
         time = real(step) * numbers.c.dt
         if plan.sequential or (step != first) | (half & 1 == 0):
             sense(step, time, late, numbers, whole, past, plan=plan, stages=stages, order=order)
-        # where agents take turns, who senses and who moves alternate: there is no place to cut a step
-        # The first half of a step ends before anybody moves, so that a caller can overrule commands.
+        # where agents take turns, who senses and who moves alternate: there is no place to cut a
+        # step The first half of a step ends before anybody moves, so that a caller can overrule
+        # commands.
         if not plan.sequential and half & 2 != 0:
             break
         for name in order["watch"]:
             if step % whole.collide_every == 0:
-                # Collisions count at every step, but pairs are looked at only when two agents can have closed the gap
-                # since the last look. Positions move by the old velocity, so the bound is exact; SLACK covers
-                # rounding. This makes collisions at every step cost a few per cent instead of doubling the flight.
+                # Collisions count at every step, but pairs are looked at only when two agents can
+                # have closed the gap since the last look. Positions move by the old velocity, so
+                # the bound is exact; SLACK covers rounding. This makes collisions at every step
+                # cost a few per cent instead of doubling the flight.
                 if drifts and travelled >= gap:
                     start_drift(held, flock, n, plan=plan)
-                # While nobody is in contact only the least distance is searched, each pair once: the pair rules have
-                # nothing to say yet. The search is a function of its own, since standing twice in the loop cost half
-                # a second of compiling.
+                # While nobody is in contact only the least distance is searched, each pair once:
+                # the pair rules have nothing to say yet. The search is a function of its own, since
+                # standing twice in the loop cost half a second of compiling.
                 if foretold and calm and travelled >= gap:
                     gap = (
                         call_rule(stages["nearest"])
@@ -180,9 +187,9 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
                         - SLACK
                     )
                     travelled = ZERO
-                if watched and travelled < gap:  # nobody can have come near enough since pairs were last looked at
-                    # The instant counts although no pair was looked at: `within` promises that metrics contribute
-                    # nothing beyond it.
+                if watched and travelled < gap:  # no pair can have come near enough since the last check
+                    # The instant counts although no pair was looked at: `within` promises that
+                    # metrics contribute nothing beyond it.
                     sums[sampled[name][1]] += 1
                     if not calm:
                         reset_metric_memory(watched, memory, n)
@@ -204,9 +211,10 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
                 sample_stage(name, time, values, sums, stages=stages, sampled=sampled)
             keep_frame(step, first, frames, whole, stages=stages)
         if step < whole.steps:
-            # Columns of faults are written between two calls and agents change places at decisions only, so it is
-            # enough to search the affected lanes here; searching at every step cost two passes over the flock.
-            if plan.struck and (step == first or step % whole.decide_every == 0):  # between, nobody changes places
+            # Columns of faults are written between two calls and agents change places at decisions
+            # only, so it is enough to search the affected lanes here; searching at every step cost
+            # two passes over the flock.
+            if plan.struck and (step == first or step % whole.decide_every == 0):  # between, agents keep their places
                 hurt_first, hurt_end = call_rule(stages["struck"], time=time)
             fastest = call_rule(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
             if drifts:  # noqa: SIM108 - a helper of several lines stands where it is assigned
@@ -214,7 +222,8 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
             else:
                 nearer = 2.0 * math.sqrt(fastest) * numbers.c.dt
             travelled += nearer
-    # What the next call needs goes back into the array, so that any cuts give the bits of the whole flight.
+    # What the next call needs goes back into the array, so that any cuts give the bits of the whole
+    # flight.
     held[TRAVELLED] = travelled
     held[GAP] = gap
     held[CALM] = ONE if calm else ZERO
@@ -241,7 +250,8 @@ def measure_frames(
 
     frame_period : s
     """
-    # Recordings are measured by the very stages of a flight, so that a score never depends on where it was computed.
+    # Recordings are measured by the very stages of a flight, so that a score never depends on where
+    # it was computed.
     for step in range(first, first + frames.shape[0]):
         time = real(step) * frame_period
         for i in range(n):

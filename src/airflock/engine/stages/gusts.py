@@ -16,8 +16,8 @@ def gusts(numbers: Any, whole: Any, step: int, gust: Any, *, plan: Plan) -> Any:
     gust : deviation from the mean wind (m/s) along each axis, from step to step; of Dryden turbulence the gust along
            the mean wind (m/s), and two states each across it and upwards
     """
-    # All agents feel the same gust: a flock is small beside the length scales of turbulence. Hence agent 0 in the
-    # counter.
+    # All agents feel the same gust: a flock is small beside the length scales of turbulence. Hence
+    # agent 0 in the counter.
     w0, w1, w2, w3 = random.draw(0, step, GUST, whole.world, whole.seed_low, whole.seed_high)
     ga, gb = random.normal_pair(w0, w1)
     gc, gd = random.normal_pair(w2, w3)
@@ -25,7 +25,8 @@ def gusts(numbers: Any, whole: Any, step: int, gust: Any, *, plan: Plan) -> Any:
         w4, w5, _, _ = random.draw(0, step, MORE, whole.world, whole.seed_low, whole.seed_high)
         ge, _ = random.normal_pair(w4, w5)
         air = numbers.air
-        # Exact transition and exact covariance, so that variance and spectrum do not depend on the motion step.
+        # Exact transition and exact covariance, so that variance and spectrum do not depend on the
+        # motion step.
         gust[0] = dryden.along(gust[0], ga, numbers.c.dt, air.length, air.sigma, air.airspeed)
         side = dryden.across(gust[1], gust[2], gb, gc, numbers.c.dt, air.length, air.airspeed)
         rise = dryden.across(gust[3], gust[4], gd, ge, numbers.c.dt, air.length_up, air.airspeed)

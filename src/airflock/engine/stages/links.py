@@ -38,8 +38,8 @@ def join_cell(
         r2 = apart(d, own, cells.flat, f, numbers.w, plan=plan)
         r = math.sqrt(r2)
         if call_rule(metric.linked, r=r, r2=r2, q=numbers.q):
-            # An agent that joins is swapped behind those left in the cell, so no agent is visited twice, however
-            # dense the flock.
+            # An agent that joins is swapped behind those left in the cell, so no agent is visited
+            # twice, however dense the flock.
             end -= 1
             grown.places[k] = grown.places[end]
             grown.reached[tail] = f
@@ -74,7 +74,8 @@ def expand_member(
     if plan.dimensions == 2:
         low[Z] = 0
         high[Z] = 1
-    # Links are no longer than a cell is wide, so the 9 cells of a plane, or 27 in space, hold all partners.
+    # Links are no longer than a cell is wide, so the 9 cells of a plane, or 27 in space, hold all
+    # partners.
     for qz in range(low[Z], high[Z]):
         for qy in range(low[Y], high[Y]):
             row = wrap_cell(qz, count[Z], plan=plan) * count[Y] + wrap_cell(qy, count[Y], plan=plan)
@@ -105,7 +106,8 @@ def cluster_sums(
             for a in range(plan.dimensions):
                 total[a] = ZERO
     hh = ZERO
-    # Only headings are always summed; positions and velocities are read where a rule for members needs their means.
+    # Only headings are always summed; positions and velocities are read where a rule for members
+    # needs their means.
     for e in range(done, tail):
         j = whose[reached[e]]
         for a in range(plan.dimensions):
@@ -125,6 +127,7 @@ def sum_members(
     k = totals()
     if metric.member is not None:
         clear_totals(k, metric.Member, metric)
+        # Members lie side by side in `reached`: no other agent is visited.
         for e in range(done, tail):
             j = whose[reached[e]]
             t = call_member(j, mean, flock, numbers, metric=metric)
@@ -160,8 +163,8 @@ def clusters_by_cells(
     for e in range(n):
         ident[e] = e
     done = 0
-    # One core: growing is sequential by nature. Sums over a cluster come in the order in which members are reached,
-    # so they differ from all pairs in the last bits; counts do not.
+    # One core: growing is sequential by nature. Sums over a cluster come in the order in which
+    # members are reached, so they differ from all pairs in the last bits; counts do not.
     for here in range(count[X] * count[Y] * count[Z]):
         while tally[here] > 0:
             tally[here] -= 1
@@ -169,7 +172,8 @@ def clusters_by_cells(
             cell[done] = here
             tail = done + 1
             e = done
-            # `reached` is the queue of the search, and its finished part the list of members: e follows, tail leads.
+            # `reached` is the queue of the search, and its finished part the list of members: e
+            # follows, tail leads.
             while e < tail:
                 tail = expand_member(reached[e], cell[e], tail, numbers, cells, grown, plan=plan, metric=metric)
                 e += 1

@@ -50,6 +50,8 @@ class MeasuredMetric(NamedTuple):
 def measured_metrics(plan: Plan, clock: str) -> tuple[MeasuredMetric, ...]:
     """Metrics of a clock, and where their numbers lie."""
     found, value, row, total = [], 0, 0, 0
+    # Values and memories are numbered over all metrics, pair totals only among those of one clock,
+    # since only these share a loop.
     for metric in plan.metrics:
         if metric.clock == clock:
             found.append(MeasuredMetric(metric, value, row, total))
@@ -70,7 +72,8 @@ def fill_headings(flock: FlockRows, n: int, *, plan: Plan, summed: str) -> Any:
     summed : of what a mean is taken: position x, velocity v, heading h
     """
     axes, x, v, h = range(plan.dimensions), flock.position, flock.velocity, flock.heading
-    # Speeds first, as every heading divides by one; the sums of the second loop then read finished rows.
+    # Speeds first, as every heading divides by one; the sums of the second loop then read finished
+    # rows.
     for i in range(n):
         flock.speed[i] = norm(v[X][i], v[Y][i], v[Z][i])
         f = ONE / flock.speed[i]
@@ -80,7 +83,8 @@ def fill_headings(flock: FlockRows, n: int, *, plan: Plan, summed: str) -> Any:
     for total in (sx, sv, sh):
         for a in axes:
             total[a] = ZERO
-    # A CPU compiler drops sums that no rule reads; a GPU kernel would exchange them by shuffles, hence `summed`.
+    # A CPU compiler drops sums that no rule reads; a GPU kernel would exchange them by shuffles,
+    # hence `summed`.
     for i in range(n):
         for total, row in ((sx, x), (sv, v), (sh, h)):
             for a in axes:
@@ -105,6 +109,7 @@ def reductions(record: Any, metric: Metric) -> list[str]:
 
 def clear_totals(total: Any, record: Any, metric: Metric) -> None:
     """Totals of a record before its first term."""
+    # Written out: one variable of the driver for each field.
     for c, way in enumerate(reductions(record, metric)):
         total[c] = REDUCTION_START[way]
 
@@ -132,7 +137,8 @@ def offset(d: Any, own: Any, x: Axes, j: int, w: Any, *, plan: Plan) -> Any:
     if plan.periodic:
         for a in range(plan.dimensions):
             d[a] = nearest_image(d[a], getattr(w, HALF_SIZES[a]))
-    # The guard TINY is added here and in the pair loop of the law alike, so that limits compare the same squares.
+    # The guard TINY is added here and in the pair loop of the law alike, so that limits compare the
+    # same squares.
     return sum(d[a] * d[a] for a in range(plan.dimensions)) + TINY
 
 
@@ -148,8 +154,9 @@ def sum_pairs(
     """
     least2 = FAR
     if any(one.metric.pair is not None for one in metrics):
-        # LLVM unrolls a short loop of minima four times, a body of 64 agents, so a flock of 30 runs in its slow
-        # remainder. With two agents per turn it unrolls twice, and one reading of the others serves both.
+        # LLVM unrolls a short loop of minima four times, a body of 64 agents, so a flock of 30 runs
+        # in its slow remainder. With two agents per turn it unrolls twice, and one reading of the
+        # others serves both.
         if abreast and not nearest:
             for h in range((n + 1) // 2):
                 i = 2 * h
@@ -158,8 +165,8 @@ def sum_pairs(
         else:
             for i in range(n):
                 near2 = sum_pairs_of((i,), flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest)
-                # The collision clock alone needs the least distance: adding this second minimum to every sample took
-                # 7.9 µs instead of 0.95 µs for 50 boids.
+                # The collision clock alone needs the least distance: adding this second minimum to
+                # every sample took 7.9 µs instead of 0.95 µs for 50 boids.
                 if nearest:
                     least2 = least(least2, near2)
     return least2
@@ -176,16 +183,16 @@ def sum_pairs_of(
     near2 = FAR
     nn = integer(n)
     sides = tuple(zip(agents, (own, other), (sums, others), strict=False))
-    # Totals lie in registers over the whole pair loop, for all metrics of this clock at once: the distance of a pair
-    # is computed once for all of them.
+    # Totals lie in registers over the whole pair loop, for all metrics of this clock at once: the
+    # distance of a pair is computed once for all of them.
     for e, at, total in sides:
         for a in axes:
             at[a] = x[a][e]
         for metric, _, _, first in paired:
             for c, way in enumerate(reductions(metric.Pair, metric)):
                 total[first + c] = REDUCTION_START[way]
-    # The pair loop runs over whole vectors of the others (m of them); `ok` drops the agent itself and the lanes
-    # behind the last agent, so that no turn branches.
+    # The pair loop runs over whole vectors of the others (m of them); `ok` drops the agent itself
+    # and the lanes behind the last agent, so that no turn branches.
     for j in range(m):
         for e, at, total in sides:
             d = vector()
@@ -245,13 +252,15 @@ def sum_agents(metric: Metric, row: int, mean: Any, flock: FlockRows, numbers: A
     total = totals()
     if metric.agent is not None:
         clear_totals(total, metric.Agent, metric)
-        # One agent after another, over true states: pairs and surveys have filled their columns before.
+        # One agent after another, over true states: pairs and surveys have filled their columns
+        # before.
         for i in range(n):
             pair = shared_record(metric.Pair, flock.pair, i, metric) if rule_asks(metric.agent, "pair") else None
             shared = (
                 shared_record(metric.Shared, flock.shared, i, metric) if rule_asks(metric.agent, "shared") else None
             )
-            # What a metric remembers of an agent changes at every instant that it samples, and only there.
+            # What a metric remembers of an agent changes at every instant that it samples, and only
+            # there.
             if rule_asks(metric.agent, "memory"):
                 before = record_from_table(i, metric.Memory, memory, row)
                 t, kept = call_agent_rule(i, pair, shared, before, mean, flock, numbers, metric=metric)
@@ -303,7 +312,8 @@ def measure(
         mean = fill_headings(flock, n, plan=plan, summed=summed)
     else:
         mean = ()
-    # By cells from 6,000 agents on (2,000 in a periodic box): below, all pairs in vectors are as fast.
+    # By cells from 6,000 agents on (2,000 in a periodic box): below, all pairs in vectors are as
+    # fast.
     if over is not None:  # noqa: SIM108 - a helper of several lines stands where it is assigned
         least2 = over()
     else:
@@ -319,7 +329,8 @@ def measure(
     for one in metrics:
         if one.metric.survey is not None:
             survey[one.metric.name]()
-    # The engine knows no metric by name: a metric set brings its rules, its parameters and its fitness.
+    # The engine knows no metric by name: a metric set brings its rules, its parameters and its
+    # fitness.
     for metric, value, row, _ in metrics:
         agents = sum_agents(metric, row, mean, flock, numbers, n, memory)
         clusters = clustered[metric.name](metric, mean, flock, numbers, n, m, labels, plan=plan)

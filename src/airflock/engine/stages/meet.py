@@ -39,8 +39,8 @@ def fill_hidden(
 ) -> None:
     """Fill the row `hidden`: 1 where obstacles or the scene hide another agent from agent i, by believed places."""
     x = flock.measured_position
-    # A cast through the tree of shapes branches and cannot be a vector, so it has a loop of its own, and only agents
-    # in range are cast at.
+    # A cast through the tree of shapes branches and cannot be a vector, so it has a loop of its
+    # own, and only agents in range are cast at.
     for j in others:
         flock.hidden[j] = ZERO
         if flock.square[j] < HALF * FAR:
@@ -80,8 +80,8 @@ def meet(
 
 def call_topology(n: int, others: CandidateRows, numbers: Any, *, plan: Plan) -> None:
     """Fill the row `met` by the rule of the topology, for these n agents."""
-    # The k-th least distance is a limit, and an agent exactly on it is met, too: no number of an agent decides, and a
-    # flock that is its own mirror image stays so.
+    # The k-th least distance is a limit, and an agent exactly on it is met, too: no number of an
+    # agent decides, and a flock that is its own mirror image stays so.
     call_rule(
         plan.meets, n=n, dx=others.away[X], dy=others.away[Y], dz=others.away[Z], r2=others.square,
         hidden=others.hidden, fade=others.fade, met=others.met, heap=others.heap, weak=others.weak, t=numbers.topology,

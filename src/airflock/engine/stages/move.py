@@ -27,8 +27,9 @@ from airflock.engine.stages.words import (
 
 def measured_velocity(i: int, a: int, flock: FlockRows, *, plan: Plan) -> Any:
     """Return the own velocity as agent i measures it along one axis, m/s."""
-    # The controller feels the true velocity plus the error of the last measurement, so the body flies on between two
-    # decisions. It keeps the inertial velocity when satellite navigation fails: a frozen one would be a runaway.
+    # The controller feels the true velocity plus the error of the last measurement, so the body
+    # flies on between two decisions. It keeps the inertial velocity when satellite navigation
+    # fails: a frozen one would be a runaway.
     return (
         flock.velocity[a][i] + flock.own_drift[a][i]
         if plan.has_sensor_error and a < plan.dimensions
@@ -47,8 +48,9 @@ def apply_body_and_faults(
     for i in () if kept else hurt:
         for a in range(plan.dimensions):
             flock.before_step[a][i] = v[a][i]
-    # All lanes take the plain loop of the body; rules of faults are called afterwards over the lanes that may suffer.
-    # Two loops of the body (with and without faults) gave other last bits and cost more than this second pass.
+    # All lanes take the plain loop of the body; rules of faults are called afterwards over the
+    # lanes that may suffer. Two loops of the body (with and without faults) gave other last bits
+    # and cost more than this second pass.
     apply_body(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
     # Faults are applied one after another, each to what the one before left of the motion.
     for i in hurt:
@@ -68,6 +70,8 @@ def apply_body(
 ) -> None:
     """Advance velocities by the rule of the body."""
     v, command = flock.velocity, flock.command
+    # One call of the rule per lane, whatever the body: what it needs of wind, noise or memory is
+    # decided when the driver is made, so that the loop has no branch.
     for i in lanes:
         t = call_rule(
             plan.body.move,
@@ -126,8 +130,8 @@ def move(
     if plan.integration != "old":
         apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
     fastest = ZERO
-    # Over whole vectors, with absent lanes counted as standing: the remainder of a loop costs three times as much per
-    # agent as its vector part.
+    # Over whole vectors, with absent lanes counted as standing: the remainder of a loop costs three
+    # times as much per agent as its vector part.
     for i in lanes if watched else ():
         if drifts:
             speed2 = sum(
@@ -137,15 +141,16 @@ def move(
         else:
             speed2 = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
         fastest = most(fastest, choose(integer(i) < integer(n), speed2, ZERO))
-    # Positions move by the velocity before the step (the authors' program, integration "old") or after it; `fastest` is
-    # that of the velocity that moves them, so the bound on collisions is exact.
+    # Positions move by the velocity before the step (the authors' program, integration "old") or
+    # after it; `fastest` is that of the velocity that moves them, so the bound on collisions is
+    # exact.
     for a in range(plan.dimensions):
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
     if plan.integration == "old":
         apply_body_and_faults(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan, kept=kept)
-    # Edges come last, when the step is done: a periodic box takes the agent to its other side, a mirror turns its
-    # velocity.
+    # Edges come last, when the step is done: a periodic box takes the agent to its other side, a
+    # mirror turns its velocity.
     if plan.edge_rule:
         for i in agents:
             for a in range(plan.dimensions):

@@ -37,11 +37,13 @@ from airflock.engine.stages.words import (
 )  # fmt: skip
 from airflock.world import nearest_image
 
-# Rounding may put an agent into the cell beside its own, so a ring is trusted only up to 0.999 of its width.
+# Rounding may put an agent into the cell beside its own, so a ring is trusted only up to 0.999 of
+# its width.
 ROUNDING_MARGIN = (
     0.999  # of what rings are wide: the cell of an agent at its cell's edge may be that beside it, by rounding
 )
-# A fixed number of parts, not the number of threads: the order of sums must not depend on the machine.
+# A fixed number of parts, not the number of threads: the order of sums must not depend on the
+# machine.
 PARTS = 64  # of the flock, whatever the number of threads
 
 
@@ -59,6 +61,7 @@ def wrap_cell(c: Any, count: Any, *, plan: Plan) -> Any:
 
 def apart(d: Any, own: Any, flat: Any, f: int, w: Any, *, plan: Plan) -> Any:
     """Put the offset from a place to the agent at place f into the vector d, m; returns its square, m²."""
+    # Reads sorted rows by component and place, so that a run of places is read in order.
     for a in range(plan.dimensions):
         d[a] = flat[a, f] - own[a]
     if plan.periodic:
@@ -84,7 +87,8 @@ def sum_run(
     nearest: bool,
 ) -> Any:
     """Add all pairs with those at places first to last - 1 to the sums of the agent at place e; its least square."""
-    # A run of places that lie side by side: the inner loop of this search, written like that over all pairs.
+    # A run of places that lie side by side: the inner loop of this search, written like that over
+    # all pairs.
     for f in range(first, last):
         d = vector()
         r2 = apart(d, own, cells.flat, f, numbers.w, plan=plan)
@@ -123,8 +127,8 @@ def in_ring(
     Cells side by side along x are one run of places; a run that goes over the ends of a periodic box is cut there.
     """
     at, low, high, count, starts = home.at, home.low, home.high, cells.count, cells.starts
-    # The ring is a shell of cells: full rows on its top, bottom and sides, and of the rows through its middle the two
-    # ends. The first ring also takes the cell itself and those beside it.
+    # The ring is a shell of cells: full rows on its top, bottom and sides, and of the rows through
+    # its middle the two ends. The first ring also takes the cell itself and those beside it.
     for oz in range(max(-ring, low[Z]), min(ring, high[Z]) + 1):
         for oy in range(max(-ring, low[Y]), min(ring, high[Y]) + 1):
             row = wrap_cell(at[Z] + oz, count[Z], plan=plan) * count[Y] + wrap_cell(at[Y] + oy, count[Y], plan=plan)
@@ -132,8 +136,8 @@ def in_ring(
             for end in range(1 if full else 2):  # of a row that passes through the ring its two ends
                 west = at[X] + max(-ring if end == 0 else ring, low[X])
                 east = at[X] + min(ring if full or end == 1 else -ring, high[X])
-                # Cells along x lie side by side in memory, so nine runs replace 27 cells in space; a run over the end
-                # of a periodic box is cut there.
+                # Cells along x lie side by side in memory, so nine runs replace 27 cells in space;
+                # a run over the end of a periodic box is cut there.
                 for turn in range(
                     -1 if plan.periodic and west < 0 else 0, 2 if plan.periodic and east >= count[X] else 1
                 ):
@@ -177,8 +181,8 @@ def sum_pairs_of_place(
     near2 = FAR
     ring = 1
     going = 1
-    # Rings grow until each metric's `settled` holds: a nearest neighbour is known after one ring in a dense flock. A
-    # rule that says so too early gives wrong numbers, as a wrong `within` does.
+    # Rings grow until each metric's `settled` holds: a nearest neighbour is known after one ring in
+    # a dense flock. A rule that says so too early gives wrong numbers, as a wrong `within` does.
     while going == 1:
         near2 = in_ring(
             ring, home, e, ii, near2, own, sums, flock, numbers, cells, plan=plan, paired=paired, nearest=nearest
@@ -214,12 +218,13 @@ def pairs_by_cells(
         part2 = FAR
         at, low, high = vector(), vector(), vector()
         home = HomeCell(at, low, high)
-        # A part is a run of cells, empty ones among them: parts of a dispersed flock differ in work, hence more parts
-        # than threads.
+        # A part is a run of cells, empty ones among them: parts of a dispersed flock differ in
+        # work, hence more parts than threads.
         for here in range(total * part // PARTS, total * (part + 1) // PARTS):
             if starts[here] < starts[here + 1]:
                 cell_position(at, here, count)
-                # In a periodic box half of the cells lie on either side, so that nobody is met at two images.
+                # In a periodic box half of the cells lie on either side, so that nobody is met at
+                # two images.
                 for a in (X, Y, Z):  # a periodic box has no ends: half of its cells lie on either side
                     low[a] = -((count[a] - 1) // 2) if plan.periodic else -at[a]
                     high[a] = count[a] // 2 if plan.periodic else count[a] - 1 - at[a]

@@ -28,7 +28,7 @@ from airflock.engine.stages.words import (
     vector,
 )  # fmt: skip
 
-SMALLEST = 1e-3  # m; width of the cells of a law that nobody flies by
+SMALLEST = 1e-3  # m; width of the cells of a law without agents
 
 
 def own_state(i: int, own: Any, v: Any, h: Any, true: Any, flock: FlockRows, *, plan: Plan) -> None:
@@ -37,7 +37,8 @@ def own_state(i: int, own: Any, v: Any, h: Any, true: Any, flock: FlockRows, *, 
     for a in axes:
         own[a] = flock.measured_position[a][i]
         v[a] = flock.measured_velocity[a][i]
-    # Ranges are a matter of true distances, laws of believed ones; true places are read only where the two differ.
+    # Ranges are a matter of true distances, laws of believed ones; true places are read only where
+    # the two differ.
     if plan.perturbed or plan.packets:
         for a in axes:
             true[a] = flock.position[a][i]
@@ -49,6 +50,7 @@ def fill_heading(v: Any, h: Any, *, plan: Plan) -> None:
     if plan.dimensions == 2:
         v[Z] = ZERO
     f = ONE / norm(v[X], v[Y], v[Z])
+    # All three axes: a law may read the heading along z in a plane, where it is zero.
     for a in (X, Y, Z):
         h[a] = f * v[a]
 
@@ -62,8 +64,8 @@ def squared_reach(p: Any, *, plan: Plan, model: Model) -> Any:
 def widest_reach(agents: Iterable[int], flock: FlockRows, numbers: Any, *, plan: Plan, model: Model) -> Any:
     """The widest reach of those who fly by a law whose numbers differ among them, m."""
     near = real(SMALLEST)
-    # Cells must be as wide as the farthest look of any agent of this law; a narrower law pays nothing for it, because
-    # each law sorts its own cells.
+    # Cells must be as wide as the farthest look of any agent of this law; a narrower law pays
+    # nothing for it, because each law sorts its own cells.
     for i in agents:
         own_p = agent_numbers(i, "p", flock, numbers, plan=plan)
         near = most(near, least(call_rule(model.reach, p=own_p), LIMIT))
@@ -72,8 +74,8 @@ def widest_reach(agents: Iterable[int], flock: FlockRows, numbers: Any, *, plan:
 
 def draw_words(i: int, flock: FlockRows, draw: Callable[[int], None], *, plan: Plan) -> None:
     """Have the random words of agent i and the others of its four drawn, once for all of them."""
-    # Four receivers share one Philox call. With several laws, or in turn, the four are not processed together, so
-    # each draws its own word: the same number, at four times the price.
+    # Four receivers share one Philox call. With several laws, or in turn, the four are not
+    # processed together, so each draws its own word: the same number, at four times the price.
     if plan.sequential or plan.laws:
         draw(i)
     else:
@@ -113,23 +115,24 @@ def neighbours(
     images : whether offsets go to the nearest image (candidates that come by cells are at theirs)
     """
     k, w = numbers.k, numbers.w
-    # A neighbour at exactly the range or the reach counts. Squares of distances that carry the guard TINY, which only
-    # double precision can tell, are compared with squares that carry it, too. Who is in range is a matter of true
-    # distances, which carry none.
-    # Lattices and formations lie exactly on these limits, random places never do: without the guard a neighbour at
-    # the range counted in single precision and not in double.
+    # A neighbour at exactly the range or the reach counts. Squares of distances that carry the
+    # guard TINY, which only double precision can tell, are compared with squares that carry it,
+    # too. Who is in range is a matter of true distances, which carry none. Lattices and formations
+    # lie exactly on these limits, random places never do: without the guard a neighbour at the
+    # range counted in single precision and not in double.
     range_ = least(k.range, LIMIT)
     range2 = range_ * range_ + TINY if plan.bits == 64 and not plan.perturbed else range_ * range_
     if model.reach is not None and not plan.varies("p"):
         near2 = squared_reach(numbers.p, plan=plan, model=model)
     else:
         near2 = LIMIT
-    # A link sends a whole number of packets in a decision, the same for all pairs: counted once, outside the loops.
+    # A link sends a whole number of packets in a decision, the same for all pairs: counted once,
+    # outside the loops.
     fast = packet_count(decision, getattr(k, plan.radio.rates[0]), numbers) if len(plan.radio.rates) > 0 else ZERO
     slow = packet_count(decision, getattr(k, plan.radio.rates[1]), numbers) if len(plan.radio.rates) > 1 else ZERO
     at = Decision(decision, n, time, late, fast, slow, drawn)
-    # The loop over agents is the outer one and all tests of the plan stand outside the pair loop, so that the inner
-    # loop over `others` becomes one vector loop without branches.
+    # The loop over agents is the outer one and all tests of the plan stand outside the pair loop,
+    # so that the inner loop over `others` becomes one vector loop without branches.
     for i in agents:
         ii = integer(i)
         own_p = agent_numbers(i, "p", flock, numbers, plan=plan)
@@ -139,7 +142,7 @@ def neighbours(
             draw_words(i, flock, draw, plan=plan)
             lot = words[flock.number[i] & 3]
         else:
-            lot = ZERO  # nobody asks for it
+            lot = ZERO  # no rule reads it
         own, v, true, h, total = vector(), vector(), vector(), vector(), totals()
         own_state(i, own, v, h, true, flock, plan=plan)
         # Totals live in registers during the pair loop and go to their rows once, after it.
@@ -149,13 +152,14 @@ def neighbours(
             talkers = talkers_in_range(i, others, range_ * range_, flock, w, plan=plan)
         else:
             talkers = ZERO
-        # A cast per pair in range through the tree of shapes: in a city, shading costs 3.6 times the flight with
-        # `constant`.
+        # A cast per pair in range through the tree of shapes: in a city, shading costs 3.6 times
+        # the flight with `constant`.
         if plan.shades and drawn is None:
             fill_clear(i, others, range_ * range_, flock, w, whole, around, plan=plan)
         me = PairLoopAgent(i, ii, ii, None, own, v, h, true, own_p, talkers, lot)
         reach = SquaredRanges(range_ * range_, range2, near2)
-        # One pass where everybody in range is met; two where a topology first ranks those who are heard.
+        # One pass where everybody in range is met; two where a topology first ranks those who are
+        # heard.
         for part in (HEAR_AND_ADD,) if plan.topology is None else (HEAR, ADD):
             for j in others:
                 pair(

@@ -1,7 +1,7 @@
 """Neighbours by cells: sum a law's rule over those in the cells around each agent, as `neighbours` does over all pairs.
 
 Cells are no smaller than the law reaches. Candidates of a cell are three slabs of agents that lie side by side, so that
-the loop over them runs in whole vectors; the last of these holds some that are nobody. Lines of cells are gone through
+the loop over them runs in whole vectors; the last of these ends with empty places. Lines of cells are gone through
 side by side. The order of every sum is that of slabs and places, whatever the number of threads.
 """
 
@@ -91,7 +91,7 @@ def make_line(
         carried=carried,
     )  # fmt: skip
     pad_candidates(found, h, hv, plan=plan, carried=carried)
-    # of what an agent makes of its candidates, a driver has the rows that its topology asks for
+    # a driver keeps only those of these rows that its topology reads
     square = np.zeros(room + 2 * BLOCK, work.dtype)
     met = np.zeros(room + 2 * BLOCK, work.dtype)
     heap = np.zeros(room + 2 * BLOCK, work.dtype)
@@ -123,8 +123,8 @@ def sum_agent(
     place = integer(line.middle[ox] - line.slab[ox] + e - cells.starts[here])
     me = PairLoopAgent(who, place, ident[e], many, own, v, h, own, own_p, ZERO, ZERO)
     for part in (HEAR_AND_ADD,) if plan.topology is None else (HEAR, ADD):
-        # With a signed index Numba adds the wraparound of negative indices, which turns vector loads into gathers:
-        # 391 ns instead of 295 ns per agent-step.
+        # With a signed index Numba adds the wraparound of negative indices, which turns vector
+        # loads into gathers: 391 ns instead of 295 ns per agent-step.
         for q in range(padded):
             j = first + np.uint64(q)  # it cannot count from the end, which would turn loads of vectors into gathers
             pair(
@@ -158,8 +158,8 @@ def sum_line(
 ) -> None:
     """The agents of a line of cells, cell by cell."""
     line = make_line(oy, oz, flock, numbers, work, cells, ident, plan=plan, model=model)
-    # Cells along the line share the slabs that were copied once: the candidates of a cell begin at its left slab and
-    # end with its right one.
+    # Cells along the line share the slabs that were copied once: the candidates of a cell begin at
+    # its left slab and end with its right one.
     for ox in range(cells.count[X]):
         here = (oz * cells.count[Y] + oy) * cells.count[X] + ox
         if cells.starts[here] == cells.starts[here + 1]:
@@ -193,8 +193,8 @@ def neighbours_by_cells(
     if not plan.varies("p"):
         near = least(call_rule(model.reach, p=numbers.p), LIMIT)
         near2 = near * near + TINY if plan.bits == 64 else near * near
-    # Each law sorts cells of its own. One sort for all, as wide as the widest reach, would let each fish look at 27
-    # times as many candidates where one in a hundred looks three times as far.
+    # Each law sorts cells of its own. One sort for all, as wide as the widest reach, would let each
+    # fish look at 27 times as many candidates where one in a hundred looks three times as far.
     sides, count = call_rule(sort, near=widest() if plan.varies("p") else near, most_cells=MAX_CELLS_PER_AGENT * n)
     cells = SortedCells(starts, whose, packed, flat, count)
     sums_of = totals_[: n * max(1, len(sums))].reshape(n, max(1, len(sums)))
@@ -204,7 +204,8 @@ def neighbours_by_cells(
                 ident[e] = flock.number[cells.whose[e]]
     reach = SquaredRanges(range2, range2, LIMIT if plan.varies("p") else near2)
     at = Decision(decision, n, time, late, ZERO, ZERO, None)
-    # Threads share lines of cells, and each line writes only the sums of its own agents: no thread waits for another.
+    # Threads share lines of cells, and each line writes only the sums of its own agents: no thread
+    # waits for another.
     for line in parallel(count[Y] * count[Z]):
         oy, oz = line_position(line, count)
         if plan.law is None:
@@ -231,6 +232,7 @@ def neighbours_by_cells(
 
 def copy_sums(i: int, flock: FlockRows, sums_of: Any, *, sums: Sums) -> None:
     """Sums of agent i to its rows."""
-    # Sums are written to the agent's slot by its own loop: fetching them afterwards was random access over megabytes.
+    # Sums are written to the agent's slot by its own loop: fetching them afterwards was random
+    # access over megabytes.
     for k, (c, _) in enumerate(sums):
         flock.sums[c][i] = sums_of[i, k]

@@ -31,8 +31,8 @@ def draw(
     u3: Row,
 ) -> None:  # fmt: skip
     """Draw four random words of a stream per agent, into four rows; order: numbers of the agents."""
-    # Philox is inlined here before LLVM sees it. Compiled alone, LLVM vectorises across its four words, and the loop
-    # over agents stays scalar: 2.8 µs instead of 0.65 µs for 112 agents.
+    # Philox is inlined here before LLVM sees it. Compiled alone, LLVM vectorises across its four
+    # words, and the loop over agents stays scalar: 2.8 µs instead of 0.65 µs for 112 agents.
     for i in range(m):
         u0[i], u1[i], u2[i], u3[i] = random.philox(order[i], step, stream, world, seed_low, seed_high)
 
@@ -40,11 +40,11 @@ def draw(
 def fill_words(u: Columns, flock: FlockRows, whole: Any, step: Any, stream: int, m: int, drawn: Draw) -> None:
     """Draw four random words of a stream for all agents of this world.
 
-    Until somebody leaves each agent lies at its own number, and a loop that counts takes a tenth less than one that
+    Until an agent leaves, each lies at its own number, and a loop that counts takes a tenth less than one that
     looks the number up. The two are functions of their own: beside the other, either is compiled to a slower one.
     """
-    # A draw of 100 agents takes 147 ns by counting and 162 ns by looking up numbers. Both in one function would
-    # compile the counting one to something slower.
+    # A draw of 100 agents takes 147 ns by counting and 162 ns by looking up numbers. Both in one
+    # function would compile the counting one to something slower.
     if drawn is None:
         draw(
             m, flock.number, step, stream, whole.world, whole.seed_low, whole.seed_high, u[0], u[1], u[2], u[3]
@@ -67,7 +67,8 @@ def call_draw(
 
 def normal(m: int, a: Row, b: Row, g: Row, h: Row) -> None:
     """Two normal numbers per agent of two random words each."""
-    # Box and Muller: two uniform numbers give two normal ones, without a rejection that vectors could not follow.
+    # Box and Muller: two uniform numbers give two normal ones, without a rejection that vectors
+    # could not follow.
     for i in range(m):
         g[i], h[i] = random.normal_pair(a[i], b[i])
 
@@ -78,7 +79,8 @@ def normals(
     """Four normal numbers of a stream per agent, in four rows from the first on."""
     u = flock.words
     fill_words(u, flock, whole, step, stream, m, drawn)
-    # Random words are 19 % and normal numbers 16 % of a flight of 30 drones; rows are marked as lying apart.
+    # Random words are 19 % and normal numbers 16 % of a flight of 30 drones; rows are marked as
+    # lying apart.
     for c in (0, 2):
         if drawn is None:
             normal(m, u[c], u[c + 1], rows[first + c], rows[first + c + 1])
@@ -90,6 +92,7 @@ def uniforms(flock: FlockRows, rows: Columns, whole: Any, step: Any, stream: int
     """Four uniform numbers of a stream per agent, between 0 and 1, in four rows."""
     u = flock.words
     fill_words(u, flock, whole, step, stream, m, drawn)
+    # Four loops over agents, one for each row, which compilers turn into vectors.
     for c in range(4):
         for i in range(m):
             rows[c][i] = random.uniform(u[c][i])

@@ -48,8 +48,8 @@ from airflock.engine.stages.words import (
 )  # fmt: skip
 from airflock.world import nearest_image
 
-# Where an agent meets but some of whom it hears, its others are gone through twice: who is heard, and, of those whom
-# it meets, what they say.
+# Where a topology chooses, the pair loop runs twice: first to find the agents that are heard, then
+# to add the terms of those that are met.
 HEAR_AND_ADD, HEAR, ADD = "both", "hear", "add"
 
 
@@ -65,15 +65,16 @@ def group_of(j: int, others: CandidateRows, *, plan: Plan) -> Any:
 
 def same_group(i: int, j: int, flock: FlockRows, others: CandidateRows, *, plan: Plan) -> Any:
     """Return 1 if two agents are of one group, else 0; always 1 where no rule uses groups."""
-    # A rule sees of groups only two words, `kin` and `group`: what a group means is the business of the law.
+    # A rule sees of groups only two words, `kin` and `group`: what a group means is the business of
+    # the law.
     return (ONE if others.group[j] == flock.own("", "group")[i] else ZERO) if plan.uses_groups else ONE
 
 
 def true_offset(me: PairLoopAgent, j: int, o: Any, flock: FlockRows, w: Any, *, plan: Plan) -> Any:
     """Fill the true offset o of agent j, m, and return its squared length, m²."""
     axes = range(plan.dimensions)
-    # Two loops over the axes, one after the other: they are written out, and the second stands only in a periodic
-    # box.
+    # Two loops over the axes, one after the other: they are written out, and the second stands only
+    # in a periodic box.
     for a in axes:
         o[a] = flock.position[a][j] - me.true[a]
     if plan.periodic:
@@ -100,8 +101,8 @@ def as_heard(
     axes = range(plan.dimensions)
     if plan.packets:
         age = clock_time(at.time, me.i, flock, plan=plan) - packet[2 * plan.dimensions]
-        # The usual radios write their coordinate out axis by axis: as a call of a rule the compiler adds in another
-        # order, and flights over links would lose their last bits.
+        # The usual radios write their coordinate out axis by axis: as a call of a rule the compiler
+        # adds in another order, and flights over links would lose their last bits.
         if plan.turns:
             place = carried_by_rule(age, packet, k, plan=plan)
         for a in axes:
@@ -136,8 +137,8 @@ def pair_counts(
     model: Model,
 ) -> Any:
     """Return True if agent j counts by distance: in radio range (or met), and within the law's reach."""
-    # Range of the radio (true distance) first, the law's own reach (believed distance) last; exactly on the edge
-    # counts.
+    # Range of the radio (true distance) first, the law's own reach (believed distance) last;
+    # exactly on the edge counts.
     if part == ADD:
         ok = others.met[q] > HALF
     elif plan.packets:  # the newest packet is heard on, as long as its sender is in range
@@ -153,8 +154,8 @@ def pair_counts(
 
 def true_offset_if_asked(me: PairLoopAgent, j: int, part: str, o: Any, flock: FlockRows, w: Any, *, plan: Plan) -> Any:
     """Fill the true offset o of agent j, m, and return its squared length, m², where rules need it; else return 0."""
-    # Without delay, sensor errors or packets the believed offset is the true one; a second subtraction would cost
-    # every pair.
+    # Without delay, sensor errors or packets the believed offset is the true one; a second
+    # subtraction would cost every pair.
     if (plan.perturbed or plan.packets) and part != ADD:  # noqa: SIM108 - a helper of several lines stands alone
         apart2 = true_offset(me, j, o, flock, w, plan=plan)
     else:
@@ -176,8 +177,8 @@ def is_clear_between(
 ) -> Any:
     """Return 1 if nothing that shades the radio stands between two agents, else 0."""
     if plan.shades and at.drawn is not None:
-        # A GPU has no row per agent for this: a table of all pairs would not fit, so each pair is cast inside the
-        # loop.
+        # A GPU has no row per agent for this: a table of all pairs would not fit, so each pair is
+        # cast inside the loop.
         open_way = is_clear(me.i, j, reach.radio, flock, w, whole, around, plan=plan)
     else:
         open_way = flock.clear[j] if plan.shades else ONE
@@ -202,6 +203,8 @@ def receive_packet(
 ) -> None:
     """Let an agent hear what agent j has sent, and put the newest of it into `packet`, where packets are kept."""
     if plan.packets and part != ADD:
+        # Everything that a rule of the radio may take is offered by name; a driver computes only
+        # the arguments of its rule.
         carried2 = squared_range(me.i, j, reach.radio, flock, plan=plan)
         known = {
             "distance": math.sqrt(apart2 + TINY), "dx": o[X], "dy": o[Y], "dz": o[Z], "talkers": me.talkers,
@@ -218,8 +221,9 @@ def packet_arrives(
 ) -> Any:
     """Return True if a pair that counts also receives its packet, by the loss of the radio."""
     if plan.lossy and not plan.packets and part != ADD:
-        # One uniform number against one probability decides loss and both links: three draws a pair, real powers and
-        # rows written and read again made two lossy links ten times as dear as an ideal radio; this way 1.7 times.
+        # One uniform number against one probability decides loss and both links: three draws a
+        # pair, real powers and rows written and read again made two lossy links ten times as dear
+        # as an ideal radio; this way 1.7 times.
         distance = math.sqrt(apart2 + TINY) if plan.perturbed else r
         ok = ok & (random.uniform(drawn_pair_word(me, j, at)) >= loss_probability({"distance": distance}, k, plan=plan))
     return ok
@@ -237,7 +241,8 @@ def add_rule(
         age=other.age, lower=ONE if integer(others.number[j]) < me.number else ZERO,
         kin=same_group(me.i, j, flock, others, plan=plan), group=group_of(j, others, plan=plan), p=me.p,
     )  # fmt: skip
-    # The rule is called for every pair, and choose() drops what does not count: a branch would end the vector loop.
+    # The rule is called for every pair, and choose() drops what does not count: a branch would end
+    # the vector loop.
     for c, how in sums:
         total[c] = reduce_term(how, total[c], choose(ok, t[c], REDUCTION_START[how]))
 
@@ -264,14 +269,16 @@ def pair(
     """Agent j, at place q among the others of an agent: who is heard (part = HEAR), what it says (ADD), or both."""
     axes, k, w, v = range(plan.dimensions), numbers.k, numbers.w, me.v
     d, dv, o, nh, packet = vector(), vector(), vector(), vector(), totals()
-    # The order is that of the physics: what is truly in range, whether a packet arrives, what is believed of its
-    # sender, and only then what the law makes of that. All in one loop, so that nothing between goes through memory.
+    # The order is that of the physics: what is truly in range, whether a packet arrives, what is
+    # believed of its sender, and only then what the law makes of that. All in one loop, so that
+    # nothing between goes through memory.
     age = heard_age(me, j, at, flock, plan=plan)
     apart2 = true_offset_if_asked(me, j, part, o, flock, w, plan=plan)
     open_way = is_clear_between(me, j, reach, at, flock, w, whole, around, plan=plan)
     receive_packet(me, j, part, apart2, o, open_way, reach, at, packet, flock, numbers, whole, plan=plan)
     age = as_heard(me, j, d, dv, packet, age, at, k, flock, others, plan=plan)
-    # Candidates that come by cells are at their nearest image already; all pairs find it here, once for the offset.
+    # Candidates that come by cells are at their nearest image already; all pairs find it here, once
+    # for the offset.
     if images:
         for a in axes:
             d[a] = nearest_image(d[a], getattr(w, HALF_SIZES[a]))
@@ -287,8 +294,8 @@ def pair(
         nh[a] = g * (v[a] + dv[a])
     other = NeighbourEstimate(d, dv, nh, r, r2, speed, age)
     if part == HEAR:
-        # Where a topology chooses, pairs are visited twice: a rule that ranks neighbours must know all before it adds
-        # one.
+        # Where a topology chooses, pairs are visited twice: a rule that ranks neighbours must know
+        # all before it adds one.
         others.square[q] = FAR  # and so it stays where an interpreted driver goes on to the next one
     ok = pair_counts(me, j, q, part, apart2, other, reach, packet, numbers, flock, others, plan=plan, model=model)
     ok = packet_arrives(me, j, ok, part, apart2, r, at, k, plan=plan)

@@ -26,8 +26,8 @@ class ErrorFunctions(NamedTuple):
 
 def wander(m: int, q: Row, u: Row, g: Row, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
     """Errors along one axis after one more measurement: of the position, and of the velocity."""
-    # The Langevin error keeps this short form (one axis at a time): written as `measure` it would be one loop over a
-    # dozen rows. `gnss` through `measure` costs 1.19 times this flight.
+    # The Langevin error keeps this short form (one axis at a time): written as `measure` it would
+    # be one loop over a dozen rows. `gnss` through `measure` costs 1.19 times this flight.
     for i in range(m):
         q[i], u[i] = call_rule(
             plan.sensor.error, dx=q[i], dv=u[i], g=g[i], period=numbers.c.period,
@@ -45,8 +45,9 @@ def err(m: int, place: Row, rate: Row, x: Row, v: Row, q: Row, u: Row) -> None:
 
 def snapshot(flock: FlockRows, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
     """Put the state that is sent, and the faults by which, into the slot of the ring from which it will be heard."""
-    # What is sent carries the error of the sender's last measurement, and the faults of the moment of sending: beside
-    # each state the ring holds the columns of faults that disturb it. Faults replaced within the delay stay as sent.
+    # What is sent carries the error of the sender's last measurement, and the faults of the moment
+    # of sending: beside each state the ring holds the columns of faults that disturb it. Faults
+    # replaced within the delay stay as sent.
     for i in range(m):
         for a in range(plan.dimensions):
             ring[slot, a, i] = (
@@ -63,7 +64,8 @@ def snapshot(flock: FlockRows, slot: int, m: int, ring: Any, *, plan: Plan) -> N
 
 def draw_sensor_numbers(flock: FlockRows, whole: Any, decision: int, m: int, *, plan: Plan, drawn: Draw) -> None:
     """Random numbers that a sensor asks for: g0 to g11, u0 to u3."""
-    # Only the numbers that the rule takes are drawn: Philox and normal numbers are a third of a small flight.
+    # Only the numbers that the rule takes are drawn: Philox and normal numbers are a third of a
+    # small flight.
     if rule_asks(plan.sensor.measure, "g0", "g1", "g2", "g3"):
         normals(flock, flock.errors, whole, decision, SENSOR + 256 * FIRST_DRAW, m, 0, drawn)
     if rule_asks(plan.sensor.measure, "g4", "g5", "g6", "g7"):
@@ -84,8 +86,8 @@ def measure(lanes: Iterable[int], flock: FlockRows, numbers: Any, time: Any, *, 
             **{"u" + str(c): u[c][i] for c in range(4)}, time=time, period=numbers.c.period,
             s=agent_numbers(i, "s", flock, numbers, plan=plan),
         )  # fmt: skip
-        # The error is kept because others hear it too. A second measurement for them would give a receiver two biases
-        # and two outages at once.
+        # The error is kept because others hear it too. A second measurement for them would give a
+        # receiver two biases and two outages at once.
         for a in range(plan.dimensions):
             flock.measured_position[a][i] = t[a]
             flock.own_error[a][i] = t[a] - x[a][i]
@@ -108,8 +110,8 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
         draw_sensor_numbers(flock, whole, decision, m, plan=plan, drawn=drawn)
         measure(range(m), flock, numbers, real(decision) * numbers.c.period, plan=plan)
     elif plan.has_sensor_error:
-        # Four normal numbers of one draw serve four errors: the first draw both axes of a plane, own and sent, the
-        # second the height.
+        # Four normal numbers of one draw serve four errors: the first draw both axes of a plane,
+        # own and sent, the second the height.
         for draw, kinds in enumerate(errors[: dims - 1]):
             normals(flock, flock.errors, whole, decision, SENSOR + 256 * draw, m, 0, drawn)
             for g, ((error, drift), a) in enumerate(kinds):
@@ -155,7 +157,8 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
             for i in range(m):
                 flock.heard_position[a][i] = flock.position[a][i]
                 flock.heard_velocity[a][i] = flock.velocity[a][i]
-    # Faults travel with the packet: what is heard now is disturbed by the columns that stood when it was sent.
+    # Faults travel with the packet: what is heard now is disturbed by the columns that stood when
+    # it was sent.
     for c, name, what in plan.sent_faults:
         for i in range(m):
             flock.as_sent.fault(name, what)[i] = ring[slot, c, i]
@@ -163,7 +166,8 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
     then = now - real(whole.delay) * numbers.c.dt
     x, v, hx, hv = flock.measured_position, flock.measured_velocity, flock.heard_position, flock.heard_velocity
     as_sent = flock.as_sent if plan.late else flock
-    # The own state is disturbed by the faults of now, what is heard by those of the moment of sending (`as_sent`).
+    # The own state is disturbed by the faults of now, what is heard by those of the moment of
+    # sending (`as_sent`).
     for kind in plan.suffers("sense"):
         faults.apply_state_faults(range(m), kind, "believed", decision, now, x, v, flock, numbers, plan=plan)
         if not plan.sees:

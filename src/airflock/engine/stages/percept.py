@@ -79,7 +79,8 @@ def cast(
             ),
         )  # fmt: skip
     if plan.scene and model.sight is not None:
-        # Few shapes in sight lie in the list of this decision; where they did not fit (-1), the cast walks the tree.
+        # Few shapes in sight lie in the list of this decision; where they did not fit (-1), the
+        # cast walks the tree.
         if percept.gathered >= 0:
             t = bvh.cast_near(x, y, z, ux, uy, uz, t, radius, percept.shapes, percept.near, percept.gathered)
         else:

@@ -34,7 +34,8 @@ UNIFORM, NORMAL = ("u0", "u1", "u2", "u3"), ("g0", "g1", "g2", "g3")  # random n
 
 def first_of_four(i: int, flock: FlockRows) -> Any:
     """Return True if agent i is the first present one of the four receivers that share random words."""
-    # Where agents have left, numbers have gaps: a new group of four begins where the quotient by four changes.
+    # Where agents have left, numbers have gaps: a new group of four begins where the quotient by
+    # four changes.
     return (i == 0) | (flock.number[i] >> 2 != flock.number[i - 1] >> 2)
 
 
@@ -43,8 +44,9 @@ def draw(
 ) -> None:  # fmt: skip
     """Random words of all that is sent to agent i and to the others of its four, in four rows, one for each of them."""
     u = flock.words
-    # The counter holds (receiver >> 2) * agents + sender, so that the number depends on neither memory layout nor
-    # vector width: pilots, `look` and a thread of a GPU draw the same number alone.
+    # The counter holds (receiver >> 2) * agents + sender, so that the number depends on neither
+    # memory layout nor vector width: pilots, `look` and a thread of a GPU draw the same number
+    # alone.
     for j in others:
         u[0][j], u[1][j], u[2][j], u[3][j] = random.philox(
             random.pair_number(flock.number[i], flock.number[j], whole.born if plan.absence else n), decision, PACKET,
@@ -54,8 +56,8 @@ def draw(
 
 def word(i: int, j: int, decision: int, n: int, whole: Any) -> Any:
     """Random word of what agent j sends agent i, where it draws alone."""
-    # The four words of one Philox call belong to four receivers; the last two bits of the receiver pick its own
-    # without a branch.
+    # The four words of one Philox call belong to four receivers; the last two bits of the receiver
+    # pick its own without a branch.
     w0, w1, w2, w3 = random.draw(
         random.pair_number(i, j, n), decision, PACKET, whole.world, whole.seed_low, whole.seed_high
     )
@@ -106,7 +108,8 @@ def pair_numbers(
     """Draw the random numbers that rules of the radio take for one pair and decision, by name."""
     pair = pair_number(me.i, j, at.agents, flock, whole, plan=plan)
     u, g = totals(), totals()
-    # Only the numbers that a rule of this radio takes are drawn: each Philox call is a cost for every pair.
+    # Only the numbers that a rule of this radio takes are drawn: each Philox call is a cost for
+    # every pair.
     if plan.rolls(UNIFORM):
         u[0], u[1], u[2], u[3] = random.draw(pair, at.step, AIR, whole.world, whole.seed_low, whole.seed_high)
     if plan.rolls(NORMAL):
@@ -148,8 +151,8 @@ def update_packet(
         got = got & passed
     if plan.draws:
         got = got & (random.uniform(drawn_pair_word(me, j, at)) >= miss)
-    # One packet of a pair is under way at a time, those behind it are dropped, as on a link that repeats until it is
-    # acknowledged. A queue would need rows for each place in it.
+    # One packet of a pair is under way at a time, those behind it are dropped, as on a link that
+    # repeats until it is acknowledged. A queue would need rows for each place in it.
     if plan.radio.late is not None:
         queue_packet(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
         deliver_due(me.i, j, at, packet, flock, numbers, plan=plan)
@@ -170,13 +173,13 @@ def glimpse(
 ) -> None:  # fmt: skip
     """Put the place of agent j into `packet`, by the newest picture that shows it to agent i.
 
-    Places are those that agent i believes in, so the error of its own position is in all of them alike.
+    Places are those that agent i believes in, so the error of its own position is in all of them.
     """
     dims, w = plan.dimensions, numbers.w
     then, off, expected, v, ev = vector(), vector(), vector(), vector(), vector()
     since = sent_time(i, at, flock, plan=plan) - flock.packet[2 * dims][i, j]
-    # What is kept is a place in the observer's own frame at the moment of the picture, so that the error of the own
-    # position is in both terms and drops out where the law takes the difference.
+    # What is kept is a place in the observer's own frame at the moment of the picture, so that the
+    # error of the own position is in both terms and drops out where the law takes the difference.
     for a in range(dims):
         moved = apart(flock.position[a][i], flock.heard_position[a][i], a, w, plan=plan)
         then[a] = flock.measured_position[a][i] - moved
@@ -190,7 +193,8 @@ def glimpse(
         k=numbers.k,
     )  # fmt: skip
     for a in range(dims):
-        # Nothing branches: a picture that does not show the other one leaves the old packet in place.
+        # Nothing branches: a picture that does not show the other one leaves the old packet in
+        # place.
         packet[a] = choose(got, then[a] + t[a], flock.packet[a][i, j])
         packet[a + dims] = choose(got, t[a + 3], flock.packet[a + dims][i, j])
     packet[2 * dims] = choose(got, sent_time(i, at, flock, plan=plan), flock.packet[2 * dims][i, j])
@@ -202,8 +206,8 @@ def call_receive(
     """Return True if a packet arrives by the radio's own rule; keeps its new Packet where the pair is in range."""
     age = clock_time(at.time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
     if plan.radio.Packet is not None:
-        # What the rule remembers of a pair changes only where the two are in range, as if it had not been called
-        # elsewhere.
+        # What the rule remembers of a pair changes only where the two are in range, as if it had
+        # not been called elsewhere.
         kept = plan.radio.Packet(*[flock.packet[plan.pocket + c][i, j] for c in field_indices(plan.radio.Packet)])
         hit = call_rule(plan.radio.receive, **about, age=age, packet=kept, k=numbers.k)
         for c in field_indices(plan.radio.Packet):
@@ -220,8 +224,8 @@ def queue_packet(
     dims, first, due = plan.dimensions, plan.waiting, 2 * plan.waiting
     goes = got & (flock.packet[due][i, j] < HALF * GONE)
     wait = call_rule(plan.radio.late, **about, k=numbers.k)
-    # The waiting packet lies in rows of its own behind the newest one; both are tables [i, j] that the pair loop
-    # passes in vectors.
+    # The waiting packet lies in rows of its own behind the newest one; both are tables [i, j] that
+    # the pair loop passes in vectors.
     for a in range(dims):
         flock.packet[first + a][i, j] = choose(goes, flock.heard_position[a][j], flock.packet[first + a][i, j])
         flock.packet[first + a + dims][i, j] = choose(
@@ -236,7 +240,8 @@ def queue_packet(
 def deliver_due(i: int, j: int, at: Decision, packet: Any, flock: FlockRows, numbers: Any, *, plan: Plan) -> None:
     """Deliver the packet on its way if it is due by now, within half a step."""
     first, due = plan.waiting, 2 * plan.waiting
-    # Half a motion step of tolerance: float32 times of send and delay do not add up exactly to a step.
+    # Half a motion step of tolerance: float32 times of send and delay do not add up exactly to a
+    # step.
     come = (flock.packet[due][i, j] > HALF * GONE) & (flock.packet[due][i, j] <= at.time + HALF * numbers.c.dt)
     for c in range(plan.waiting):
         packet[c] = choose(come, flock.packet[first + c][i, j], flock.packet[c][i, j])
@@ -267,8 +272,9 @@ def packet_is_valid(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
     Over a radio that keeps it, it does until the next one comes; where lost neighbours stop an agent, until they count
     as lost.
     """
-    # At 60 % loss, counting only the packets of this decision left an agent deaf to more than half of its neighbours:
-    # smallest distance 0.3 m in ten seeds; with data believed for `patience`, 2.9 m.
+    # At 60 % loss, counting only the packets of this decision left an agent deaf to more than half
+    # of its neighbours: smallest distance 0.3 m in ten seeds; with data believed for `patience`,
+    # 2.9 m.
     return (
         (packet[2 * plan.dimensions] > -1e8) & (call_rule(plan.radio.lasts, age=age, k=numbers.k) > HALF)
         if plan.radio.lasts is not None

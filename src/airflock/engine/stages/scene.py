@@ -75,9 +75,9 @@ def move_own_goals(flock: FlockRows, numbers: Any, time: float, n: int, scene: A
             for a in axes:
                 flock.departed[a][i] = x[a][i]
             far = most(far, sum((scene.goals[who[i], a] - x[a][i]) * (scene.goals[who[i], a] - x[a][i]) for a in axes))
-        # All goals are under way for the same time on straight ways. With least squared ways no two come nearer than
-        # the spacing over the root of 2 (Turpin, Michael & Kumar 2014), so flocking only mends what noise and wind
-        # disturb.
+        # All goals are under way for the same time on straight ways. With least squared ways no two
+        # come nearer than the spacing over the root of 2 (Turpin, Michael & Kumar 2014), so
+        # flocking only mends what noise and wind disturb.
         at[3] = 1.5 * math.sqrt(far) / w.goal_speed if w.goal_speed > ZERO else ZERO
     for i in range(n):
         for a in axes:
@@ -88,21 +88,22 @@ def move_own_goals(flock: FlockRows, numbers: Any, time: float, n: int, scene: A
 def let_appear(flock: FlockRows, numbers: Any, time: float, n: int, scene: Any) -> int:
     """Let stand what is due, as soon as nobody is in its place.
 
-    A shape waits until every agent is at start.clearance from its bounds, as nobody builds onto a drone in flight.
+    A shape waits until every agent is at start.clearance from its bounds, so that nothing appears on top of a drone.
     """
     x, w, later = flock.position, numbers.w, scene.later
     for r in range(len(later)):
         if (later[r, 6] >= ZERO) and (later[r, 6] <= time):
             free = True
-            # Every agent is looked at: shapes appear a few times in a flight, so the search need not be quick.
+            # Every agent is looked at: shapes appear a few times in a flight, so the search need
+            # not be quick.
             for i in range(n):
                 if bvh.beside(x[X][i], x[Y][i], x[Z][i], later, r) <= w.clearance * w.clearance:
                     free = False
             if free:
                 shape = int(later[r, 7])
                 later[r, 6] = GONE
-                # A shape that is not due yet has its bounds at 1e9 m: all loops test bounds first, so no cast tests a
-                # time.
+                # A shape that is not due yet has its bounds at 1e9 m: all loops test bounds first,
+                # so no cast tests a time.
                 for c in repeat(6):
                     scene.shapes[shape, c] = later[r, c]
     return 0
@@ -118,8 +119,8 @@ def find_contacts(flock: FlockRows, numbers: Any, n: int, scene: Any, *, plan: P
                 for a in axes:
                     before[a][i] = x[a][i]
         scene.counts[1] = 1
-    # A contact is tested along the way since the last look, so that a fast agent cannot pass through a thin wall
-    # between two.
+    # A contact is tested along the way since the last look, so that a fast agent cannot pass
+    # through a thin wall between two.
     for i in range(n):
         if plan.scene:
             flock.touches[i] = bvh.touches(

@@ -17,8 +17,8 @@ def stop(agents: Iterable[int], flock: FlockRows, numbers: Any, n: int, time: fl
     axes, w, c = range(plan.dimensions), numbers.w, flock.command
     for i in agents:
         somebody, now = ZERO, clock_time(time, i, flock, plan=plan)
-        # Over everybody the agent has ever heard: the newest packet and its age say how far the other one can have
-        # flown.
+        # Over everybody the agent has ever heard: the newest packet and its age say how far the
+        # other one can have flown.
         for j in range(n):
             d = vector()
             for a in axes:
@@ -32,12 +32,14 @@ def stop(agents: Iterable[int], flock: FlockRows, numbers: Any, n: int, time: fl
             somebody = most(somebody, choose(integer(j) == integer(i), ZERO, near))
         at, o = flock.stop_position, vector()
         for a in axes:
-            # Commanding zero velocity is not standing still: a body with the noise of the paper drifts 2.4 m along
-            # each axis in 15 s. So an agent that stopped returns to where it stopped.
+            # Commanding zero velocity is not standing still: a body with the noise of the paper
+            # drifts 2.4 m along each axis in 15 s. So an agent that stopped returns to where it
+            # stopped.
             at[a][i] = choose(flock.stopped[i] > HALF, at[a][i], flock.measured_position[a][i])
             o[a] = at[a][i] - flock.measured_position[a][i]
-        # Without the pause an agent went on in the one decision in which it heard all, and crept 1 to 2 m at a time:
-        # two at 5 m came to 3 m. Pauses of 0, 0.4 and 1 s gave medians of 5.3, 5.8 and 6.8 m.
+        # Without the pause an agent went on in the one decision in which it heard all, and crept 1
+        # to 2 m at a time: two at 5 m came to 3 m. Pauses of 0, 0.4 and 1 s gave medians of 5.3,
+        # 5.8 and 6.8 m.
         until = silence.stands_until(somebody, now, flock.stands_until[i], numbers.silence)
         stands = choose(now < until, ONE, ZERO)
         flock.stands_until[i], flock.stopped[i] = until, stands

@@ -14,7 +14,7 @@ from airflock.world import bvh, inside, start as places
 
 START = random.START
 SPEEDS, OFFSETS = START + 256, START + 512  # further draws of the same agent
-ATTEMPTS = 20_000  # draws per agent before a start is given up; the border refuses crowded arenas beforehand
+ATTEMPTS = 20_000  # draws per agent before a start fails; validation refuses crowded arenas before
 EXTENTS = ("extent_x", "extent_y", "extent_z")
 
 
@@ -26,6 +26,7 @@ def excursion(
         x, y, height_above_middle(z, edges, corners, plan=plan), w.half_x, w.half_y, w.half_z, edges, corners
     )
     if plan.obstacles:
+        # The deepest of all: outside the arena, inside an obstacle, inside a shape of the scene.
         for o in range(obstacles):
             e = most(e, -plan.obstacle(x, y, z, edges, spans[o, 0], spans[o, 1]).distance)
     if plan.scene:
@@ -40,7 +41,8 @@ def try_place(
     w0, w1, w2, w3 = random.draw(i, attempt, START, whole.world, whole.seed_low, whole.seed_high)
     for a, word in zip(range(plan.dimensions), (w0, w1, w2), strict=False):
         s[a] = places.spread(random.uniform(word), -getattr(w, EXTENTS[a]), getattr(w, EXTENTS[a]))
-    # In a world without walls the test always holds, but compilers cannot see it: 26 instructions of a GPU kernel.
+    # In a world without walls the test always holds, but compilers cannot see it: 26 instructions
+    # of a GPU kernel.
     free = (
         excursion(s[X], s[Y], s[Z], w, around.edges, around.spans, whole.corners, whole.obstacles, around.scene)
         <= -w.wall_clearance
@@ -57,9 +59,9 @@ def is_free(free: Any, s: Any, w: Any, scene: Any, *, plan: Plan) -> Any:
     if plan.scene:
         if free:
             free = bvh.nearest(s[X], s[Y], s[Z], w.clearance, *scene_tree(scene)).distance >= w.clearance
-        # Parity of crossings is wrong where buildings of a city model overlap (inside both it is even); a winding
-        # number over the closed parts is not. Three lines must agree, as one may pass through an edge of two
-        # triangles.
+        # Parity of crossings is wrong where buildings of a city model overlap (inside both it is
+        # even); a winding number over the closed parts is not. Three lines must agree, as one may
+        # pass through an edge of two triangles.
         if plan.has_mesh and free:
             free = inside(s[X], s[Y], s[Z], *scene_tree(scene)) < HALF
     return free
@@ -80,6 +82,8 @@ def place_in_formation(i: int, s: Any, w: Any, whole: Any, *, plan: Plan) -> Non
     w0, w1, w2, w3 = random.draw(i, 0, OFFSETS, whole.world, whole.seed_low, whole.seed_high)
     g[X], g[Y] = random.normal_pair(w0, w1)
     g[Z], _ = random.normal_pair(w2, w3)
+    # Jitter is a normal offset from the own place, drawn by number, so that a formation is the same
+    # for every size of flock.
     for a in range(plan.dimensions):
         s[a] = f[a] + w.jitter * g[a]
 
@@ -94,7 +98,8 @@ def begin(  # noqa: C901 - tests of the plan leave one way through
     excursion : the stage of this name
     """
     axes, x, v, w = range(plan.dimensions), flock.position, flock.velocity, numbers.w
-    # Lanes without an agent must be far away from the start: at the origin they would be met by vector loops.
+    # Lanes without an agent must be far away from the start: at the origin they would be met by
+    # vector loops.
     for i in range(m):
         for a in axes:
             x[a][i] = AWAY
@@ -117,14 +122,15 @@ def begin(  # noqa: C901 - tests of the plan leave one way through
         return 0
     for i in range(n):
         placed = False
-        # Rejection sampling, agent by agent: a place depends only on the seed and on agents with lower numbers, so
-        # the same start comes out on every device.
+        # Rejection sampling, agent by agent: a place depends only on the seed and on agents with
+        # lower numbers, so the same start comes out on every device.
         for attempt in repeat(ATTEMPTS):
             s = vector()
             free = try_place(i, attempt, s, w, whole, around, excursion, plan=plan)
             for j in range(i if w.separation > ZERO else 0):
                 free = free & (sum((s[a] - x[a][j]) * (s[a] - x[a][j]) for a in axes) >= w.separation * w.separation)
-            # The dear test, through the tree of shapes, comes last and only for places that are free so far.
+            # The dear test, through the tree of shapes, comes last and only for places that are
+            # free so far.
             free = is_free(free, s, w, around.scene, plan=plan)
             if free:
                 for a in axes:

@@ -12,10 +12,11 @@ from airflock.engine.stages.words import ZERO_ROW, IdentityRow, field_indices
 Row = Any  # one number per agent: row[i]
 FAULT_PREFIX = "fault_"  # what names of rows with numbers of a fault begin with
 NUMBER_PREFIX = "number_"  # those of rows with a number that differs among agents
-# The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts
-# (rays cast at this decision, whether positions before are known); goals, aim (where the goal is, its number) and
-# reached (time of each, s; -1 before); later (bounds, time and number of each shape that is yet to appear; time -1 once
-# it has). A shape that is not there yet has its bounds far away, so that nothing meets it.
+# The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered
+# shapes; counts (rays cast at this decision, whether positions before are known); goals, aim (where
+# the goal is, its number) and reached (time of each, s; -1 before); later (bounds, time and number
+# of each shape that is yet to appear; time -1 once it has). A shape that is not there yet has its
+# bounds far away, so that nothing meets it.
 SCENE_ARRAYS = ("shapes", "nodes", "links", "near", "counts", "goals", "aim", "reached", "later")
 
 
@@ -84,17 +85,17 @@ class FlockRows:
     reach_in: Row = row_attribute("reach_in")  # square of how far it hears
     clock: Row = row_attribute("clock")  # how far its clock is ahead, s
     sent_clock: Row = row_attribute("sent_clock")  # the same when it sent what is heard now
-    stopped: Row = row_attribute("stopped")  # whether it stopped for somebody whom it has lost, 1 or 0
+    stopped: Row = row_attribute("stopped")  # whether it stopped for a lost neighbour, 1 or 0
     stop_position: Axes = axes_attribute("stop_")  # where, m
     stands_until: Row = row_attribute("stands_until")  # s
     away: Columns = columns_attribute("away")  # offsets of the others from one agent, m
-    square: Row = row_attribute("square")  # squares of their distances, m²; FAR of whom it does not hear
+    square: Row = row_attribute("square")  # squares of their distances, m²; FAR for agents not heard
     hidden: Row = row_attribute("hidden")  # whether something that stands in the world hides each of them, 1 or 0
     clear: Row = row_attribute("clear")  # whether nothing stands in the way of packets from each of them, 1 or 0
     fade: Row = row_attribute("fade")  # normal number of the signal of each of them
     met: Row = row_attribute("met")  # whether that agent meets each of them, 1 or 0
-    heap: Row = row_attribute("heap")  # scratch of whoever ranks agents
-    weak: Row = row_attribute("weak")  # scratch of whoever ranks signals
+    heap: Row = row_attribute("heap")  # scratch for ranking agents
+    weak: Row = row_attribute("weak")  # scratch for ranking signals
     sums: Columns = columns_attribute("sum")  # what the rule for neighbours adds up to, by field
     walls: Columns = columns_attribute("wall")  # what the rule for surfaces adds up to
     body: Columns = columns_attribute("body")  # what the body remembers, by field of its Memory
@@ -107,7 +108,7 @@ class FlockRows:
     before: Axes = axes_attribute("before_")  # where it was when it was last looked at, m
     before_step: Axes = axes_attribute(
         "unhindered_v"
-    )  # velocity before a motion step, of whoever may suffer from a fault, m/s
+    )  # velocity before a motion step, where a fault of motion may act, m/s
     touches: Row = row_attribute("touches_")  # whether it touched the scene since then, 1 or 0
     rays: Row = row_attribute("rays_")  # rays that it cast at its last decision
     errors: Columns = columns_attribute("e")  # normal numbers of the sensors

@@ -20,7 +20,8 @@ def add_surface(i: int, surface: Any, flock: FlockRows, numbers: Any, *, plan: P
         model.boundary, distance=surface.distance, nx=surface.nx, ny=surface.ny, nz=surface.nz,
         vx=v[X], vy=v[Y], vz=v[Z], p=agent_numbers(i, "p", flock, numbers, plan=plan),
     )  # fmt: skip
-    # Sums go to rows, not to locals: the loop over surfaces is the outer one, so an agent comes by once per surface.
+    # Sums go to rows, not to locals: the loop over surfaces is the outer one, so an agent comes by
+    # once per surface.
     for c in nonzero_fields(model.Walls, plan.dimensions):
         flock.walls[c][i] += t[c]
 
@@ -40,9 +41,9 @@ def sum_walls(
     """Walls whose surface is a function of four numbers, by family."""
     x = flock.measured_position
     bounds = (0, whole.faces_0, whole.faces_0 + whole.faces_1)
-    # Surfaces outside, agents inside: the inner loop runs over agents that share one wall, so that its numbers are
-    # constants of the loop and the agents fill vectors. Families have a rule each, hence the loop that is written
-    # out.
+    # Surfaces outside, agents inside: the inner loop runs over agents that share one wall, so that
+    # its numbers are constants of the loop and the agents fill vectors. Families have a rule each,
+    # hence the loop that is written out.
     for family, distance_to in enumerate(plan.surfaces):
         for e in range(bounds[family], bounds[family + 1]):
             ea = faces[e, 0]
@@ -67,8 +68,9 @@ def sum_edges(
 ) -> None:
     """Edges of a polygonal arena: those that an agent can see and, for an agent outside, the nearest point."""
     x = flock.measured_position
-    # The shill agent of an edge stands at its closest point, as the paper says. On the infinite line it would be up
-    # to 13 m off in a hexagon of 100 m, and push agents in one arm of an L away from a wall of the other.
+    # The shill agent of an edge stands at its closest point, as the paper says. On the infinite
+    # line it would be up to 13 m off in a hexagon of 100 m, and push agents in one arm of an L away
+    # from a wall of the other.
     for e in range(whole.corners):
         for i in agents:
             f = polygon.wall(
@@ -107,8 +109,9 @@ def boundaries(
                 f = plan.obstacle(x[X][i], x[Y][i], x[Z][i], around.edges, around.spans[o, 0], around.spans[o, 1])
                 add_surface(i, f, flock, numbers, plan=plan, model=model)
     if plan.scene:
-        # Only the ground and the one nearest point are felt. With every building in reach the pushes of both sides of
-        # a street cancel while their damping adds up, and nothing of the own way is left.
+        # Only the ground and the one nearest point are felt. With every building in reach the
+        # pushes of both sides of a street cancel while their damping adds up, and nothing of the
+        # own way is left.
         for ground in (ZERO, ONE)[: plan.dimensions - 1]:
             for i in agents:
                 f = bvh.nearest_of(

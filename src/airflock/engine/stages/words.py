@@ -63,15 +63,16 @@ def integer(value: Any) -> Any:
 
 def row_index(value: Any) -> Any:
     """A whole number that is a place in a row: a driver need not test whether it counts from the row's end."""
-    # Numba tests for every signed index whether it counts from the row's end; leaving the test out took 1 % off a
-    # flight.
+    # Numba tests for every signed index whether it counts from the row's end; leaving the test out
+    # took 1 % off a flight.
     return int(value)
 
 
 def least(a: Any, b: Any) -> Any:
     """The lesser of two numbers; of a number and nan the number."""
-    # Compiled to llvm.minnum and maxnum: Numba's own min of floats is a comparison without fast-math flags, and a
-    # reduction over it stays scalar (25 µs instead of 10.5 µs for the nearest neighbours of 100).
+    # Compiled to llvm.minnum and maxnum: Numba's own min of floats is a comparison without
+    # fast-math flags, and a reduction over it stays scalar (25 µs instead of 10.5 µs for the
+    # nearest neighbours of 100).
     return b if a != a or b < a else a
 
 
@@ -82,8 +83,8 @@ def most(a: Any, b: Any) -> Any:
 
 def choose(test: Any, a: Any, b: Any) -> Any:
     """`a` where the test holds, else `b`; both are computed, there is no branch."""
-    # Of two conditional expressions on one test LLVM makes two ways through the loop, which is then not vectorised;
-    # the select instruction keeps it: 1.9 ns a pair before, 0.22 after.
+    # Of two conditional expressions on one test LLVM makes two ways through the loop, which is then
+    # not vectorised; the select instruction keeps it: 1.9 ns a pair before, 0.22 after.
     return a if test else b
 
 

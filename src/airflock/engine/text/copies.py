@@ -1,8 +1,8 @@
-"""Copies: the text that a rule had in an earlier driver, for one that would write the same.
+"""Copies: texts of rules from earlier drivers, for drivers that would write the same.
 
-To write it anew takes half of the time that the text of a driver takes. What a copy depended on is asked again, in the
-same order: what names of the rule stand for, choices and vectors of its records, and the names of what it calls, which
-come along.
+Writing the texts of rules takes half of the time of the text of a driver. A copy is used if all that it depended on is
+unchanged: the values of names in the rule, choices and vectors of its records, and the names of functions that it
+calls, which come along.
 """
 
 from collections import OrderedDict
@@ -14,7 +14,7 @@ from airflock.core import resolve_global
 
 
 class TextSource(Protocol):
-    """What a rule's text is written for: a `generate.DriverSource`."""
+    """The driver that a rule's text is written for: a `generate.DriverSource`."""
 
     constants: Mapping[str, Mapping[str, str | float]]
     vectors: Mapping[str, Mapping[str, int]]
@@ -32,7 +32,7 @@ class Dependency(NamedTuple):
 
 
 class DependencyRecorder:
-    """What is asked about one rule while it is copied; all of it is kept."""
+    """A recorder of all questions about one rule while it is copied, with their answers."""
 
     def __init__(self, rule: Callable[..., Any], source: TextSource):
         self.rule, self.source = rule, source
@@ -43,11 +43,11 @@ class DependencyRecorder:
         return self._kept("choice", record, field)
 
     def size(self, record: str, field: str) -> int:
-        """How many components a field of a record has; 0 if it is no vector."""
+        """Return the number of components of a field of a record; 0 if it is no vector."""
         return int(self._kept("size", record, field))
 
     def free(self, name: str) -> Any:
-        """What a free name of the rule stands for; None if for nothing."""
+        """Return the value of a free name of the rule; None if it has none."""
         return self._kept("free", name)
 
     def name(self, item: Any, chosen: Mapping[str, str]) -> str:
@@ -55,7 +55,7 @@ class DependencyRecorder:
         return str(self._kept("name", item, tuple(chosen.items())))
 
     def hold(self, dependencies: list[Dependency]) -> bool:
-        """Whether all answers of another time are those of now; what the rule calls comes along."""
+        """Return True if all earlier answers still hold; functions that the rule calls come along."""
         return all(_same(each.answer, self._answer(each.kind, *each.about)) for each in dependencies)
 
     def _kept(self, kind: str, *about: Any) -> Any:
@@ -74,12 +74,12 @@ class DependencyRecorder:
 
 
 def _same(known: Any, found: Any) -> bool:
-    """Whether an answer is what it was: the same object, or an equal text or number of the same type."""
+    """Return True if an answer is unchanged: the same object, or an equal text or number of the same type."""
     return known is found or (type(known) is type(found) and isinstance(known, (str, int, float)) and known == found)
 
 
 class TextCache:
-    """Texts that were written for rules, each with the questions that it depends on; the last that were asked for.
+    """A cache of texts of rules, each with the questions that it depends on; the least recently used go first.
 
     most : rules, each under one name and under all else that its text depends on; each : texts of one of them
     """
@@ -94,10 +94,12 @@ class TextCache:
             known = self._kept.get(key, ())
             if known:
                 self._kept.move_to_end(key)
+        # Answers are compared outside the lock: a comparison may write texts of called rules, which
+        # takes the lock again.
         return next((text for asked, text in known if recorder.hold(asked)), None)
 
     def keep(self, key: Hashable, recorder: DependencyRecorder, text: str) -> None:
-        """Keep a text, with what was asked while it was written."""
+        """Keep a text, with the questions of its writing."""
         with self._lock:
             self._kept[key] = (*self._kept.get(key, ())[-self._each + 1 :], (recorder.asked, text))
             self._kept.move_to_end(key)

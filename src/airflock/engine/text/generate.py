@@ -56,7 +56,7 @@ class DriverSource:
     def of(
         self, law: int, constants: Mapping[str, Mapping[str, str | float]], vectors: Mapping[str, Mapping[str, int]]
     ) -> "DriverSource":
-        """The same text, for rules of another law of the flock: what they read of its records is its own."""
+        """Return a source that writes into this text for another law of the flock, with records of its own."""
         other = copy(self)
         other.constants, other.vectors, other.law = constants, vectors, law
         return other
@@ -67,6 +67,8 @@ class DriverSource:
         chosen : arguments of the function that are choices, by name; they become constants of its text
         """
         key = (item, *chosen.items()) if chosen else item
+        # Two laws share the texts of rules, except of those that read their own parameters or
+        # percept.
         if self.law and inspect.isfunction(item) and {"p", "percept"} & set(item.__code__.co_varnames):
             key = (self.law, key)
         if key in self._names:
@@ -96,7 +98,7 @@ class DriverSource:
         return self._taken
 
     def originals(self) -> dict[str, Any]:
-        """What was copied, by its name in the driver: plain functions and NamedTuple classes of their authors."""
+        """Return the copied originals by their names in the driver: plain functions and NamedTuple classes."""
         return dict(self._originals)
 
     def solver(self, rule: Callable[..., Any]) -> str:
@@ -137,17 +139,20 @@ class DriverSource:
             node.body.pop(0)
         rewritten = RuleRewriter(rule, self, chosen, notes).visit(node)
         _end_at_return(rewritten)
-        # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
-        # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
+        # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is
+        # unrolled and vectorised across its few scalars, and the loop over agents around it no
+        # longer is (philox: 4 times slower).
         loops = any(isinstance(item, (ast.For, ast.While)) for item in walk_tree(node))
         decorator = INLINED if loops and self.decorator and not self._apart else self.decorator
+        # Deep loops, and rules with scratch, are compiled once on their own: inlined at each call
+        # they took minutes.
         if self._apart and (_depth(node) > 2 or "work" in {argument.arg for argument in node.args.args}):
             decorator = ALONE
         return f"{decorator}\n{ast.unparse(rewritten)}"
 
 
 def _depth(node: ast.AST) -> int:
-    """How many loops of a function lie inside each other."""
+    """Return the depth of nested loops of a function."""
     inner = max((_depth(child) for child in ast.iter_child_nodes(node)), default=0)
     return inner + isinstance(node, (ast.For, ast.While))
 

@@ -1,4 +1,4 @@
-"""Probe: call every rule of a model once as plain Python, so that a fault appears in the author's own file and line."""
+"""Probe: call every rule of a model once as plain Python, so that an error names the author's own file and line."""
 
 import math
 import traceback
@@ -36,10 +36,11 @@ VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
 
 
 def probe_model(model: Model, parameters: Any) -> None:
-    """Raise a RuleError that names file, line and fault, if a rule fails or returns something else than it declares."""
+    """Raise a RuleError that names file, line and error, if a rule fails or returns something else than it declares."""
     given: dict[str, Any] = {**VALUES, "p": parameters, "period": 0.2, "percept": Percept(1.0, 10.0, 20.0, 0.0)}
     given["wing"], given["aero"] = wings.Parameters(segments="5"), descent.Parameters()
     given["own"] = Own(1.0, 2.0, 0.0, 0.4472, 0.8944, 0.0)
+    # Neighbour and boundary rules first: their answers are what the deciding rule is called with.
     for kind, rule in (("reach", model.reach), ("neighbour", model.neighbour), ("boundary", model.boundary)):
         if rule is not None:
             law.check_rule(rule)
@@ -68,7 +69,7 @@ def probe_model(model: Model, parameters: Any) -> None:
 
 @cache
 def probe_fault(kind: Fault) -> None:
-    """The same for the rules of a kind of fault."""
+    """Probe the rules of a kind of fault, as `probe_model` does."""
     names = {name for rule in kind.rules for name in VOCABULARY[rule]}
     given: dict[str, Any] = {name: 0.5 + 0.1 * k for k, name in enumerate(sorted(names))}
     given["f"] = kind.Parameters()
@@ -83,7 +84,7 @@ def probe_fault(kind: Fault) -> None:
 
 @cache
 def probe_sensor(sensor: Sensor) -> None:
-    """The same for the rule of a sensor."""
+    """Probe the rule of a sensor, as `probe_model` does."""
     kind = "measure" if sensor.error is None else "error"
     rule = sensor.measure or sensor.error
     assert rule is not None
@@ -97,7 +98,7 @@ def probe_sensor(sensor: Sensor) -> None:
 
 @cache
 def probe_body(body: Body, chosen: tuple[tuple[str, str], ...]) -> None:
-    """The same for the rule of a body, with these choices of its parameters."""
+    """Probe the rule of a body with these choices of its parameters, as `probe_model` does."""
     given: dict[str, Any] = {name: 9.0 + 0.1 * k for k, name in enumerate(VOCABULARY["move"])}
     given |= {"dt": 0.01, "b": body.Parameters(**dict(chosen)), "wing": wings.Parameters(segments="5")}
     given["memory"] = body.Memory() if body.Memory is not None else None
@@ -109,7 +110,7 @@ def probe_body(body: Body, chosen: tuple[tuple[str, str], ...]) -> None:
 
 @cache
 def probe_radio(radio: Radio) -> None:
-    """The same for the rules of a radio."""
+    """Probe the rules of a radio, as `probe_model` does."""
     for kind in RULES:
         rule = getattr(radio, kind)
         if rule is None:
@@ -126,7 +127,7 @@ def probe_radio(radio: Radio) -> None:
 
 @cache
 def probe_topology(kind: Topology) -> None:
-    """The same for the rule of a topology: it says of each of two others, by 1.0 or 0.0, whether it is met."""
+    """Probe the rule of a topology, which marks each of two others by 1.0 or 0.0 as met or not."""
     law.check_rule(kind.meet)
     rows = {name: [0.5, 2.0] for name in VOCABULARY["meet"]}
     rows |= {"hidden": [0.0, 1.0], "met": [2.0, 2.0], "heap": [1e30] * 2, "weak": [1e30] * 2}
@@ -138,7 +139,7 @@ def probe_topology(kind: Topology) -> None:
 
 
 def _shared(model: Model, given: dict[str, Any]) -> Any:
-    """What the rule of the whole flock finds for the first of three agents."""
+    """Run the rule of the whole flock for three agents; returns Shared of the first one."""
     assert model.flock is not None and model.workspace is not None and model.Shared is not None
     shapes = scratch_shapes(model.workspace, 3, given)
     work = type(shapes)(*[[[0.0] * columns for _ in range(rows)] for rows, columns in shapes])
@@ -157,7 +158,7 @@ def scratch_shapes(workspace: Callable[..., Any], agents: int, records: Mapping[
 
 
 def _answer(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str, *parts: str) -> Any:
-    """What a rule says on a probe; it must be of these parts, of which a single one is no tuple."""
+    """Call a rule on a probe; its answer must have these parts, and a single part is no tuple."""
     law.check_rule(rule)
     answer = _call(rule, kind, given, owner)
     if (len(answer) if isinstance(answer, tuple) else 1) != len(parts):

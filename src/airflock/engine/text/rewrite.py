@@ -16,11 +16,11 @@ from airflock.core import component_names, law, walk_tree
 from airflock.engine.text.copies import DependencyRecorder
 from airflock.support import RuleError
 
-# ------------------------------------------------------------------------------------------- vectors of parameters
+# ---------------------------------------------------------------------------- vectors of parameters
 
 
 class VectorUnroller(ast.NodeTransformer):
-    """What is known of vectors in one rule.
+    """A rewriter that writes out the vectors of one rule.
 
     vectors : for each record name its vectors, with how many components each has
     """
@@ -29,7 +29,7 @@ class VectorUnroller(ast.NodeTransformer):
         self.rule, self.vectors = rule, vectors
 
     def size(self, node: ast.AST) -> int:
-        """How many components the vector has that an expression names; 0 where it names none."""
+        """Return the number of components of the vector that an expression names; 0 if it names none."""
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
             return self.vectors.get(node.value.id, {}).get(node.attr, 0)
         return 0
@@ -39,7 +39,7 @@ class VectorUnroller(ast.NodeTransformer):
         return [ast.Attribute(node.value, name, ast.Load()) for name in component_names(node.attr, self.size(node))]
 
     def counts(self, node: ast.Call) -> bool:
-        """Whether a call asks for the number of components of a vector."""
+        """Return True if a call is the length of a vector."""
         called = node.func.id if isinstance(node.func, ast.Name) else ""
         return called == "len" and len(node.args) == 1 and bool(self.size(node.args[0]))
 
@@ -75,7 +75,7 @@ class VectorUnroller(ast.NodeTransformer):
         return done or ast.Pass()
 
     def _turns(self, node: ast.For) -> list[ast.expr] | None:
-        """What the target of a loop over components stands for, turn by turn; None for any other loop."""
+        """Return the values of the target of a loop over components, turn by turn; None for any other loop."""
         if self.size(node.iter):
             return self.components(node.iter)  # type: ignore[arg-type]
         called = node.iter.func if isinstance(node.iter, ast.Call) else None
@@ -130,11 +130,11 @@ def _sets(statements: list[ast.stmt], name: str) -> bool:
 
 
 def _left(node: ast.For) -> bool:
-    """Whether a loop may be left early, skip the rest of a turn, or do something at its end."""
+    """Return True if a loop may be left early, skip the rest of a turn, or do something at its end."""
     return bool(node.orelse) or any(isinstance(item, (ast.Break, ast.Continue)) for item in walk_tree(node))
 
 
-# ----------------------------------------------------------------------------------------------------------- rules
+# -------------------------------------------------------------------------------------------- rules
 
 
 GIVEN = law.ALLOWED_CALLS | {law.CAST_NAME, *law.RENAMED_BUILTINS.values()}  # what every driver has
@@ -142,7 +142,7 @@ NO_CHOICES: Mapping[str, str] = {}
 
 
 class RewriteTarget(Protocol):
-    """What a rule is written for: a `generate.DriverSource`."""
+    """The driver that a rule is written for: a `generate.DriverSource`."""
 
     law: int
     allow_builtins: bool
@@ -153,7 +153,7 @@ class RewriteTarget(Protocol):
 
 
 def law_suffix(law: int | None) -> str:
-    """What names of a driver end in that are of one law of several."""
+    """Return the suffix of names of one law of several in a driver."""
     return f"_{law}" if law else ""
 
 
@@ -298,6 +298,8 @@ class RuleRewriter(VectorUnroller):
         if node.id in GIVEN or node.id in self.source.names() or node.id.startswith("percept_"):
             return node
         value = self.notes.free(node.id)
+        # Global constants are inlined, real ones in the precision of the driver; bool first, as it is an
+        # int in Python.
         if isinstance(value, bool):
             return ast.Constant(value)
         if isinstance(value, float):
