@@ -32,7 +32,7 @@ class Line(FitModel):
         self.rule, self.noise = law, generator.normal(0.0, NOISE, (STEPS, 2))
         self.seen = law(self.input, *truth)
 
-    def with_numbers(self, numbers):
+    def with_parameters(self, numbers):
         chosen, whole = list(numbers), self.whole
 
         def rule(x, *places):

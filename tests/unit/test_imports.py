@@ -644,7 +644,7 @@ def test_the_comparison_of_axes_keeps_no_long_log_in_memory():
 
 GIVEN_BACK = """
 import numpy as np
-from airflock.recordings.imports import grid
+from airflock.recordings.imports import resampling
 from airflock.recordings.imports.track import COMMAND_TARGETS, POSITION_TARGETS, VELOCITY_TARGETS, ImportedTrack
 
 def told(word):
@@ -654,11 +654,11 @@ def one(number, rows):
     columns = {name: np.linspace(0.0, 100.0, rows) for name in (*POSITION_TARGETS, *VELOCITY_TARGETS, *COMMAND_TARGETS)}
     return ImportedTrack(str(number), "log", np.linspace(0.0, 0.02 * (rows - 1), rows), columns, np.arange(rows))
 
-grid.recording([one(0, 100)], np.arange(10) * 0.02, 0.02, 1.0, 32)
+resampling.resample([one(0, 100)], np.arange(10) * 0.02, 0.02, 1.0, 32)
 tracks = [one(number, 60_000) for number in range(30)]
-times, period = grid.grid_of(tracks, None, None, None)
+times, period = resampling.time_grid(tracks, None, None, None)
 before = told("VmRSS")
-found, _ = grid.recording(tracks, times, period, 1.0, 32)
+found, _ = resampling.resample(tracks, times, period, 1.0, 32)
 print((told("VmHWM") - before) * 1024 / found.nbytes)
 """
 

@@ -333,14 +333,14 @@ class Drawn:
     def tracks(self, place, noise, seed):
         return noise
 
-    def model_of(self, tracks):
+    def model_on(self, tracks):
         return tracks
 
 
 def test_the_interval_of_a_laws_noise_holds_it_in_95_percent(monkeypatch):
     held, wide = 0, []
     flights = None
-    monkeypatch.setattr(noises, "statistics", lambda twin, place, spans: flights.statistics(twin))
+    monkeypatch.setattr(noises, "noise_statistics", lambda twin, place, spans: flights.statistics(twin))
     for seed in range(100):
         flights = Drawn(FitNoise(0, 0.3, 0.0, 0.02), np.random.default_rng(seed))
         guess = FitNoise(0, 0.3 * np.exp(0.5 * np.sin(seed)), 0.0, 0.02)
@@ -354,7 +354,7 @@ def test_the_interval_of_a_laws_noise_holds_it_in_95_percent(monkeypatch):
 
 def test_noise_that_does_not_show_beside_that_of_the_tracks_has_no_lower_end(monkeypatch):
     flights = Drawn(FitNoise(0, 1e-3, 0.0, 0.02), np.random.default_rng(5))
-    monkeypatch.setattr(noises, "statistics", lambda twin, place, spans: flights.statistics(twin))
+    monkeypatch.setattr(noises, "noise_statistics", lambda twin, place, spans: flights.statistics(twin))
     guess = FitNoise(0, 2e-3, 0.0, 0.02)
     found = noises.estimate_law_noise(flights, np.array([0.5]), np.zeros(1), guess, np.array([0.5]), (0.975,), 1)
     low, high = found[1][0]

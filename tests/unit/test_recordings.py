@@ -191,8 +191,8 @@ def test_where_nothing_stands_no_instant_has_a_clearance(circling):
 def test_the_text_by_which_recordings_were_flown_is_written_once(monkeypatch):
     """It takes a tenth of a second, and most recordings of a study or a test are of one plan."""
     found, written = airflock.load("vicsek_1995/ordered", {"agents": 3, "duration": 0.5}), []
-    write = drivers.flight
-    monkeypatch.setattr(drivers, "flight", lambda plan: written.append(plan) or write(plan))
+    write = drivers.flight_driver_text
+    monkeypatch.setattr(drivers, "flight_driver_text", lambda plan: written.append(plan) or write(plan))
     drivers._text.cache_clear()
     flown = [airflock.simulate(found, seed=seed, device="python") for seed in range(3)]
     text = driver_text(found, precision=flown[0].attrs["airflock_precision"])

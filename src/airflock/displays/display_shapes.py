@@ -44,9 +44,9 @@ def shape_points(shape: str, count: int, spacing: float = 3.0, height: float = 1
         if path.stat().st_size > MOST_BYTES:
             raise AirflockError(f"{shape}: {path.stat().st_size / 1e6:.0f} MB is more than {MOST_BYTES / 1e6:.0f} MB")
     elif FILE_NAME.fullmatch(shape) or (kind and os.path.isfile(shape)):
-        fault = f"ending {path.suffix}: neither a picture nor a mesh" if os.path.isfile(shape) else "no such file"
+        problem = f"ending {path.suffix}: neither a picture nor a mesh" if os.path.isfile(shape) else "no such file"
         raise AirflockError(
-            f"{shape}: {fault}; give {', '.join(IMAGES + MESHES)}, or for a text add a space at its end"
+            f"{shape}: {problem}; give {', '.join(IMAGES + MESHES)}, or for a text add a space at its end"
         )
     if kind in MESHES:
         found = _spread_over_mesh(path, count, rng)
@@ -89,8 +89,8 @@ def _pixels_of_image(path: Path) -> NDArray[np.bool_]:
         image = np.asarray(iio.imread(path, index=0) if path.suffix.lower() == ".gif" else iio.imread(path))
     except AirflockError:
         raise
-    except Exception as fault:  # any decoder may fail in any way on a damaged file
-        raise AirflockError(f"{path}: is not an image, damaged or cut short: {str(fault).splitlines()[0]}") from fault
+    except Exception as error:  # any decoder may fail in any way on a damaged file
+        raise AirflockError(f"{path}: is not an image, damaged or cut short: {str(error).splitlines()[0]}") from error
     if image.ndim == 2:
         return image < 128
     if image.shape[2] in (2, 4) and image[:, :, -1].min() < 250:
@@ -123,8 +123,8 @@ def _spread_over_mesh(path: Path, count: int, rng: np.random.Generator) -> Point
 
     try:
         mesh: Any = read_mesh(path)
-    except SceneError as fault:  # there is no scene.file here
-        raise AirflockError(str(fault).replace("scene.file = ", "")) from fault
+    except SceneError as error:  # there is no scene.file here
+        raise AirflockError(str(error).replace("scene.file = ", "")) from error
     corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     if area.sum() <= 0.0:

@@ -168,7 +168,7 @@ class ShapeReport:
     time     : until every surviving drone was within 1 m of its point, s; nan if never
     error, worst : mean and largest distance of a surviving drone from its point at the end, m
     drones   : surviving; collisions : of two drones; struck : by one that falls; hulls : with one that hovers
-    reassigned : how often points were given anew; detours : how often a drone was sent around what held it up
+    reassigned : number of reassignments; detours : how often a drone was sent around what held it up
     """
 
     time: float
@@ -229,7 +229,7 @@ class ShowControl:
             self._fly(self._under_way() + CHECK if self._assign() else CHECK)
         far = self._distances()
         # collisions and contacts are known when the flight is closed
-        told = (
+        figures = (
             float(far.mean()),
             float(far.max()),
             len(far),
@@ -239,7 +239,7 @@ class ShowControl:
             self.reassignment_count,
             self.detour_count,
         )
-        self.shape_reports.append(ShapeReport(self.placed, *told))
+        self.shape_reports.append(ShapeReport(self.placed, *figures))
 
     def finish(self) -> list[ShapeReport]:
         """End the flight with its last sample; the figures of all shapes, with the collisions of their windows."""
@@ -262,15 +262,15 @@ class ShowControl:
             detour_lengths(places, self.points, np.array(self.hulls)) if self.tried and self.hulls else 0.0
         )
         found = assign_points(places, self.points, blocked, more)
-        anew = first or bool(blocked[self.target[there]].any())
-        anew = anew or is_better_assignment(places, self.points, self.target[there], found, more)
-        if anew:
+        changed = first or bool(blocked[self.target[there]].any())
+        changed = changed or is_better_assignment(places, self.points, self.target[there], found, more)
+        if changed:
             self.reassignment_count += 0 if first else 1
             self.target[there] = found
         self.target[~there] = self.target[there][0]  # who has failed goes nowhere: any point that is free will do
-        if anew or failed:
+        if changed or failed:
             self._tell()
-        return anew
+        return changed
 
     def _tell(self) -> None:
         """Send each drone its goal, and the hulls that stand in the way."""

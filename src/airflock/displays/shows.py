@@ -131,7 +131,7 @@ def display(
     Raises
     ------
     ScenarioError
-        With one line for each fault of the shapes, shares, numbers and keys.
+        With one line for each error of the shapes, shares, numbers and keys.
     AirflockError
         If the display cannot be flown.
 
@@ -163,26 +163,26 @@ def plan_shapes(
     """Return the points (point, 3) of each shape, m; raise ScenarioError with all errors. `dash` goes before names in
     errors.
     """
-    faults = []
+    errors = []
     if not 0.0 <= failing <= 0.9:
-        faults.append(f"{name_prefix}failing = {failing:g} lies outside [0, 0.9]")
+        errors.append(f"{name_prefix}failing = {failing:g} lies outside [0, 0.9]")
     if not 0.0 < spacing < math.inf:
-        faults.append(f"{name_prefix}spacing = {spacing:g} m is not above 0")
+        errors.append(f"{name_prefix}spacing = {spacing:g} m is not above 0")
         spacing = 3.0  # by which the rest is judged
     if failure not in FAILURE_KINDS:
-        faults.append(f"{name_prefix}failure = {failure!r} is none of {', '.join(FAILURE_KINDS)}")
+        errors.append(f"{name_prefix}failure = {failure!r} is none of {', '.join(FAILURE_KINDS)}")
     count = drones if points is None else points
     if drones > count:
-        faults.append(
+        errors.append(
             f"{name_prefix}drones = {drones} are more than {name_prefix}points = {count}; "
             "give each drone a point, or fly fewer"
         )
-    with collect_errors(faults):
+    with collect_errors(errors):
         display_scenario(drones, dict(settings or {}))
     found = []
     for number, shape in enumerate(shapes):
-        with collect_errors(faults):
+        with collect_errors(errors):
             found.append(shape_points(shape, count, spacing, seed=number))
-    if faults:
-        raise ScenarioError(faults)
+    if errors:
+        raise ScenarioError(errors)
     return found

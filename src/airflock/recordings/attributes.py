@@ -1,7 +1,7 @@
 """Attributes of a recording, read as text from outside: the scenario, numbers, the format, the checksum.
 
 Format 1 is that of version 0.1. Format 2 names no file of code: a law of the user's own is its bare name and a hash,
-and `airflock_checksum` tells whether somebody changed what Airflock wrote.
+and `airflock_checksum` shows changes since Airflock wrote the file.
 """
 
 import hashlib
@@ -38,8 +38,8 @@ def read_integer(recording: xr.Dataset, name: str, default: int | None = None, w
     if isinstance(value, (float, np.floating)) and np.isfinite(value) and value == int(value):
         value = int(value)
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not -(2**64) < int(value) < 2**64:
-        told = "is missing" if value is None else f"= {shortened(repr(value), 60)} is not a whole number"
-        raise RecordingError(f"{where}: attribute {name} {told}")
+        problem = "is missing" if value is None else f"= {shortened(repr(value), 60)} is not a whole number"
+        raise RecordingError(f"{where}: attribute {name} {problem}")
     return int(value)
 
 

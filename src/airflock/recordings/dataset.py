@@ -82,32 +82,32 @@ def check_dataset(value: Any, where: str = "recording") -> None:
 def check_recording(recording: xr.Dataset, where: str = "recording") -> None:
     """Raise a RecordingError that lists everything a dataset lacks to be a recording."""
     check_dataset(recording, where)
-    faults = []
+    errors = []
     if "position" not in recording:
-        faults.append("no variable position")
+        errors.append("no variable position")
     else:
         missing = [name for name in DIMENSIONS if name not in recording["position"].dims]
         if missing:
-            faults.append(f"position lacks the dimension{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
+            errors.append(f"position lacks the dimension{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
     # Without all dimensions the other checks would fail by themselves, and hide the first error.
-    if not faults:
+    if not errors:
         sizes = recording["position"].sizes
         if sizes["time"] < 1 or sizes["individual"] < 1:
-            faults.append(f"position is empty ({sizes['time']} times, {sizes['individual']} individuals)")
+            errors.append(f"position is empty ({sizes['time']} times, {sizes['individual']} individuals)")
         if sizes["space"] not in (2, 3):
-            faults.append(f"space has {sizes['space']} components, not 2 or 3")
+            errors.append(f"space has {sizes['space']} components, not 2 or 3")
         times = recording["time"].values if "time" in recording.coords else np.zeros(0, "U")
         if times.ndim != 1 or times.dtype.kind not in "fiu" or not (np.diff(times.astype(float)) > 0).all():
-            faults.append("time is not an increasing coordinate, s")
+            errors.append("time is not an increasing coordinate, s")
         for name in ("position", "velocity"):
             if name in recording and recording[name].dtype.kind not in "fiu":
-                faults.append(f"{name} is of kind {recording[name].dtype}, not numbers")
+                errors.append(f"{name} is of kind {recording[name].dtype}, not numbers")
             if name in recording and {d: recording[name].sizes.get(d) for d in DIMENSIONS} != {
                 d: sizes[d] for d in DIMENSIONS
             }:
-                faults.append(f"{name} has not the dimensions {', '.join(DIMENSIONS)} of position")
-    if faults:
-        raise RecordingError("\n".join(f"{where}: {fault}" for fault in faults))
+                errors.append(f"{name} has not the dimensions {', '.join(DIMENSIONS)} of position")
+    if errors:
+        raise RecordingError("\n".join(f"{where}: {error}" for error in errors))
 
 
 def recording_frames(recording: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any], float, NDArray[np.bool_]]:

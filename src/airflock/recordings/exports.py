@@ -122,8 +122,8 @@ def write_parquet(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """Write a long Parquet table; needs pyarrow."""
     try:
         import pyarrow  # noqa: F401
-    except ImportError as fault:
-        raise RecordingError(f"{path}: Parquet needs pyarrow: pip install 'airflock[logs]'") from fault
+    except ImportError as error:
+        raise RecordingError(f"{path}: Parquet needs pyarrow: pip install 'airflock[logs]'") from error
     with atomic.atomic_path(path) as temporary:
         to_table(recording).to_parquet(temporary, index=False, engine="pyarrow")
     return Path(path)

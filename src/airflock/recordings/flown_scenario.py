@@ -95,7 +95,7 @@ def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dat
     kept = document["metrics"] if str(given.get("metrics.kind")).endswith(".py") and "metrics" in document else kept
     stand_in = {**document, "model": {}, "body": {}, "metrics": {k: v for k, v in kept.items() if v is not None}}
     stand_in = {key: value for key, value in stand_in.items() if key not in ("groups", "faults")}
-    if isinstance(document.get("groups"), list):  # who is in which is told even where nobody knows how they fly
+    if isinstance(document.get("groups"), list):  # members are known even if their law is not
         stand_in["groups"] = [
             {key: group[key] for key in ("name", "agents") if key in group} if isinstance(group, Mapping) else group
             for group in document["groups"]

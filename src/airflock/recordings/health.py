@@ -73,9 +73,9 @@ def doctor() -> dict[str, Any]:
 
 def _gpu(scenario: Scenario, known: dict[str, float]) -> dict[str, Any]:
     """Report the GPUs, or why none can be used, and the same flight on the first of them."""
-    fault = gpu.unavailable_reason()
-    if fault is not None:
-        return {"gpu": fault}
+    reason = gpu.unavailable_reason()
+    if reason is not None:
+        return {"gpu": reason}
     found: dict[str, Any] = {}
     for number, device in enumerate(gpu.describe_gpus()):
         text = "{name}, compute capability {compute_capability}, {multiprocessors} multiprocessors, {free_gb} of "

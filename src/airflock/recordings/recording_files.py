@@ -63,8 +63,8 @@ def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         packed = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
         content = recording.to_netcdf(None, engine="h5netcdf", encoding=packed)
         atomic.write_file(target, content)
-    except OSError as fault:
-        raise RecordingError(f"{target}: cannot be written: {fault.strerror or fault}; nothing was saved") from fault
+    except OSError as error:
+        raise RecordingError(f"{target}: cannot be written: {error.strerror or error}; nothing was saved") from error
     return target
 
 

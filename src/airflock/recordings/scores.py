@@ -61,9 +61,9 @@ def score(
     done : callable, optional
         Called after each flight.
     device : str
-        cpu, cuda (a GPU, all flights together), python, or auto, which tells `say` what it picked.
+        cpu, cuda (a GPU, all flights together), python, or auto, which reports its choice to `say`.
     say : callable, optional
-        Told what auto picked.
+        Called with the choice of auto.
     scheduler : str, optional
         Address of a dask scheduler whose workers fly, instead of this process.
     aero : bool
@@ -105,9 +105,9 @@ def score(
         return _of_recording(
             scenario_or_recording, settings, aero=aero, groups=groups, body_length=body_length, trust=trust
         )
-    asked = {"aero": aero, "groups": groups, "body_length": body_length is not None}
-    if any(asked.values()):
-        names = ", ".join(name for name, given in asked.items() if given)
+    recording_options = {"aero": aero, "groups": groups, "body_length": body_length is not None}
+    if any(recording_options.values()):
+        names = ", ".join(name for name, given in recording_options.items() if given)
         raise RecordingError(f"{names}: needs a recording, such as one from airflock.simulate(scenario)")
     scenario, numbers = scenario_variant(scenario_or_recording, settings, trust=trust), check_seeds(seeds)
     options: dict[str, Any] = {
@@ -139,7 +139,7 @@ def _of_recording(
     if groups:
         table = _about(group_scores(recording, settings, trust=trust), scenario)
         for place, about in (("units", 0), ("meanings", 1)):
-            table.attrs[place] |= {name: told[about] for name, told in PAIR_METRICS.items()}
+            table.attrs[place] |= {name: texts[about] for name, texts in PAIR_METRICS.items()}
         return table
     table = _about(pd.DataFrame([measure_recording(recording, settings, trust=trust)[0]]), scenario)
     table.attrs["not_told"] = undefined_metrics_of(recording, scenario, settings)
@@ -233,7 +233,7 @@ def measure_recording(
 
     Frames are taken every metrics.period, or each one if they are farther apart; collisions every
     metrics.collision_period. Where a number is missing (nan) the individual is not there: an instant counts with those
-    who are, means over time are means over instants at which at least two are, and the value `present` tells the share
+    who are, means over time are means over instants at which at least two are, and the value `present` is the share
     of individuals and instants that is there. What tracks do not have for want of a length (`undefined_metrics_of`) is
     left out.
     """
@@ -253,9 +253,9 @@ def measure_recording(
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
     scores |= {} if present.all() else {"present": float(present.mean())}
-    untold = undefined_metrics_of(recording, scenario, settings)
-    kept = {name: value for name, value in scores.items() if name not in untold}
-    return kept, course[[name for name in course if name not in untold]]
+    undefined = undefined_metrics_of(recording, scenario, settings)
+    kept = {name: value for name, value in scores.items() if name not in undefined}
+    return kept, course[[name for name in course if name not in undefined]]
 
 
 # Groups: order parameters of each group of a recording, and between each two of them.
@@ -420,14 +420,14 @@ class ScoreTable(pd.DataFrame):  # type: ignore[misc]  # pandas has no types her
     def _repr_html_(self) -> str | None:
         """Return the table as pandas writes it, with units and meanings in the column headers."""
         page: Any = super()._repr_html_()
-        if page is None:  # pandas was told to show text
+        if page is None:  # pandas is set to show text
             return None
         head, end, rest = str(page).partition("</thead>")
         meanings = self.attrs.get("meanings", {})
         for name, unit in self.attrs.get("units", {}).items():
             written = escape(str(name))
-            told = f'<th title="{escape(meanings.get(name, ""))}">{written}<br>{escape(unit) or "&nbsp;"}</th>'
-            head = head.replace(f"<th>{written}</th>", told, 1)
+            cell = f'<th title="{escape(meanings.get(name, ""))}">{written}<br>{escape(unit) or "&nbsp;"}</th>'
+            head = head.replace(f"<th>{written}</th>", cell, 1)
         return head + end + rest
 
 

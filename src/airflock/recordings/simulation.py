@@ -46,9 +46,9 @@ def simulate(
     start : array, optional
         Positions and velocities to start from, (component, agent) in m and m/s, instead of random ones.
     device : str
-        cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which tells `say` what it picked.
+        cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which reports its choice to `say`.
     say : callable, optional
-        Told what auto picked.
+        Called with the choice of auto.
     events : sequence of mappings, optional
         What is done to the flight on its way, as `Flight.events` or `recordings.attributes.events` tell it.
     keep : sequence of str
@@ -205,13 +205,13 @@ def check_keep(keep: Sequence[str], events: Sequence[Any], scenario: Scenario) -
     """Refuse what cannot be kept, one line each."""
     if isinstance(keep, str) or not isinstance(keep, Iterable):
         raise FlightError(f"keep = {keep!r} is not a list; give some of {', '.join(KINDS)}, such as keep=('measured',)")
-    faults = [f"keep = {kind!r} is none of {', '.join(KINDS)}" for kind in keep if kind not in KINDS]
+    errors = [f"keep = {kind!r} is none of {', '.join(KINDS)}" for kind in keep if kind not in KINDS]
     if keep and events:
-        faults.append("keep: a flight with events is cut by them already; keep nothing, or give no events")
+        errors.append("keep: a flight with events is cut by them already; keep nothing, or give no events")
     if keep and scenario.flight.update == "sequential":
-        faults.append("keep: with update = 'sequential' each agent moves before the next one perceives")
-    if faults:
-        raise FlightError("\n".join(faults))
+        errors.append("keep: with update = 'sequential' each agent moves before the next one perceives")
+    if errors:
+        raise FlightError("\n".join(errors))
 
 
 def finish_keeping(flight: Flight, keep: Sequence[str]) -> dict[str, xr.Variable]:

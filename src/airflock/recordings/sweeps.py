@@ -54,9 +54,9 @@ def sweep(
     done : callable, optional
         Called after each flight.
     device : str
-        cpu, cuda, python, or auto, which tells `say` what it picked.
+        cpu, cuda, python, or auto, which reports its choice to `say`.
     say : callable, optional
-        Told what auto picked.
+        Called with the choice of auto.
     scheduler : str, optional
         Address of a dask scheduler whose workers fly, instead of this process.
 
@@ -68,7 +68,7 @@ def sweep(
     Raises
     ------
     ScenarioError, FlightError, ParameterError, DeviceError, StudyError
-        With the faults of all points, before anything flies; if a flight goes wrong; if seeds or device are none that
+        With the errors of all points, before anything flies; if a flight goes wrong; if seeds or device are none that
         there are; if the scheduler does not answer.
 
     Examples
@@ -107,27 +107,27 @@ def scenarios_at(
     trust: bool = False,
 ) -> list[Scenario]:
     """Build the scenario at each point of a grid; raise ScenarioError with the errors of all points."""
-    faults: list[str] = []
+    errors: list[str] = []
     found = []
     # All points are built before any flies, so that an error in the last one costs no flights.
     for point in points:
-        with collect_errors(faults):
+        with collect_errors(errors):
             changed = {**(settings or {}), **point}
             found.append(scenario_variant(scenario, changed, law, trust=trust))
-    faults += _columns_given_twice(points, found)
-    if faults:
-        raise ScenarioError(faults)
+    errors += _columns_given_twice(points, found)
+    if errors:
+        raise ScenarioError(errors)
     return found
 
 
 def _columns_given_twice(points: Sequence[Mapping[str, Any]], scenarios: Sequence[Scenario]) -> list[str]:
     """Return errors for swept keys whose last word is another column of the table: the seed, or an order parameter."""
-    faults: list[str] = []
+    errors: list[str] = []
     for key in points[0] if points and scenarios else ():
         if key == "seed" or any(key in reported_values(found.measures) for found in scenarios):
             whole = " or ".join(short_keys.keys_by_last_word(scenarios[0].records).get(key, ()))
-            faults.append(f"{scenarios[0].name}: {key}: is a column of the table already; write {whole}")
-    return faults
+            errors.append(f"{scenarios[0].name}: {key}: is a column of the table already; write {whole}")
+    return errors
 
 
 def fly_points(
@@ -139,7 +139,7 @@ def fly_points(
     flights = [found for _, found, _ in jobs]
     rows = score_scenarios(flights, [seed for _, _, seed in jobs], **options)
     table = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
-    known = {name: told for found in scenarios for name, told in reported_values(found.measures).items()}
+    known = {name: text for found in scenarios for name, text in reported_values(found.measures).items()}
     return with_units(table, known)
 
 

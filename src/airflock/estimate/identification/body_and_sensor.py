@@ -47,7 +47,7 @@ GAIN, SATURATED = 200.0, 100  # least 2 Δ log-likelihood and rows at the limit 
 # they disagree.
 DISAGREE = 0.15  # of two estimates of tau
 # Relative standard deviation of what the filter leaves out: commands come from the true velocity,
-# so they know more of it than the filter does, also one row after they are given (`_told`).
+# so they know more of it than the filter does, also one row after they are given (`_counted_rows`).
 # Measured on random fleets with 0.1 m/s of noise in the log (benchmarks/identify.py).
 BEYOND = np.array([0.01, 0.01, 0.005, 0.005])
 
@@ -56,9 +56,9 @@ BEYOND = np.array([0.01, 0.01, 0.005, 0.005])
 class BodyFit:
     """Fit of the body: values and 95 % intervals by name.
 
-    refused : name → reason, for numbers that cannot be told apart
+    refused : name → reason, for numbers that cannot be separated
     gain    : 2 Δ log-likelihood of a limited against an unlimited acceleration
-    seen    : least limit that goes with the log, m/s²: of 95 % by its likelihood, and at most what was asked for
+    seen    : least limit that goes with the log, m/s²: of 95 % by its likelihood, and at most the largest demand
     """
 
     value: dict[str, float]
@@ -84,7 +84,7 @@ def _body_kernel() -> Any:
     decay_rate, wander, gap_left = njit(held.decay_rate), njit(held.wander), njit(held.gap_left)
 
     @njit
-    def kernel(time, m, c, new, told, block, out, tau, a_max, noise, white, dt):  # type: ignore[no-untyped-def]
+    def kernel(time, m, c, new, counted, block, out, tau, a_max, noise, white, dt):  # type: ignore[no-untyped-def]
         out[:] = 0.0
         axes = m.shape[1]
         v, e = np.zeros(3), np.zeros(3)
@@ -121,7 +121,7 @@ def _body_kernel() -> Any:
             variance *= 1.0 - gain
             # Rows that do not count still move the filter, so the next row begins at the right
             # state.
-            if told[k]:
+            if counted[k]:
                 out[block[k]] += 0.5 * axes * np.log(total) + 0.5 * loss / total
         return out.sum()
 
@@ -149,7 +149,7 @@ def fit_body(logs: FlightLogs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
         np.ascontiguousarray(flying.velocity),
         np.ascontiguousarray(flying.command),
         flying.is_new,
-        _told(flying),
+        _counted_rows(flying),
         span,
     )
     kernel = _body_kernel()
@@ -177,8 +177,8 @@ def fit_body(logs: FlightLogs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
     saturated = int((gap > value["a_max"] * value["tau"]).sum())
     # A limit that no row reaches cannot be fitted; then the largest demand of the log bounds it
     # from below.
-    asked = float(np.quantile(gap, 0.999) / value["tau"])
-    seen = _least_limit(loss, z, lowest, min(asked, value["a_max"]))
+    demand = float(np.quantile(gap, 0.999) / value["tau"])
+    seen = _least_limit(loss, z, lowest, min(demand, value["a_max"]))
     free = _settled(lambda y: loss([y[0], np.log(FREE), y[1], y[2]]), z[[0, 2, 3]])
     found = BodyFit(
         value, interval, {}, saturated, len(flying.time), 2.0 * (free - lowest),
@@ -210,7 +210,7 @@ def _nothing(reason: str) -> BodyFit:
 
 # Mean error of tau 0.81 -> 0.18 %, of the limit -1.46 -> -0.91 %; the filter itself still runs
 # through these rows.
-def _told(logs: FlightLogs) -> NDArray[np.bool_]:
+def _counted_rows(logs: FlightLogs) -> NDArray[np.bool_]:
     """Return True for rows whose increment counts: not for one that begins as a command arrives.
 
     That command was computed from the very velocity that the filter does not know, so that the gap to it is wrong by
@@ -395,8 +395,8 @@ def gust_correlation(logs: FlightLogs, value: dict[str, float]) -> float:
     shared = np.isfinite(table).all(axis=0)
     if shared.sum() < 30:
         return 0.0
-    alike = np.corrcoef(table[:, shared])
-    return float((alike.sum() - logs.drones) / (logs.drones * (logs.drones - 1)))
+    correlation = np.corrcoef(table[:, shared])
+    return float((correlation.sum() - logs.drones) / (logs.drones * (logs.drones - 1)))
 
 
 def command_delay(logs: FlightLogs, value: dict[str, float]) -> float:

@@ -21,7 +21,7 @@ TABLE_KEYS: tuple[str, ...] = tuple(f"radio.received_{n}" for n in range(table.E
 COLUMNS = ("receiver", "sender", "t", "stamp")
 NUMBERS = ("t", "stamp", "distance", "got", "fast", "slow")
 OLDEST = 60.0  # s; no radio brings packets so late (radio.delay ends at 30 s)
-# half of an interval, relative, beyond which a number is not told At 20 % one fleet in twenty may
+# half of an interval, relative, beyond which a number is refused. At 20 % one fleet in twenty may
 # be 65 % off and raise the rms from 1.8 to 17 %; at 15 % the worst was 13.8 %.
 WIDEST = {"near": 0.15, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
 FEW = 500  # rows below which no curve is fitted
@@ -85,7 +85,7 @@ def _kernel() -> Any:
 def check_packets(heard: pd.DataFrame, where: str = "heard") -> pd.DataFrame:
     """Return a table of packets with the needed columns; raise RecordingError with all errors otherwise.
 
-    where : its name in faults; rows are counted as an editor does, the header being the first
+    where : its name in errors; rows are counted as an editor does, the header being the first
     """
     lacking = [name for name in COLUMNS if name not in heard]
     if lacking:
@@ -95,16 +95,16 @@ def check_packets(heard: pd.DataFrame, where: str = "heard") -> pd.DataFrame:
         )
     numbers = {name: pd.to_numeric(heard[name], errors="coerce") for name in NUMBERS if name in heard}
     came = numbers["got"] > 0 if "got" in numbers else pd.Series(True, heard.index)
-    faults = []
+    errors = []
     for name, values in numbers.items():
         needed = came if name in ("t", "stamp") else pd.Series(True, heard.index)  # what never came has no stamp
         bad = needed & ~np.isfinite(values.astype(float))
         odd, what = (~values.isin([0, 1]), "0 or 1") if name == "got" else (bad, "a number")
         if odd.any():
             row = int(np.flatnonzero(odd)[0])
-            faults.append(f"{where}: column {name}, row {row + 2}: {heard[name].iloc[row]} is not {what}")
-    if faults:
-        raise RecordingError("\n".join(faults))
+            errors.append(f"{where}: column {name}, row {row + 2}: {heard[name].iloc[row]} is not {what}")
+    if errors:
+        raise RecordingError("\n".join(errors))
     found = heard.assign(**numbers)
     late = fit_delay(found)
     if not late.reason and late.value > OLDEST:
@@ -132,7 +132,7 @@ def fit_delay(heard: pd.DataFrame) -> DelayFit:
     """Fit the age of packets and the clocks of the drones by least squares.
 
     The age of a packet is delay + clock of the receiver - clock of the sender; with both directions of a pair the
-    clocks cancel. An asymmetry of the two directions cannot be told from an offset of the clocks.
+    clocks cancel. An asymmetry of the two directions cannot be separated from an offset of the clocks.
     """
     got = heard[heard["got"] > 0] if "got" in heard else heard
     names = pd.unique(pd.concat([got["receiver"], got["sender"]]))
@@ -323,7 +323,7 @@ def _pictured(due: pd.DataFrame) -> pd.DataFrame:
 # (`parts.radios.links`): near, far (m) and the shares received there. The search is unbounded, in
 # the numbers of `unpack`.
 CURVE_PARAMETERS = ("near", "far", "received_near", "received_far")
-ALIKE = 3.0  # of log-likelihood: half of a chi-square at 95 % and what the descent leaves open
+EQUALLY_LIKELY = 3.0  # of log-likelihood: half of a chi-square at 95 % and what the descent leaves open
 FARS = 20  # lengths of far that are tried, and from where the others are fitted:
 SHARES, RATIOS = (0.2, 0.5), (0.0, -1.5)  # of near in far; of the far share in the near one, by its logit
 # A far of 50 m hid between two tried lengths, 42.7 and 55.1 m, whose profile falls towards the
@@ -354,7 +354,7 @@ def best_mode(loss: Any, farthest: float) -> list[Any]:
     tops |= height[1:-1] < height.min() + BETWEEN
     ends = sorted((_settled(loss, pack_at_far(fars[k], profile[k].x)) for k in np.flatnonzero(tops)), key=_fun)
     found: list[Any] = []
-    for each in (np.asarray(end.x) for end in ends if _fun(end) < _fun(ends[0]) + ALIKE):
+    for each in (np.asarray(end.x) for end in ends if _fun(end) < _fun(ends[0]) + EQUALLY_LIKELY):
         if all(abs(unpack(each)[1] / unpack(other)[1] - 1.0) > SAME for other in found):
             found.append(each)
     return found
@@ -406,7 +406,7 @@ def pack(near: float, far: float, received_near: float, received_far: float) -> 
 def profile_intervals(loss: Any, z: Any) -> dict[str, tuple[float, float]]:
     """Return 95 % intervals: the range of each number where the likelihood is hardly lower (its profile).
 
-    At each value of a number the other three are fitted anew. Curvature says too little where a share is nearly 1, or
+    At each value of a number the other three are fitted again. Curvature says too little where a share is nearly 1, or
     where far and the share there make up for each other along a ridge.
     """
     lowest_loss, spread, values = float(loss(z)), _spread(loss, z), unpack(z)

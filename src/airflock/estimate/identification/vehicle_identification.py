@@ -98,8 +98,8 @@ class IdentifiedParameters:
                 continue
             try:
                 build_scenario(document, self.like.name, {key: number.value})
-            except AirflockError as fault:
-                reason = str(fault).splitlines()[0].partition(": ")[2] or str(fault)
+            except AirflockError as error:
+                reason = str(error).splitlines()[0].partition(": ")[2] or str(error)
                 self.by_key[key] = replace(number, reason=reason)
 
 
@@ -186,7 +186,7 @@ def identify(
     options : Options, optional
         How files are read (`airflock.recordings.imports.track.ImportOptions`), as in `load_tracks`.
     accept : iterable of str
-        Kinds of faults that are meant so, as in `load_tracks`.
+        Kinds of errors that are intended, as in `load_tracks`.
     begin, end : float, optional
         Window of time of the files that is used, s.
 
@@ -334,8 +334,8 @@ def read_heard(path: Any) -> pd.DataFrame:
     refuse_archive(place)
     try:
         table = pd.read_csv(place, skipinitialspace=True)
-    except (OSError, ValueError, pd.errors.ParserError) as fault:
-        raise RecordingError(f"{path}: is not a table of packets: {str(fault).splitlines()[0]}") from fault
+    except (OSError, ValueError, pd.errors.ParserError) as error:
+        raise RecordingError(f"{path}: is not a table of packets: {str(error).splitlines()[0]}") from error
     if len(table.columns) == 1 and ";" in str(table.columns[0]):
         raise RecordingError(f"{path}: has ; between its columns; write it with commas, and points in its numbers")
     return radio_links.check_packets(table, str(path))

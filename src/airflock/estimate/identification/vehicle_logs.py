@@ -72,7 +72,7 @@ class FlightLogs:
 def logs_from_tracks(tracks: list[ImportedTrack], standing: tuple[float, float] | None = None) -> FlightLogs:
     """Make logs of imported tracks; raise RecordingError where velocities are missing.
 
-    standing : first and last time (s after each drone's first row) on the ground, unless the log tells it itself
+    standing : first and last time (s after each drone's first row) on the ground, unless the log contains it
     """
     if not tracks:
         raise RecordingError("no tracks to identify from")

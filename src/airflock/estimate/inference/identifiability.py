@@ -221,9 +221,9 @@ WINDOW, LINE_STEPS = (
     0.05,
     14,
 )  # of a range: on which one of them looks for its place alone, at least; and how often it looks
-ALIKE = 0.5  # correlation of the slopes of two numbers, from which they act alike
+SIMILAR = 0.5  # correlation of the slopes of two numbers, from which they are similar
 SHORTEST = 0.03  # of a range: ends nearer than this by the curvature are not looked for
-FIRST = 0.4  # of the way to the end that the curvature tells: first step
+FIRST = 0.4  # of the way to the end by the curvature: first step
 STRIDE = (0.01, 0.15)  # of a range: least step, but for a first one that is shorter, and longest
 FASTER = 1.6  # each step is so much longer than the one before, while the likelihood hardly falls
 PLACES = 16  # that are looked at, on each side of a ridge
@@ -233,7 +233,7 @@ SHORTER = 3.0  # a step is so much shorter where the likelihood has fallen too f
 # that begin beside each other end several units apart, and from the top of a spike every way falls
 HIGHER = 6.0
 AGAIN = 2  # times
-UNLIKELY_END = 20.0  # fall at the end of a range, the others where they are, beyond which they are not asked to follow
+UNLIKELY_END = 20.0  # fall at the end of a range, the others where they are, beyond which nothing follows
 
 
 @dataclass(frozen=True)
@@ -291,7 +291,11 @@ def _ways(
     named = [k for k, f in enumerate(fit.free) if f < model.named]
     # Following a ridge costs tens of climbs, so only uncertain or tied numbers are followed.
     worst = [k for k in sorted(named, key=lambda k: -view.reach[k]) if view.reach[k] >= SHORTEST][:WORST]
-    tied = [k for k in sorted(named, key=lambda k: -view.alike[k, named].max()) if view.alike[k, named].max() > TIED]
+    tied = [
+        k
+        for k in sorted(named, key=lambda k: -view.similarity[k, named].max())
+        if view.similarity[k, named].max() > TIED
+    ]
     ways: list[RidgePath] = []
     # The ends of all ranges: a plateau shows there, and nowhere on a ridge.
     for k, end in ((fit.free[k], end) for k in named for end in (0.0, 1.0)):
@@ -313,14 +317,14 @@ class CurvatureView:
     """Prediction by the curvature at a fit of the ways along its numbers, by their places among the free.
 
     reach : how far each goes by the curvature until the likelihood has fallen by `drop`
-    alike : how much any two act alike
+    similarity : of the slopes of any two numbers
     """
 
     def __init__(self, model: FitModel, fit: Fit, spans: Sequence[int], drop: float):
         curved = [curvature(model, fit, spans, way) for way in (WIDE_SLOPES, CENTRAL_SLOPES)]
         covariances = [np.linalg.inv(each) for each in curved]
         self.model, self.fit, self.spans, self.drop = model, fit, spans, drop
-        self.covariance, self.alike = covariances[1], _alike(curved[1])
+        self.covariance, self.similarity = covariances[1], _similarity(curved[1])
         self.reach: Array = np.sqrt(2.0 * drop * np.maximum(*(np.diag(each) for each in covariances)))
 
     def walk(self, k: int, side: float, leave: bool) -> tuple[RidgePath, Array | None]:
@@ -330,7 +334,7 @@ class CurvatureView:
         fit, covariance = self.fit, self.covariance
         slope = np.zeros(len(fit.place))
         slope[fit.free] = covariance[k] / covariance[k, k]
-        near = [g for g in np.argsort(-self.alike[k]).tolist() if self.alike[k, g] > ALIKE]
+        near = [g for g in np.argsort(-self.similarity[k]).tolist() if self.similarity[k, g] > SIMILAR]
         follow = [fit.free[g] for g in near if fit.free[g] < self.model.named]
         first = FIRST * float(self.reach[k])
         return _walk(self.model, fit, self.spans, fit.free[k], follow, side * slope, first, self.drop, leave)
@@ -368,7 +372,7 @@ def _slid(model: FitModel, u: Array, number: int, spans: Sequence[int], far: flo
     return (with_coordinate(u, number, float(found.x)), float(found.fun)) if found.fun < here else (u, here)
 
 
-def _alike(curved: Array) -> Array:
+def _similarity(curved: Array) -> Array:
     """Return the similarity of any two numbers: correlations of their slopes, 0 of each with itself."""
     sizes = np.sqrt(np.diag(curved))
     found: Array = np.abs(curved) / np.outer(sizes, sizes)
@@ -407,8 +411,8 @@ def _walk(
         if near:
             # all along the way so far, or none but the moved one and one that makes up for it
             beside = with_coordinate(last, number, float(start[number]))
-            asked = [(start, near[0]), *((beside, f) for f in near[:NESTED])]
-            alone = [_slid(model, u, f, spans, abs(float(start[f] - last[f]))) for u, f in asked]
+            candidates = [(start, near[0]), *((beside, f) for f in near[:NESTED])]
+            alone = [_slid(model, u, f, spans, abs(float(start[f] - last[f]))) for u, f in candidates]
             start = min(alone, key=lambda each: each[1])[0]
             start = climb_to_maximum(
                 model, start, near[:NESTED], spans, FOLLOWS, slopes=(FINE_SLOPES, CENTRAL_SLOPES)
@@ -438,7 +442,7 @@ def _walk(
 
 # Dropped numbers: if their defaults explain the tracks as well, the intervals of the others must
 # still allow for them.
-AWAY = 0.2  # of a range: move of a number of which is asked whether the others make up for it exactly
+AWAY = 0.2  # of a range: move of a number, to test whether the others compensate for it exactly
 DROP = 12.0  # fall of the log-likelihood at which a walk ends that looks for a higher place
 EXACT = 0.05  # change of the log-likelihood by such a move, below which they do
 

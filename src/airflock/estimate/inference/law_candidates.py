@@ -61,7 +61,7 @@ class FitParameter:
 class LawCandidate:
     """A law that may explain the tracks.
 
-    name     : as it was asked for
+    name     : as requested
     scenario : of its law, without any noise
     plan     : what flies it
     numbers  : what may be fitted; noises : numbers of the law that are noise, which the scenario has at 0
@@ -115,18 +115,18 @@ def law_scenarios(
     """Return scenarios of the laws, and half sides (m) of the periodic box common to all; 0 along an open axis.
 
     models : names of laws, presets, scenario files, files with a law, or Scenarios
-    Raises ScenarioError with every fault.
+    Raises ScenarioError with every error.
     """
-    faults: list[tuple[str, str]] = []
+    errors: list[tuple[str, str]] = []
     found = []
     for what in models:
         try:
             found.append(_base(what, settings, trust))
-        except AirflockError as fault:
-            faults += [(f"{what}: ", line) for line in str(fault).splitlines()]
-    if faults:  # what is wrong with a setting is so for all laws: it is said once
-        bare = Counter(line.removeprefix(name) for name, line in set(faults))
-        lines = [line.removeprefix(name) if bare[line.removeprefix(name)] > 1 else line for name, line in faults]
+        except AirflockError as error:
+            errors += [(f"{what}: ", line) for line in str(error).splitlines()]
+    if errors:  # what is wrong with a setting is so for all laws: it is said once
+        bare = Counter(line.removeprefix(name) for name, line in set(errors))
+        lines = [line.removeprefix(name) if bare[line.removeprefix(name)] > 1 else line for name, line in errors]
         raise ScenarioError(list(dict.fromkeys(lines)))
     boxes = [half_sizes(each.world) if each.world.edges == "periodic" else (0.0, 0.0, 0.0) for each in found]
     for each, box in zip(found, boxes, strict=True):

@@ -70,11 +70,11 @@ def force_maps(model: FitModel, point: Array, scale: TrackScale, spans: Sequence
             window = tracks.seen[k - lag : k + lag + 1]
             turned = tracks.nearest(window[-1] - window[lag]) - tracks.nearest(window[lag] - window[0])
             felt = turned / (lag * tracks.period) ** 2
-            told = np.tensordot(weights, pushes[k - lag + 1 : k + lag], 1) / (lag * lag * tracks.period)
+            commanded = np.tensordot(weights, pushes[k - lag + 1 : k + lag], 1) / (lag * lag * tracks.period)
             there: Any = (tracks.state[k - lag : k + lag + 1] > ABSENT).all(axis=0) & np.isfinite(felt).all(axis=0)
             cell, who, h, left = _cells(kept[k], there, tracks.state[k] > ABSENT, edge, tracks.nearest)
             count += np.bincount(cell, minlength=size)
-            for table, force in ((seen, felt), (law, told)):
+            for table, force in ((seen, felt), (law, commanded)):
                 for part, axis in enumerate((h, left)):
                     own_force = (axis * np.nan_to_num(force)).sum(axis=0)
                     table[part] += np.bincount(cell, own_force[who], size)
@@ -215,7 +215,7 @@ class InferResult:
 def judge_laws(laws: list[LawResult]) -> tuple[LawResult | None, str]:
     """Return the law that explains the tracks, if one does, and the verdict.
 
-    Of laws that foretell as well within a standard error it is that with the fewest numbers (Breiman et al. 1984).
+    Of laws that predict as well within a standard error it is the one with the fewest numbers (Breiman et al. 1984).
     """
     first = laws[0]
     if not _explains(first):
@@ -322,7 +322,7 @@ def _short(value: float) -> float:
 
 # One set of points ended in the wrong mode (238 units below a climb from the truth); of three
 # others two found the right one.
-RACES = 3  # from places drawn anew, of a law that is searched deeper
+RACES = 3  # from new points, of a law that is searched deeper
 LAWS = ("couzin_2002", "reynolds_1987", "vicsek_1995", "vasarhelyi_2018")
 
 
@@ -353,7 +353,7 @@ def infer(
     trust : bool
         Whether laws in files may run.
     done : callable, optional
-        Told what has been done, now and then.
+        Called with the progress, now and then.
 
     Returns
     -------
@@ -509,13 +509,13 @@ def _read(path: Path) -> xr.Dataset:
     """Read a file of tracks that needs no options; where it needs some, the error contains the command."""
     try:
         return load_tracks(path)
-    except RecordingError as fault:
-        if not path.is_file() or " --" not in str(fault):  # it is nothing that an option would mend
+    except RecordingError as error:
+        if not path.is_file() or " --" not in str(error):  # it is nothing that an option would mend
             raise
         raise RecordingError(
-            f"{fault}\n{path}: infer takes no options of import: airflock import {path.name} ... --save tracks.nc, "
+            f"{error}\n{path}: infer takes no options of import: airflock import {path.name} ... --save tracks.nc, "
             "then give tracks.nc"
-        ) from fault
+        ) from error
 
 
 def _alike(followed: Sequence[SpanTracks]) -> None:

@@ -423,10 +423,10 @@ def _lower(model: FitModel, places: Sequence[Array], free: Sequence[int], spans:
 # with the numbers of the group alone first, others in a race with all numbers, since beside a wrong
 # rest the group alone climbs back to its old place. Where ends lie apart, the way from one to the
 # better one is continued beyond it.
-TOGETHER = 4  # numbers that are drawn anew together, at most
+TOGETHER = 4  # most numbers that are drawn together
 # Bhattacharyya's overlap, of roots: in squares a few steps at an edge outweigh all others, and a
 # wall's range and gain (overlap 0.84 to 0.96) were never drawn together.
-ALIKE = 0.8  # overlap of where two numbers act, from which they are
+SIMILAR = 0.8  # overlap of where two numbers act, from which they are
 GROUPS = 3  # of them, the least certain first
 SHARED = 0.5  # of a group: where more of it stands in an earlier one, other groups come first
 REDRAWN = 8  # two to the power of this: places of a group that are looked at
@@ -472,7 +472,7 @@ def search_modes(
 
 
 def redraw_group(model: FitModel, fit: Fit, group: Sequence[int], few_spans: Sequence[int]) -> list[Array]:
-    """Draw a group anew from a Sobol sequence; return ends of a race, and of the group by itself."""
+    """Draw a group again from a Sobol sequence; return ends of a race, and of the group by itself."""
     from scipy.stats import qmc
 
     drawn = np.tile(fit.place, (2**REDRAWN, 1))
@@ -555,7 +555,7 @@ def parameter_groups(model: FitModel, fit: Fit, spans: Sequence[int]) -> list[li
     # The least certain number founds a group of the numbers that act most like it, unless it is in
     # one already.
     for k in np.argsort(-errors).tolist():
-        near = [f for f in np.argsort(-overlap[k]).tolist() if f != k and overlap[k, f] > ALIKE][: TOGETHER - 1]
+        near = [f for f in np.argsort(-overlap[k]).tolist() if f != k and overlap[k, f] > SIMILAR][: TOGETHER - 1]
         group = sorted(named[f] for f in (k, *near))
         if near and not any(named[k] in other for other in found):
             found.append(group)

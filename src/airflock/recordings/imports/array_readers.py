@@ -34,11 +34,11 @@ def read_array(
     if values.ndim != 3 or values.shape[2] not in (2, 3):
         raise RecordingError(f"{where}: has shape {values.shape}; give (frame, individual, 2 or 3)")
     rate, scale = options.fps or fps, math.nan
-    faults = [] if rate else [f"{where}: counts frames; say how many a second: --fps 25"]
-    with collect_errors(faults):
+    errors = [] if rate else [f"{where}: counts frames; say how many a second: --fps 25"]
+    with collect_errors(errors):
         scale = table_columns.unit_in_metres("", where, "array", options)
-    if faults or rate is None:
-        raise RecordingError("\n".join(faults))
+    if errors or rate is None:
+        raise RecordingError("\n".join(errors))
     frames = np.arange(len(values))
     found = []
     for number in range(values.shape[1]):
@@ -57,8 +57,8 @@ def _numbers(array: Any, where: str) -> Any:
         raise RecordingError(f"{where}: holds {values.dtype}, not numbers; give positions as floats")
     try:
         values = values.astype(float) if values.dtype == object else values
-    except (TypeError, ValueError) as fault:
-        raise RecordingError(f"{where}: holds what is not a number: {str(fault).splitlines()[0]}") from fault
+    except (TypeError, ValueError) as error:
+        raise RecordingError(f"{where}: holds what is not a number: {str(error).splitlines()[0]}") from error
     return values if hidden is None else np.where(hidden, np.nan, values)
 
 
@@ -79,11 +79,11 @@ def read_npy(path: Path, options: ImportOptions, findings: ImportReport) -> list
                 loaded = loaded[names[0]]
                 if isinstance(loaded, bytes):
                     raise RecordingError(f"{path}: is an archive of {names[0]}, which is no array; unpack it first")
-    except (ValueError, OSError, EOFError) as fault:
-        text = str(fault).splitlines()[0]
+    except (ValueError, OSError, EOFError) as error:
+        text = str(error).splitlines()[0]
         if "allow_pickle" in text or "pickle" in text.lower():
-            raise RecordingError(_pickled(path)) from fault
-        raise RecordingError(f"{path}: is not an array of numbers: {text}") from fault
+            raise RecordingError(_pickled(path)) from error
+        raise RecordingError(f"{path}: is not an array of numbers: {text}") from error
     return read_array(loaded, options, str(path))
 
 
@@ -110,14 +110,14 @@ def read_idtracker(file: xr.Dataset, path: Path, options: ImportOptions, finding
         shown = ", ".join([str(name) for name in file.variables][:8]) or "nothing"
         raise RecordingError(f"{path}: has no dataset trajectories, as idtracker.ai writes; it has {shown}")
     values = file["trajectories"].values
-    told = {**{str(k): v.values[()] for k, v in file.variables.items() if v.shape == ()}, **file.attrs}
+    entries = {**{str(k): v.values[()] for k, v in file.variables.items() if v.shape == ()}, **file.attrs}
     if "identities_labels" in file:
-        told["identities_labels"] = file["identities_labels"].values
-    fps = float(told["frames_per_second"]) if "frames_per_second" in told else None
-    body = told.get("body_length")
+        entries["identities_labels"] = file["identities_labels"].values
+    fps = float(entries["frames_per_second"]) if "frames_per_second" in entries else None
+    body = entries.get("body_length")
     if body is not None and np.ndim(body) == 0:
         findings.notes.append(f"{path}: idtracker.ai gives a body length of {float(body):g} px")
-    labels = told.get("identities_labels")
+    labels = entries.get("identities_labels")
     given = [] if labels is None else [str(name) for name in np.atleast_1d(labels)]
     names = given if len(given) == values.shape[1] else None
     return read_array(values, options, str(path), names, fps)
@@ -149,14 +149,14 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
     axes = [str(axis) for axis in found["space"].values]
     if axes not in (["x", "y"], ["x", "y", "z"]):
         raise RecordingError(f"{where}: space has the axes {', '.join(axes)}, not x, y or x, y, z")
-    faults: list[str] = []
+    errors: list[str] = []
     seconds, scale = np.empty(0), np.nan
-    with collect_errors(faults):
+    with collect_errors(errors):
         seconds = _seconds(found, options, where)
-    with collect_errors(faults):
+    with collect_errors(errors):
         scale = table_columns.unit_in_metres(str(found["position"].attrs.get("units", "")), where, "position", options)
-    if faults:
-        raise RecordingError("\n".join(faults))
+    if errors:
+        raise RecordingError("\n".join(errors))
     rows = np.arange(len(seconds))
     tracks = []
     # Variables of unknown unit are ignored rather than guessed; velocities are then differentiated
@@ -167,10 +167,10 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
         columns = {axis: position[:, c] for c, axis in enumerate(axes)}
         for variable, names in (("velocity", VELOCITY_TARGETS), ("command", COMMAND_TARGETS)):
             if variable in own and {"time", "space"} == set(own[variable].dims):
-                told = str(own[variable].attrs.get("units", ""))
-                if told not in table_columns.SPEED_UNITS:
+                unit = str(own[variable].attrs.get("units", ""))
+                if unit not in table_columns.SPEED_UNITS:
                     continue  # of unknown unit (frames, pixels) or no velocity: differentiated instead
-                values = own[variable].transpose("time", "space").values.astype(float) * table_columns.SPEED_UNITS[told]
+                values = own[variable].transpose("time", "space").values.astype(float) * table_columns.SPEED_UNITS[unit]
                 columns |= {names[c]: values[:, c] for c in range(len(axes))}
         tracks.append(ImportedTrack(str(name), where, seconds, columns, rows))
     return tracks

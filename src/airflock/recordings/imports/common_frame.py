@@ -73,7 +73,7 @@ def to_local_frame(
     placed = [t for t in tracks if "x" in t.columns and t.origin is not None]
     free = [t for t in tracks if "x" in t.columns and t.origin is None]
     if free and (geodetic or placed):
-        findings.fault(
+        findings.add_error(
             f"{free[0].source}: has no origin, while {(geodetic or placed)[0].source} has one; import them separately"
         )
         return
@@ -81,11 +81,11 @@ def to_local_frame(
         origin = placed[0].origin
     wrong: set[str] = set()
     for track in geodetic:
-        fault = _degrees_fault(track)
-        if fault and track.source not in wrong:
+        error = _degrees_error(track)
+        if error and track.source not in wrong:
             wrong.add(track.source)
-            findings.fault(fault)
-        elif not fault and len(track.columns["lat"]):
+            findings.add_error(error)
+        elif not error and len(track.columns["lat"]):
             if origin is None:
                 origin = _first_fix(track)
                 findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
@@ -95,7 +95,7 @@ def to_local_frame(
         _move(track, origin)
 
 
-def _degrees_fault(track: ImportedTrack) -> str:
+def _degrees_error(track: ImportedTrack) -> str:
     """Return the error of the first row that is no latitude and longitude; empty if all are."""
     lat, lon = track.columns["lat"], track.columns["lon"]
     beyond = {name: np.abs(track.columns[name]) > most for name, most in DEGREES.items()}
@@ -159,7 +159,7 @@ def align_clocks(tracks: list[ImportedTrack], same_clock: bool, findings: Import
     lacking = [track for track in own if track.utc is None]
     if lacking and len({track.source for track in tracks}) > 1:
         names = ", ".join(sorted({track.source for track in lacking})[:3])
-        findings.fault(
+        findings.add_error(
             f"{names}{' ...' if len(lacking) > 3 else ''}: nothing says that the clocks of {len(files)} files "
             "agree, and distances between individuals need that; write --same-clock if they do, or --map utc:=COLUMN"
         )
@@ -179,7 +179,7 @@ def to_utc(track: ImportedTrack) -> float:
     offset = utc - own
     ahead = offset - offset.mean()
     spread = float(((own - centre) ** 2).sum())
-    # a drift can only be told over minutes: quartz drifts by 1e-5, a packet of the receiver is late
+    # a drift only shows over minutes: quartz drifts by 1e-5, a packet of the receiver is late
     # by 0.1 s
     drift = float((ahead * (own - centre)).sum() / spread) if own.max() - own.min() > 60.0 else 0.0
     residual = ahead - drift * (own - centre)

@@ -30,17 +30,17 @@ NED = (("x", "y", "z"), ("vx", "vy", "vz"))
 def read_ulog(path: Path, options: ImportOptions, findings: ImportReport) -> list[ImportedTrack]:
     """Read a PX4 log: vehicle_local_position, and trajectory_setpoint as the command in force.
 
-    The set-point is what the companion asked for; vehicle_local_position_setpoint is the controller's own output and
+    The set-point is the request of the companion; vehicle_local_position_setpoint is the controller's own output and
     is not read. Rows where the estimator calls its position invalid are left out.
     """
     try:
         from pyulog import ULog
-    except ImportError as fault:
-        raise RecordingError(f"{path}: PX4 logs need pyulog: pip install 'airflock[logs]'") from fault
+    except ImportError as error:
+        raise RecordingError(f"{path}: PX4 logs need pyulog: pip install 'airflock[logs]'") from error
     try:
         log = ULog(str(path), TOPICS)
-    except Exception as fault:  # pyulog raises TypeError, struct.error, IndexError and others for damaged files
-        raise RecordingError(f"{path}: is not a ULog that can be read: {type(fault).__name__}: {fault}") from fault
+    except Exception as error:  # pyulog raises TypeError, struct.error, IndexError and others for damaged files
+        raise RecordingError(f"{path}: is not a ULog that can be read: {type(error).__name__}: {error}") from error
     topics = {data.name: data.data for data in reversed(log.data_list) if data.multi_id == 0}
     options.done(0.8)
     if LOCAL not in topics:
@@ -123,8 +123,8 @@ def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -
     with path.open("rb") as file:
         if file.read(len(HEAD)) != HEAD:
             raise RecordingError(f"{path}: is no DataFlash log of ArduPilot: it does not begin with its mark, A3 95")
-    told = ReaderProcess(path, read_dataflash_arrays, "a DataFlash log", pace=PACE).answer(options.done)
-    rows = {part: told[part].values for part in PARTS if part in told}
+    contents = ReaderProcess(path, read_dataflash_arrays, "a DataFlash log", pace=PACE).answer(options.done)
+    rows = {part: contents[part].values for part in PARTS if part in contents}
     if "PSCN" not in rows or "PSCE" not in rows:
         raise RecordingError(
             f"{path}: has no PSCN and PSCE (position control, Copter 4.2 and later); write its estimates as a table: "
@@ -132,10 +132,10 @@ def read_dataflash(path: Path, options: ImportOptions, findings: ImportReport) -
         )
     found = _joined(rows, path)
     found.clock, found.datum = "boot", "amsl"
-    if "ORGN" in told:
-        latitude, longitude, height = (float(value) for value in told["ORGN"].values[-1])
+    if "ORGN" in contents:
+        latitude, longitude, height = (float(value) for value in contents["ORGN"].values[-1])
         found.origin = (latitude, longitude, height)
-    found.utc = _gps_times(told["GPS"].values) if "GPS" in told else None
+    found.utc = _gps_times(contents["GPS"].values) if "GPS" in contents else None
     return [found]
 
 
@@ -179,12 +179,12 @@ def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
     All vehicles are stamped by the receiver's clock, so they share it; their positions are about their own origins.
     """
     _need_pymavlink(path)
-    told = ReaderProcess(path, read_telemetry_arrays, "telemetry", pace=PACE).answer(options.done)
-    if "LOCAL_POSITION_NED" not in told:
+    contents = ReaderProcess(path, read_telemetry_arrays, "telemetry", pace=PACE).answer(options.done)
+    if "LOCAL_POSITION_NED" not in contents:
         raise RecordingError(f"{path}: has no LOCAL_POSITION_NED; import the vehicles' own logs instead")
-    states = _by_vehicle(told, "LOCAL_POSITION_NED", (0, 2, 1, 3, 5, 4, 6), (1, 1, 1, -1, 1, 1, -1))
-    wishes = _by_vehicle(told, "POSITION_TARGET_LOCAL_NED", (0, 2, 1, 3), (1, 1, 1, -1))
-    origins = _by_vehicle(told, "GPS_GLOBAL_ORIGIN", (1, 2, 3), (1e-7, 1e-7, 1e-3))
+    states = _by_vehicle(contents, "LOCAL_POSITION_NED", (0, 2, 1, 3, 5, 4, 6), (1, 1, 1, -1, 1, 1, -1))
+    wishes = _by_vehicle(contents, "POSITION_TARGET_LOCAL_NED", (0, 2, 1, 3), (1, 1, 1, -1))
+    origins = _by_vehicle(contents, "GPS_GLOBAL_ORIGIN", (1, 2, 3), (1e-7, 1e-7, 1e-3))
     found = []
     for who, table in sorted(states.items()):
         columns = dict(zip((*POSITION_TARGETS, *VELOCITY_TARGETS), table.T[1:].copy(), strict=True))
@@ -204,11 +204,11 @@ def read_tlog(path: Path, options: ImportOptions, findings: ImportReport) -> lis
     return found
 
 
-def _by_vehicle(told: Any, kind: str, columns: tuple[int, ...], factors: tuple[float, ...]) -> dict[int, Any]:
+def _by_vehicle(contents: Any, kind: str, columns: tuple[int, ...], factors: tuple[float, ...]) -> dict[int, Any]:
     """Return rows of each vehicle, of these columns (0: the time) times factors, in their order in the log."""
-    if kind not in told:
+    if kind not in contents:
         return {}
-    table = told[kind].values
+    table = contents[kind].values
     return {int(who): table[table[:, 0] == who][:, 1:][:, columns] * factors for who in np.unique(table[:, 0])}
 
 
@@ -271,21 +271,21 @@ def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) ->
     """Read the log of a node on board: local east-north-up of its mission, by the clock of its computer.
 
     A row is a tick at which the own state was another than at the tick before; between such rows the autopilot had said
-    nothing new. Commands are those of phases in which the node flies; their clock is told UTC by the log's first line.
+    nothing new. Commands are those of phases in which the node flies; the log's first line relates their clock to UTC.
     """
     with open(path, "rb") as file:
         if not file.read(8).startswith(b'{"log":'):
             raise RecordingError(f"{path}: .log: unknown format; {OTHERS}")
     try:
-        told = read_log_ticks(path)
-    except LinkError as fault:
-        raise RecordingError(str(fault)) from fault
+        log = read_log_ticks(path)
+    except LinkError as error:
+        raise RecordingError(str(error)) from error
     options.done(0.8)
-    states = [tick.own for tick in told.ticks]
+    states = [tick.own for tick in log.ticks]
     rows = [k for k, own in enumerate(states) if own is not None and (k == 0 or own != states[k - 1])]
     if not rows:
         raise RecordingError(f"{path}: the autopilot never told where it is")
-    ticks = [told.ticks[k] for k in rows]
+    ticks = [log.ticks[k] for k in rows]
     time = np.array([tick.time for tick in ticks])
     flown = np.array([tick.phase in FLYING_PHASES for tick in ticks])
     place = np.array([tick.own for tick in ticks], float)
@@ -299,7 +299,7 @@ def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) ->
     labels = {name: f"own[{c}]" for c, name in enumerate((*POSITION_TARGETS, *VELOCITY_TARGETS))}
     labels |= {name: f"set[{c}]" for c, name in enumerate(COMMAND_TARGETS)}
     found = ImportedTrack(
-        f"member_{told.member}",
+        f"member_{log.member}",
         str(path),
         time,
         columns,
@@ -309,6 +309,6 @@ def read_node_log(path: Path, options: ImportOptions, findings: ImportReport) ->
         datum="home",
     )
     ends = time[[0, -1]]
-    found.utc = np.stack([ends, told.utc * 1e-6 + ends - told.now], axis=1)
+    found.utc = np.stack([ends, log.utc * 1e-6 + ends - log.now], axis=1)
     found.in_air = np.array([tick.phase in AIRBORNE_PHASES for tick in ticks])
     return [found]

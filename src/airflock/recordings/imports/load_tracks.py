@@ -92,7 +92,7 @@ def load_tracks(
     same_clock : bool
         The clocks of several files agree.
     accept : str or iterable of str
-        Kinds of faults that are meant so: absent, axes, down, duplicates, height, jumps, time.
+        Kinds of errors that are intended: absent, axes, down, duplicates, height, jumps, time.
     decimal, delimiter : str
         Of a text file: its decimal point, and what stands between columns, which is found out by default.
     precision : int
@@ -110,7 +110,7 @@ def load_tracks(
     Raises
     ------
     RecordingError
-        With one line per fault: file, column, first row, and what to write instead.
+        With one line per error: file, column, first row, and what to write instead.
 
     Examples
     --------
@@ -239,18 +239,18 @@ def _read(what: Any, options: ImportOptions, findings: ImportReport) -> list[Imp
         what = [what]
     try:
         files = [expand_path(name) for name in what]
-    except TypeError as fault:
+    except TypeError as error:
         raise RecordingError(
             f"{type(what).__name__} holds no tracks; give files, a DataFrame, a Dataset or an array"
-        ) from fault
+        ) from error
     if not files:
         raise RecordingError("no files to import")
     tracks = []
     for path in files:
         try:
             tracks += _placed(path, read_file(path, options, findings))
-        except RecordingError as fault:
-            findings.faults += str(fault).splitlines()
+        except RecordingError as error:
+            findings.errors += str(error).splitlines()
         options.done(1.0)
     return tracks
 
@@ -268,7 +268,7 @@ def check_options(
     options: ImportOptions, findings: ImportReport, numbers: Mapping[str, Any], precision: Any, accept: Any, origin: Any
 ) -> None:
     """Refuse options that cannot be meant, all at once. Raises RecordingError."""
-    faults = findings.faults
+    errors = findings.errors
     known = {
         "unit": ("", *table_columns.LENGTH_UNITS, *table_columns.PIXEL_UNITS),
         "time_unit": ("", *table_columns.TIME_UNITS, "frames"),
@@ -276,28 +276,28 @@ def check_options(
     for name, allowed in {**known, "axes": ("", "enu", "ned"), "decimal": (".", ",")}.items():
         value = getattr(options, name)
         if not isinstance(value, str) or value not in allowed:
-            faults.append(f"{name} = {value!r} is none of {', '.join(text for text in allowed if text)}")
+            errors.append(f"{name} = {value!r} is none of {', '.join(text for text in allowed if text)}")
     given = {name: getattr(options, name) for name in ("keypoint", "delimiter")}
-    faults += [f"{name} = {value!r} is no text" for name, value in given.items() if not isinstance(value, str)]
+    errors += [f"{name} = {value!r} is no text" for name, value in given.items() if not isinstance(value, str)]
     if not isinstance(options.map, Mapping):
-        faults.append(f'map = {options.map!r}: give targets with expressions, such as {{"t": "time_us*1e-6"}}')
+        errors.append(f'map = {options.map!r}: give targets with expressions, such as {{"t": "time_us*1e-6"}}')
     else:
         said = [(key, text) for key, text in options.map.items() if not isinstance(text, str)]
-        faults += [f"map: {key} = {text!r} is no text; an expression is one" for key, text in said]
+        errors += [f"map: {key} = {text!r} is no text; an expression is one" for key, text in said]
     for name, number in {"scale": options.scale, "fps": options.fps, "rate": numbers["rate"]}.items():
         if number is not None and not (is_number(number) and 0.0 < number < 1e9):
-            faults.append(f"{name} = {_shown(number)} must be a number above 0")
+            errors.append(f"{name} = {_shown(number)} must be a number above 0")
     if not (is_number(numbers["bridge"]) and 0.0 <= numbers["bridge"] < 1e9):
-        faults.append(f"bridge = {_shown(numbers['bridge'])} s must be a number, 0 or more")
+        errors.append(f"bridge = {_shown(numbers['bridge'])} s must be a number, 0 or more")
     for name in ("begin", "end"):
         if numbers[name] is not None and not (is_number(numbers[name]) and np.isfinite(numbers[name])):
-            faults.append(f"{name} = {_shown(numbers[name])} is not a time in s")
+            errors.append(f"{name} = {_shown(numbers[name])} is not a time in s")
     if not is_number(precision) or precision not in (32, 64):
-        faults.append(f"precision = {precision} is none of 32, 64")
+        errors.append(f"precision = {precision} is none of 32, 64")
     if origin is not None and not _is_origin(origin):
-        faults.append(f"origin = {origin!r} is not (latitude, longitude, height) in degrees, degrees and m")
+        errors.append(f"origin = {origin!r} is not (latitude, longitude, height) in degrees, degrees and m")
     kinds = [accept] if isinstance(accept, str) or not isinstance(accept, Iterable) else list(accept)
-    faults += [
+    errors += [
         f"accept = {kind} is none of {', '.join(ACCEPTABLE_ERRORS)}"
         for kind in kinds
         if str(kind) not in ACCEPTABLE_ERRORS

@@ -46,8 +46,8 @@ def read_csv(path: Path, options: ImportOptions, findings: ImportReport) -> list
                     yield at, part
                     at += len(part)
                     options.done(file.tell() / max(size, 1))
-            except (pd.errors.ParserError, UnicodeDecodeError) as fault:
-                raise RecordingError(f"{path}: {str(fault).splitlines()[0]}") from fault
+            except (pd.errors.ParserError, UnicodeDecodeError) as error:
+                raise RecordingError(f"{path}: {str(error).splitlines()[0]}") from error
 
     return tracks_from_parts(str(path), path.stem, head.names, parts, options, findings)
 
@@ -57,12 +57,12 @@ def read_parquet(path: Path, options: ImportOptions, findings: ImportReport) -> 
     try:
         import pyarrow
         import pyarrow.parquet as parquet
-    except ImportError as fault:
-        raise RecordingError(f"{path}: needs pyarrow: pip install 'airflock[logs]'") from fault
+    except ImportError as error:
+        raise RecordingError(f"{path}: needs pyarrow: pip install 'airflock[logs]'") from error
     try:
         file = parquet.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20)
-    except (OSError, ValueError) as fault:
-        raise RecordingError(f"{path}: is not a Parquet table: {str(fault).splitlines()[0]}") from fault
+    except (OSError, ValueError) as error:
+        raise RecordingError(f"{path}: is not a Parquet table: {str(error).splitlines()[0]}") from error
     total = max(file.metadata.num_rows, 1)
 
     def parts(columns: list[str] | None) -> Iterator[tuple[int, pd.DataFrame]]:
@@ -82,8 +82,8 @@ def table_from_columns(columns: Mapping[str, Any]) -> pd.DataFrame:
     """Make a table of columns by name; a column that is no list has one value for all rows. Raise RecordingError."""
     lists = {str(k): list(v) for k, v in columns.items() if np.iterable(v) and not isinstance(v, str)}
     if len({len(column) for column in lists.values()}) != 1:
-        told = ", ".join(f"{name} has {len(column)}" for name, column in lists.items()) or "there are none"
-        raise RecordingError(f"columns of a table must be lists of equal length: {told}")
+        lengths = ", ".join(f"{name} has {len(column)}" for name, column in lists.items()) or "there are none"
+        raise RecordingError(f"columns of a table must be lists of equal length: {lengths}")
     return pd.DataFrame({str(name): lists.get(str(name), value) for name, value in columns.items()})
 
 
@@ -144,7 +144,7 @@ def _numbers(column: Any, where: str, name: str, at: int, *, time: bool) -> Any:
     """Return a column as float64: dates as seconds since 1970, durations as seconds; raise RecordingError for other
     texts.
 
-    time : whether it tells times, which may be written as dates or as hours:minutes:seconds
+    time : True for times, which may be written as dates or as hours:minutes:seconds
     """
     if pd.api.types.is_numeric_dtype(column):
         return column.to_numpy(float, na_value=np.nan)
@@ -289,8 +289,8 @@ def _lines(path: Path) -> tuple[str, list[str]]:
         encoding = "utf-8-sig"
     try:
         return encoding, start.decode(encoding, errors="strict" if len(start) < MOST else "ignore").splitlines()
-    except UnicodeDecodeError as fault:
-        raise RecordingError(f"{path}: is not written in UTF-8 (byte {fault.start}); save it as UTF-8") from fault
+    except UnicodeDecodeError as error:
+        raise RecordingError(f"{path}: is not written in UTF-8 (byte {error.start}); save it as UTF-8") from error
 
 
 def _remark(line: str) -> bool:
@@ -369,8 +369,8 @@ def split_by_individual(
         return [(stem, table)]
     taken = [column for parts in wide.values() for column in parts.values()]
     rest = table.drop(columns=taken)
-    told = {layout.user_labels[axis]: axis for axis in POSITION_TARGETS if axis in layout.user_labels}
+    axes = {layout.user_labels[axis]: axis for axis in POSITION_TARGETS if axis in layout.user_labels}
     return (
-        (number, rest.assign(**{label: table[parts[axis]] for label, axis in told.items() if axis in parts}))
+        (number, rest.assign(**{label: table[parts[axis]] for label, axis in axes.items() if axis in parts}))
         for number, parts in wide.items()
     )

@@ -48,7 +48,7 @@ def time_grid(
 def grid_tolerance(period: float, *instants: float) -> float:
     """Return the time (s) by which rows may miss the grid: 1e-6 of a period, and the resolution of these instants.
 
-    Seconds since 1970 are told to 2.4e-7 s.
+    Seconds since 1970 are resolved to 2.4e-7 s.
     """
     return 1e-6 * period + 2.0 * float(np.spacing(max(abs(instant) for instant in instants)))
 
@@ -147,8 +147,8 @@ def _fill(
     logged = track.has(VELOCITY_TARGETS)
     slopes = _slopes(own, rows, track.breaks, usual)
     for c, name in enumerate(VELOCITY_TARGETS[:axes] if logged else ()):
-        told = track.columns.get(name, slopes[:, c])
-        slopes[:, c] = np.where(np.isfinite(told), told, slopes[:, c])  # what is not logged is differentiated
+        velocity = track.columns.get(name, slopes[:, c])
+        slopes[:, c] = np.where(np.isfinite(velocity), velocity, slopes[:, c])  # what is not logged is differentiated
     p, v = _hermite(rows, slopes, before, after, step, part)
     if logged:  # between two rows the logged velocity itself, not the slope of the curve through the positions
         v = slopes[before] + part[:, None] * (slopes[after] - slopes[before])

@@ -27,9 +27,7 @@ SPEED_UNITS = {"m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 1e-3,
 OTHER_COMMAND_UNITS = ("1", "m/s^2")  # units of commands that are headings or accelerations
 ANGLES = {"deg": 1.0, "°": 1.0, "degrees": 1.0}
 PIXEL_UNITS = ("px", "pixel", "pixels")
-UNIT_HINT = (
-    "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"  # where nothing tells the unit of a length
-)
+UNIT_HINT = "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"  # for a length without a unit
 
 _EAST, _NORTH, _UP = ("x", "e", "east"), ("y", "n", "north"), ("z", "u", "up")
 ALIASES: dict[str, tuple[str, ...]] = {
@@ -141,7 +139,7 @@ def column_factor(target: str, unit: str, where: str, options: ImportOptions) ->
 def unit_in_metres(unit: str, where: str, subject: str, options: ImportOptions) -> float:
     """Return the metres in one unit of an array without a header; raise RecordingError if nothing names the unit.
 
-    unit : that the file tells, if any; where, what : file and variable, for the message
+    unit : that of the file, if any; where, what : file and variable, for the message
     """
     if options.unit or unit in LENGTH_UNITS or unit in PIXEL_UNITS:
         return column_factor("x", options.unit or unit, where, options)
@@ -170,8 +168,8 @@ def px4_options(where: str, columns: Sequence[str], options: ImportOptions) -> t
     if is_px4_log(columns):
         unit = options.time_unit or ("" if names["timestamp"] else "us")
         found = replace(options, axes=options.axes or "ned", time_unit=unit, unit=options.unit or "m")
-        told = "x is north, y east, z down (otherwise --axes enu), times in us, lengths in m"
-        return found, [f"{where}: fields of PX4's vehicle_local_position: {told}"] if not options.axes else []
+        meaning = "x is north, y east, z down (otherwise --axes enu), times in us, lengths in m"
+        return found, [f"{where}: fields of PX4's vehicle_local_position: {meaning}"] if not options.axes else []
     if micro and not options.axes:
         raise RecordingError(
             f"{where}: timestamp in us, x, y, z, vx, vy, vz are fields of PX4, whose x is north and z down: "
@@ -230,8 +228,8 @@ def parse_expression(text: str, target: str) -> ast.expr:
         raise RecordingError(f"--map {target}:=...: has {len(text)} characters, more than {LONGEST}")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, MemoryError, RecursionError) as fault:
-        raise RecordingError(f"--map {target}:={text}: cannot be read; it may hold {ALLOWED}") from fault
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        raise RecordingError(f"--map {target}:={text}: cannot be read; it may hold {ALLOWED}") from error
     for node in ast.walk(tree):
         number = isinstance(node, ast.Constant) and type(node.value) in (int, float, str)
         sign = isinstance(node, (ast.UnaryOp, ast.USub, ast.UAdd))
@@ -326,24 +324,24 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
     twice = [name for i, name in enumerate(columns) if name in columns[:i]]
     if twice:
         raise RecordingError(f"{where}: column {twice[0]} appears twice; rename one of them")
-    faults: list[str] = []
+    errors: list[str] = []
     options, notes = px4_options(where, columns, options)
     found = ColumnLayout(where, notes=notes)
     other = [column for column in columns if _commands_no_velocity(column)]
-    with collect_errors(faults):
+    with collect_errors(errors):
         _mapped(found, columns, options)
-    with collect_errors(faults):
+    with collect_errors(errors):
         _recognised(found, [column for column in columns if column not in other], options)
     if other:
         found.notes.append(f"{where}: {', '.join(other)}: no commanded velocity: left out")
     # Missing targets are only reported if all columns could be read: they may be the unreadable
     # ones.
-    whole = not faults
-    _frames(found, options, faults)
+    whole = not errors
+    _frames(found, options, errors)
     if whole:
-        _complete(found, columns, faults)
-    if faults:
-        raise RecordingError("\n".join(faults))
+        _complete(found, columns, errors)
+    if errors:
+        raise RecordingError("\n".join(errors))
     found.ground = bool(options.axes) or split_header(found.user_labels.get("x", ""))[0] in EAST_HEADERS
     _ned(found, options)
     for name in extra_columns(columns, options):
@@ -357,12 +355,12 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
 
 def _commands_no_velocity(column: str) -> bool:
     """Return True if a column is a commanded heading or acceleration."""
-    told = header_meaning(column)
-    return told is not None and told.target in COMMAND_TARGETS and told.unit in OTHER_COMMAND_UNITS
+    meaning = header_meaning(column)
+    return meaning is not None and meaning.target in COMMAND_TARGETS and meaning.unit in OTHER_COMMAND_UNITS
 
 
 def _mapped(found: ColumnLayout, columns: Sequence[str], options: ImportOptions) -> None:
-    faults = []
+    errors = []
     for target, text in options.map.items():
         try:
             if target not in TARGETS:
@@ -378,63 +376,67 @@ def _mapped(found: ColumnLayout, columns: Sequence[str], options: ImportOptions)
                     raise RecordingError(f"--map id:={text}: give one column, or file")
                 continue
             one = single_column(tree)
-            told = header_meaning(one) if one else None
-            unit = told.unit if told is not None and told.target == target else (split_header(one)[1] if one else "")
+            meaning = header_meaning(one) if one else None
+            unit = (
+                meaning.unit
+                if meaning is not None and meaning.target == target
+                else (split_header(one)[1] if one else "")
+            )
             found.expressions[target], found.user_labels[target] = tree, text.strip()
             alone = bool(one)
             found.factors[target] = column_factor(target, unit, found.where, options) if alone else 1.0
-            if target == "alt" and told is not None:
-                found.datum = told.datum
-        except RecordingError as fault:
-            faults.append(str(fault))
-    if faults:
-        raise RecordingError("\n".join(faults))
+            if target == "alt" and meaning is not None:
+                found.datum = meaning.datum
+        except RecordingError as error:
+            errors.append(str(error))
+    if errors:
+        raise RecordingError("\n".join(errors))
 
 
 def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOptions) -> None:
-    faults, unsaid = [], []
+    errors, unsaid = [], []
     for column in columns:
-        told = header_meaning(column)
-        if told is None or told.target in found.expressions:
+        meaning = header_meaning(column)
+        if meaning is None or meaning.target in found.expressions:
             continue
-        if told.target == "id":
+        if meaning.target == "id":
             if not found.id and options.map.get("id", "").strip() != "file":
                 found.id = column
             continue
-        if told.target in options.map:
+        if meaning.target in options.map:
             continue
         try:
-            scale = column_factor(told.target, told.unit, f"{found.where}: column {column}", options)
-        except RecordingError as fault:
-            faults.append(str(fault))
+            scale = column_factor(meaning.target, meaning.unit, f"{found.where}: column {column}", options)
+        except RecordingError as error:
+            errors.append(str(error))
             continue
-        found.expressions[told.target] = parse_expression(repr(column), told.target)
-        found.factors[told.target] = told.sign * scale
-        found.user_labels[told.target] = column
-        found.datum = told.datum or found.datum
-        if told.target in POSITION_TARGETS and not told.unit and not options.unit:
+        found.expressions[meaning.target] = parse_expression(repr(column), meaning.target)
+        found.factors[meaning.target] = meaning.sign * scale
+        found.user_labels[meaning.target] = column
+        found.datum = meaning.datum or found.datum
+        if meaning.target in POSITION_TARGETS and not meaning.unit and not options.unit:
             unsaid.append(column)
     if {"lat", "lon", "alt", "z"} <= set(found.expressions) and "z" not in options.map and "x" not in found.expressions:
         unsaid = [
             column for column in unsaid if column != found.user_labels["z"]
         ]  # such as U, used, of ArduPilot's GPS
         _drop(found, "z")
-    if faults:
-        raise RecordingError("\n".join(faults))
+    if errors:
+        raise RecordingError("\n".join(errors))
     # Lengths without a unit are metres in logs of robots, but pixels in files of trackers and
     # cameras: there they are refused.
     if unsaid:
-        tells = [f"{c} comes from a tracker" for c in columns if split_header(c)[0] in OF_A_TRACKER]
+        hints = [f"{c} comes from a tracker" for c in columns if split_header(c)[0] in OF_A_TRACKER]
         if "t" not in found.expressions and "frame" in found.expressions:
-            tells.append(f"{found.user_labels['frame']} comes from a camera")
-        if tells:
-            raise RecordingError(f"{found.where}: column {unsaid[0]} has no unit, and {tells[0]}; {UNIT_HINT}")
+            hints.append(f"{found.user_labels['frame']} comes from a camera")
+        if hints:
+            raise RecordingError(f"{found.where}: column {unsaid[0]} has no unit, and {hints[0]}; {UNIT_HINT}")
         found.notes.append(
             f"{found.where}: {', '.join(unsaid)} without a unit: taken as m; if not, write for instance --unit mm"
         )
 
 
-def _frames(found: ColumnLayout, options: ImportOptions, faults: list[str]) -> None:
+def _frames(found: ColumnLayout, options: ImportOptions, errors: list[str]) -> None:
     """Use frame numbers as time where there is no other time."""
     counted = options.time_unit == "frames" and "t" in found.expressions
     if "t" not in found.expressions and "frame" in found.expressions:
@@ -442,7 +444,7 @@ def _frames(found: ColumnLayout, options: ImportOptions, faults: list[str]) -> N
         counted = True
     if counted:
         if options.fps is None:
-            faults.append(
+            errors.append(
                 f"{found.where}: column {found.user_labels['t']} counts frames; say how many a second: --fps 25"
             )
         else:
@@ -450,19 +452,19 @@ def _frames(found: ColumnLayout, options: ImportOptions, faults: list[str]) -> N
     _drop(found, "frame")
 
 
-def _complete(found: ColumnLayout, columns: Sequence[str], faults: list[str]) -> None:
+def _complete(found: ColumnLayout, columns: Sequence[str], errors: list[str]) -> None:
     shown = ", ".join(list(columns)[:12]) + (", ..." if len(columns) > 12 else "")
     if "t" not in found.expressions and "utc" not in found.expressions:
-        faults.append(f"{found.where}: no column of times among {shown}; write for instance --map t:=COLUMN")
+        errors.append(f"{found.where}: no column of times among {shown}; write for instance --map t:=COLUMN")
     local = all(name in found.expressions for name in POSITION_TARGETS[:2])
     geodetic = all(name in found.expressions for name in ("lat", "lon"))
     if not (local or geodetic):
-        faults.append(f"{found.where}: no position among {shown}; write for instance --map x:=COLUMN --map y:=COLUMN")
+        errors.append(f"{found.where}: no position among {shown}; write for instance --map x:=COLUMN --map y:=COLUMN")
     for part in (VELOCITY_TARGETS, COMMAND_TARGETS):
         if sum(name in found.expressions for name in part[:2]) == 1:
             there = next(name for name in part[:2] if name in found.expressions)
             lacks = next(name for name in part[:2] if name not in found.expressions)
-            faults.append(
+            errors.append(
                 f"{found.where}: has {there} ({found.user_labels[there]}) but no {lacks}; --map {lacks}:=COLUMN"
             )
 

@@ -119,20 +119,20 @@ class ImportReport:
     """Errors and notes of an import, collected to be reported together."""
 
     accepted_kinds: frozenset[str] = frozenset()
-    faults: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def fault(self, line: str, kind: str = "") -> bool:
+    def add_error(self, line: str, kind: str = "") -> bool:
         """Add an error; one of a kind that the user accepts becomes a note. Return True if it was accepted."""
         if kind in self.accepted_kinds:
             self.notes.append(f"accepted ({kind}): {line}")
             return True
         kept = "the first of each" if kind == "duplicates" else "it so"
         way = f"; or keep {kept}: --accept {kind}" if kind else ""
-        self.faults.append(line + way)
+        self.errors.append(line + way)
         return False
 
     def raise_errors(self) -> None:
-        """Raise a RecordingError with all faults, if there are any."""
-        if self.faults:
-            raise RecordingError("\n".join(dict.fromkeys(self.faults)))
+        """Raise a RecordingError with all errors, if there are any."""
+        if self.errors:
+            raise RecordingError("\n".join(dict.fromkeys(self.errors)))

@@ -109,8 +109,8 @@ def _tell(findings: ImportReport, source: str, lacking: MissingRows, what: str) 
         rows = np.concatenate([rows for rows, _ in parts])
         if len(rows):
             endless = sum(count for _, count in parts)
-            told = f" ({endless} of them inf)" if endless else ""
-            line = f"{len(rows)} rows {what}{told}, first row {rows.min()}"
+            infinite = f" ({endless} of them inf)" if endless else ""
+            line = f"{len(rows)} rows {what}{infinite}, first row {rows.min()}"
             lines.setdefault((rows.tobytes(), line), []).append(column)
     for (_, line), columns in lines.items():
         named = f"column {', '.join(columns)}: " if any(columns) else ""
@@ -138,7 +138,7 @@ def check_times(tracks: list[ImportedTrack], findings: ImportReport) -> None:
         _repeated(source, own, findings)
         wrong = [line for line in map(_wrong_step, own) if line]
         if wrong:
-            findings.fault(wrong[0], "time")
+            findings.add_error(wrong[0], "time")
         else:
             findings.notes += [line for line in map(_unsaid_step, own) if line][:1]
 
@@ -203,7 +203,7 @@ def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> 
         # Mostly at different places: two individuals share an id. Otherwise the logger repeated
         # rows.
         if len(other) > 0.5 * len(same):
-            findings.fault(
+            findings.add_error(
                 f"{source}: column {track.label('t')}: {track.name} is at two places at once, first row "
                 f"{track.rows[same[other[0]] + 1]} ({apart[other[0]]:.3g} m apart): two individuals under one id; "
                 "map another column: --map id:=COLUMN",
@@ -215,7 +215,7 @@ def _repeated(source: str, own: list[ImportedTrack], findings: ImportReport) -> 
     if again:
         who = again[0][0].name if len(again) == 1 else f"{len(again)} individuals"
         count, first = sum(len(rows) for _, rows in again), min(int(rows[0]) for _, rows in again)
-        findings.fault(
+        findings.add_error(
             f"{source}: column {again[0][0].label('t')}: {count} rows of {who} repeat a time, first row {first}; "
             "remove the duplicates",
             "duplicates",
@@ -227,7 +227,7 @@ def check_names(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     known: dict[str, ImportedTrack] = {}
     for track in tracks:
         if track.name in known:
-            findings.fault(
+            findings.add_error(
                 f"{track.source}: {track.name} is also in {known[track.name].source}; write --map id:=file, or rename"
             )
         known.setdefault(track.name, track)
@@ -249,7 +249,7 @@ def check_columns(tracks: list[ImportedTrack], findings: ImportReport) -> None:
                 line = f"{where} holds no height: read as in a plane"
                 findings.notes += [line] if line not in findings.notes else []
             elif not known.any():
-                findings.fault(
+                findings.add_error(
                     f"{where} holds no height of {track.name}, but of others; leave it out, "
                     f'or put all at one height: --map "{name}:=0"'
                 )
@@ -265,8 +265,8 @@ def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport
     """Rule 4: require that all heights are above the same level; z points up, if `axes` (enu, ned) are the file's."""
     levels = {track.datum: track for track in tracks if "z" in track.columns or "alt" in track.columns}
     if len(levels) > 1:
-        told = ", ".join(f"{t.name}: {level or 'not said'}" for level, t in levels.items())
-        findings.fault(f"heights are above different levels ({told}); convert them to one", "height")
+        remedy = ", ".join(f"{t.name}: {level or 'not said'}" for level, t in levels.items())
+        findings.add_error(f"heights are above different levels ({remedy}); convert them to one", "height")
     for source, own in tracks_by_source(tracks).items():
         heights = [(track, track.columns["z"]) for track in own if "z" in track.columns]
         rows = sum(len(z) for _, z in heights)
@@ -278,11 +278,11 @@ def check_heights(tracks: list[ImportedTrack], axes: str, findings: ImportReport
         name = track.label("z")
         turn = f'--map "z:=-{quote_column(name)}"'
         if axes == "ned":
-            told = f"it points up, where --axes ned has it down; leave --axes ned out, or add {turn} if x is north"
+            remedy = f"it points up, where --axes ned has it down; leave --axes ned out, or add {turn} if x is north"
         else:
-            told = f"it points down; write {turn}, or --axes ned if x is north"
-        findings.fault(
-            f"{source}: column {name}: z of {track.name} lies below -1 m, first row {track.rows[low[0]]}: {told}",
+            remedy = f"it points down; write {turn}, or --axes ned if x is north"
+        findings.add_error(
+            f"{source}: column {name}: z of {track.name} lies below -1 m, first row {track.rows[low[0]]}: {remedy}",
             "down",
         )
         return
@@ -318,7 +318,7 @@ def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
             continue
         track, share = own[rare[0]], shares[rare[0]]
         more = f", {len(rare) - 1} more for less than {LEAST:.0%}" if len(rare) > 1 else ""
-        findings.fault(
+        findings.add_error(
             f"{source}: {track.name} is there for {share:.0%} of {last - first:.4g} s "
             f"(from {track.time[0]:.4g} to {track.time[-1]:.4g} s){more}; leave it out, or cut with --begin and --end",
             "absent",
@@ -413,15 +413,15 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
         return
     likeness = _likeness(moved, summed)
     lively, r, slopes = likeness
-    swapped = _swap_fault(source, track, likeness)
+    swapped = _swap_error(source, track, likeness)
     if swapped:
-        findings.fault(swapped, "axes")
+        findings.add_error(swapped, "axes")
         return
     axes = range(len(slopes))
     turned = [i for i in axes if lively[i] and r[i, i] < -0.5]
     for i in turned:
         speed = track.label(VELOCITY_TARGETS[i])
-        findings.fault(
+        findings.add_error(
             f"{source}: column {track.label(POSITION_TARGETS[i])}, "
             f"row {track.rows[0]} on: {POSITION_TARGETS[i]} grows where "
             f"{speed} is negative (slope {slopes[i]:.2f}): one of them points the other way; "
@@ -433,14 +433,14 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
     wrong = [i for i in wrong if abs(r[i, i]) > 0.5]
     if wrong:
         columns, slope = ", ".join(track.label(POSITION_TARGETS[i]) for i in wrong), float(np.median(slopes[wrong]))
-        findings.fault(
+        findings.add_error(
             f"{source}: column {columns}, row {track.rows[0]} on: positions change {slope:.3g} times as fast "
             f"as the velocities say: {_scale_reason(track, slope)}",
             "axes",
         )
 
 
-def _swap_fault(source: str, track: ImportedTrack, likeness: AxisCorrelation) -> str:
+def _swap_error(source: str, track: ImportedTrack, likeness: AxisCorrelation) -> str:
     """Return the error of the first axis of positions that goes with another axis of velocities; empty if there is
     none.
     """
@@ -468,8 +468,8 @@ def _scale_reason(track: ImportedTrack, slope: float) -> str:
 def _unswapped(track: ImportedTrack, i: int, j: int) -> str:
     """Return the remedy where axis i of the positions is axis j of the velocities."""
     own = [quote_column(track.label(POSITION_TARGETS[k])) for k in (i, j)]
-    told = [header_meaning(track.label(POSITION_TARGETS[k])) for k in (i, j)]
-    if [None if one is None else one.target for one in told] == [
+    meanings = [header_meaning(track.label(POSITION_TARGETS[k])) for k in (i, j)]
+    if [None if one is None else one.target for one in meanings] == [
         POSITION_TARGETS[j],
         POSITION_TARGETS[i],
     ]:  # they have been exchanged already, by --axes or --map
@@ -501,7 +501,7 @@ def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
     next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
     # Every second row is near, the next one far: two individuals alternate.
     if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
-        findings.fault(
+        findings.add_error(
             f"{track.source}: {track.name} jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on: "
             "two individuals under one id? Map another column: --map id:=COLUMN",
             "jumps",
@@ -513,7 +513,7 @@ def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
     jumps = np.flatnonzero((size > limit) & ~known)
     if len(jumps) > max(20, 0.05 * len(size)):
         row = int(track.rows[jumps[0] + 1])
-        findings.fault(
+        findings.add_error(
             f"{track.source}: {track.name} jumps {len(jumps)} times, first row {row}: two individuals under one id? "
             "Map another column: --map id:=COLUMN",
             "jumps",
@@ -525,7 +525,7 @@ def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
     resets = [int(k) for k in jumps if k not in away and k not in back]
     if resets:
         k = resets[0]
-        findings.fault(
+        findings.add_error(
             f"{track.source}: column {track.label('x')}, row {track.rows[k + 1]}: {track.name} jumps {size[k]:.3g} m "
             f"more than its velocity explains ({len(resets)} times): a reset of the estimator; cut before or "
             "after it with --end or --begin; if accepted, the track is split there",

@@ -17,7 +17,7 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     width     : of a bin of distances, m: about a tenth of the group
     farthest  : m; by default the largest distance that occurs
-    nan where nobody differs from the mean, to the precision of a recording: of all who move alike nothing fluctuates.
+    nan where nobody differs from the mean, to the precision of a recording: a group in unison has no fluctuations.
     Cavagna et al., PNAS 107, 11865 (2010), with the mean velocity of those present taken off at each instant.
 
     Raises RecordingError for what is no recording of one keypoint, and ParameterError for a `width` that is not above
@@ -51,8 +51,8 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
         i, j = np.triu_indices(u.shape[1], 1)
         apart = np.linalg.norm(dataset.nearest_image(x[:, j] - x[:, i], found.box), axis=0)
         bins = np.floor(apart / width).astype(int)
-        alike = (u[:, i] * u[:, j]).sum(axis=0)
-        number, total = np.bincount(bins), np.bincount(bins, alike)
+        products = (u[:, i] * u[:, j]).sum(axis=0)
+        number, total = np.bincount(bins), np.bincount(bins, products)
         for b in np.flatnonzero(number):
             entry = sums.setdefault(int(b), [0.0, 0.0])
             entry[0] += total[b]

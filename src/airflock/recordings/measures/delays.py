@@ -9,7 +9,7 @@ from airflock.support import ParameterError
 
 # Of equal delays the shortest counts. Two that fly straight had "led" by the longest delay, through
 # rounding.
-ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordings have single precision
+ROUNDING = 1e-6  # correlations nearer than this are the same: headings of recordings have single precision
 
 
 def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: float = 0.0) -> xr.DataArray:
@@ -91,13 +91,13 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
                 continue
             # Correlations within rounding are equal; among these the shortest delay is the simplest
             # explanation.
-            top = np.flatnonzero(course >= np.nanmax(course) - ALIKE)
+            top = np.flatnonzero(course >= np.nanmax(course) - ROUNDING)
             k = int(top[np.abs(shifts[top]).argmin()])
             if course[k] >= least:
                 best[i, j] = float(shifts[k]), float(course[k])
                 best[j, i] = 0.0 - float(shifts[k]), float(course[k])
     names = table["leader"].values
     rows = [(names[i], names[j], *best[i, j]) for i, j in sorted(best)]
-    told = pd.DataFrame(rows, columns=["leader", "follower", "delay", "correlation"])
-    told.attrs["units"] = {"delay": "s", "correlation": "1"}
-    return told
+    pairs = pd.DataFrame(rows, columns=["leader", "follower", "delay", "correlation"])
+    pairs.attrs["units"] = {"delay": "s", "correlation": "1"}
+    return pairs

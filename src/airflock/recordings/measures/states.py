@@ -72,9 +72,9 @@ def track_arrays(recording: xr.Dataset, keypoint: str | None = None) -> TrackArr
 
 def check_numbers(**values: Any) -> None:
     """Refuse values that are not numbers, all at once. Raise ParameterError."""
-    faults = [f"{name} = {value!r} is not a number" for name, value in values.items() if not is_number(value)]
-    if faults:
-        raise ParameterError("\n".join(faults))
+    errors = [f"{name} = {value!r} is not a number" for name, value in values.items() if not is_number(value)]
+    if errors:
+        raise ParameterError("\n".join(errors))
 
 
 def headings(velocity: Array, slowest: float = 0.0) -> Array:
