@@ -383,7 +383,7 @@ def check_certificate(
 
     path    : of certificate.toml; threads : of the flights, all processors by default
     trust   : whether a law in a Python file that the scenario names may run
-    done    : called after each flight
+    on_done : called after each flight
 
     Raises StudyError where the file is no certificate, of another format, version or scenario than it says; and an
     AirflockError where it cannot be read.
@@ -391,10 +391,10 @@ def check_certificate(
     Examples
     --------
     >>> import airflock
-    >>> from airflock.certificates.certificate import check
+    >>> from airflock.certificates.certificate import check_certificate
     >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
     >>> path = airflock.certify(short, "n_coll<1 at 90%", flights=100).save("certificate.toml")
-    >>> check(path).same
+    >>> check_certificate(path).same
     True
     """
     with as_error(path, StudyError):
