@@ -1,4 +1,4 @@
-"""Campaign: what is to be shown about a scenario and how; everything that decides the result, but not the time."""
+"""Campaign: limits to show for a scenario, and everything else that decides the result; also its seeds and flights."""
 
 import hashlib
 import json
@@ -51,7 +51,7 @@ class Campaign:
 
     @cached_property
     def hash(self) -> str:
-        """Identity of the scenario, which fixes the seeds."""
+        """Identity of the scenario; it fixes the seeds."""
         return scenario_identity(self.scenario)
 
     @cached_property
@@ -61,7 +61,7 @@ class Campaign:
 
     @property
     def alpha(self) -> float:
-        """What may go wrong for one limit: the limits share it."""
+        """Error probability of one limit: the limits share 1 - confidence equally."""
         return (1.0 - self.confidence) / len(self.limits)
 
     @property
@@ -134,7 +134,7 @@ def campaign_from_request(
     precision: int = 32,
     device: str = "cpu",
 ) -> Campaign:
-    """The campaign that is asked for. Raises ScenarioError, all faults together."""
+    """Make the campaign of a request. Raises ScenarioError with all errors together."""
     asked = ErrorCollector()
     limits = asked.read(parse_limits, [limit] if isinstance(limit, str) else list(limit), scenario)
     asked.read(check_confidence, confidence)
@@ -269,7 +269,7 @@ def _of_faults(scenario: Scenario) -> EnvironmentNumbers:
 
 
 def _read(scenario: Scenario, key: str) -> bool:
-    """Whether flights read a number once it is above zero."""
+    """Return True if flights read a number once it is above zero."""
     section, _, name = key.partition(".")
     if section == "wind" and scenario.wind.kind == "dryden":
         return False
@@ -350,7 +350,7 @@ def event_details(
 
 
 class CampaignTask(ScenarioTask):
-    """What a worker of a dask scheduler is sent: the scenario as text, the limits, and how to measure."""
+    """Task of a dask worker: the scenario as text, the limits, and how to measure."""
 
     def __init__(self, scenario: Scenario, limits: Sequence[EventLimit], precision: int):
         """Raises StudyError for a law that exists only in this process."""

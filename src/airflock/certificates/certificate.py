@@ -76,7 +76,7 @@ NOT_SAID = (
 
 @dataclass(frozen=True)
 class Certificate:
-    """What counting showed.
+    """Certificate: results of counting, splitting and tolerances of a campaign.
 
     verdicts  : one for each limit; hazards: whether events came evenly, by limit, where that can be asked
     rows      : scores of all flights that were counted, in the order of their seeds
@@ -101,7 +101,7 @@ class Certificate:
 
     @property
     def shown(self) -> bool:
-        """Whether all limits are shown."""
+        """True if all limits are shown."""
         return all(verdict.shown for verdict in self.verdicts)
 
     @property
@@ -211,7 +211,7 @@ class Certificate:
 
     @property
     def disclaimers(self) -> list[str]:
-        """What it does not say."""
+        """Sentences on what the certificate does not show."""
         return campaign_disclaimers(self.campaign)
 
     def __repr__(self) -> str:
@@ -238,7 +238,7 @@ class Certificate:
 
 
 def campaign_disclaimers(campaign: Campaign) -> list[str]:
-    """What a certificate does not say, with the numbers whose intervals were flown."""
+    """Return sentences on what a certificate does not show, with the numbers whose intervals were flown."""
     if not campaign.number_intervals:
         return list(NOT_SAID)
     flown = (
@@ -352,7 +352,7 @@ def with_checksum(document: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """What a check found.
+    """Report of a check.
 
     flown : flights that were flown again; faults: what does not hold, one line each; notes: what may explain it
     """
@@ -364,7 +364,7 @@ class CheckReport:
 
     @property
     def same(self) -> bool:
-        """Whether everything agrees."""
+        """True if all flights and bounds agree."""
         return not self.faults
 
     def __repr__(self) -> str:
@@ -382,7 +382,7 @@ def check_certificate(
     """Check a certificate file.
 
     path    : of certificate.toml; threads : of the flights, all processors by default
-    trust   : whether a law in a Python file that the scenario names may run
+    trust   : True lets a law run that stands in a Python file named by the scenario
     on_done : called after each flight
 
     Raises StudyError where the file is no certificate, of another format, version or scenario than it says; and an
@@ -523,7 +523,7 @@ def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
 
 
 def _fixed(told: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: EventLimit, count: int) -> bool:
-    """Whether looks are the first of those that a limit fixes, at flights that there are, and no event is undone."""
+    """Return True if looks are the first of a limit's schedule, within the flights, with events that never decrease."""
     known = list(islice(looks_due(campaign, limit), len(told)))
     sizes = [(flights, above, below) for flights, _, above, below in told]
     same = len(known) == len(told) and all(

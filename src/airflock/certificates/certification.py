@@ -213,7 +213,7 @@ def run_campaign(
 
 
 def event_timings(campaign: Campaign, counted: CountResult) -> dict[int, EventTiming]:
-    """Whether events came evenly over a flight, for each limit whose event has a moment."""
+    """Return the timing of events over a flight for each limit whose event has a moment."""
     found = {}
     timed = [i for i, limit in enumerate(campaign.limits) if limit.is_timed]
     for place, i in enumerate(timed):
@@ -238,7 +238,7 @@ def flight_folder(folder: str | os.PathLike[str] | None) -> Iterator[Path]:
 def campaign_executor(
     campaign: Campaign, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
 ) -> Executor:
-    """Who flies: this process, or the workers of a dask scheduler."""
+    """Make the executor of a campaign: threads of this process, or the workers of a dask scheduler."""
     if scheduler is not None:
         task = CampaignTask(campaign.scenario, campaign.limits, campaign.bits)
         return DaskCluster([task], scheduler, timeout=timeout)

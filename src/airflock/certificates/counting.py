@@ -28,7 +28,7 @@ class CampaignFlyer:
     note: Callable[[str], None] | None = None
 
     def with_budget(self, budget: float) -> "CampaignFlyer":
-        """The same, with so much time from now on, s."""
+        """Return a copy with a new time budget (s) from now on."""
         return replace(self, until=time.monotonic() + budget)
 
     @property
@@ -38,7 +38,7 @@ class CampaignFlyer:
 
     @property
     def is_time_over(self) -> bool:
-        """Whether the budget is spent."""
+        """True if the budget is spent."""
         return self.left < 0.0
 
     def fly(self, batch: CandidateBatch, tasks: Sequence[Flight]) -> Iterator[FlightResult]:
@@ -61,7 +61,7 @@ MARGIN = 1.5  # a limit is given up beforehand only if it needs so many times th
 
 @dataclass
 class LimitVerdict:
-    """What counting says of one limit.
+    """Verdict of counting on one limit.
 
     probability : the limit per flight; None: it is only to be bounded
     looks    : in their order; all their bounds hold together
@@ -87,12 +87,12 @@ class LimitVerdict:
 
     @property
     def shown(self) -> bool:
-        """Whether the limit is shown; without a rate, whether it has been bounded."""
+        """True if the limit is shown; without a rate, if the event has been bounded."""
         return self.high < 1.0 if self.probability is None else self.high <= self.probability
 
     @property
     def is_refuted(self) -> bool:
-        """Whether the opposite is shown: the event happens more often."""
+        """True if the opposite is shown: the event happens more often than the limit allows."""
         return self.probability is not None and not self.shown and self.low > self.probability
 
     @property
@@ -218,7 +218,7 @@ class _Counting:
 
 
 def _open(campaign: Campaign, verdict: LimitVerdict) -> bool:
-    """Whether further flights could decide."""
+    """Return True if further flights could decide."""
     if campaign.flights:
         return not verdict.looks
     return not verdict.shown and not verdict.is_refuted

@@ -49,7 +49,7 @@ class EventLimit:
         return f"{self.score}{self.sign}{self.value:g}"
 
     def has_happened(self, scores: Mapping[str, Any]) -> bool:
-        """Whether the event happened in a flight; a score that is nan counts as one."""
+        """Return True if the event happened in a flight; nan counts as an event."""
         found = scores.get(self.score)
         if self.score == "r_min" and scores.get("closest") is not None:
             found = scores["closest"]
@@ -117,7 +117,7 @@ def parse_limit(text: str, scenario: Scenario) -> EventLimit:
 
 
 def _lasting(scenario: Scenario, score: str, sign: str, value: float) -> bool:
-    """Whether an event stays true once it has happened: of a minimum, a maximum, or a count that only grows."""
+    """Return True if an event stays true once it has happened: of a minimum, a maximum, or a growing count."""
     if score == "phi_wall":  # mean over those outside: above 0 from the first moment on
         return sign == ">" and value == 0.0
     for metric in scenario.order_parameters:
@@ -157,26 +157,28 @@ def parse_limits(texts: list[str], scenario: Scenario) -> tuple[EventLimit, ...]
 
 
 EARLY = 16  # flights at the first look that could refute
+# Sizes fixed in advance, look k pays alpha / (k (k + 1)): all bounds hold together, whatever the reason to stop. The
+# price is 23 % more flights at 95 % than for one fixed look.
 GROWTH = 1.5  # ratio of two sizes: a limit is shown after at most so many times the flights that would do
 
 
 def lower_bound(events: int, flights: int, confidence: float) -> float:
-    """Smallest probability of an event per flight that so many events allow (Clopper and Pearson 1934, one-sided)."""
+    """Return the one-sided lower bound on the probability of an event per flight (Clopper and Pearson 1934)."""
     return 1.0 - upper_probability_bound(flights - events, flights, confidence)
 
 
 def alpha_share(look: int) -> float:
-    """Share of alpha that look 1, 2, 3, ... pays; all of them sum up to 1."""
+    """Return the share of alpha that look 1, 2, 3, ... pays; all shares sum up to 1."""
     return 1.0 / (look * (look + 1.0))
 
 
 def flights_needed(limit: float, alpha: float) -> int:
-    """Flights without any event after which the bound lies below a limit per flight."""
+    """Return the number of flights without any event after which the bound lies below a limit per flight."""
     return max(1, math.ceil(math.log(alpha) / math.log1p(-limit)))
 
 
 def look_schedule(limit: float, alpha: float) -> Iterator[tuple[int, float, float]]:
-    """Looks in their order: flights, and the alpha of the upper bound (0: not looked at) and of the lower one."""
+    """Yield looks in their order: flights, alpha of the upper bound (0: not used), alpha of the lower bound."""
     shows, turn, size = flights_needed(limit, alpha * alpha_share(1)), 0, float(EARLY)
     while math.ceil(size) < shows:
         turn += 1
@@ -203,7 +205,7 @@ class InterimLook:
 
 
 def take_look(flights: int, events: int, upper_alpha: float, lower_alpha: float) -> InterimLook:
-    """Both bounds, the upper one with confidence 1 - above, the lower one with 1 - below."""
+    """Return both bounds: the upper one with confidence 1 - upper_alpha, the lower one with 1 - lower_alpha."""
     low = lower_bound(events, flights, 1.0 - lower_alpha) if lower_alpha > 0.0 else 0.0
     high = upper_probability_bound(events, flights, 1.0 - upper_alpha) if upper_alpha > 0.0 else 1.0
     return InterimLook(flights, events, upper_alpha, lower_alpha, low, high)

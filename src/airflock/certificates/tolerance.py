@@ -67,7 +67,7 @@ def screening_level(campaign: Campaign) -> float:
 
 
 class ValueScreen:
-    """Judges one value at a time against a level per flight, on seeds that all values share.
+    """Screen that judges one value at a time against a level per flight, on seeds that all values share.
 
     end : moment of `time.monotonic` at which the time for all values is spent, s
     """
@@ -144,7 +144,7 @@ class ValueTrials:
         self.flights, self.verdict = 0, ""
 
     def safe(self, value: float) -> bool | None:
-        """Whether a value is safe; None where time was over before that was known."""
+        """Return True if a value is safe, None if time ended before that was known."""
         parameters = {self._key: value}
         batch = value_batch("tolerance", parameters)
         self._screen.flyer.store.ask(batch, [[value]], [parameters])
@@ -157,6 +157,7 @@ class ValueTrials:
 
 def _axis(screen: ValueScreen, key: str, how: Quantity, nominal: float) -> dict[str, Any]:
     """Move one number until it is no longer safe, then halve the way between."""
+    # Doubling brackets the first unsafe value in few trials. Bisection is geometric: tolerances are factors.
     first = nominal or FIRST_VALUE[key]
     last, end = first * REACH ** worse_direction(key), ""
     trials, safe, bad = ValueTrials(screen, key, compiles=not nominal), nominal, math.nan
@@ -186,7 +187,7 @@ def _axis(screen: ValueScreen, key: str, how: Quantity, nominal: float) -> dict[
 
 
 def _kind(campaign: Campaign, key: str) -> str:
-    """The kind of a fault whose number this is."""
+    """Return the kind of the fault to which a number belongs; else empty."""
     place = key.removeprefix("faults[").partition("]")[0]
     return campaign.scenario.faults[int(place)].fault.name if place.isdecimal() else ""
 

@@ -56,9 +56,10 @@ class DaskCluster:
     ):
         """Connect.
 
-        tasks   : what is run on a worker, by the place of a flight
-        timeout : s that one flight may take; answer : s to wait for the scheduler
-        kept    : whether what has landed is stored, so that it can be gone on with
+        tasks           : called on a worker, by the place of a flight
+        timeout         : s that one flight may take
+        connect_timeout : s to wait for the scheduler
+        is_stored       : True if landed flights are stored, so that the run can be resumed
 
         Raises StudyError if nobody answers at the address, or nobody works there.
         """
@@ -90,6 +91,7 @@ class DaskCluster:
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield each flight as soon as it is over; hand out only so many at a time."""
+        # With a time limit one flight per thread: waiting in a worker's queue must not count as flying.
         from distributed import wait
 
         waiting = list(reversed(flights))
@@ -138,7 +140,7 @@ class DaskCluster:
     def _landed(
         self, future: Any, flight: Flight, began: float, tries: dict[tuple[int, int], int]
     ) -> FlightResult | None:
-        """The outcome of a task that is over; None if it has to fly again."""
+        """Return the result of a task that is over; None if it has to fly again."""
         key = (flight.candidate_index, flight.repeat)
         if future.status == "finished":
             values, reason, duration, worker = future.result()
@@ -181,7 +183,7 @@ class DaskCluster:
 
 
 class ScenarioTask:
-    """What a worker is sent to fly one scenario: small, and picklable wherever the worker's code comes from."""
+    """Task by which a worker flies one scenario: small, and picklable wherever the code of its law stands."""
 
     def __init__(self, scenario: Scenario, precision: int):
         """The scenario as JSON text; raises StudyError for one whose code exists only in this process."""
@@ -202,7 +204,7 @@ class ScenarioTask:
         return landed.values, landed.reason, landed.duration, landed.worker
 
     def flown(self, scenario: Scenario) -> Scenario:
-        """The scenario whose driver flies."""
+        """Return the scenario whose driver flies."""
         return scenario
 
     def score_function(self, scenario: Scenario) -> ScoreFunction:

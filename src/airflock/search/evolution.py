@@ -163,7 +163,7 @@ def evolve(
 
 
 def study_score(study: Study, scenario_index: int = 0) -> ScoreFunction:
-    """Parameters and a seed → order parameters, for one of the study's scenarios."""
+    """Return the function from parameters and a seed to order parameters, for one scenario of the study."""
     from airflock.engine import score_flight
 
     precision = int(study.search.precision)
@@ -175,7 +175,7 @@ def study_score(study: Study, scenario_index: int = 0) -> ScoreFunction:
 
 
 def resolve_device(study: Study, device: str) -> Study:
-    """The study for a device: cpu, cuda, or what auto picks for a generation of it. A missing one is one line."""
+    """Return the study for a device: cpu, cuda, or the choice of auto for one generation. Raises if it is missing."""
     check_study_device(device)
     if device == "cpu":
         return study
@@ -188,7 +188,7 @@ def resolve_device(study: Study, device: str) -> Study:
 def study_executor(
     study: Study, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
 ) -> Executor:
-    """Who flies: this process, or the workers of a dask scheduler."""
+    """Make the executor of a study: threads of this process, or the workers of a dask scheduler."""
     if study.device != "cpu":
         return BatchExecutor(study, study.device)
     if scheduler is not None:
@@ -245,9 +245,10 @@ def evolve_request(
     folder: Path | None = None,
     **others: Any,
 ) -> tuple[Study, str]:
-    """As `study_from_request`, which takes the others; if a folder is given, what is not asked for is as that holds it.
+    """Make a study by `study_from_request`, which takes the other arguments. Values missing in a resumed one come
+    from its folder.
 
-    Also a note of what the folder gave.
+    Returns the study and a note of the values that the folder gave.
     """
 
     def ask(changes: Mapping[str, Any] | None, keys: Mapping[str, Any], limits: Any, *, quick: bool = False) -> Study:
@@ -274,7 +275,7 @@ def study_from_request(
     trust: bool = False,
     fast: bool = False,
 ) -> Study:
-    """The study that `evolve` is asked for."""
+    """Make the study of a call of `evolve` from its arguments."""
     if isinstance(what, Study):
         asked: dict[str, Any] = {"settings": settings, "space": space, "objective": objective, "fitness": fitness}
         asked |= {"limit": limit, "over_scenarios": over_scenarios, "fast": fast}
@@ -305,19 +306,19 @@ def study_from_request(
 
 
 def _text_of(code: Any) -> str:
-    """Hash of what a function does, the same in every process."""
+    """Return a hash of the code of a function; it is equal in every process."""
     constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
     return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
 
 
 def check_sensitivity_method(sensitivity: str) -> None:
-    """Refuse a method of finding sensitivities that nobody knows."""
+    """Refuse an unknown method of sensitivity analysis."""
     if sensitivity and sensitivity not in SENSITIVITY_METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(SENSITIVITY_METHODS)}")
 
 
 def check_study_device(device: str, scheduler: str | None = None) -> None:
-    """Refuse a device on which no study flies, and another one than their cpu for a scheduler's workers."""
+    """Refuse an unknown device, and any device but the CPU for workers of a scheduler."""
     check_worker_device(scheduler, device)
     if device not in ("cpu", "cuda", "auto"):
         raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
@@ -334,10 +335,11 @@ def resume_study(
     limit: Sequence[str],
     make_request: Callable[[dict[str, Any], dict[str, Any], list[str]], Study],
 ) -> tuple[Study, str]:
-    """The study as its folder holds it, and a note of what was taken from there; what is asked for anew stays so.
+    """Return the study as its folder holds it, and a note of the values taken from there. New requests win.
 
-    study : as it would be without the folder; settings, search, limit : what is asked for now
-    ask   : the study for other settings, keys of the search, and limits
+    study : as it would be without the folder
+    settings, search, limit : values that this call requests
+    make_request : makes the study for other settings, keys of the search, and limits
     """
     if not (folder / STUDY_FILE).is_file():
         return study, ""
@@ -363,7 +365,7 @@ def resume_study(
 
 
 def _changed(held: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> list[tuple[str, Any]]:
-    """Keys of a scenario that have another value in the folder, with that value."""
+    """Return the keys of a scenario whose value in the folder differs, with the value in the folder."""
     found: list[tuple[str, Any]] = []
     for key, value in held.items():
         other = now.get(key)
@@ -375,7 +377,7 @@ def _changed(held: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> l
 
 
 class ValidationReport(NamedTuple):
-    """What a valid file is, in one sentence, and notes on it for a person to read."""
+    """Summary of a valid file in one sentence, with notes for the reader."""
 
     verdict: str
     notes: tuple[str, ...]
@@ -477,7 +479,8 @@ def run_sensitivity(
         points = sample_morris.sample(problem, samples, seed=seed)
     batch = CandidateBatch(method, samples, 0)
     k = study.whole("seeds")
-    seeds = [[study.seed(3, j) for j in range(k)]] * len(points)  # common: chance must not pass for an effect
+    # Common random numbers: otherwise the chance of single flights would pass for an effect of a parameter.
+    seeds = [[study.seed(3, j) for j in range(k)]] * len(points)
     rows = Evaluator(study, store, executor, on_flight).evaluate(batch, np.asarray(points), seeds=seeds)
     values = np.array([np.nan if row[0] is None else row[0] for row in rows])
     if not np.isfinite(values).any():
@@ -526,14 +529,14 @@ class BatchExecutor:
             yield FlightResult(flight, values, "", each, self.device)
 
     def close(self) -> None:
-        """Nothing was taken."""
+        """Release nothing: this executor holds no threads."""
 
 
 class StudyTask(ScenarioTask):
     """Flies a scenario with the parameters of a candidate."""
 
     def score_function(self, scenario: Scenario) -> ScoreFunction:
-        """Parameters and seed → order parameters."""
+        """Return the function from parameters and a seed to order parameters."""
         from airflock.engine import score_flight
 
         return lambda p, seed: score_flight(with_parameters(scenario, p), seed, precision=self.precision)

@@ -1,4 +1,4 @@
-"""The search itself: generations are asked for, flown where the store does not hold them yet, and told.
+"""Generations of a search: ask the optimiser for candidates, fly those missing in the store, report their losses.
 
 A study that was ended, however roughly, is continued by running it again: the optimiser is fed with the stored flights
 from its first generation on and comes to the very state in which it was left. No state is pickled.
@@ -178,7 +178,7 @@ class FlightLength:
 
     @property
     def whole(self) -> bool:
-        """Whether flights are as long as the scenario says."""
+        """Return True if flights are as long as the scenario says."""
         return len(self.left) == 1
 
     def end_generation(self, values: Sequence[float | None]) -> None:
@@ -302,7 +302,7 @@ class ProgressTally:
     mean: float | None = None
 
     def note(self, is_new: bool) -> None:
-        """One more flight, flown now or found in the store."""
+        """Count one more flight, flown now or read from the store."""
         self.done, self.fresh = self.done + 1, self.fresh + is_new
         if self.watch:
             self.watch(
@@ -310,7 +310,7 @@ class ProgressTally:
             )
 
     def end_generation(self, values: Sequence[float | None], maximise: bool) -> None:
-        """First objective of a generation's candidates."""
+        """Update the best and the mean value from the first objective of a generation's candidates."""
         found = [value for value in values if value is not None]
         if not found:
             return
@@ -320,7 +320,7 @@ class ProgressTally:
 
 
 def total_flights(study: Study) -> int:
-    """Flights of the whole search."""
+    """Return the number of flights of the whole search."""
     runs = range(study.whole("restarts") + 1)
     each = sum(study.seeds(generation) for generation in range(study.whole("generations")))
     return sum(study.population(run) for run in runs) * each * len(study.scenarios)
@@ -329,9 +329,9 @@ def total_flights(study: Study) -> int:
 def run_search(
     study: Study, store: FlightStore, executor: Executor, on_progress: OnSearchProgress | None = None
 ) -> list[NDArray[np.float64]]:
-    """Run a study to its end, or to Ctrl-C.
+    """Run the search of a study to its end, or to Ctrl-C.
 
-    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if asked for.
+    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if requested.
     """
     tally = ProgressTally(total_flights(study), on_progress)
     evaluator = Evaluator(study, store, executor, tally.note)
@@ -345,7 +345,9 @@ def run_search(
 
 
 def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[np.float64]]:
-    """One run of the optimiser; returns its mean (axis,) after each generation of whole flights, if it has one."""
+    """Run the optimiser once; return its mean (axis,) after each generation of whole flights, if it has one."""
+    # Optimiser state is not stored: replay with the stored flights takes 4 ms a generation and notices another version
+    # of pycma, which a pickle would follow astray.
     study, store = evaluator.study, evaluator.store
     first = study.objectives[0]
     state = make_optimiser(

@@ -48,7 +48,7 @@ RESERVE = SearchSettings().reserve  # how many times rarer than allowed an event
 
 @dataclass(frozen=True)
 class Constraints:
-    """What must go on to hold in each of several scenarios; flights are one table for each of them.
+    """Constraints that each step must keep in all scenarios; flights are one table for each scenario.
 
     limits : events that may happen so rarely; cost : fitness that may be given up in all
     """
@@ -69,7 +69,7 @@ class Constraints:
     def refused(
         self, scenarios: Sequence[Scenario], before: Sequence[ScoreColumns], after: Sequence[ScoreColumns]
     ) -> str:
-        """What a step breaks, or that it costs too much, in words; empty if it may stay."""
+        """Return why a step is refused: the constraint that it breaks, or its cost; empty if it may stay."""
         for scenario, was, now in zip(scenarios, before, after, strict=True):
             if found := violation_text(was, now) or self._limit_broken(scenario, was, now):
                 return f"{found}, in {scenario.name}" if len(scenarios) > 1 else found
@@ -118,7 +118,7 @@ def violation_text(before: ScoreColumns, after: ScoreColumns) -> str:
 
 
 def has_gained(before: ScoreColumns, after: ScoreColumns) -> bool:
-    """Whether distances or clearances grew or excursions shrank, each with 95 % confidence."""
+    """Return True if distances or clearances grew or excursions shrank, each with 95 % confidence."""
     wider = mean_interval((after["r_min"] - before["r_min"]).tolist())[2] > 0.0
     if "phi_wall" not in before:
         return wider
@@ -164,12 +164,12 @@ class HardeningCandidate:
         self.first = compare_with_optimum(join_scenarios(self.optimum), join_scenarios(self.optimum), *optimum)
 
     def touches(self) -> bool:
-        """Whether what was kept so far touches walls or obstacles in some flight, or more often than a limit allows."""
+        """Return True if the kept set touches walls or obstacles in a flight, or more often than a limit allows."""
         seen = any("phi_wall" in table and float(table["phi_wall"].max()) > 0.0 for table in self.table)
         return seen or scenarios_excess(self.constraints.wall_limits, self.scenarios, self.table) > 0.0
 
     def is_short_at_walls(self) -> bool:
-        """Whether limits of walls and obstacles are farther from being kept than the others."""
+        """Return True if the limits of walls and obstacles are farther from being kept than the others."""
         walls, others = (
             scenarios_excess(limits, self.scenarios, self.table)
             for limits in (self.constraints.wall_limits, self.constraints.other_limits)
@@ -177,7 +177,7 @@ class HardeningCandidate:
         return walls > others
 
     def tried(self, step: HardeningStep) -> list[StepResult]:
-        """The step and, where it breaks something or costs too much, half of it."""
+        """Try the step and, if it breaks a constraint or costs too much, half of it."""
         found = []
         for part, name in ((1.0, step.name), (0.5, f"half of: {step.name}")):
             parameters = parameters_after_step(self.scenarios[0], self.kept[-1][1], step, part)
@@ -198,14 +198,14 @@ class HardeningCandidate:
         return found
 
     def _gained(self, table: Sequence[ScoreColumns]) -> bool:
-        """Whether a step that breaks nothing comes nearer to the limits, or gains distance or room at walls."""
+        """Return True if a step comes nearer to the limits, or gains distance or room at walls."""
         nearer = self.constraints.short(self.scenarios, table) < self.constraints.short(self.scenarios, self.table)
         return nearer or has_gained(join_scenarios(self.table), join_scenarios(table))
 
     def verify_on_fresh_seeds(self) -> StepResult:
-        """What was kept, on seeds that chose nothing; the last step is undone until everything that held holds.
+        """Fly the kept set on seeds that chose nothing; undo the last step until all constraints hold.
 
-        Seeds come in rounds, so that what breaks much is undone after the first; the optimum alone flies one round.
+        Seeds come in rounds, so that a set that breaks much is undone after the first. The optimum flies one round.
         """
         before = [self._fly(self.kept[0][1], self.fresh[0])]
         after: list[list[ScoreColumns]] = []
@@ -222,7 +222,7 @@ class HardeningCandidate:
         return replace(found, verdict=said, kept=bool(left))
 
     def beside(self) -> list[StepResult]:
-        """What measures beside the numbers of the law would gain for what was kept, where agents come too near."""
+        """Measure what programs on board would gain for the kept set, if agents come too near."""
         now, parameters = self.table or self._fly(self.kept[-1][1], self.seeds), self.kept[-1][1]
         before = join_scenarios(now)
         near = scenarios_excess(self.constraints.other_limits, self.scenarios, now) > 0.0
@@ -237,7 +237,7 @@ class HardeningCandidate:
         return found
 
     def _lasting(self, before: list[list[ScoreColumns]]) -> list[list[ScoreColumns]]:
-        """Rounds of flights with what is kept, none if they break what held; `before` is of the optimum and grows."""
+        """Return rounds of flights of the kept set; none if they break a constraint. `before` (optimum) grows."""
         after: list[list[ScoreColumns]] = []
         for count, seeds in enumerate(self.fresh, start=1):
             if len(before) < count:
@@ -339,7 +339,7 @@ def harden(
 
 
 def hardening_request(scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[str] = ()) -> Constraints:
-    """What must go on to hold. Raises ScenarioError, all faults together."""
+    """Return the constraints of a request. Raises ScenarioError with all errors together."""
     held, faults = read_limits({"limits": limit}, scenarios)
     faults += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
     if faults:

@@ -70,7 +70,7 @@ def rank_by_excess(losses: NDArray[np.float64], excess: NDArray[np.float64]) -> 
 
 
 def limit_reports(study: Study, flights: Sequence[ScoreRow]) -> list[dict[str, Any]]:
-    """What flights of one candidate say of each limit, one entry a limit and scenario, as plain values."""
+    """Report each limit in the flights of one candidate: one entry a limit and scenario, as plain values."""
     n = len(study.scenarios)
     found = []
     for place, (label, scenario) in enumerate(zip(study.labels, study.scenarios, strict=True)):

@@ -75,7 +75,7 @@ class Objective:
 
 
 def user_fitness(function: UserFitness, name: str, values: Mapping[str, Any]) -> float:
-    """What a function of the user's own gives for one flight; whatever goes wrong in it is one line with its place."""
+    """Call the user's own function for one flight; an error in it becomes one line with its place."""
     try:
         return float(function(values))
     except Exception as fault:  # the user's own function may fail in any way
@@ -90,7 +90,7 @@ def user_fitness(function: UserFitness, name: str, values: Mapping[str, Any]) ->
 def candidate_losses(
     fitness_rows: Sequence[Sequence[float | None]], objectives: Sequence[Objective]
 ) -> NDArray[np.float64]:
-    """What an optimiser minimises (candidate, objective). A failed candidate is worse than all of its generation."""
+    """Return losses (candidate, objective) to minimise; a failed candidate is worse than all of its generation."""
     signs = [-1.0 if objective.maximise else 1.0 for objective in objectives]
     table = np.array(
         [[math.nan if v is None else s * v for s, v in zip(signs, row, strict=True)] for row in fitness_rows], float

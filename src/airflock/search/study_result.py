@@ -24,7 +24,7 @@ RESULT_FILE, BEST_FILE = "result.toml", "best.toml"
 
 @dataclass(frozen=True)
 class EvolveResult:
-    """What a study found.
+    """Result of a study: the winner, its score, working ranges and finalists.
 
     parameters : of the winner, by key; scenario : with these parameters
     fitness, sd, low, high, seeds : of the winner on fresh seeds, with Student's 95 % interval of the
@@ -36,7 +36,7 @@ class EvolveResult:
     failed     : candidates of the search that failed
     scenarios  : of several: what each is called → mean, low and high of the winner's fitness in it
     limits     : what the winner's fresh flights say of each limit: events, flights, estimated and allowed probability
-    dead       : why nothing flies, in words; then no best.toml is written; empty if something flies
+    dead_reason : why nothing flies; then no best.toml is written; empty if something flies
     """
 
     folder: Path
@@ -106,7 +106,7 @@ def _told(name: str, mean: float, low: float, high: float) -> dict[str, Any]:
 
 
 def best_files(study: Study) -> list[str]:
-    """Files that hold the winner: best.toml, and best_2.toml and so on for further scenarios."""
+    """Return the names of the winner's files: best.toml, and best_2.toml and so on for further scenarios."""
     return [BEST_FILE, *(f"best_{place}.toml" for place in range(2, len(study.scenarios) + 1))]
 
 
@@ -119,9 +119,9 @@ def further_best_files(folder: Path) -> list[Path]:
 def best_document(
     study: Study, parameters: dict[str, float], result: EvolveResult, folder: Path, scenario_index: int = 0
 ) -> dict[str, Any]:
-    """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along.
+    """Return a scenario file with the winner's parameters and their source; copy a law in a file of its own.
 
-    place : which of the study's scenarios
+    scenario_index : which of the study's scenarios
     """
     scenario = study.scenarios[scenario_index]
     document = {formats.KEY: formats.FORMAT, **to_toml_values(scenario.document)}
@@ -143,7 +143,7 @@ def best_document(
 
 
 def result_summary(result: EvolveResult) -> str:
-    """How good the winner is, on fresh seeds."""
+    """Summarise a result in one sentence: the winner's fitness on fresh seeds."""
     if result.dead_reason:
         return f"Result {result.folder}: nothing flies: {result.dead_reason}"
     span = f"{result.fitness:.3g} (95 %: {result.low:.3g} to {result.high:.3g}) on {result.seeds} fresh seeds"
@@ -151,7 +151,7 @@ def result_summary(result: EvolveResult) -> str:
 
 
 def result_html(result: EvolveResult) -> str:
-    """A table of the winner's parameters, and of the ranges in which candidates of the search were as good."""
+    """Return a table of the winner's parameters and working ranges as HTML."""
     units = {
         f"{section}.{name}".lstrip("."): declared.unit
         for section, record in result.scenario.records.items()
@@ -267,7 +267,7 @@ def mean_interval(values: Sequence[float]) -> tuple[float, float, float, float]:
 
 
 def draw_study(study: Study, store: FlightStore, result: EvolveResult, folder: Path) -> list[Path]:
-    """Convergence, fitness against parameters, pairwise slices; with several objectives the front."""
+    """Draw convergence, fitness against parameters, slices of pairs and, with several objectives, the front."""
     from airflock.view import convergence, fitness_scatter, pareto, save_figure, slices
 
     first = study.objectives[0]

@@ -81,7 +81,7 @@ def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
 
 
 def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapping[str, Any]) -> list[str]:
-    """What is wrong with one entry by itself."""
+    """Return the errors of one entry by itself."""
     faults = []
     for name, value in entry.items():
         numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -96,13 +96,13 @@ PLAN_FILE, START_FILE, STUDY_FOLDER, TUNED_FILE, CERTIFICATE_FILE, STEPS_FILE = 
 
 @dataclass(frozen=True)
 class TuneResult:
-    """What tuning found: the scenario to fly, and what each stage said.
+    """Result of a tuning: the scenario to fly, and the result of each stage.
 
     start      : the scenario that tuning began from; notes : what was noticed on the way
     result     : of the search
     steps      : of hardening; empty where the law has no recipe, and `why` says so
     seconds    : that it took, s
-    identified : what logs said, where it began with logs
+    identify_report : what logs said, where it began with logs
     """
 
     folder: Path
@@ -118,7 +118,7 @@ class TuneResult:
 
     @property
     def shown(self) -> bool:
-        """Whether the certificate shows all limits."""
+        """True if the certificate shows all limits."""
         return self.certificate.shown
 
     def __repr__(self) -> str:
@@ -130,7 +130,7 @@ class TuneResult:
         return head + self.certificate._repr_html_() + self.scenario._repr_html_()
 
     def document(self) -> dict[str, Any]:
-        """What was found as plain values, for --json."""
+        """Return the result as plain values, for --json."""
         return {
             "folder": str(self.folder),
             "tuned": str(self.folder / TUNED_FILE),
@@ -148,7 +148,7 @@ MOST_SEEDS = 1_000_000  # of each step of hardening
 
 
 def load_plan(folder: Path, start: Scenario, resume: bool) -> BudgetPlan | None:
-    """The plan that a folder keeps, or None where it is new. Raises StudyError for a folder of something else."""
+    """Return the plan of a folder, or None if the folder is new. Raises StudyError for a folder of something else."""
     if (folder / PLAN_FILE).is_file():
         if not resume:
             raise StudyError(f"{folder}: holds a tuning already; continue it with --resume, or give another --out")
@@ -178,7 +178,7 @@ def save_plan(folder: Path, start: Scenario, plan: BudgetPlan) -> None:
 
 
 def read_plan(path: Path) -> tuple[BudgetPlan, str]:
-    """The plan that a folder keeps, and the identity of its scenario; StudyError where the file is damaged."""
+    """Read the plan of a folder and the identity of its scenario. Raises StudyError for a damaged file."""
     found = read_toml_file(path)
     try:
         search = {str(key): value for key, value in found["search"].items()}
@@ -195,12 +195,12 @@ def read_plan(path: Path) -> tuple[BudgetPlan, str]:
 
 
 def scenario_text_document(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as a file holds it, without what a paper prints of it."""
+    """Return the document of a scenario file without published values of a paper."""
     return {formats.KEY: formats.FORMAT, **{k: v for k, v in scenario.document.items() if k != "published"}}
 
 
 def read_steps(path: Path) -> tuple[list[StepResult], str]:
-    """Steps of hardening that a folder keeps, and why there are none; StudyError where the file is damaged."""
+    """Read the steps of hardening, and why there are none. Raises StudyError for a damaged file."""
     with as_error(path, StudyError):
         told = parse_json_object(read_text(path))
     try:
@@ -210,7 +210,7 @@ def read_steps(path: Path) -> tuple[list[StepResult], str]:
 
 
 def _measured(told: Mapping[str, Any]) -> StepResult:
-    """One step from plain values; raises what its constructors raise."""
+    """Make one step from plain values; errors of the constructors pass through."""
 
     def three(values: Any) -> tuple[float, float, float]:
         mean, low, high = map(float, values)
@@ -227,12 +227,12 @@ def _measured(told: Mapping[str, Any]) -> StepResult:
     )  # fmt: skip
 
 
-PILOT = 4  # flights per core that tell how long one takes
+PILOT = 4  # flights per core by which the time of one flight is measured
 Notify = Callable[[str], None]
 
 
 class TuneProgress(NamedTuple):
-    """What tuning is at: its stage, what that has found so far in a few words, its flights and how many there will be.
+    """Progress of a tuning: its stage, a short message, flights so far and in total.
 
     total : None where it is not known; hardening often ends before its total
     """
@@ -247,7 +247,7 @@ OnTuneProgress = Callable[[TuneProgress], None]
 
 
 def measure_flight_rate(scenario: Scenario, threads: int | None) -> float:
-    """Flights per second, from a few of them."""
+    """Measure flights per second by a few flights."""
     from airflock.engine import compile_for, score_flights
     from airflock.support import available_cores
 
@@ -266,7 +266,7 @@ def run_search_stage(
     threads: int | None,
     on_progress: OnTuneProgress,
 ) -> EvolveResult:
-    """What the search of the folder found."""
+    """Run or continue the search in the folder; return its result."""
     on_progress(TuneProgress("search"))
 
     def searched(p: Searched) -> None:
@@ -282,7 +282,7 @@ def run_search_stage(
 def run_hardening_stage(
     folder: Path, plan: BudgetPlan, limits: Sequence[str], threads: int | None, trust: bool, on_progress: OnTuneProgress
 ) -> tuple[Scenario, list[StepResult], str]:
-    """The scenario after hardening, its steps, and why there are none."""
+    """Harden or read the hardened set; return the scenario, its steps, and why there are none."""
     if (folder / STEPS_FILE).is_file():
         steps, why = read_steps(folder / STEPS_FILE)
         return load(folder / TUNED_FILE, trust=trust), steps, why
@@ -320,7 +320,7 @@ def run_certificate_stage(
     threads: int | None,
     on_progress: OnTuneProgress,
 ) -> Certificate:
-    """The certificate of the tuned set, saved in the folder."""
+    """Certify the tuned set; save the certificate in the folder and return it."""
     on_progress(TuneProgress("certificate"))
 
     def counted(p: Counted) -> None:

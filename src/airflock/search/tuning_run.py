@@ -1,4 +1,7 @@
-"""The public door: start, evolve, harden, certify, report; each stage is continued where it was left."""
+"""Tune a flock: from a scenario or logs through search, hardening and certificate to a report, in one folder.
+
+Each stage is kept in the folder and continued where it was interrupted.
+"""
 
 import hashlib
 import json
@@ -54,7 +57,7 @@ Paths = Sequence[str | os.PathLike[str]]
 
 @dataclass(frozen=True)
 class IdentifiedFleet:
-    """What logs say of a fleet: the scenario with its numbers, its file's content, and what to tell of it.
+    """A fleet identified from logs: the scenario with its numbers, its file, and a report.
 
     told : files with their hashes, the law's scenario, numbers with intervals or the reason why not, notes
     """
@@ -70,7 +73,7 @@ class IdentifiedFleet:
 
 
 def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> IdentifiedFleet:
-    """What the folder holds of these logs, or what they say now.
+    """Return the identified fleet of the folder, or identify it now from the logs.
 
     Raises StudyError where the folder holds what other logs said, RecordingError or AirflockError for bad logs.
     """
@@ -89,7 +92,7 @@ def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.Pa
 
 
 def _asked(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> dict[str, Any]:
-    """What decides the outcome, as plain values."""
+    """Return everything that decides the outcome, as plain values."""
     files = [*logs, *([] if heard is None else [heard])]
     like_document = {key: value for key, value in like.document.items() if key != "published"}
     return {
@@ -121,7 +124,7 @@ SCALES = "vasarhelyi_2018"  # the law whose scaling with the speed is published
 
 
 def prepare_start(scenario: Scenario) -> tuple[Scenario, list[str]]:
-    """The scenario to start from, and what was set, for a person to read.
+    """Return the scenario to start from, and notes on the numbers that were set.
 
     Only numbers that the scenario's document does not give are set; every other value stays.
     """
@@ -136,13 +139,13 @@ def prepare_start(scenario: Scenario) -> tuple[Scenario, list[str]]:
 
 
 def measures_walls(scenario: Scenario) -> bool:
-    """Whether its order parameters tell how near agents come to walls and obstacles, and some stand there."""
+    """Return True if there are walls or obstacles and the metrics measure clearance to them."""
     stand = scenario.world.arena != "none" or bool(scenario.world.obstacles)
     return stand and "clearance" in scalar_names(scenario.measures, scenario.metrics)
 
 
 def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
-    """Numbers of the law, scaled to the speed of the scenario."""
+    """Return numbers of the law scaled to the speed of the scenario, and notes."""
     if scenario.model.name != SCALES:
         return {}, [
             f"{scenario.model.name}: no scaling with the speed is published; the search starts from its own values"
@@ -161,11 +164,12 @@ def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
 
 
 def _off_the_walls(scenario: Scenario) -> list[float]:
-    """Room at walls and obstacles when a flight begins, m, where the document gives none; less where that is too much.
+    """Return clearances (m) to walls and obstacles at the start to try, largest first; none if the document has one.
 
-    Half of what agents have between them, or r_coll. Without it the nearest that most flights come to a wall is where
-    somebody was put at the start, whatever the law does.
+    Half of the distance between agents, or r_coll.
     """
+    # Starts as close as 1 cm to a wall decided `clearance` of most flights, whatever the law: a fitness of 0.05, with
+    # room at the start 0.777.
     drawn = scenario.start.kind in ("arena", "ball", "box")
     if not (measures_walls(scenario) and drawn) or "wall_clearance" in scenario.document.get("start", {}):
         return []
@@ -175,7 +179,7 @@ def _off_the_walls(scenario: Scenario) -> list[float]:
 
 @dataclass(frozen=True)
 class TuneRequest:
-    """What a tuning is asked for.
+    """Request of a tuning.
 
     campaign : what its certificate is to show; limits: the texts of its limits
     """
@@ -190,7 +194,7 @@ def make_request(
     confidence: float | None = None,
     plan: BudgetPlan | None = None,
 ) -> TuneRequest:
-    """What is asked for; what is not given is as in the plan of a tuning that goes on, or else as usual.
+    """Make a request. Missing values come from the plan of a resumed tuning, or are defaults.
 
     Raises ScenarioError, all faults together.
     """
@@ -223,7 +227,7 @@ def default_limits(scenario: Scenario) -> list[str]:
 
 
 def infeasible_limit_lines(campaign: Campaign, plan: BudgetPlan) -> list[str]:
-    """A line for each limit that the plan's flights could not show even if nothing ever happened in them."""
+    """Return a line for each limit that the plan's flights could not show even without any event."""
     able = int(COUNT_BUDGET_SHARE * plan.seconds * plan.rate)
     return [
         f"{limit.text}: needs {flights:,} flights without an event to be shown, and there is time for {able:,}; "
@@ -235,7 +239,7 @@ def infeasible_limit_lines(campaign: Campaign, plan: BudgetPlan) -> list[str]:
 
 
 def _time(seconds: float) -> str:
-    """At least so long, as --budget takes it."""
+    """Format a time, rounded up, as --budget takes it."""
     return f"{math.ceil(seconds / 3600.0)}h" if seconds > 7200.0 else f"{math.ceil(seconds / 60.0)}min"
 
 
