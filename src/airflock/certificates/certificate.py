@@ -78,9 +78,9 @@ NOT_SAID = (
 class Certificate:
     """Certificate: results of counting, splitting and tolerances of a campaign.
 
-    verdicts  : one for each limit; hazards: whether events came evenly, by limit, where that can be asked
+    verdicts  : one for each limit; hazards: timing of events by limit, where events have a moment
     rows      : scores of all flights that were counted, in the order of their seeds
-    tolerance : plain values of `airflock.certificates.tolerance`, empty if not asked for
+    tolerance : plain values of `airflock.certificates.tolerance`, empty if not requested
     splitting : the same of `airflock.certificates.splitting`; over: of `airflock.certificates.tolerance`
     versions  : of what flew, and on which processor
     seconds, rate : of this process, s; flights per second
@@ -340,7 +340,7 @@ def scores_digest(scores: Mapping[str, Any]) -> str:
 
 
 def certificate_checksum(document: Mapping[str, Any]) -> str:
-    """Checksum of a certificate: it tells what was changed by accident or in an editor, and is no signature."""
+    """Checksum of a certificate: it detects changes by accident or in an editor, and is no signature."""
     text = json.dumps(_without(document, "seal"), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -483,10 +483,10 @@ def _is(value: Any, kinds: tuple[type, ...]) -> bool:
 
 
 def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None, trust: bool) -> Campaign:
-    told = dict(document["scenario"])
-    name = str(told.pop("name"))
+    settings = dict(document["scenario"])
+    name = str(settings.pop("name"))
     if scenario is None:
-        scenario = build_scenario(told, name, folder=Path(where).parent, trust=trust)
+        scenario = build_scenario(settings, name, folder=Path(where).parent, trust=trust)
     flights, flown = document["flights"], document["flown"]
     campaign = Campaign(
         scenario,
@@ -508,8 +508,10 @@ def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
     if document["flights"]["first_seed"] != certificate_seed(campaign.hash, COUNT_PURPOSE, 0):
         faults.append("its seeds are not those that the scenario fixes")
     for entry, limit in zip(document["limit"], campaign.limits, strict=True):
-        told = [(int(x["flights"]), int(x["events"]), float(x["above"]), float(x["below"])) for x in entry["looks"]]
-        again = [take_look(*each) for each in told]
+        stored_looks = [
+            (int(x["flights"]), int(x["events"]), float(x["above"]), float(x["below"])) for x in entry["looks"]
+        ]
+        again = [take_look(*each) for each in stored_looks]
         high, low = min((x.high for x in again), default=1.0), max((x.low for x in again), default=0.0)
         paid = max(sum(x.above for x in again), sum(x.below for x in again))
         probability = campaign.probability(limit)
@@ -517,22 +519,24 @@ def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
         right = abs(high - entry["high"]) <= 1e-9 * high and abs(low - entry["low"]) <= 1e-9 and shown == entry["shown"]
         if not right or paid > campaign.alpha * (1.0 + 1e-9):
             faults.append(f"limit '{limit.text}': its bounds do not follow from its counts")
-        elif not _fixed(told, campaign, limit, int(document["flights"]["count"])):
+        elif not _fixed(stored_looks, campaign, limit, int(document["flights"]["count"])):
             faults.append(f"limit '{limit.text}': its looks are not those that the limit fixes")
     return faults
 
 
-def _fixed(told: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: EventLimit, count: int) -> bool:
+def _fixed(
+    stored_looks: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: EventLimit, count: int
+) -> bool:
     """Return True if looks are the first of a limit's schedule, within the flights, with events that never decrease."""
-    known = list(islice(looks_due(campaign, limit), len(told)))
-    sizes = [(flights, above, below) for flights, _, above, below in told]
-    same = len(known) == len(told) and all(
+    known = list(islice(looks_due(campaign, limit), len(stored_looks)))
+    sizes = [(flights, above, below) for flights, _, above, below in stored_looks]
+    same = len(known) == len(stored_looks) and all(
         each[0] == right[0] and all(math.isclose(a, b, rel_tol=1e-9) for a, b in zip(each[1:], right[1:], strict=True))
         for each, right in zip(sizes, known, strict=True)
     )
-    events = [0, *(events for _, events, _, _ in told)]
+    events = [0, *(events for _, events, _, _ in stored_looks)]
     grow = all(old <= new for old, new in pairwise(events))
-    return same and grow and all(events <= flights <= count for flights, events, _, _ in told)
+    return same and grow and all(events <= flights <= count for flights, events, _, _ in stored_looks)
 
 
 def _flown_again(

@@ -42,7 +42,7 @@ from airflock.runs import (
 from airflock.scenarios import Scenario, formats, scenario_variant
 from airflock.support import ErrorCollector, StudyError, expand_path
 
-COUNT_BUDGET_SHARE = 2.0 / 3.0  # share of the budget that counting may take where tolerance is asked for
+COUNT_BUDGET_SHARE = 2.0 / 3.0  # share of the budget that counting may take if tolerances are requested
 
 
 def certify(
@@ -135,16 +135,16 @@ def certify(
     (True, 0)
     """
     found = scenario_variant(scenario, settings, law, trust=trust)
-    asked = ErrorCollector()
+    errors = ErrorCollector()
     chosen: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-    campaign = asked.read(campaign_from_request, found, limit, confidence, flights, **chosen)
+    campaign = errors.read(campaign_from_request, found, limit, confidence, flights, **chosen)
     if split:
-        asked.read(check_split, campaign)
-    keys = asked.read(tolerance_keys, found, tolerance)
-    axes = asked.read(check_map_axes, found, over) if over else {}
-    asked.read(check_certify_budget, budget)
-    asked.read(check_workers, timeout, scheduler, device)
-    asked.raise_errors()
+        errors.read(check_split, campaign)
+    keys = errors.read(tolerance_keys, found, tolerance)
+    axes = errors.read(check_map_axes, found, over) if over else {}
+    errors.read(check_certify_budget, budget)
+    errors.read(check_workers, timeout, scheduler, device)
+    errors.raise_errors()
     with flight_folder(folder) as path:
         executor = campaign_executor(campaign, scheduler, threads, timeout)
         try:
@@ -174,7 +174,8 @@ def run_campaign(
 ) -> Certificate:
     """Count, find tolerances of `keys`, split, and map over `axes`, in a folder that `open_folder` has accepted.
 
-    note : told in a few words what begins; kept: whether the folder stays
+    notify    : called with a few words as each part begins
+    is_stored : True if the folder stays
     """
     began = time.monotonic()
     where = str(folder / "scenario.toml") if is_stored else campaign.scenario.name

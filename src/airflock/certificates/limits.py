@@ -32,7 +32,7 @@ class EventLimit:
     text  : as it was given
     score, sign, value : the event: an order parameter of the flight, < <= > or >=, and a number in its unit
     rate, unit : how often at most: per flock hour (h), per drone hour (drone-h) or per flight; None: only to be bounded
-    timed : whether the event, once it has happened, stays true for the rest of the flight
+    is_timed : whether the event, once it has happened, stays true for the rest of the flight
     """
 
     text: str
@@ -230,7 +230,7 @@ ScoreRow = Mapping[str, Any] | None  # scores of a flight; None: it failed
 
 
 def reliability_indices(limit: EventLimit, flights: Sequence[Sequence[ScoreRow]]) -> NDArray[np.float64]:
-    """Reliability index of each candidate (candidate,): standard deviations between its mean and the limit's event.
+    """Return the reliability index (candidate,): standard deviations between a candidate's mean and the event.
 
     flights : of each candidate; a flight that failed counts as the event
     """
@@ -252,23 +252,25 @@ def reliability_indices(limit: EventLimit, flights: Sequence[Sequence[ScoreRow]]
 
 
 def estimated_probability(limit: EventLimit, flights: Sequence[ScoreRow]) -> float:
-    """Estimated probability of the limit's event per flight of one candidate: no less than what was counted."""
+    """Estimate the probability of an event per flight of one candidate: no less than the counted share."""
     counted = sum(row is None or limit.has_happened(row) for row in flights) / len(flights)
     return max(counted, float(norm.sf(reliability_indices(limit, [flights])[0])) if counted < 1.0 else 1.0)
 
 
 def reliability_index(probability: float) -> float:
-    """The reliability index beyond which an event has this probability."""
+    """Return the reliability index of a probability."""
     return float(norm.isf(probability))
 
 
 def _of_share(events: int, flights: int) -> float:
-    """Index of a share of flights; infinite where nothing happened, finite where it always did."""
+    """Return the index of a share of flights; infinite without events, finite if all flights have one."""
     return reliability_index(min(events, flights - 0.5) / flights) if events else math.inf
 
 
 def _of_tail(room: NDArray[np.float64]) -> float:
-    """Index of one candidate, from how far its nearest flights are from the limit; infinite where that cannot tell."""
+    """Return the index of one candidate by an exponential tail of its nearest flights; infinite if it has none."""
+    # The nearest tenth as an exponential tail was 0.88 to 2.91 times the truth in 80 % of trials, a normal one 0.08 to
+    # 3.11 times.
     nearest = np.sort(room)[: max(FEWEST, round(NEAREST * len(room))) + 1]
     begin, excess = nearest[-1], float((nearest[-1] - nearest[:-1]).mean())
     if begin <= 0.0 or excess == 0.0:
@@ -277,7 +279,9 @@ def _of_tail(room: NDArray[np.float64]) -> float:
 
 
 def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Index of each candidate (candidate,), from how far their flights are from the limit."""
+    """Return the index of each candidate (candidate,) from the distances of all flights to the limit."""
+    # Shrunk towards all candidates (James & Stein): without it the lucky ones win, and their sets then collide in up to
+    # 4e-3 of flights where 1.7e-4 was allowed.
     sizes, own = np.array([len(room) for room in rooms]), np.array([room.mean() for room in rooms])
     squares, freedom = np.array([((room - room.mean()) ** 2).sum() for room in rooms]), sizes - 1
     left, flat = 1.0, not freedom.any()  # left of each difference, after what chance explains
@@ -287,14 +291,15 @@ def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     means = own.mean() + left * (own - own.mean())
     around = np.full(len(rooms), own.mean()) if flat else means  # where each flew once: around the common mean
     away = np.concatenate([room - mean for room, mean in zip(rooms, around, strict=True)])
+    # Deviations towards the event only: distances above the mean say nothing of the dangerous side of a skew score.
     below = away[away < 0.0]
     counted = len(away) - (1.0 if flat else left * len(rooms))
     variance = float((below**2).mean()) * len(away) / counted if len(below) else 0.0
-    alike = variance
+    pooled = variance
     if not flat:
         near = np.argsort(np.abs(own[:, None] - own[None, :]), axis=1, kind="stable")[:, :LIKE]
-        alike = squares[near].sum(axis=1) / np.maximum(freedom[near].sum(axis=1), 1)
-    spread = np.sqrt(left * alike + (1.0 - left) * variance)
+        pooled = squares[near].sum(axis=1) / np.maximum(freedom[near].sum(axis=1), 1)
+    spread = np.sqrt(left * pooled + (1.0 - left) * variance)
     if len(rooms) == 1:
         spread = np.array([math.sqrt(variance)])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -302,6 +307,6 @@ def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 def _room(limit: EventLimit, row: ScoreRow) -> float:
-    """How far a flight's score lies on the safe side of the event, in its unit; nan where there is none."""
+    """Return how far a score lies on the safe side of the event, in its unit; nan without a score."""
     found = math.nan if row is None or row.get(limit.score) is None else float(row[limit.score])
     return found - limit.value if limit.sign in ("<", "<=") else limit.value - found

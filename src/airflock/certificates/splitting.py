@@ -1,7 +1,7 @@
 """Splitting: the probability of a rare fall of a score, by flights that branch off from those that came near it.
 
 Subset simulation (Au & Beck 2001) over whole flights. A flight is a lineage: a seed, and moments from which on other
-random numbers are drawn. Among the flights below a level, Metropolis-Hastings steps draw all noise anew from a moment
+random numbers are drawn. Among the flights below a level, Metropolis-Hastings steps draw all noise again from a moment
 before the level was first crossed, and keep what crosses it again; a share of them lies below the next level.
 
 This finds and ranks rare flights. As a number it is an estimate with a known weakness: what happens once in a hundred
@@ -110,7 +110,7 @@ def run_repetition(
     """Go down level by level until `target`.
 
     start : the flights with the least values among `counted` independent ones
-    mean_branch_lead : mean number of samples before the first crossing from which noise is drawn anew
+    mean_branch_lead : mean number of samples before the first crossing from which noise is drawn again
     size  : flights of a level
     """
     level = max(particle.least for particle in start)
@@ -146,9 +146,11 @@ def _moved(
     gaps, chances = rng.exponential(back, size), rng.random(size)
     crossings = [particle.crossing(level) for particle in flock]
     moments = [max(0, math.floor(at - gap)) for at, gap in zip(crossings, gaps, strict=True)]
-    asked = [p.lineage.branch(at, 1 + batch * size + i) for i, (p, at) in enumerate(zip(flock, moments, strict=True))]
+    branched = [
+        p.lineage.branch(at, 1 + batch * size + i) for i, (p, at) in enumerate(zip(flock, moments, strict=True))
+    ]
     found = []
-    for i, (lineage, falls) in enumerate(zip(asked, fly(batch, asked), strict=True)):
+    for i, (lineage, falls) in enumerate(zip(branched, fly(batch, branched), strict=True)):
         new = LineageFlight(lineage, falls)
         taken = new.least <= level and math.log(chances[i]) < -(new.crossing(level) - crossings[i]) / back
         found.append(new if taken else flock[i])
@@ -230,7 +232,7 @@ REPETITIONS = 5
 SIZE = 200  # flights of a level
 FEWEST = 2000  # flights from which repetitions start, each from its share of them
 START = 100  # flights with which a repetition goes on: the nearest ones of its share
-BACK = 4.0  # s, mean time before the first crossing from which noise is drawn anew
+BACK = 4.0  # s, mean time before the first crossing from which noise is drawn again
 WORST = 5
 
 
@@ -321,7 +323,7 @@ class BudgetSpent(Exception):
 class LineageFlyer:
     """Flies lineages of one repetition, and keeps how their distances fell.
 
-    counted : flights from which splitting starts; from more of them it starts anew
+    counted : flights from which splitting starts; with more of them it starts again
     """
 
     def __init__(self, flyer: CampaignFlyer, repetition: int, threads: int | None, counted: int):

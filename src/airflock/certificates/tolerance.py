@@ -48,17 +48,17 @@ def find_tolerances(flyer: CampaignFlyer, counted: CountResult, keys: Sequence[s
     level = screening_level(campaign)
     screen = ValueScreen(flyer, level)
     events = sum(any(limit.has_happened(row) for limit in campaign.limits) for row in counted.rows)
-    told: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
+    result: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
     if not counted.rows or take_look(len(counted.rows), events, 1.0 - campaign.confidence, 0.0).high > level:
-        told["reason"] = f"without any change, the scenario is not shown to stay below {100.0 * level:g} % per flight"
-        return told
+        result["reason"] = f"without any change, the scenario is not shown to stay below {100.0 * level:g} % per flight"
+        return result
     known, said = environment_numbers(campaign.scenario), read_intervals(campaign.scenario.document)
     for done, key in enumerate(keys):
         flyer.report(f"tolerance of {key}")
         screen.share_time(len(keys) - done)
         axis = _axis(screen, key, *known[key])
-        told["axis"].append(axis | ({"interval": list(said[key])} if key in said else {}))
-    return told
+        result["axis"].append(axis | ({"interval": list(said[key])} if key in said else {}))
+    return result
 
 
 def screening_level(campaign: Campaign) -> float:
@@ -128,7 +128,7 @@ class ValueScreen:
 
 
 def value_batch(stage: str, parameters: Mapping[str, float]) -> CandidateBatch:
-    """Where flights at these values are kept: told by the values, so that a campaign may go on with other keys."""
+    """Return the batch of flights at these values. Its name holds them: a campaign may resume with other keys."""
     return CandidateBatch(f"{stage}: {', '.join(f'{key} = {value!r}' for key, value in parameters.items())}", 0, 0)
 
 
@@ -240,5 +240,5 @@ def map_bounds(flyer: CampaignFlyer, axes: Mapping[str, Sequence[float]]) -> dic
             cell |= {"low": found.low, "high": found.high, "flights": found.flights, "events": found.events}
         cells.append(cell)
     units = [declared_numbers(flyer.campaign.scenario)[key][0].unit for key in axes]
-    told: dict[str, Any] = {"level": screen.level, "keys": list(axes), "units": units}
-    return told | {"axes": [list(values) for values in axes.values()], "cell": cells}
+    result: dict[str, Any] = {"level": screen.level, "keys": list(axes), "units": units}
+    return result | {"axes": [list(values) for values in axes.values()], "cell": cells}

@@ -65,18 +65,18 @@ class DaskCluster:
         """
         try:
             from distributed import Client
-        except ModuleNotFoundError as fault:
-            raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from fault
+        except ModuleNotFoundError as error:
+            raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from error
         self.tasks, self.timeout, self.kept = tuple(tasks), timeout, is_stored
         self.seen = 0.0  # when there was a worker, s of the monotonic clock
         try:
             self.client: Any = Client(address, timeout=connect_timeout, set_as_default=False)
             self.client.wait_for_workers(1, timeout=connect_timeout)
-        except Exception as fault:  # whatever the network and its libraries raise
+        except Exception as error:  # whatever the network and its libraries raise
             reason = "has no workers" if hasattr(self, "client") else "does not answer"
             if hasattr(self, "client"):
                 self.client.close()
-            raise StudyError(f"--scheduler {address}: {reason} ({connect_timeout:g} s waited)") from fault
+            raise StudyError(f"--scheduler {address}: {reason} ({connect_timeout:g} s waited)") from error
         self._warn_of_mixed_processors()
 
     def _warn_of_mixed_processors(self) -> None:
@@ -129,8 +129,8 @@ class DaskCluster:
         after = "; what has landed is stored, continue with --resume" if self.kept else ""
         try:
             threads = int(sum(self.client.nthreads().values()))
-        except Exception as fault:  # whatever the network raises
-            raise StudyError(f"the scheduler answers no more{after}") from fault
+        except Exception as error:  # whatever the network raises
+            raise StudyError(f"the scheduler answers no more{after}") from error
         if threads:
             self.seen = time.monotonic()
         elif time.monotonic() - self.seen > DESERTED:
@@ -190,10 +190,10 @@ class ScenarioTask:
         self.text, self.where, self.precision = json.dumps(scenario.document), scenario.name, precision
         try:
             rebuild_scenario(self.text, self.where)
-        except AirflockError as fault:
+        except AirflockError as error:
             raise StudyError(
-                f"{scenario.name}: workers cannot rebuild this scenario; put its law into a file: {fault}"
-            ) from fault
+                f"{scenario.name}: workers cannot rebuild this scenario; put its law into a file: {error}"
+            ) from error
 
     def __call__(self, parameters: Mapping[str, float], seed: int) -> tuple[Any, str, float, str]:
         """Fly on a worker: order parameters or None, reason, duration (s), who flew."""

@@ -61,8 +61,8 @@ def fly_task(score: ScoreFunction, task: Flight, worker: str = "") -> FlightResu
     begin = time.perf_counter()
     try:
         values, reason = score(task.parameters, task.seed), ""
-    except (AirflockError, ArithmeticError) as fault:
-        values, reason = None, str(fault).splitlines()[0] if str(fault) else type(fault).__name__
+    except (AirflockError, ArithmeticError) as error:
+        values, reason = None, str(error).splitlines()[0] if str(error) else type(error).__name__
     return FlightResult(task, values, reason, time.perf_counter() - begin, worker)
 
 

@@ -45,8 +45,8 @@ def open_folder(folder: Path, study: HasDocument, *, resume: bool, kind: str = "
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_toml_file(found, study.document(), f"A {kind} of Airflock. Written once, when it began.")
-    except OSError as fault:
-        raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
+    except OSError as error:
+        raise StudyError(f"{folder}: cannot be written: {error.strerror or error}") from error
 
 
 def remove_unfinished(folder: Path) -> None:

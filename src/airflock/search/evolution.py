@@ -1,4 +1,4 @@
-"""The public door: a study from beginning to end in one folder, begun or continued."""
+"""Evolve: a study from its request to its result in one folder, begun or resumed; also validation and sensitivity."""
 
 import hashlib
 import os
@@ -75,7 +75,7 @@ def evolve(
     out : str or path
         The study's folder.
     resume : bool
-        Continue the study in the folder to the identical end. What is not asked for again is as in the first call.
+        Continue the study in the folder to the identical end. Options that are not given are as in the first call.
     settings : mapping, optional
         Keys of the scenario to change, such as {"duration": 300.0}.
     space : mapping, optional
@@ -99,7 +99,7 @@ def evolve(
     timeout : float, optional
         Time that a flight may take on a dask worker, s.
     sensitivity : str
-        "sobol" or "morris": also fly what tells which parameters matter; table sensitivity.csv.
+        "sobol" or "morris": also measure which parameters matter; table sensitivity.csv.
     watch : callable, optional
         Called with a Progress after each flight.
     trust : bool
@@ -137,8 +137,8 @@ def evolve(
     True
     """
     folder = expand_path(out)
-    asked = ErrorCollector()
-    found = asked.read(
+    errors = ErrorCollector()
+    found = errors.read(
         evolve_request,
         scenario,
         settings,
@@ -152,10 +152,10 @@ def evolve(
         over_scenarios=over_scenarios,
         trust=trust,
     )
-    asked.read(check_sensitivity_method, sensitivity)
-    asked.read(check_timeout, timeout)
-    asked.read(check_study_device, device, scheduler)
-    asked.raise_errors()
+    errors.read(check_sensitivity_method, sensitivity)
+    errors.read(check_timeout, timeout)
+    errors.read(check_study_device, device, scheduler)
+    errors.raise_errors()
     study = resolve_device(found[0], device)
     open_folder(folder, study, resume=resume)
     executor = study_executor(study, scheduler, threads, timeout)
@@ -214,7 +214,7 @@ def run_study(
     *,
     sensitivity: str = "",
 ) -> EvolveResult:
-    """Search and conclude in a folder that `open_folder` has accepted; closes the executor."""
+    """Search and conclude in a folder that `open_folder` has accepted; close the executor."""
     try:
         with FlightStore(folder) as store:
             store.begin(program_versions())
@@ -277,9 +277,9 @@ def study_from_request(
 ) -> Study:
     """Make the study of a call of `evolve` from its arguments."""
     if isinstance(what, Study):
-        asked: dict[str, Any] = {"settings": settings, "space": space, "objective": objective, "fitness": fitness}
-        asked |= {"limit": limit, "over_scenarios": over_scenarios, "fast": fast}
-        beside = [*(key for key, value in asked.items() if value), *(search_keys or {})]
+        requested: dict[str, Any] = {"settings": settings, "space": space, "objective": objective, "fitness": fitness}
+        requested |= {"limit": limit, "over_scenarios": over_scenarios, "fast": fast}
+        beside = [*(key for key, value in requested.items() if value), *(search_keys or {})]
         if beside:
             said = ", ".join(beside)
             raise StudyError(f"{said}: a Study object sets this itself; give a preset, a file or a Scenario")
@@ -324,7 +324,7 @@ def check_study_device(device: str, scheduler: str | None = None) -> None:
         raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
 
 
-OWN = ("layout", "airflock")  # of the version that made the folder: nothing that can be asked for
+OWN = ("layout", "airflock")  # of the version that made the folder; no option sets them
 
 
 def resume_study(
@@ -359,8 +359,8 @@ def resume_study(
     taken = flown | searched | held_to
     if not taken:
         return study, ""
-    told = ", ".join(f"{key} = {value_of(value)}" for key, value in taken.items())
-    said = f"goes on with what {folder} holds: {told}"
+    listed = ", ".join(f"{key} = {value_of(value)}" for key, value in taken.items())
+    said = f"goes on with what {folder} holds: {listed}"
     return make_request({**settings, **flown}, {**keys, **search}, limits if held_to or limit else []), said
 
 
@@ -424,9 +424,9 @@ def validate(
     if text.lower().endswith(".nc"):
         same, differences = replay_recording(load_recording(name), law, settings, trust=trust)
         if not same:
-            told = "".join(f"\n{text}: {line}" for line in differences)
+            listed = "".join(f"\n{text}: {line}" for line in differences)
             reason = "see below" if differences else "although nothing relevant differs"
-            raise AirflockError(f"{text}: flown again, the positions differ, {reason}{told}")
+            raise AirflockError(f"{text}: flown again, the positions differ, {reason}{listed}")
         return ValidationReport("flown again with the same bits", tuple(differences))
     if is_study(text):
         if law is not None:
@@ -456,7 +456,7 @@ def run_sensitivity(
     samples: int = 16,
     on_flight: Callable[[bool], None] | None = None,
 ) -> pd.DataFrame:
-    """Effect of each parameter on the first objective over the study's whole space.
+    """Measure the effect of each parameter on the first objective over the study's whole space.
 
     samples : base samples: sobol takes samples · (axes + 2) candidates, samples a power of two; morris
               samples · (axes + 1), in trajectories
@@ -466,8 +466,8 @@ def run_sensitivity(
     try:
         from SALib.analyze import morris as analyse_morris, sobol as analyse_sobol
         from SALib.sample import morris as sample_morris, sobol as sample_sobol
-    except ModuleNotFoundError as fault:
-        raise StudyError("sensitivity needs SALib: pip install 'airflock[evolve]'") from fault
+    except ModuleNotFoundError as error:
+        raise StudyError("sensitivity needs SALib: pip install 'airflock[evolve]'") from error
     if method not in SENSITIVITY_METHODS:
         raise StudyError(f"method = {method!r} is none of {', '.join(SENSITIVITY_METHODS)}")
     n = len(study.space.axes)
@@ -496,7 +496,7 @@ def run_sensitivity(
 
 
 class BatchExecutor:
-    """One call of the engine for each batch; a flight that goes wrong is found by halves, and the others stand."""
+    """Fly a batch in one call of the engine; bisect it to find a flight with an error, and keep the others."""
 
     def __init__(self, study: Study, device: str):
         """`device` as `airflock.engine.score_flights` takes it."""
@@ -515,9 +515,9 @@ class BatchExecutor:
             scenarios = [with_parameters(self.study.scenarios[flight.place], flight.parameters) for flight in flights]
             precision = int(self.study.search.precision)
             rows = score_flights(scenarios, [f.seed for f in flights], precision=precision, device=self.device)
-        except (AirflockError, ArithmeticError) as fault:
+        except (AirflockError, ArithmeticError) as error:
             if len(flights) == 1:
-                reason = str(fault).splitlines()[0] if str(fault) else type(fault).__name__
+                reason = str(error).splitlines()[0] if str(error) else type(error).__name__
                 yield FlightResult(flights[0], None, reason, time.perf_counter() - begin, self.device)
                 return
             half = len(flights) // 2
@@ -533,7 +533,7 @@ class BatchExecutor:
 
 
 class StudyTask(ScenarioTask):
-    """Flies a scenario with the parameters of a candidate."""
+    """Task of a dask worker that flies a scenario with the parameters of a candidate."""
 
     def score_function(self, scenario: Scenario) -> ScoreFunction:
         """Return the function from parameters and a seed to order parameters."""
@@ -543,5 +543,5 @@ class StudyTask(ScenarioTask):
 
 
 def study_tasks(study: Study) -> tuple[StudyTask, ...]:
-    """The task of each scenario of a study; raises StudyError for a law that exists only in this process."""
+    """Make the task of each scenario. Raises StudyError for a law that exists only in this process."""
     return tuple(StudyTask(scenario, int(study.search.precision)) for scenario in study.scenarios)

@@ -22,7 +22,7 @@ S4 = "Table S4"
 class HardeningStep:
     """One change of the recipe: factors on keys, and why.
 
-    earlier : time of flight (s) by which r0_shill grows, so that agents brake earlier at walls and obstacles
+    braking_lead : time of flight (s) by which r0_shill grows, so that agents brake earlier at walls and obstacles
     """
 
     name: str

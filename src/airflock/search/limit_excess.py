@@ -18,7 +18,7 @@ from airflock.scenarios import Scenario
 from airflock.search.study import Study
 
 TIE = 1e-6  # by which fitness orders those who break limits equally
-FARTHEST = 1e6  # standard deviations; where all flights are alike there is none
+FARTHEST = 1e6  # standard deviations; equal flights have no standard deviation
 
 
 def allowed_probability(limit: EventLimit, scenario: Scenario, duration_share: float = 1.0) -> float:
@@ -63,7 +63,9 @@ def batch_excess(
 
 
 def rank_by_excess(losses: NDArray[np.float64], excess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Losses (candidate, objective) in which each that breaks limits is worse than all that keep them."""
+    """Return losses (candidate, objective) by which candidates that break limits rank after all that keep them."""
+    # Ranks, not penalties: CMA-ES is invariant to the scale of fitness, and a weight is a number that nobody can know.
+    # The augmented Lagrangian ended between 2e-6 and 1e-2 where 1.7e-3 was allowed.
     worst = losses.max(axis=0)
     broken = worst + excess[:, None] + TIE * (losses - worst) / np.maximum(np.ptp(losses, axis=0), TIE)
     return np.where(excess[:, None] > 0.0, broken, losses)
@@ -89,7 +91,7 @@ def limit_reports(study: Study, flights: Sequence[ScoreRow]) -> list[dict[str, A
 
 
 def limit_report_line(entry: Mapping[str, Any]) -> str:
-    """One entry of `limit_reports` in words."""
+    """Format one entry of `limit_reports` as a sentence."""
     where = f" in {entry['scenario']}" if "scenario" in entry else ""
     verdict = "looks kept" if entry["keeps"] else "looks broken"
     near = ", by how near they came" if entry["estimated"] > entry["events"] / entry["flights"] else ""
@@ -100,10 +102,10 @@ def limit_report_line(entry: Mapping[str, Any]) -> str:
 
 
 def rarest_probability(limits: Sequence[EventLimit], scenario: Scenario) -> float:
-    """The smallest probability per flight that a limit allows; 1 without limits."""
+    """Return the smallest probability per flight that a limit allows; 1 without limits."""
     return min((allowed_probability(limit, scenario) for limit in limits), default=1.0)
 
 
 def flights_per_event(limits: Sequence[EventLimit], scenario: Scenario) -> int:
-    """Flights among which one event of the rarest limit is to be expected where it is just kept."""
+    """Return the number of flights in which one event of the rarest limit is expected if it is just kept."""
     return math.ceil(1.0 / rarest_probability(limits, scenario))

@@ -282,11 +282,11 @@ def read_scenarios(
         try:
             path = beside if beside is not None and is_file(beside) else name
             found.append(load(path, {**keys, **own, **settings}, trust=trust))
-        except ScenarioError as fault:
-            faults += fault.faults
+        except ScenarioError as error:
+            faults += error.faults
             continue
-        told = ", ".join(f"{key} = {value}" for key, value in own.items())
-        labels.append(f"{name} with {told}" if told else name)
+        detail = ", ".join(f"{key} = {value}" for key, value in own.items())
+        labels.append(f"{name} with {detail}" if detail else name)
     return tuple(found), distinct_labels(labels), faults
 
 
@@ -317,8 +317,8 @@ def common_space(scenarios: Sequence[Scenario]) -> tuple[SearchSpace, list[str]]
         return space, notes
     axes = {axis.key: axis for axis in space.axes}
     for scenario in scenarios[1:]:
-        more, told = default_space(scenario)
-        notes += [note for note in told if note not in notes]
+        more, more_notes = default_space(scenario)
+        notes += [note for note in more_notes if note not in notes]
         for axis in more.axes:
             known = axes.get(axis.key, axis)
             axes[axis.key] = replace(known, low=min(known.low, axis.low), high=max(known.high, axis.high))

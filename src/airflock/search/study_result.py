@@ -172,7 +172,7 @@ KEY = ["stage", "run", "generation", "candidate"]
 
 
 def candidate_table(store: FlightStore, objectives: Sequence[str], stage: str = "search") -> pd.DataFrame:
-    """One row a candidate: its parameters by key, then its fitness, one column for each objective; nan: failed."""
+    """Return one row a candidate: its parameters by key, then its fitness by objective; nan: failed."""
     rows = store.rows(
         "SELECT run, generation, candidate, parameters, fitness FROM candidate WHERE stage=? AND fitness IS NOT NULL "
         "ORDER BY run, generation, candidate",
@@ -182,15 +182,15 @@ def candidate_table(store: FlightStore, objectives: Sequence[str], stage: str = 
     for run, generation, candidate, parameters, fitness in rows:
         place = {"run": run, "generation": generation, "candidate": candidate}
         with as_error(f"{store.path}: candidate {candidate} of generation {generation}", StudyError):
-            told = dict(zip(objectives, _fitness(fitness, len(objectives)), strict=True))
-            found.append({**place, **parse_values(parameters), **told})
+            fitnesses = dict(zip(objectives, _fitness(fitness, len(objectives)), strict=True))
+            found.append({**place, **parse_values(parameters), **fitnesses})
     return pd.DataFrame(found)
 
 
 def flight_table(store: FlightStore, stage: str | None = None) -> pd.DataFrame:
-    """One row a flight: parameters by key, seed, order parameters, why it failed, duration (s), worker, versions.
+    """Return one row a flight: parameters, seed, order parameters, why it failed, duration (s), worker, versions.
 
-    A flight of another length than the scenario's tells it as `duration_flown` (s, simulated).
+    A flight of another length than the scenario's has it as `duration_flown` (s, simulated).
     """
     rows = store.rows(
         "SELECT f.stage, f.run, f.generation, f.candidate, f.repeat, f.seed, c.parameters, f.scores, f.reason, "
@@ -211,7 +211,7 @@ def flight_table(store: FlightStore, stage: str | None = None) -> pd.DataFrame:
 
 
 def _fitness(text: Any, count: int) -> list[float]:
-    """Fitness of a row, one number for each objective; nan: failed."""
+    """Decode the fitness of a row, one number for each objective; nan: failed."""
     found = parse_json(text)
     sound = isinstance(found, list) and len(found) == count
     if not sound or not all(value is None or isinstance(value, (int, float)) for value in found):
@@ -222,7 +222,7 @@ def _fitness(text: Any, count: int) -> list[float]:
 def export(store: FlightStore, folder: Path, scenarios: Sequence[str] = ()) -> list[Path]:
     """Write all flights as evaluations.csv, and as evaluations.parquet where pyarrow is installed.
 
-    scenarios : what those of the study are called; of several, each flight tells its own
+    scenarios : labels of the study's scenarios; with several, each row has its own
     """
     table = flight_table(store)
     if len(scenarios) > 1:
@@ -234,8 +234,8 @@ def export(store: FlightStore, folder: Path, scenarios: Sequence[str] = ()) -> l
             written.append(folder / "evaluations.parquet")
             with atomic.atomic_path(written[1]) as temporary:
                 table.to_parquet(temporary, index=False)
-    except OSError as fault:
-        raise StudyError(f"{folder}: tables cannot be written: {fault.strerror or fault}") from fault
+    except OSError as error:
+        raise StudyError(f"{folder}: tables cannot be written: {error.strerror or error}") from error
     return written
 
 
@@ -248,13 +248,13 @@ def _has_parquet() -> bool:
 
 
 def sort_by_fitness(table: pd.DataFrame, objective: str, maximise: bool) -> Any:
-    """Candidates without the failed ones, the best first; of equals the earlier."""
+    """Return the candidates without the failed ones, the best first; of equals the earlier."""
     sound = table[table[objective].notna()]
     return sound.sort_values(objective, ascending=not maximise, kind="stable")
 
 
 def full_length_candidates(table: pd.DataFrame, growing: bool) -> pd.DataFrame:
-    """Candidates that flew as long as the scenario says; those of a search's short flights compare with each other."""
+    """Return the candidates of whole flights; fitness of short flights is on another scale."""
     return table[table[DURATION_COLUMN].isna()] if growing and DURATION_COLUMN in table else table
 
 

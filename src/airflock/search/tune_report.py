@@ -164,9 +164,9 @@ def _hardened(found: TuneResult) -> list[str]:
     ]
 
 
-def _between(told: tuple[float, float, float], form: str) -> str:
+def _between(interval: tuple[float, float, float], form: str) -> str:
     """A mean with its interval."""
-    mean, low, high = (format(value, form) for value in told)
+    mean, low, high = (format(value, form) for value in interval)
     return f"{mean} ({low} to {high})"
 
 
@@ -227,24 +227,24 @@ def _range(span: tuple[float, float] | None) -> str:
     return "" if span is None else f"{span[0]:.3g} to {span[1]:.3g}"
 
 
-def _identified(told: Mapping[str, Any]) -> list[str]:
+def _identified(fleet: Mapping[str, Any]) -> list[str]:
     """Return the section of numbers identified from logs; empty if the tuning did not begin with logs."""
-    if not told:
+    if not fleet:
         return []
     rows = []
-    for number in told["numbers"]:
+    for number in fleet["numbers"]:
         key, unit = str(number["key"]), KEY_UNITS.get(str(number["key"]), "")
         if "reason" in number:
-            rows.append((key, "", "", f"as in {told['name']}: {number['reason']}"))
+            rows.append((key, "", "", f"as in {fleet['name']}: {number['reason']}"))
         else:
             span = f"{number['low']:.3g} to {number['high']:.3g}"
             rows.append((key, format_with_unit(f"{number['value']:.4g}", unit), span, str(number["origin"])))
-    files = ", ".join(f"{name} ({digest})" for name, digest in told["logs"].items())
+    files = ", ".join(f"{name} ({digest})" for name, digest in fleet["logs"].items())
     return [
         "<h2>What was identified</h2>",
-        f"<p>From the logs of {told['drones']} drones: {escape(files)}.</p>",
+        f"<p>From the logs of {fleet['drones']} drones: {escape(files)}.</p>",
         _table(("number", "value", "95 % interval", "from"), rows),
-        _list([str(note) for note in told["notes"]]),
+        _list([str(note) for note in fleet["notes"]]),
     ]
 
 
@@ -436,8 +436,8 @@ def flight_card_limits(result: TuneResult) -> tuple[list[tuple[str, str, str]], 
     members = range(1, int(scenario.flight.agents) + 1)
     try:
         document = make_card_document(scenario, site=(0.0, 0.0, 0.0), members=members, mission=1, expires=0)
-    except CardError as fault:
-        return [], f"No flight card can be made of it: {str(fault).splitlines()[0]}"
+    except CardError as error:
+        return [], f"No flight card can be made of it: {str(error).splitlines()[0]}"
     from airflock.drones import SafetyLimits
 
     known = {name: how for name, how, _ in declarations(SafetyLimits())}

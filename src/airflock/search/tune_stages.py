@@ -33,7 +33,7 @@ SEARCH, HARDEN, CERTIFY_SHARE = 0.45, 0.15, 0.4  # shares of the budget
 TRIED = 15  # rounds of flights that hardening is planned with; all whole and half steps and fresh seeds would be 19
 POPULATION = 24  # reaches a good set in less time than 100 do: small flocks' flights are few
 LEAST = 6  # generations
-FLIGHTS = 2  # of a candidate: from two on, chance can be told from merit
+FLIGHTS = 2  # of a candidate: from two on, chance and merit can be separated
 AVERAGES = 2  # of the last means of the search, which also fly in its final
 USUAL = 100  # flights of a finalist
 DEFAULT_CONFIDENCE = 0.95
@@ -45,7 +45,7 @@ class BudgetPlan:
 
     search : keys of the table [search]; seeds: flights of each step of hardening; seconds: of certifying
     rate   : flights per second that the plan was made with
-    limits, confidence : what is to be shown; goes on with these unless others are given
+    limits, confidence : of the certificate; a resumed tuning keeps them unless others are given
     """
 
     search: dict[str, Any]
@@ -56,16 +56,17 @@ class BudgetPlan:
     confidence: float = DEFAULT_CONFIDENCE
 
     def document(self) -> dict[str, Any]:
-        """The plan as plain values."""
+        """Return the plan as plain values."""
         return {"airflock": __version__, **asdict(self)}
 
 
 def make_plan(budget: float, rate: float, *, warm: bool = False, flights_for_limits: int = USUAL) -> BudgetPlan:
-    """A plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
+    """Make a plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
 
-    telling : flights that tell whether the rarest limit is kept: at most so many for each finalist and each step
-    StudyError where nothing sensible fits into it.
+    flights_for_limits : flights that show if the rarest limit is kept: at most so many for each finalist and each step
+    Raises StudyError if the budget is too small.
     """
+    # Fixed when it begins and kept on resume: the same flights are flown, whatever the machine is doing by then.
     flights = budget * SEARCH * rate
     finals = flights / 4.0
     top = 4
@@ -173,8 +174,8 @@ def save_plan(folder: Path, start: Scenario, plan: BudgetPlan) -> None:
             {**plan.document(), "identity": scenario_identity(start)},
             "A tuning of Airflock. Written once, when it began.",
         )
-    except OSError as fault:
-        raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
+    except OSError as error:
+        raise StudyError(f"{folder}: cannot be written: {error.strerror or error}") from error
 
 
 def read_plan(path: Path) -> tuple[BudgetPlan, str]:
@@ -185,8 +186,8 @@ def read_plan(path: Path) -> tuple[BudgetPlan, str]:
         limits = [str(text) for text in found.get("limits", ())]
         sure = float(found.get("confidence", DEFAULT_CONFIDENCE))
         made = BudgetPlan(search, int(found["seeds"]), float(found["seconds"]), float(found["rate"]), limits, sure)
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
-        raise StudyError(f"{path}: is damaged: no plan of a tuning is in it; give another --out") from fault
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
+        raise StudyError(f"{path}: is damaged: no plan of a tuning is in it; give another --out") from error
     if found.get("margins"):  # of a version that could widen them
         raise StudyError(f"{path}: margins are no longer widened; remove the line `margins` to go on without them")
     if not (0 < made.seeds <= MOST_SEEDS and 0.0 <= made.seconds < 1e9 and 0.0 < made.rate < 1e9):
@@ -202,14 +203,14 @@ def scenario_text_document(scenario: Scenario) -> dict[str, Any]:
 def read_steps(path: Path) -> tuple[list[StepResult], str]:
     """Read the steps of hardening, and why there are none. Raises StudyError for a damaged file."""
     with as_error(path, StudyError):
-        told = parse_json_object(read_text(path))
+        stored = parse_json_object(read_text(path))
     try:
-        return [_measured(step) for step in told["steps"]], str(told["why"])
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
-        raise StudyError(f"{path}: is damaged; remove it, and the hardening is done once more") from fault
+        return [_measured(step) for step in stored["steps"]], str(stored["why"])
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
+        raise StudyError(f"{path}: is damaged; remove it, and the hardening is done once more") from error
 
 
-def _measured(told: Mapping[str, Any]) -> StepResult:
+def _measured(row: Mapping[str, Any]) -> StepResult:
     """Make one step from plain values; errors of the constructors pass through."""
 
     def three(values: Any) -> tuple[float, float, float]:
@@ -217,13 +218,13 @@ def _measured(told: Mapping[str, Any]) -> StepResult:
         return mean, low, high
 
     def table(name: str) -> dict[str, float]:
-        return {str(key): float(value) for key, value in told[name].items()}
+        return {str(key): float(value) for key, value in row[name].items()}
 
     return StepResult(
-        name=str(told["name"]), reason=str(told["reason"]), parameters=table("parameters"),
-        fitness=float(told["fitness"]), r_min=float(told["r_min"]), n_coll=float(told["n_coll"]),
-        cost=three(told["cost"]), gain=three(told["gain"]), parts=table("parts"), contacts=float(told["contacts"]),
-        clearance=float(told.get("clearance", "nan")), kept=bool(told["kept"]), verdict=str(told["verdict"]),
+        name=str(row["name"]), reason=str(row["reason"]), parameters=table("parameters"),
+        fitness=float(row["fitness"]), r_min=float(row["r_min"]), n_coll=float(row["n_coll"]),
+        cost=three(row["cost"]), gain=three(row["gain"]), parts=table("parts"), contacts=float(row["contacts"]),
+        clearance=float(row.get("clearance", "nan")), kept=bool(row["kept"]), verdict=str(row["verdict"]),
     )  # fmt: skip
 
 
@@ -300,14 +301,14 @@ def run_hardening_stage(
         write_toml_file(
             folder / TUNED_FILE, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune."
         )
-    except ScenarioError as fault:
-        why = fault.faults[0]
+    except ScenarioError as error:
+        why = error.faults[0]
         law = folder / STUDY_FOLDER / str(best.document.get("model", {}).get("kind", ""))
         if law.suffix == ".py" and law.is_file():
             atomic.write_file(folder / law.name, law.read_bytes())
         write_toml_file(folder / TUNED_FILE, scenario_text_document(best), "Evolved by airflock tune; not hardened.")
-    told = {"why": why, "steps": [step.as_dict() for step in steps]}
-    atomic.write_file(folder / STEPS_FILE, json.dumps(told))
+    outcome = {"why": why, "steps": [step.as_dict() for step in steps]}
+    atomic.write_file(folder / STEPS_FILE, json.dumps(outcome))
     return load(folder / TUNED_FILE, trust=trust), steps, why
 
 

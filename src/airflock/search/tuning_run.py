@@ -59,17 +59,17 @@ Paths = Sequence[str | os.PathLike[str]]
 class IdentifiedFleet:
     """A fleet identified from logs: the scenario with its numbers, its file, and a report.
 
-    told : files with their hashes, the law's scenario, numbers with intervals or the reason why not, notes
+    report : files with their hashes, the law's scenario, numbers with intervals or the reason why not, notes
     """
 
     scenario: Scenario
     document: Mapping[str, Any]
-    told: Mapping[str, Any]
+    report: Mapping[str, Any]
 
     def save(self, folder: Path) -> None:
         """Write identified.toml and identified.json, the latter last: it says that the stage is over."""
         write_toml_file(folder / SCENARIO, self.document, "Identified from logs by airflock tune.")
-        atomic.write_file(folder / REPORT_FILE, json.dumps(self.told))
+        atomic.write_file(folder / REPORT_FILE, json.dumps(self.report))
 
 
 def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> IdentifiedFleet:
@@ -77,21 +77,23 @@ def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.Pa
 
     Raises StudyError where the folder holds what other logs said, RecordingError or AirflockError for bad logs.
     """
-    asked = _asked(logs, like, heard)
+    request = _identify_request(logs, like, heard)
     if (folder / REPORT_FILE).is_file():
         with as_error(folder / REPORT_FILE, StudyError):
-            told = parse_json_object(read_text(folder / REPORT_FILE))
-        for key, value in asked.items():
-            if told.get(key) != value:
+            report = parse_json_object(read_text(folder / REPORT_FILE))
+        for key, value in request.items():
+            if report.get(key) != value:
                 raise StudyError(f"{folder}: holds the tuning of other logs ({key} differs); give another --out")
-        return IdentifiedFleet(load(folder / SCENARIO), {}, told)
+        return IdentifiedFleet(load(folder / SCENARIO), {}, report)
     found = identify(list(logs), like, heard=None if heard is None else read_heard(heard))
     document = found.document()
     # by the name of the file that it becomes, so that a tuning that is resumed is the same one
-    return IdentifiedFleet(build_scenario(document, str(folder / SCENARIO)), document, {**asked, **_told(found)})
+    return IdentifiedFleet(
+        build_scenario(document, str(folder / SCENARIO)), document, {**request, **_identify_report(found)}
+    )
 
 
-def _asked(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> dict[str, Any]:
+def _identify_request(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> dict[str, Any]:
     """Return everything that decides the outcome, as plain values."""
     files = [*logs, *([] if heard is None else [heard])]
     like_document = {key: value for key, value in like.document.items() if key != "published"}
@@ -105,11 +107,11 @@ def _hash(path: str | os.PathLike[str]) -> str:
     try:
         with expand_path(path).open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()[:12]
-    except OSError as fault:
-        raise RecordingError(f"{path}: {fault.strerror or fault}") from fault
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}") from error
 
 
-def _told(found: IdentifyResult) -> dict[str, Any]:
+def _identify_report(found: IdentifyResult) -> dict[str, Any]:
     """Every number with its interval, or the reason why the logs do not tell it; and notes."""
     numbers = [
         {"key": n.key, "value": n.value, "low": n.low, "high": n.high, "origin": n.origin}
@@ -128,14 +130,14 @@ def prepare_start(scenario: Scenario) -> tuple[Scenario, list[str]]:
 
     Only numbers that the scenario's document does not give are set; every other value stays.
     """
-    values, told = _scaled(scenario)
+    values, remarks = _scaled(scenario)
     start = rebuilt(scenario, values) if values else scenario
     for room in _off_the_walls(scenario):
         with suppress(ScenarioError):  # they have no place so far from the walls
             why = f"no agent starts nearer than {room:g} m to walls and obstacles"
             away = rebuilt(start, {"start.wall_clearance": room})
-            return away, [*told, f"{why} (start.wall_clearance, which is not given)"]
-    return start, told
+            return away, [*remarks, f"{why} (start.wall_clearance, which is not given)"]
+    return start, remarks
 
 
 def measures_walls(scenario: Scenario) -> bool:
@@ -198,11 +200,11 @@ def make_request(
 
     Raises ScenarioError, all faults together.
     """
-    asked = ErrorCollector()
-    limits = list(limit) or (plan.limits if plan else []) or asked.read(default_limits, start)
+    errors = ErrorCollector()
+    limits = list(limit) or (plan.limits if plan else []) or errors.read(default_limits, start)
     sure = (plan.confidence if plan else DEFAULT_CONFIDENCE) if confidence is None else confidence
-    campaign = asked.read(campaign_from_request, start, limits, sure)
-    asked.raise_errors()
+    campaign = errors.read(campaign_from_request, start, limits, sure)
+    errors.raise_errors()
     return TuneRequest(campaign, limits)
 
 
@@ -290,8 +292,8 @@ def tune(
     threads : int, optional
         Flights side by side; by default one per core.
     watch, note : callable, optional
-        Told as each stage begins and of its flights (`airflock.search.tune_stages.TuneProgress`); told in a line,
-        before they begin, of each limit that the budget leaves too little time to show.
+        Called as each stage begins and after its flights (`airflock.search.tune_stages.TuneProgress`); called with a
+        line for each limit that the budget leaves too little time to show.
     trust : bool
         Whether code that files name may run.
 
@@ -323,19 +325,19 @@ def tune(
     begun = parts.read(_begun, scenario, like, heard, settings, folder, trust)
     start = parts.read(lambda found: found.start, begun)
     plan = parts.read(load_plan, folder, start, resume)
-    asked = parts.read(make_request, start, limit, confidence, value_or_default(plan, None))
+    request = parts.read(make_request, start, limit, confidence, value_or_default(plan, None))
     parts.raise_errors()
     logs = begun.logs
-    sure, rated = asked.campaign.confidence, [each for each in asked.campaign.limits if each.rate is not None]
+    sure, rated = request.campaign.confidence, [each for each in request.campaign.limits if each.rate is not None]
     if plan is None:
         telling = flights_per_event(rated, start)
         made = make_plan(budget, measure_flight_rate(start, threads), warm=warm, flights_for_limits=telling)
-        plan = replace(made, limits=asked.limits, confidence=sure)
+        plan = replace(made, limits=request.limits, confidence=sure)
         save_plan(folder, start, plan)
     searched = [each.text for each in rated]
     if logs is not None and not (folder / REPORT_FILE).is_file():
         logs.save(folder)
-    short = infeasible_limit_lines(asked.campaign, plan)
+    short = infeasible_limit_lines(request.campaign, plan)
     for line in short:
         if note is not None:
             note(line)
@@ -346,10 +348,10 @@ def tune(
         if result.dead_reason:
             raise StudyError(f"{start.name}: {result.dead_reason}")
         tuned, steps, why = run_hardening_stage(folder, plan, searched, threads, trust, watch)
-        shown = run_certificate_stage(folder, tuned, asked.limits, sure, plan, threads, watch)
+        shown = run_certificate_stage(folder, tuned, request.limits, sure, plan, threads, watch)
         found = TuneResult(
             folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
-            {} if logs is None else logs.told,
+            {} if logs is None else logs.report,
         )  # fmt: skip
         watch(TuneProgress("report"))
         from airflock.search.tune_report import save
@@ -361,7 +363,7 @@ def tune(
 
 
 class _Begun(NamedTuple):
-    """Where a tuning begins: its scenario, what was set in it, and what logs told if it began with logs."""
+    """Start of a tuning: its scenario, notes on numbers that were set, and the fleet identified from logs."""
 
     start: Scenario
     notes: list[str]
