@@ -455,7 +455,7 @@ _LOOK: KeyTypes = {"flights": (int,), "events": (int,), "above": _NUMBER, "below
 
 
 def _shape_faults(document: Mapping[str, Any]) -> list[str]:
-    """Keys of a certificate that are missing or of another kind than it is written with."""
+    """Return errors for keys of a certificate that are missing or of another type."""
     faults = [] if _is(document.get("confidence"), _NUMBER) else ["confidence"]
     for name, kinds in _TABLES.items():
         faults += _wrong(name, document.get(name), kinds)
@@ -503,7 +503,8 @@ def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None
 
 
 def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
-    """Bounds and verdicts that do not follow from the counts."""
+    """Return errors of bounds and verdicts that do not follow from the counts."""
+    # A changed file has to fail here even if its checksum was recomputed: every number follows from counts and limits.
     faults = []
     if document["flights"]["first_seed"] != certificate_seed(campaign.hash, COUNT_PURPOSE, 0):
         faults.append("its seeds are not those that the scenario fixes")
@@ -545,6 +546,7 @@ def _flown_again(
     from airflock.engine import compile_for
     from airflock.support import run_in_threads
 
+    # One flight in `every` is enough: a certificate of other bits fails in nearly all of them.
     wanted, every = document["check"]["digests"], int(document["check"]["every"])
     numbers = [every * i for i in range(len(wanted))]
     score = limit_score_function(campaign.flown, campaign.limits, campaign.bits, campaign.device)
@@ -564,7 +566,7 @@ def _flown_again(
 
 
 def _differences(flown: Mapping[str, Any]) -> tuple[str, ...]:
-    """Versions that differ from those of the certificate: what may explain other bits."""
+    """Return versions that differ from those of the certificate: they may explain other bits."""
     now = program_versions()
     return tuple(
         f"{name}: {flown[name]} then, {value} now" for name, value in now.items() if flown.get(name, value) != value

@@ -189,6 +189,7 @@ def run_campaign(
         write_toml_file(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
         flyer = CampaignFlyer(campaign, store, executor, note=notify)
         try:
+            # Counting first, with its share: splitting and tolerances start from its flights.
             part = COUNT_BUDGET_SHARE if keys or split or axes else 1.0
             counted = count_events(flyer if campaign.flights else flyer.with_budget(budget * part), on_progress)
             rare: Mapping[str, Any] = {}
@@ -223,12 +224,12 @@ def event_timings(campaign: Campaign, counted: CountResult) -> dict[int, EventTi
     return found
 
 
-TRIAL = 16  # flights that tell how many there is time for
+TRIAL = 16  # flights by which the time of one flight is measured
 
 
 @contextmanager
 def flight_folder(folder: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """The folder of flights: the one that is given, or one that is gone afterwards."""
+    """Yield the folder of flights: the given one, or a temporary one."""
     if folder is not None:
         yield expand_path(folder)
         return
@@ -255,9 +256,9 @@ def campaign_executor(
 
 
 def with_planned_flights(campaign: Campaign, executor: Executor, budget: float, folder: Path, resume: bool) -> Campaign:
-    """The campaign with a number of flights where a limit has no rate: as many as there is time for.
+    """Return the campaign with a number of flights if a limit has no rate: as many as the budget allows.
 
-    A few flights on seeds of their own tell how long one takes; the number then stands before the first one counts.
+    A few flights on seeds of their own measure how long one takes; the number is fixed before the first one counts.
     """
     if campaign.flights is not None or all(limit.rate is not None for limit in campaign.limits):
         return campaign
@@ -265,10 +266,12 @@ def with_planned_flights(campaign: Campaign, executor: Executor, budget: float, 
         known = read_toml_file(folder / f"{CAMPAIGN_KIND}.toml").get("flights")
         return replace(campaign, flights=known if isinstance(known, int) else None)
     began = time.monotonic()
+    # Seeds of their own, far behind those of tolerances: a flight that chose the number must not count.
     own = [certificate_seed(campaign.hash, TOLERANCE_PURPOSE, (1 << 29) + i) for i in range(TRIAL)]
     for landed in executor.fly([Flight(0, i, campaign.parameters(s), s) for i, s in enumerate(own)]):
         if landed.values is None:
             raise StudyError(f"{campaign.scenario.name}: seed {landed.flight.seed}: {landed.reason}")
     able = 0.9 * budget * TRIAL / max(time.monotonic() - began, 1e-6)
+    # Two digits: a round number shows that the count did not choose it. A tenth of the time is kept as a margin.
     digits = 10.0 ** max(0, math.floor(math.log10(max(able, 1.0))) - 1)
     return replace(campaign, flights=max(1, min(int(able / digits) * int(digits), (1 << 30) - 1)))

@@ -183,6 +183,7 @@ class _Counting:
         if self.fresh < FIRST or math.isinf(left):
             self.chunk = max(FIRST, math.ceil(CHUNK * self.result.rate))
             return True
+        # Flights that the remaining time allows. A limit that needs many more is given up, so that others get the time.
         able = len(rows) + left * self.result.rate
         for verdict in still:
             first = self._first(verdict)  # a limit with an event may yet be refuted
@@ -201,6 +202,7 @@ class _Counting:
         """Fly the next few flights that the store does not hold."""
         done = len(self.result.rows)
         flights = []
+        # In short chunks: looks may end counting, and time may run out.
         for number in range(done, min(max(self.aims), done + self.chunk)):
             if number not in self.scores:
                 own = certificate_seed(self.campaign.hash, COUNT_PURPOSE, number)

@@ -179,6 +179,7 @@ def flights_needed(limit: float, alpha: float) -> int:
 
 def look_schedule(limit: float, alpha: float) -> Iterator[tuple[int, float, float]]:
     """Yield looks in their order: flights, alpha of the upper bound (0: not used), alpha of the lower bound."""
+    # Before the first size that could show the limit only refutation is possible, so only the lower bound pays there.
     shows, turn, size = flights_needed(limit, alpha * alpha_share(1)), 0, float(EARLY)
     while math.ceil(size) < shows:
         turn += 1
@@ -284,6 +285,7 @@ def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     # 4e-3 of flights where 1.7e-4 was allowed.
     sizes, own = np.array([len(room) for room in rooms]), np.array([room.mean() for room in rooms])
     squares, freedom = np.array([((room - room.mean()) ** 2).sum() for room in rooms]), sizes - 1
+    # The share of differences between candidates that chance does not explain (one-way analysis of variance).
     left, flat = 1.0, not freedom.any()  # left of each difference, after what chance explains
     if not flat and len(rooms) > 1:
         within, between = float(squares.sum()) / int(freedom.sum()), float(own.var(ddof=1))
@@ -297,6 +299,7 @@ def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     variance = float((below**2).mean()) * len(away) / counted if len(below) else 0.0
     pooled = variance
     if not flat:
+        # Spread is pooled over candidates of similar means: wide flocks' distances vary more than narrow ones'.
         near = np.argsort(np.abs(own[:, None] - own[None, :]), axis=1, kind="stable")[:, :LIKE]
         pooled = squares[near].sum(axis=1) / np.maximum(freedom[near].sum(axis=1), 1)
     spread = np.sqrt(left * pooled + (1.0 - left) * variance)

@@ -113,12 +113,15 @@ def run_repetition(
     mean_branch_lead : mean number of samples before the first crossing from which noise is drawn again
     size  : flights of a level
     """
+    # Subset simulation: each level is a quantile of the scores below the level before, so that its conditional
+    # probability is about SHARE. The product of these probabilities is that of the target.
     level = max(particle.least for particle in start)
     p, below = len(start) / counted, list(start)
     made = Repetition([(level, p)], below)
     for number in range(MOST):
         if level <= target or not below:
             break
+        # Resampled in a random order: each survivor is copied as evenly as possible.
         flock = [below[i] for i in rng.permutation(np.resize(np.arange(len(below)), size))]
         states: list[LineageFlight] = []
         for move in range(MOVES):
@@ -197,6 +200,7 @@ def _interval(found: Sequence[float]) -> tuple[float, float, float]:
     """Mean, and the 95 % interval of the mean logarithm, stretched to hold the mean."""
     if len(found) < 2 or min(found) <= 0.0:
         return math.nan, math.nan, math.nan
+    # Estimates of a product of probabilities are skewed; their logarithms are nearly normal.
     logs = np.log(found)
     half = float(t.ppf(0.975, len(found) - 1)) * float(logs.std(ddof=1)) / math.sqrt(len(found))
     mean = float(np.mean(found))
@@ -217,6 +221,7 @@ def _disagreement(repetitions: Sequence[Repetition], levels: Sequence[float], va
     """The first level at which repetitions and counting cannot both be right; empty if there is none."""
     n, rest = len(values), 0.5 * (1.0 - SURE)
     for level in levels:
+        # Exact binomial interval of counting against the t-interval of splitting: they have to overlap.
         k = sum(value <= level for value in values)
         least = float(beta.ppf(rest, k, n - k + 1)) if k else 0.0
         most = float(beta.ppf(1.0 - rest, k + 1, n - k)) if k < n else 1.0
@@ -265,6 +270,7 @@ def estimate_by_splitting(
         seeds, least = _topped_up(flyer, own, values)
     except BudgetSpent:
         return _refused(target, "time ran out before there were enough flights to start from")
+    # Repetitions start from disjoint flights, so that they are independent and their spread is an honest interval.
     share, runs, period = len(least) // REPETITIONS, [], sample_period(campaign.scenario)
     for number in range(REPETITIONS):
         fly = LineageFlyer(flyer, number, threads, len(counted_rows.rows))
@@ -292,7 +298,7 @@ def start_repetition(
     rng: np.random.Generator,
     notify: Callable[[float, float], None] | None = None,
 ) -> Repetition:
-    """One repetition, from the nearest of its flights (seed, smallest distance) on; `period` between samples, s."""
+    """Run one repetition from its nearest flights (seed, smallest distance) on; `period` between samples, s."""
     nearest = sorted(range(len(seeds)), key=lambda i: smallest_distances[i])[:START]
     lineages = [Lineage(seeds[i]) for i in nearest]
     start = [LineageFlight(x, falls) for x, falls in zip(lineages, fly(-1, lineages), strict=True)]

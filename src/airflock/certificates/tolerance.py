@@ -39,7 +39,7 @@ TIME_OVER = "time was over"
 
 
 def find_tolerances(flyer: CampaignFlyer, counted: CountResult, keys: Sequence[str]) -> dict[str, Any]:
-    """Largest value of each key at which the events of all limits stay below a level, and the next that is not shown.
+    """Find the largest value of each key at which the events of all limits stay below a level, and the next value.
 
     Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal; of zero
     none), flights, and the interval that the scenario's file gives, if any.
@@ -62,7 +62,7 @@ def find_tolerances(flyer: CampaignFlyer, counted: CountResult, keys: Sequence[s
 
 
 def screening_level(campaign: Campaign) -> float:
-    """Probability per flight against which values are judged: that of the limits, or LEVEL where they are rarer."""
+    """Return the probability per flight against which values are judged: that of the limits, at least LEVEL."""
     return max([LEVEL, *(p for p in map(campaign.probability, campaign.limits) if p is not None)])
 
 
@@ -85,6 +85,7 @@ class ValueScreen:
             return
         for _ in self.flyer.fly(batch, [flight]):
             pass
+        # A new kind of number (a delay above zero) compiles another driver. That takes seconds and is no flight time.
         waited = time.monotonic() - began
         self.end += waited
         self.flyer = replace(self.flyer, until=self.flyer.until + waited)
@@ -103,7 +104,8 @@ class ValueScreen:
         ]
 
     def judged(self, batch: CandidateBatch, parameters: Mapping[str, float]) -> tuple[str, InterimLook | None]:
-        """safe, unsafe, open, or a reason why it cannot be flown; and the last look."""
+        """Return safe, unsafe, open, or a reason why it cannot be flown; and the last look."""
+        # Flights in rounds between looks: a value that is clearly safe or unsafe needs few of them.
         campaign = self.flyer.campaign
         flown = {number: values for (_, number), values in self.flyer.store.flown(batch).items()}
         events, done, last = 0, 0, None

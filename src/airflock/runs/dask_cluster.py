@@ -148,6 +148,7 @@ class DaskCluster:
         fault = future.exception() if future.status == "error" else None
         lost = fault is None or type(fault).__name__ in ("KilledWorker", "CommClosedError", "CancelledError")
         tries[key] = tries.get(key, 0) + 1
+        # A flight is rarely the cause of a lost worker, so it flies again; after LOSSES workers it fails.
         if lost and tries[key] < LOSSES:
             return None
         reason = f"its worker was lost {tries[key]} times" if lost else f"{type(fault).__name__}: {fault}"
@@ -162,6 +163,7 @@ class DaskCluster:
         late = [future for future, (_, began) in out.items() if time.monotonic() - began > self.timeout]
         if not late:
             return
+        # A running flight cannot be stopped: its worker process is restarted.
         flying = self.client.who_has() | self.client.processing()
         workers = [worker for worker, keys in flying.items() if {future.key for future in late} & set(keys)]
         for future in late:

@@ -91,6 +91,7 @@ class ThreadExecutor:
                 for future in over:
                     yield future.result()
         except KeyboardInterrupt:
+            # Flights cannot be interrupted: those in the air end and are stored, those that wait are cancelled.
             in_the_air = [future for future in waiting if not future.cancel()]
             for future in in_the_air:
                 yield future.result()

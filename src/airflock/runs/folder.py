@@ -66,6 +66,7 @@ def write_toml_file(path: Path, document: Mapping[str, Any], comment: str = "") 
     """Write a nested dict as TOML, complete or not at all."""
     import tomlkit
 
+    # Values that are tables come last: in TOML a plain key after a table would belong to it.
     made = tomlkit.document()
     if comment:
         made.add(tomlkit.comment(comment))

@@ -307,6 +307,7 @@ def study_from_request(
 
 def _text_of(code: Any) -> str:
     """Return a hash of the code of a function; it is equal in every process."""
+    # Nested code objects print their address: they would change the hash in every process.
     constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
     return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
 
@@ -346,6 +347,7 @@ def resume_study(
     held, now = read_toml_file(folder / STUDY_FILE), to_toml_values(study.document())
     if any(held.get(key) != now[key] for key in OWN):
         return study, ""  # `open_folder` says so
+    # A key may be given by its last name alone, so such keys win over the folder, too.
     named = {key.rpartition(".")[2] for key in settings}
     flown = {
         key: value
@@ -485,6 +487,7 @@ def run_sensitivity(
     values = np.array([np.nan if row[0] is None else row[0] for row in rows])
     if not np.isfinite(values).any():
         raise StudyError("every candidate failed: no sensitivity")
+    # SALib takes no gaps: a failed candidate counts as the worst value seen.
     values[~np.isfinite(values)] = np.nanmin(values) if study.objectives[0].maximise else np.nanmax(values)
     if method == "sobol":
         found = analyse_sobol.analyze(problem, values, calc_second_order=False, seed=seed)
@@ -520,6 +523,7 @@ class BatchExecutor:
                 reason = str(error).splitlines()[0] if str(error) else type(error).__name__
                 yield FlightResult(flights[0], None, reason, time.perf_counter() - begin, self.device)
                 return
+            # One bad flight ends the whole batch. Halving finds it in log2 steps, and all others keep their result.
             half = len(flights) // 2
             yield from self._fly(flights[:half])
             yield from self._fly(flights[half:])

@@ -65,6 +65,7 @@ def conclude_study(
     flown = store.flown(SCORE)
     values, each = _scored(study, flown)
     mean, sd, low, high = mean_interval(values)
+    # The best value of the search is the luckiest, so the winner is scored on seeds that have chosen nothing.
     safe = _safe(study, sound)
     good = _as_good(study, safe, mean)
     result = EvolveResult(
@@ -166,6 +167,7 @@ def select_finalists(
     signs = np.array([-1.0 if objective.maximise else 1.0 for objective in study.objectives])
     known = candidates[candidates[names].notna().all(axis=1)].drop_duplicates(list(study.space.keys))
     losses = known[names].to_numpy() * signs
+    # Ranks of excess come first here, too: a fast candidate that breaks limits must not fill the final.
     if study.limits:
         losses = rank_by_excess(losses, known[EXCESS_COLUMN].to_numpy())
         order = np.argsort(losses[:, 0], kind="stable")
@@ -213,6 +215,7 @@ def fly_by_successive_halving(
             break
         found = evaluator.evaluate(batch, points[alive], seeds=[seeds] * len(alive))
         for k, (value,) in zip(alive, found, strict=True):
+            # The mean over all flights so far: a finalist keeps what its earlier rounds have shown.
             before = float(rows[k] or 0.0)
             rows[k] = None if value is None else (flown * before + len(seeds) * value) / (flown + len(seeds))
         flown += len(seeds)
@@ -255,6 +258,7 @@ def _winner(study: Study, rows: Sequence[Sequence[float | None]], excess: NDArra
     if table.shape[1] == 1:
         return int(np.argmax(np.where(sound, table[:, 0], -np.inf)))
     best, worst = table[sound].max(axis=0), table[sound].min(axis=0)
+    # Each objective is scaled by its range over the front, so that units do not decide.
     away = ((best - table) / np.where(best > worst, best - worst, 1.0)) ** 2
     return int(np.argmin(np.where(sound, away.sum(axis=1), np.inf)))
 
@@ -311,6 +315,7 @@ def race_candidates(
     for k, (share, seeds) in enumerate(RACE_ROUNDS):
         alive = alive[: max(top, round(share * pool))]
         numbers = [[study.seed(4, number + j) for j in range(seeds)]] * len(alive)
+        # Fresh seeds in each round: the winners of a round are partly lucky on its seeds.
         number += seeds
         batch = CandidateBatch("race", 0, k)
         found = losses_of(evaluator.evaluate(batch, points[alive], seeds=numbers), study.objectives)

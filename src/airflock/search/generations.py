@@ -29,7 +29,7 @@ FlightScores = dict[tuple[int, int], Mapping[str, Any] | None]  # (candidate, re
 class Evaluator:
     """Evaluator of candidates: a study with its store of flights and its executor.
 
-    note : called after each flight, with whether it is a new one
+    note : called after each flight with True if it is new
     """
 
     study: Study
@@ -50,8 +50,8 @@ class Evaluator:
 
         points : (candidate, axis) of the unit cube
         seeds  : (candidate, repeat); by default those of the search
-        duration_share : of the scenarios' duration that is flown
-        racing : whether seeds are flown in turn, and no further by candidates that cannot reach the better half
+        duration_share : share of the scenarios' duration that is flown
+        racing : True flies one seed after another and drops candidates that cannot reach the better half
         """
         study = self.study
         parameters = [study.space.parameters(point) for point in points]
@@ -64,8 +64,10 @@ class Evaluator:
                 self.note(False)
         n, last = len(places), max(len(row) for row in numbers)
         alive = list(range(len(parameters)))
+        # A race flies one more seed of each remaining candidate in each pass; otherwise one pass flies all seeds.
         for seen in range(1, last + 1) if racing else [last]:
             missing = [
+                # One number holds seed and scenario, so that the scenarios of a seed lie side by side in the store.
                 Flight(i, j * n + k, {**parameters[i], **shorter}, seed, k)
                 for i in alive
                 for j, seed in enumerate(numbers[i][:seen])
@@ -128,6 +130,7 @@ def _seeds(study: Study, batch: CandidateBatch, candidates: int) -> list[list[in
     # Seeds follow from the place in the search alone, so that a resumed search flies the same ones.
     k, most = study.seeds(batch.generation), max(study.whole("seeds"), study.whole("late_seeds"))
     before = sum(study.population(run) for run in range(batch.run)) * study.whole("generations")
+    # All runs before this one may have had another population: restarts grow it.
     first = before + batch.generation * study.population(batch.run)
     how = study.search.random_numbers
     return [
@@ -297,7 +300,7 @@ OnSearchProgress = Callable[[SearchProgress], None]
 
 @dataclass
 class ProgressTally:
-    """Counts of a search so far, reported to `watch`."""
+    """Counts of a search so far, passed to `watch`."""
 
     total: int
     watch: OnSearchProgress | None
@@ -372,6 +375,7 @@ def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[n
         begun = tally.done
         racing = study.search.racing == "optimistic"
         rows = evaluator.evaluate(batch, points, duration_share=length.share, racing=racing)
+        # A race flies fewer flights than planned: the total shrinks by those that it saved.
         tally.total -= len(points) * study.seeds(generation) * len(study.scenarios) - (tally.done - begun)
         values, losses = [row[0] for row in rows], candidate_losses(rows, study.objectives)
         sound = values
@@ -383,6 +387,7 @@ def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[n
             )
         state.tell(points, losses)
         centre = state.centre()
+        # Means of generations with short flights are no finalists: their fitness is on another scale.
         if length.whole:
             tally.end_generation(sound, first.maximise)
             seen += values
@@ -427,6 +432,8 @@ def _asked(store: FlightStore, batch: CandidateBatch, points: NDArray[np.float64
     if not stored:
         return points
     known = np.array(stored)
+    # A rebuilt optimiser may differ in the last bits on another machine. A larger difference is another optimiser,
+    # which would learn from flights of points that are not its own.
     if known.shape != points.shape or not np.allclose(known, points, rtol=0.0, atol=SAME):
         raise StudyError(
             f"{store.path}: run {batch.run}, generation {batch.generation} cannot be rebuilt here: the optimiser asks "

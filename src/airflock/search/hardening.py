@@ -74,6 +74,7 @@ class Constraints:
         for scenario, was, now in zip(scenarios, before, after, strict=True):
             if found := violation_text(was, now) or self._limit_broken(scenario, was, now):
                 return f"{found}, in {scenario.name}" if len(scenarios) > 1 else found
+        # Safety is worth more than the price: a step towards limits that are not kept yet may cost any fitness.
         if self.short(scenarios, after) < self.short(scenarios, before):
             return ""
         price = float((join_scenarios(before)["fitness"] - join_scenarios(after)["fitness"]).mean())
@@ -86,6 +87,7 @@ class Constraints:
     def _limit_broken(self, scenario: Scenario, before: ScoreColumns, after: ScoreColumns) -> str:
         """Return which limit that was kept is broken, or broken more than before, in words; empty if none."""
         for limit in self.limits:
+            # With the reserve: an estimate from some flights is uncertain by about that factor.
             most = allowed_probability(limit, scenario)
             was, now = (estimated_probability(limit, table_rows(table)) for table in (before, after))
             if now > max(was, most / RESERVE):
@@ -108,6 +110,7 @@ def violation_text(before: ScoreColumns, after: ScoreColumns) -> str:
     for name in SAFETY:
         if name in before:
             drop, _, low, _ = mean_interval((before[name] - after[name]).tolist())
+            # Both: a mean may drop by chance, and with many seeds a harmless drop is significant.
             if drop > SLACK and low > 0.0:
                 return f"{name} falls from {before[name].mean():.3g} to {after[name].mean():.3g}"
     for name, what in (("phi_wall", "leave the arena or enter obstacles"), ("n_coll", "have collisions")):
@@ -210,6 +213,7 @@ class HardeningCandidate:
         """
         before = [self._fly(self.kept[0][1], self.fresh[0])]
         after: list[list[ScoreColumns]] = []
+        # From the last step backwards: later steps were judged on top of the earlier ones.
         while len(self.kept) > 1 and not after:
             after = self._lasting(before)
             if not after:
@@ -271,23 +275,23 @@ def harden(
     threads: int | None = None,
     done: Callable[[], None] | None = None,
 ) -> list[StepResult]:
-    """Make an optimum safer by the steps of Vásárhelyi et al. 2018, Table S4, as far as they keep what held.
+    """Make an optimum safer by the steps of Vásárhelyi et al. 2018, Table S4, as far as all constraints hold.
 
     Parameters
     ----------
     scenario : Scenario, str or path
         An optimum: a scenario, or its name or file, such as best.toml of a study. Of several, which hold the same
-        numbers of the law, a step must keep what held in each; means are over all of them.
+        numbers of the law, a step must keep the constraints in each; means are over all of them.
     seeds : sequence of int
         Seeds of the flights of each step; the result is judged on three times as many seeds after the largest of them.
     steps : sequence of Step
-        What is tried, one after another; earlier braking is added where agents touch walls or obstacles, and comes
-        first where that is what is short.
+        Steps to try, one after another. Earlier braking is added if agents touch walls or obstacles; it comes first if
+        walls are the larger problem.
     cost : float
         Fitness, 0 to 1, that may be given up in all; a step towards limits that are not kept yet may cost more.
     limit : str or sequence of str
-        What may happen how rarely, as `airflock.certify` takes it. A step must not raise the estimated probability of
-        an event above its limit, with a reserve of ten.
+        Events and their largest rates, as `airflock.certify` has them. A step must not raise the estimated probability
+        of an event above its limit, with a reserve of ten.
     threads : int, optional
         Flights side by side; by default one per core.
     done : callable, optional
@@ -295,10 +299,10 @@ def harden(
 
     Returns
     -------
-    list of Measured
-        The optimum, each step that was tried with whether it was kept and why, where agents still come too near what
-        measures beside the law would gain (`search.measures`), and last what is left on fresh seeds: parameters,
-        fitness, r_min (m), what it costs and gains, partial fitnesses, contacts with walls.
+    list of StepResult
+        The optimum, each tried step with its verdict, the gain of programs on board if agents still come too near, and
+        last the kept set on fresh seeds: parameters, fitness, r_min (m), cost and gain, partial fitnesses, contacts
+        with walls.
 
     Raises
     ------
@@ -324,6 +328,7 @@ def harden(
         threads,
         done,
     )
+    # Walls first if they are hit more often than agents: a step that widens distances drives agents into walls.
     found = [trial.first]
     hit = float((join_scenarios(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()

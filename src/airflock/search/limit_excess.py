@@ -17,12 +17,12 @@ from airflock.runs import CandidateBatch, FlightStore
 from airflock.scenarios import Scenario
 from airflock.search.study import Study
 
-TIE = 1e-6  # by which fitness orders those who break limits equally
+TIE = 1e-6  # weight by which fitness orders candidates that break limits equally
 FARTHEST = 1e6  # standard deviations; equal flights have no standard deviation
 
 
 def allowed_probability(limit: EventLimit, scenario: Scenario, duration_share: float = 1.0) -> float:
-    """Probability of the event that a limit with a rate allows per flight of a share of the scenario's duration."""
+    """Return the probability per flight that a limit with a rate allows, for a share of the duration."""
     found = limit.probability(duration_share * scenario.flight.duration / 3600.0, scenario.agents)
     assert found is not None, "limits without a rate are refused where they are read"
     return found
@@ -35,15 +35,16 @@ def limit_excess(
     reserve: float,
     duration_share: float = 1.0,
 ) -> NDArray[np.float64]:
-    """How far candidates are from keeping all limits (candidate,): standard deviations, added up; 0 keeps them.
+    """Return how far candidates are from keeping all limits (candidate,): standard deviations, added up.
 
-    flights : of each candidate in the scenario; reserve : how many times rarer than allowed an event is to look
+    flights : of each candidate in the scenario; reserve : how many times rarer than allowed an event has to look
     """
     found = np.zeros(len(flights))
     for limit in limits:
         short = reliability_index(allowed_probability(limit, scenario, duration_share) / reserve) - reliability_indices(
             limit, flights
         )
+        # Without spread the index is infinite: a finite bound keeps sums and ranks of excesses defined.
         found += np.clip(short, 0.0, FARTHEST)
     return found
 
@@ -51,7 +52,7 @@ def limit_excess(
 def batch_excess(
     study: Study, store: FlightStore, batch: CandidateBatch, duration_share: float = 1.0
 ) -> NDArray[np.float64]:
-    """The excess of each candidate of a batch that has flown (candidate,), added up over the study's scenarios."""
+    """Return the excess (candidate,) of a batch that has flown, added up over the study's scenarios."""
     flown: dict[int, dict[int, ScoreRow]] = {}
     for (candidate, repeat), row in store.flown(batch).items():
         flown.setdefault(candidate, {})[repeat] = row

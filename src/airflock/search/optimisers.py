@@ -170,6 +170,7 @@ def _pymoo_genetic(bits: int, population: int, seed: int, mutation: float, cross
     except ModuleNotFoundError as error:
         raise StudyError("the genetic algorithm needs pymoo: pip install 'airflock[evolve]'") from error
 
+    # pymoo merges parents and children and keeps the best. The published algorithm replaces the whole population.
     class Generational(GA):  # type: ignore[misc]
         """Children replace their parents, even better ones."""
 

@@ -67,6 +67,7 @@ class Study:
         """Return the flights of a candidate in a generation: from `seeds` up to `late_seeds` in equal ratios."""
         first, last = self.search.seeds, self.search.late_seeds
         begin, end = CONSTANT_SEEDS_SHARE * self.search.generations, max(1.0, self.search.generations - 1.0)
+        # Early candidates differ much and one flight ranks them; late ones differ by less than chance does.
         grown = min(max(0.0, (generation - begin) / max(end - begin, 1.0)), 1.0)
         return round(float(first * (max(first, last) / first) ** grown))
 
@@ -162,6 +163,7 @@ def load_study(
         if path.suffix == ".toml" and is_file(path):
             document = read_toml(path)
         if not tells_of_study(document):
+            # A scenario is a study without a space and an objective: both are defaults then.
             document = {"scenario": text, **(tables or {})}
             return make_study(document, text, settings=settings, search=search, limits=limits, trust=trust)
         where = text if text in known else str(path)
@@ -224,6 +226,7 @@ def make_study(
     kept, of_limits = read_limits({"limits": list(limits)} if limits else document.get("objective", {}), scenarios)
     faults += more + of_limits
     if found is not None:
+        # One flight has no spread, and limits are judged by the spread of flights.
         if limits and "seeds" not in (search or {}) and found.seeds < 2.0:
             found = replace(found, seeds=2.0)
         faults += search_errors(found, objectives, space, str(over), limits=bool(kept))
@@ -291,12 +294,12 @@ def read_scenarios(
 
 
 def distinct_labels(labels: Sequence[str]) -> tuple[str, ...]:
-    """Labels with a number where two would be the same."""
+    """Return labels with a number added where two are equal."""
     return tuple(f"{label} ({i + 1})" if label in labels[:i] else label for i, label in enumerate(labels))
 
 
 def _entry(entry: Any, number: int) -> tuple[str, Mapping[str, Any], list[str]]:
-    """Name and own settings of an entry of `scenarios`, and its faults."""
+    """Return name and own settings of an entry of `scenarios`, and its errors."""
     at = f"scenarios[{number}]"
     if isinstance(entry, str):
         return entry, {}, []
@@ -311,7 +314,8 @@ def _entry(entry: Any, number: int) -> tuple[str, Mapping[str, Any], list[str]]:
 
 
 def common_space(scenarios: Sequence[Scenario]) -> tuple[SearchSpace, list[str]]:
-    """The usual space of the first, its bounds stretched to hold those of the others; and what was done."""
+    """Return the default space of the first scenario, with bounds that hold those of the others; and notes."""
+    # One set of numbers has to fly in all scenarios, so the search sees every region that is usual in one of them.
     space, notes = default_space(scenarios[0])
     if len(scenarios) == 1:
         return space, notes

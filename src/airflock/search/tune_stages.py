@@ -67,6 +67,7 @@ def make_plan(budget: float, rate: float, *, warm: bool = False, flights_for_lim
     Raises StudyError if the budget is too small.
     """
     # Fixed when it begins and kept on resume: the same flights are flown, whatever the machine is doing by then.
+    # A quarter of the search is left for its finals: race, final and score. The generations take the rest.
     flights = budget * SEARCH * rate
     finals = flights / 4.0
     top = 4
@@ -252,6 +253,7 @@ def measure_flight_rate(scenario: Scenario, threads: int | None) -> float:
     from airflock.engine import compile_for, score_flights
     from airflock.support import available_cores
 
+    # Compiled first: the time of the compiler says nothing of the rate of flights.
     compile_for(scenario)
     count = PILOT * (threads or available_cores())
     began = time.perf_counter()
@@ -284,6 +286,7 @@ def run_hardening_stage(
     folder: Path, plan: BudgetPlan, limits: Sequence[str], threads: int | None, trust: bool, on_progress: OnTuneProgress
 ) -> tuple[Scenario, list[StepResult], str]:
     """Harden or read the hardened set; return the scenario, its steps, and why there are none."""
+    # steps.json is written last: if it is there, the stage is complete.
     if (folder / STEPS_FILE).is_file():
         steps, why = read_steps(folder / STEPS_FILE)
         return load(folder / TUNED_FILE, trust=trust), steps, why

@@ -323,6 +323,7 @@ def tune(
     if like is not None:
         parts.raise_errors()  # before logs are read, which takes long
     begun = parts.read(_begun, scenario, like, heard, settings, folder, trust)
+    # Each part that could be read is checked further, so that one message names all errors.
     start = parts.read(lambda found: found.start, begun)
     plan = parts.read(load_plan, folder, start, resume)
     request = parts.read(make_request, start, limit, confidence, value_or_default(plan, None))
