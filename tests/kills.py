@@ -92,9 +92,10 @@ def tune(folder):
     from importlib import import_module
 
     from airflock.scenarios.scenario_builder import build_scenario
+    from airflock.scenarios import build_scenario
 
     tuning = import_module("airflock.search.tuning_run")
-    tuning.rate_of = lambda *_: 300.0
+    tuning.measure_flight_rate = lambda *_: 300.0
     import_module("airflock.search.evolution").draw_study = lambda *_: None
     import_module("airflock.search.tune_report").save = lambda found: atomic.write_file(
         found.folder / "report.html", repr(found)

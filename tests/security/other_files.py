@@ -254,7 +254,7 @@ def _check_certificate(path):
 
     check = import_module("airflock.certificates.certificate")
     check._flown_again = flown
-    check.check(path)
+    check.check_certificate(path)
 
 
 def _ground(path):

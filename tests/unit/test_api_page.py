@@ -108,7 +108,7 @@ QUIET = {  # raise none of ours: neither their source nor their docstring shows 
     "airflock.presets", "airflock.plots.convergence", "airflock.Scenario.with_drawn_scene",
     "airflock.Scenario.separation",
     "airflock.Flight.scores", "airflock.Flight.snapshot", "airflock.Flight.compile",
-    "airflock.search.study_result.Result.document",
+    "airflock.search.study_result.EvolveResult.document",
 }  # fmt: skip
 
 

@@ -11,10 +11,11 @@ from airflock.runs.flight_store import FlightStore
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import harden
+from airflock.scenarios.making import build_scenario
+from airflock.search import hardening as harden
 from airflock.search.evolution import run_sensitivity
 from airflock.search.hardening_steps import CARRIED, STOPS, StepResult, measures
 from airflock.support.errors import ScenarioError
-from inside import simulate
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -41,7 +42,7 @@ def flown_by(monkeypatch, score):
         chance = {seed: np.random.default_rng(seed).normal() for seed in seeds}
         return [score(s.parameters, chance[seed]) for s, seed in zip(scenarios, seeds, strict=True)]
 
-    monkeypatch.setattr(simulate, "score_flights", score_flights)
+    monkeypatch.setattr("airflock.engine.score_flights", score_flights)
 
 
 def test_steps_are_measured_against_the_optimum_on_the_same_seeds(monkeypatch):
@@ -169,7 +170,7 @@ def test_measures_beside_the_law_are_tried_where_agents_collide_and_are_no_part_
         ]
         return [{"fitness": 0.9, "r_min": 9.0 - 8.0 * x, "n_coll": 1.0 * (x > 0.8), "f_coll": 0.9} for x in near]
 
-    monkeypatch.setattr(simulate, "score_flights", score_flights)
+    monkeypatch.setattr("airflock.engine.score_flights", score_flights)
     lossy = load("vasarhelyi_2018/6ms", {"radio.loss": 0.1, "radio.delay": 1.0})
     steps = harden.harden(lossy, range(5))
     tried = {step.name: step for step in steps[:-1] if step.verdict.startswith("no part of the set")}

@@ -15,7 +15,7 @@ import toys
 from airflock.certificates.limits import estimated_probability, parse_limit, reliability_indices
 from airflock.runs.executors import ThreadExecutor
 from airflock.scenarios.files import load
-from airflock.search import harden
+from airflock.search import hardening as harden
 from airflock.search.evolution import run_study
 from airflock.search.limit_excess import allowed_probability, flights_per_event, limit_excess, rank_by_excess
 from airflock.search.study import make_study

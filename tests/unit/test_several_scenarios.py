@@ -21,11 +21,12 @@ from airflock.runs.search_space import with_parameters
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import harden
+from airflock.scenarios.making import build_scenario
+from airflock.search import hardening as harden
 from airflock.search.evolution import BatchExecutor, run_study, study_executor, study_tasks
 from airflock.search.generations import Evaluator
 from airflock.search.study import combine_scenarios, load_study, make_study
 from airflock.support.errors import ScenarioError
-from inside import simulate
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -206,7 +207,7 @@ def test_a_step_of_hardening_that_breaks_what_held_in_one_of_two_scenarios_is_un
             for s in scenarios
         ]  # fmt: skip
 
-    monkeypatch.setattr(simulate, "score_flights", score_flights)
+    monkeypatch.setattr("airflock.engine.score_flights", score_flights)
     alone = harden.harden(first, range(5))
     assert alone[-1].verdict == "kept: p_rep up"
     both = harden.harden([first, late], range(5))

@@ -113,7 +113,7 @@ def test_ctrl_c_keeps_what_has_landed_and_resume_ends_the_same(tmp_path, done):
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match=r"1\d\d flights of the search are stored in .*continue with --resume"):
-        finished(tmp_path / "a", study, watch=stop)
+        finished(tmp_path / "a", study, on_progress=stop)
     open_folder(tmp_path / "a", study, resume=True)
     fresh = []
     again = run_study(study, tmp_path / "a", ThreadExecutor(toys.bowl, 2), lambda p: fresh.append(p.fresh))
@@ -356,7 +356,7 @@ def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monke
             raise FlightError("seed 43: agent 1 left the finite numbers at step 3")
         return whole(scenarios, seeds, **keywords)
 
-    monkeypatch.setattr(simulate, "score_flights", faulty)
+    monkeypatch.setattr("airflock.engine.score_flights", faulty)
     landed = {x.flight.candidate_index: x for x in BatchExecutor(study, "cpu").fly(flights)}
     assert landed[3].values is None and landed[3].reason.startswith("seed 43")
     assert {i: x.values for i, x in landed.items() if i != 3} == {i: v for i, v in alone.items() if i != 3}

@@ -106,7 +106,7 @@ def done(tmp_path_factory, seen):
     """A tuning of a few seconds; and how many flights a second were assumed."""
     folder = tmp_path_factory.mktemp("tuned") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tuning, "rate_of", lambda *_: 300.0)
+        patch.setattr(tuning, "measure_flight_rate", lambda *_: 300.0)
         patch.setattr("airflock.search.evolution.draw_study", lambda *_: None)  # the study's own pictures
         patch.setattr(
             "airflock.certificates.campaign.used_and_unused_keys", lambda _: ("radio.delay", "agents")
@@ -173,7 +173,7 @@ def test_numbers_of_groups_are_assumed():
 
 def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch):
     found, folder = done
-    monkeypatch.setattr(tuning, "rate_of", lambda *_: pytest.fail("the plan is kept"))
+    monkeypatch.setattr(tuning, "measure_flight_rate", lambda *_: pytest.fail("the plan is kept"))
     monkeypatch.setattr("airflock.search.evolution.draw_study", lambda *_: None)
     monkeypatch.setattr("airflock.certificates.campaign.used_and_unused_keys", lambda _: ("radio.delay", "agents"))
     with pytest.raises(StudyError, match="holds a tuning already; continue it with --resume"):
@@ -220,7 +220,7 @@ def test_a_plan_with_margins_of_an_earlier_version_is_refused_in_one_line(done, 
 
 
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
-    monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
+    monkeypatch.setattr(tuning, "measure_flight_rate", lambda *_: 300.0)
     monkeypatch.setattr("airflock.search.evolution.draw_study", lambda *_: None)
     monkeypatch.setattr("airflock.certificates.campaign.used_and_unused_keys", lambda _: ("radio.delay",))
     how = {"like": build_scenario(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
@@ -293,9 +293,9 @@ def test_ctrl_c_between_stages_says_how_to_go_on(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
-    monkeypatch.setattr(tuning, "search", lambda *_: SimpleNamespace(dead_reason=""))
-    monkeypatch.setattr(tuning, "hardening", interrupted)
+    monkeypatch.setattr(tuning, "measure_flight_rate", lambda *_: 300.0)
+    monkeypatch.setattr(tuning, "run_search_stage", lambda *_: SimpleNamespace(dead_reason=""))
+    monkeypatch.setattr(tuning, "run_hardening_stage", interrupted)
     with pytest.raises(Interrupted, match="stages that are over are kept in .*; continue with --resume"):
         tune(build_scenario(MINE, "mine"), tmp_path / "a", budget=4.0, limit=["r_min<0.1 at 10%"])
 

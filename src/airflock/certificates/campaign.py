@@ -1,4 +1,4 @@
-"""Campaign: what is to be shown about a scenario and how; everything that decides the result, but not the time."""
+"""Campaign: limits to show for a scenario, and everything else that decides the result; also its seeds and flights."""
 
 import hashlib
 import json
@@ -36,9 +36,9 @@ class Campaign:
     """Flights that are to show limits.
 
     confidence : of all limits together
-    flights    : a number that is fixed beforehand: one look at its end; None: looks as `certificates.bounds.schedule`
+    flights    : a number fixed in advance: one look at its end; None: looks as `look_schedule`
                  says
-    uncertain  : whether each flight draws the numbers of its world from the intervals that the scenario file holds
+    flies_intervals : whether each flight draws the numbers of its world from the intervals that the scenario file holds
     """
 
     scenario: Scenario
@@ -51,7 +51,7 @@ class Campaign:
 
     @cached_property
     def hash(self) -> str:
-        """Identity of the scenario, which fixes the seeds."""
+        """Identity of the scenario; it fixes the seeds."""
         return scenario_identity(self.scenario)
 
     @cached_property
@@ -61,7 +61,7 @@ class Campaign:
 
     @property
     def alpha(self) -> float:
-        """What may go wrong for one limit: the limits share it."""
+        """Error probability of one limit: the limits share 1 - confidence equally."""
         return (1.0 - self.confidence) / len(self.limits)
 
     @property
@@ -134,17 +134,17 @@ def campaign_from_request(
     precision: int = 32,
     device: str = "cpu",
 ) -> Campaign:
-    """The campaign that is asked for. Raises ScenarioError, all faults together."""
-    asked = ErrorCollector()
-    limits = asked.read(parse_limits, [limit] if isinstance(limit, str) else list(limit), scenario)
-    asked.read(check_confidence, confidence)
-    asked.read(check_flight_count, flights)
-    asked.read(check_flight_options, precision, device)
+    """Make the campaign of a request. Raises ScenarioError with all errors together."""
+    errors = ErrorCollector()
+    limits = errors.read(parse_limits, [limit] if isinstance(limit, str) else list(limit), scenario)
+    errors.read(check_confidence, confidence)
+    errors.read(check_flight_count, flights)
+    errors.read(check_flight_options, precision, device)
     bits = 64 if device == "python" else precision
     campaign = Campaign(scenario, limits, confidence, bits, flights, uncertain, device)
     if uncertain and not campaign.number_intervals:
-        asked.note(f"{scenario.name}: no number has an interval; airflock identify --uncertain writes them")
-    asked.raise_errors()
+        errors.note(f"{scenario.name}: no number has an interval; airflock identify --uncertain writes them")
+    errors.raise_errors()
     return campaign
 
 
@@ -162,15 +162,15 @@ def check_flight_count(flights: int | None) -> None:
 
 def check_flight_options(precision: int, device: str) -> None:
     """Refuse a precision and a device on which no certificate flies."""
-    asked = ErrorCollector()
-    asked.read(check_precision, precision)
+    errors = ErrorCollector()
+    errors.read(check_precision, precision)
     if device not in ("cpu", "python"):
-        asked.note(f"device = {device!r}: a certificate flies on cpu or python")
-    asked.raise_errors()
+        errors.note(f"device = {device!r}: a certificate flies on cpu or python")
+    errors.raise_errors()
 
 
 def tolerance_keys(scenario: Scenario, tolerance: bool | Sequence[str]) -> tuple[str, ...]:
-    """Keys whose tolerance is asked for; ScenarioError where one cannot be varied."""
+    """Return the keys whose tolerance is requested. Raises ScenarioError for one that cannot be varied."""
     if not tolerance:
         return ()
 
@@ -185,10 +185,10 @@ def check_certify_budget(budget: float) -> None:
 
 def check_workers(timeout: float | None, scheduler: str | None, device: str) -> None:
     """Refuse a time in which no flight could fly on a worker, and a scheduler's workers in plain Python."""
-    asked = ErrorCollector()
-    asked.read(check_timeout, timeout)
-    asked.read(check_worker_device, scheduler, device)
-    asked.raise_errors()
+    errors = ErrorCollector()
+    errors.read(check_timeout, timeout)
+    errors.read(check_worker_device, scheduler, device)
+    errors.raise_errors()
 
 
 # number of the environment → which way is worse
@@ -269,7 +269,7 @@ def _of_faults(scenario: Scenario) -> EnvironmentNumbers:
 
 
 def _read(scenario: Scenario, key: str) -> bool:
-    """Whether flights read a number once it is above zero."""
+    """Return True if flights read a number once it is above zero."""
     section, _, name = key.partition(".")
     if section == "wind" and scenario.wind.kind == "dryden":
         return False
@@ -277,11 +277,12 @@ def _read(scenario: Scenario, key: str) -> bool:
     return bool(re.search(rf"\b{READ_AS[section]}\.{name}\b", driver_text(above)))
 
 
+# A flight with an event is flown again, sampled at every step. Measuring all flights so would take thrice the time.
 PARTS = 60  # of a flight that is flown again: when an event happened is known to a sixtieth of its duration
 
 
 def with_distance_metrics(scenario: Scenario, limits: Sequence[EventLimit]) -> Scenario:
-    """The scenario, measured so that no approach within the largest distance of a limit is missed.
+    """Return the scenario with metrics that miss no approach within the largest distance of a limit.
 
     Collisions are looked for at every motion step, so its radius becomes that distance, unless other limits mind it.
     """
@@ -296,14 +297,14 @@ def with_distance_metrics(scenario: Scenario, limits: Sequence[EventLimit]) -> S
 
 
 def sampled_every_step(scenario: Scenario) -> Scenario:
-    """The scenario, sampled at every motion step."""
+    """Return the scenario sampled at every motion step."""
     return replace(scenario, metrics=replace(scenario.metrics, period=0.0, collision_period=None))
 
 
 def limit_score_function(
     scenario: Scenario, limits: Sequence[EventLimit], precision: int, device: str = "cpu"
 ) -> ScoreFunction:
-    """Parameters and a seed → scores; with `closest` (m) and `first` (s) where an event of a limit happened.
+    """Return the function from parameters and a seed to scores, with `closest` (m) and `first` (s) after an event.
 
     scenario : as `with_distance_metrics` gives it
     """
@@ -330,7 +331,7 @@ def limit_score_function(
 def event_details(
     scenario: Scenario, seed: int, limits: Sequence[EventLimit], precision: int, device: str = "cpu"
 ) -> dict[str, Any]:
-    """Smallest distance at any motion step (`closest`, m) and when each event had happened (`first`, s or None)."""
+    """Return the smallest distance at any motion step (`closest`, m) and times of events (`first`, s or None)."""
     from airflock.engine import Flight
 
     flight = Flight(sampled_every_step(scenario), seed, precision=precision, device=device)
@@ -350,7 +351,7 @@ def event_details(
 
 
 class CampaignTask(ScenarioTask):
-    """What a worker of a dask scheduler is sent: the scenario as text, the limits, and how to measure."""
+    """Task of a dask worker: the scenario as text, the limits, and how to measure."""
 
     def __init__(self, scenario: Scenario, limits: Sequence[EventLimit], precision: int):
         """Raises StudyError for a law that exists only in this process."""
@@ -358,14 +359,15 @@ class CampaignTask(ScenarioTask):
         self.limits = tuple(limits)
 
     def flown(self, scenario: Scenario) -> Scenario:
-        """The scenario with the distances measured that the limits ask for."""
+        """Return the scenario with metrics of the distances in the limits."""
         return with_distance_metrics(scenario, self.limits)
 
     def score_function(self, scenario: Scenario) -> ScoreFunction:
-        """Parameters and seed → what the limits look at."""
+        """Return the function from parameters and a seed to the scores of the limits."""
         return limit_score_function(scenario, self.limits, self.precision)
 
 
+# Beyond all seeds of studies and of people: no flight of a certificate has chosen anything.
 FIRST = 1 << 62
 BITS = 30  # numbers of flights within one part
 # parts of a certificate; they share no seed
@@ -376,27 +378,27 @@ MAP_PURPOSE: int = 3
 
 
 def scenario_identity(scenario: Scenario) -> str:
-    """Hash of everything that decides a flight of a scenario but its seed: its laws by name, its numbers and choices.
+    """Return a hash of everything that decides a flight but its seed: laws by name, numbers and choices.
 
-    What is only told (title, sources, published values) and how a flight is scored do not count.
+    Comments (title, sources, published values) and the scoring of a flight do not count.
     """
-    told: dict[str, Any] = {
+    document: dict[str, Any] = {
         key: {name: getattr(record, name) for name in record.__dataclass_fields__}
         for key, record in scenario.records.items()
         if key != "metrics"
     }
     stands = hashlib.sha256(scenario.stands().shapes.tobytes()).hexdigest() if scenario.scene.draw == "once" else ""
-    told["scene"] = {**told["scene"], "file": "", "stands": stands}
-    if not told["start"]["wall_clearance"]:  # as in flights from before there was one
-        del told["start"]["wall_clearance"]
-    told["laws"] = [scenario.model.name, scenario.vehicle.name]
+    document["scene"] = {**document["scene"], "file": "", "stands": stands}
+    if not document["start"]["wall_clearance"]:  # as in flights from before there was one
+        del document["start"]["wall_clearance"]
+    document["laws"] = [scenario.model.name, scenario.vehicle.name]
     if scenario.sensor.name != DEFAULT_SENSOR:  # so that certificates from before there were others stay what they are
-        told["laws"].append(scenario.sensor.name)
-    if "kind" not in told["radio"]:  # which tells those of the usual record apart
-        told["laws"].append(scenario.transceiver.name)
+        document["laws"].append(scenario.sensor.name)
+    if "kind" not in document["radio"]:  # which distinguishes records that are not the usual one
+        document["laws"].append(scenario.transceiver.name)
     if scenario.own_topology is not None:
-        told["laws"].append(scenario.own_topology.name)
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+        document["laws"].append(scenario.own_topology.name)
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 
 def certificate_seed(scenario_hash: str, purpose: int, index: int) -> int:

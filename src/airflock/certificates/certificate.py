@@ -76,11 +76,11 @@ NOT_SAID = (
 
 @dataclass(frozen=True)
 class Certificate:
-    """What counting showed.
+    """Certificate: results of counting, splitting and tolerances of a campaign.
 
-    verdicts  : one for each limit; hazards: whether events came evenly, by limit, where that can be asked
+    verdicts  : one for each limit; hazards: timing of events by limit, where events have a moment
     rows      : scores of all flights that were counted, in the order of their seeds
-    tolerance : plain values of `airflock.certificates.tolerance`, empty if not asked for
+    tolerance : plain values of `airflock.certificates.tolerance`, empty if not requested
     splitting : the same of `airflock.certificates.splitting`; over: of `airflock.certificates.tolerance`
     versions  : of what flew, and on which processor
     seconds, rate : of this process, s; flights per second
@@ -101,7 +101,7 @@ class Certificate:
 
     @property
     def shown(self) -> bool:
-        """Whether all limits are shown."""
+        """True if all limits are shown."""
         return all(verdict.shown for verdict in self.verdicts)
 
     @property
@@ -211,7 +211,7 @@ class Certificate:
 
     @property
     def disclaimers(self) -> list[str]:
-        """What it does not say."""
+        """Sentences on what the certificate does not show."""
         return campaign_disclaimers(self.campaign)
 
     def __repr__(self) -> str:
@@ -238,7 +238,7 @@ class Certificate:
 
 
 def campaign_disclaimers(campaign: Campaign) -> list[str]:
-    """What a certificate does not say, with the numbers whose intervals were flown."""
+    """Return sentences on what a certificate does not show, with the numbers whose intervals were flown."""
     if not campaign.number_intervals:
         return list(NOT_SAID)
     flown = (
@@ -340,7 +340,7 @@ def scores_digest(scores: Mapping[str, Any]) -> str:
 
 
 def certificate_checksum(document: Mapping[str, Any]) -> str:
-    """Checksum of a certificate: it tells what was changed by accident or in an editor, and is no signature."""
+    """Checksum of a certificate: it detects changes by accident or in an editor, and is no signature."""
     text = json.dumps(_without(document, "seal"), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -352,7 +352,7 @@ def with_checksum(document: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """What a check found.
+    """Report of a check.
 
     flown : flights that were flown again; faults: what does not hold, one line each; notes: what may explain it
     """
@@ -364,7 +364,7 @@ class CheckReport:
 
     @property
     def same(self) -> bool:
-        """Whether everything agrees."""
+        """True if all flights and bounds agree."""
         return not self.faults
 
     def __repr__(self) -> str:
@@ -382,8 +382,8 @@ def check_certificate(
     """Check a certificate file.
 
     path    : of certificate.toml; threads : of the flights, all processors by default
-    trust   : whether a law in a Python file that the scenario names may run
-    done    : called after each flight
+    trust   : True lets a law run that stands in a Python file named by the scenario
+    on_done : called after each flight
 
     Raises StudyError where the file is no certificate, of another format, version or scenario than it says; and an
     AirflockError where it cannot be read.
@@ -391,10 +391,10 @@ def check_certificate(
     Examples
     --------
     >>> import airflock
-    >>> from airflock.certificates.certificate import check
+    >>> from airflock.certificates.certificate import check_certificate
     >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
     >>> path = airflock.certify(short, "n_coll<1 at 90%", flights=100).save("certificate.toml")
-    >>> check(path).same
+    >>> check_certificate(path).same
     True
     """
     with as_error(path, StudyError):
@@ -455,7 +455,7 @@ _LOOK: KeyTypes = {"flights": (int,), "events": (int,), "above": _NUMBER, "below
 
 
 def _shape_faults(document: Mapping[str, Any]) -> list[str]:
-    """Keys of a certificate that are missing or of another kind than it is written with."""
+    """Return errors for keys of a certificate that are missing or of another type."""
     faults = [] if _is(document.get("confidence"), _NUMBER) else ["confidence"]
     for name, kinds in _TABLES.items():
         faults += _wrong(name, document.get(name), kinds)
@@ -483,10 +483,10 @@ def _is(value: Any, kinds: tuple[type, ...]) -> bool:
 
 
 def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None, trust: bool) -> Campaign:
-    told = dict(document["scenario"])
-    name = str(told.pop("name"))
+    settings = dict(document["scenario"])
+    name = str(settings.pop("name"))
     if scenario is None:
-        scenario = build_scenario(told, name, folder=Path(where).parent, trust=trust)
+        scenario = build_scenario(settings, name, folder=Path(where).parent, trust=trust)
     flights, flown = document["flights"], document["flown"]
     campaign = Campaign(
         scenario,
@@ -503,13 +503,16 @@ def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None
 
 
 def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
-    """Bounds and verdicts that do not follow from the counts."""
+    """Return errors of bounds and verdicts that do not follow from the counts."""
+    # A changed file has to fail here even if its checksum was recomputed: every number follows from counts and limits.
     faults = []
     if document["flights"]["first_seed"] != certificate_seed(campaign.hash, COUNT_PURPOSE, 0):
         faults.append("its seeds are not those that the scenario fixes")
     for entry, limit in zip(document["limit"], campaign.limits, strict=True):
-        told = [(int(x["flights"]), int(x["events"]), float(x["above"]), float(x["below"])) for x in entry["looks"]]
-        again = [take_look(*each) for each in told]
+        stored_looks = [
+            (int(x["flights"]), int(x["events"]), float(x["above"]), float(x["below"])) for x in entry["looks"]
+        ]
+        again = [take_look(*each) for each in stored_looks]
         high, low = min((x.high for x in again), default=1.0), max((x.low for x in again), default=0.0)
         paid = max(sum(x.above for x in again), sum(x.below for x in again))
         probability = campaign.probability(limit)
@@ -517,22 +520,24 @@ def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
         right = abs(high - entry["high"]) <= 1e-9 * high and abs(low - entry["low"]) <= 1e-9 and shown == entry["shown"]
         if not right or paid > campaign.alpha * (1.0 + 1e-9):
             faults.append(f"limit '{limit.text}': its bounds do not follow from its counts")
-        elif not _fixed(told, campaign, limit, int(document["flights"]["count"])):
+        elif not _fixed(stored_looks, campaign, limit, int(document["flights"]["count"])):
             faults.append(f"limit '{limit.text}': its looks are not those that the limit fixes")
     return faults
 
 
-def _fixed(told: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: EventLimit, count: int) -> bool:
-    """Whether looks are the first of those that a limit fixes, at flights that there are, and no event is undone."""
-    known = list(islice(looks_due(campaign, limit), len(told)))
-    sizes = [(flights, above, below) for flights, _, above, below in told]
-    same = len(known) == len(told) and all(
+def _fixed(
+    stored_looks: Sequence[tuple[int, int, float, float]], campaign: Campaign, limit: EventLimit, count: int
+) -> bool:
+    """Return True if looks are the first of a limit's schedule, within the flights, with events that never decrease."""
+    known = list(islice(looks_due(campaign, limit), len(stored_looks)))
+    sizes = [(flights, above, below) for flights, _, above, below in stored_looks]
+    same = len(known) == len(stored_looks) and all(
         each[0] == right[0] and all(math.isclose(a, b, rel_tol=1e-9) for a, b in zip(each[1:], right[1:], strict=True))
         for each, right in zip(sizes, known, strict=True)
     )
-    events = [0, *(events for _, events, _, _ in told)]
+    events = [0, *(events for _, events, _, _ in stored_looks)]
     grow = all(old <= new for old, new in pairwise(events))
-    return same and grow and all(events <= flights <= count for flights, events, _, _ in told)
+    return same and grow and all(events <= flights <= count for flights, events, _, _ in stored_looks)
 
 
 def _flown_again(
@@ -541,6 +546,7 @@ def _flown_again(
     from airflock.engine import compile_for
     from airflock.support import run_in_threads
 
+    # One flight in `every` is enough: a certificate of other bits fails in nearly all of them.
     wanted, every = document["check"]["digests"], int(document["check"]["every"])
     numbers = [every * i for i in range(len(wanted))]
     score = limit_score_function(campaign.flown, campaign.limits, campaign.bits, campaign.device)
@@ -560,7 +566,7 @@ def _flown_again(
 
 
 def _differences(flown: Mapping[str, Any]) -> tuple[str, ...]:
-    """Versions that differ from those of the certificate: what may explain other bits."""
+    """Return versions that differ from those of the certificate: they may explain other bits."""
     now = program_versions()
     return tuple(
         f"{name}: {flown[name]} then, {value} now" for name, value in now.items() if flown.get(name, value) != value

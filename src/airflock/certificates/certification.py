@@ -42,7 +42,7 @@ from airflock.runs import (
 from airflock.scenarios import Scenario, formats, scenario_variant
 from airflock.support import ErrorCollector, StudyError, expand_path
 
-COUNT_BUDGET_SHARE = 2.0 / 3.0  # share of the budget that counting may take where tolerance is asked for
+COUNT_BUDGET_SHARE = 2.0 / 3.0  # share of the budget that counting may take if tolerances are requested
 
 
 def certify(
@@ -135,16 +135,16 @@ def certify(
     (True, 0)
     """
     found = scenario_variant(scenario, settings, law, trust=trust)
-    asked = ErrorCollector()
+    errors = ErrorCollector()
     chosen: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-    campaign = asked.read(campaign_from_request, found, limit, confidence, flights, **chosen)
+    campaign = errors.read(campaign_from_request, found, limit, confidence, flights, **chosen)
     if split:
-        asked.read(check_split, campaign)
-    keys = asked.read(tolerance_keys, found, tolerance)
-    axes = asked.read(check_map_axes, found, over) if over else {}
-    asked.read(check_certify_budget, budget)
-    asked.read(check_workers, timeout, scheduler, device)
-    asked.raise_errors()
+        errors.read(check_split, campaign)
+    keys = errors.read(tolerance_keys, found, tolerance)
+    axes = errors.read(check_map_axes, found, over) if over else {}
+    errors.read(check_certify_budget, budget)
+    errors.read(check_workers, timeout, scheduler, device)
+    errors.raise_errors()
     with flight_folder(folder) as path:
         executor = campaign_executor(campaign, scheduler, threads, timeout)
         try:
@@ -174,7 +174,8 @@ def run_campaign(
 ) -> Certificate:
     """Count, find tolerances of `keys`, split, and map over `axes`, in a folder that `open_folder` has accepted.
 
-    note : told in a few words what begins; kept: whether the folder stays
+    notify    : called with a few words as each part begins
+    is_stored : True if the folder stays
     """
     began = time.monotonic()
     where = str(folder / "scenario.toml") if is_stored else campaign.scenario.name
@@ -188,6 +189,7 @@ def run_campaign(
         write_toml_file(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
         flyer = CampaignFlyer(campaign, store, executor, note=notify)
         try:
+            # Counting first, with its share: splitting and tolerances start from its flights.
             part = COUNT_BUDGET_SHARE if keys or split or axes else 1.0
             counted = count_events(flyer if campaign.flights else flyer.with_budget(budget * part), on_progress)
             rare: Mapping[str, Any] = {}
@@ -213,7 +215,7 @@ def run_campaign(
 
 
 def event_timings(campaign: Campaign, counted: CountResult) -> dict[int, EventTiming]:
-    """Whether events came evenly over a flight, for each limit whose event has a moment."""
+    """Return the timing of events over a flight for each limit whose event has a moment."""
     found = {}
     timed = [i for i, limit in enumerate(campaign.limits) if limit.is_timed]
     for place, i in enumerate(timed):
@@ -222,12 +224,12 @@ def event_timings(campaign: Campaign, counted: CountResult) -> dict[int, EventTi
     return found
 
 
-TRIAL = 16  # flights that tell how many there is time for
+TRIAL = 16  # flights by which the time of one flight is measured
 
 
 @contextmanager
 def flight_folder(folder: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """The folder of flights: the one that is given, or one that is gone afterwards."""
+    """Yield the folder of flights: the given one, or a temporary one."""
     if folder is not None:
         yield expand_path(folder)
         return
@@ -238,7 +240,7 @@ def flight_folder(folder: str | os.PathLike[str] | None) -> Iterator[Path]:
 def campaign_executor(
     campaign: Campaign, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
 ) -> Executor:
-    """Who flies: this process, or the workers of a dask scheduler."""
+    """Make the executor of a campaign: threads of this process, or the workers of a dask scheduler."""
     if scheduler is not None:
         task = CampaignTask(campaign.scenario, campaign.limits, campaign.bits)
         return DaskCluster([task], scheduler, timeout=timeout)
@@ -254,9 +256,9 @@ def campaign_executor(
 
 
 def with_planned_flights(campaign: Campaign, executor: Executor, budget: float, folder: Path, resume: bool) -> Campaign:
-    """The campaign with a number of flights where a limit has no rate: as many as there is time for.
+    """Return the campaign with a number of flights if a limit has no rate: as many as the budget allows.
 
-    A few flights on seeds of their own tell how long one takes; the number then stands before the first one counts.
+    A few flights on seeds of their own measure how long one takes; the number is fixed before the first one counts.
     """
     if campaign.flights is not None or all(limit.rate is not None for limit in campaign.limits):
         return campaign
@@ -264,10 +266,12 @@ def with_planned_flights(campaign: Campaign, executor: Executor, budget: float, 
         known = read_toml_file(folder / f"{CAMPAIGN_KIND}.toml").get("flights")
         return replace(campaign, flights=known if isinstance(known, int) else None)
     began = time.monotonic()
+    # Seeds of their own, far behind those of tolerances: a flight that chose the number must not count.
     own = [certificate_seed(campaign.hash, TOLERANCE_PURPOSE, (1 << 29) + i) for i in range(TRIAL)]
     for landed in executor.fly([Flight(0, i, campaign.parameters(s), s) for i, s in enumerate(own)]):
         if landed.values is None:
             raise StudyError(f"{campaign.scenario.name}: seed {landed.flight.seed}: {landed.reason}")
     able = 0.9 * budget * TRIAL / max(time.monotonic() - began, 1e-6)
+    # Two digits: a round number shows that the count did not choose it. A tenth of the time is kept as a margin.
     digits = 10.0 ** max(0, math.floor(math.log10(max(able, 1.0))) - 1)
     return replace(campaign, flights=max(1, min(int(able / digits) * int(digits), (1 << 30) - 1)))

@@ -18,7 +18,7 @@ class CampaignFlyer:
     """A campaign with its store of flights, who flies them and until when.
 
     until : moment of `time.monotonic` at which the budget of time is spent, s
-    note  : told in a few words what begins
+    note  : called with a few words as each part begins
     """
 
     campaign: Campaign
@@ -28,7 +28,7 @@ class CampaignFlyer:
     note: Callable[[str], None] | None = None
 
     def with_budget(self, budget: float) -> "CampaignFlyer":
-        """The same, with so much time from now on, s."""
+        """Return a copy with a new time budget (s) from now on."""
         return replace(self, until=time.monotonic() + budget)
 
     @property
@@ -38,7 +38,7 @@ class CampaignFlyer:
 
     @property
     def is_time_over(self) -> bool:
-        """Whether the budget is spent."""
+        """True if the budget is spent."""
         return self.left < 0.0
 
     def fly(self, batch: CandidateBatch, tasks: Sequence[Flight]) -> Iterator[FlightResult]:
@@ -48,7 +48,7 @@ class CampaignFlyer:
             yield landed
 
     def report(self, text: str) -> None:
-        """Report what begins, if anybody asked for that."""
+        """Call `note`, if there is one, as a part begins."""
         if self.note:
             self.note(text)
 
@@ -56,12 +56,12 @@ class CampaignFlyer:
 COUNT_BATCH = CandidateBatch("count", 0, 0)
 CHUNK = 2.0  # s of flights that are handed out together
 FIRST = 16  # flights before the first guess of how many there will be time for
-MARGIN = 1.5  # a limit is given up beforehand only if it needs so many times the flights that there is time for
+MARGIN = 1.5  # a limit is given up early only if it needs so many times the flights that there is time for
 
 
 @dataclass
 class LimitVerdict:
-    """What counting says of one limit.
+    """Verdict of counting on one limit.
 
     probability : the limit per flight; None: it is only to be bounded
     looks    : in their order; all their bounds hold together
@@ -87,12 +87,12 @@ class LimitVerdict:
 
     @property
     def shown(self) -> bool:
-        """Whether the limit is shown; without a rate, whether it has been bounded."""
+        """True if the limit is shown; without a rate, if the event has been bounded."""
         return self.high < 1.0 if self.probability is None else self.high <= self.probability
 
     @property
     def is_refuted(self) -> bool:
-        """Whether the opposite is shown: the event happens more often."""
+        """True if the opposite is shown: the event happens more often than the limit allows."""
         return self.probability is not None and not self.shown and self.low > self.probability
 
     @property
@@ -140,8 +140,8 @@ def count_events(flyer: CampaignFlyer, on_progress: OnCountProgress | None = Non
     counting = _Counting(flyer, on_progress)
     while counting.goes_on():
         counting.fly()
-    counting.told.seconds = time.monotonic() - counting.began
-    return counting.told
+    counting.result.seconds = time.monotonic() - counting.began
+    return counting.result
 
 
 class _Counting:
@@ -160,12 +160,13 @@ class _Counting:
                 raise StudyError(f"{flyer.store.path}: {_failure(campaign, number, _reason(flyer.store, number))}")
             self.scores[number] = values
         self.events = [0] * len(campaign.limits)
-        self.told = CountResult([LimitVerdict(limit, campaign.probability(limit)) for limit in campaign.limits], [])
+        self.result = CountResult([LimitVerdict(limit, campaign.probability(limit)) for limit in campaign.limits], [])
         self.aims: list[int] = []
 
     def goes_on(self) -> bool:
-        """Count the flights that have landed; whether more can decide anything, and there is time for them."""
-        rows, verdicts = self.told.rows, self.told.verdicts
+        """Count the landed flights; return True if more can decide anything and there is time for them."""
+        # Only a prefix of the seeds counts, so that slow flights are not under-represented in what has landed.
+        rows, verdicts = self.result.rows, self.result.verdicts
         while len(rows) in self.scores:
             rows.append(self.scores[len(rows)])
             for i, verdict in enumerate(verdicts):
@@ -180,26 +181,28 @@ class _Counting:
         if not still or left <= 0.0:
             return False
         if self.fresh < FIRST or math.isinf(left):
-            self.chunk = max(FIRST, math.ceil(CHUNK * self.told.rate))
+            self.chunk = max(FIRST, math.ceil(CHUNK * self.result.rate))
             return True
-        able = len(rows) + left * self.told.rate
+        # Flights that the remaining time allows. A limit that needs many more is given up, so that others get the time.
+        able = len(rows) + left * self.result.rate
         for verdict in still:
             first = self._first(verdict)  # a limit with an event may yet be refuted
             hopeless = first > MARGIN * able and not self.events[verdicts.index(verdict)]
             verdict.flights_to_show, verdict.provable_probability = (
                 (first, provable_probability(able, self.campaign.alpha)) if hopeless else (0, 1.0)
             )
-        self.chunk = max(FIRST, math.ceil(min(CHUNK, left) * self.told.rate))
+        self.chunk = max(FIRST, math.ceil(min(CHUNK, left) * self.result.rate))
         return not all(verdict.flights_to_show for verdict in still)
 
     def _first(self, verdict: LimitVerdict) -> int:
-        """Flights without an event that would show a limit; 0 where there is an upper bound already."""
+        """Return the flights without an event that would show a limit; 0 if there is an upper bound already."""
         return 0 if verdict.high < 1.0 else flights_to_show(self.campaign, verdict.limit)
 
     def fly(self) -> None:
         """Fly the next few flights that the store does not hold."""
-        done = len(self.told.rows)
+        done = len(self.result.rows)
         flights = []
+        # In short chunks: looks may end counting, and time may run out.
         for number in range(done, min(max(self.aims), done + self.chunk)):
             if number not in self.scores:
                 own = certificate_seed(self.campaign.hash, COUNT_PURPOSE, number)
@@ -208,17 +211,17 @@ class _Counting:
             if landed.values is None:
                 raise StudyError(_failure(self.campaign, landed.flight.repeat, landed.reason))
             self.scores[landed.flight.repeat], self.fresh = landed.values, self.fresh + 1
-            self.told.rate = self.fresh / max(time.monotonic() - self.began, 1e-9)
+            self.result.rate = self.fresh / max(time.monotonic() - self.began, 1e-9)
             self._note()
 
     def _note(self) -> None:
         if self.watch:
             total = max([*self.aims, len(self.scores)])
-            self.watch(CountProgress(len(self.scores), total, tuple(self.events), self.told.rate))
+            self.watch(CountProgress(len(self.scores), total, tuple(self.events), self.result.rate))
 
 
 def _open(campaign: Campaign, verdict: LimitVerdict) -> bool:
-    """Whether further flights could decide."""
+    """Return True if further flights could decide."""
     if campaign.flights:
         return not verdict.looks
     return not verdict.shown and not verdict.is_refuted

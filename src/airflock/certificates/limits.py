@@ -32,7 +32,7 @@ class EventLimit:
     text  : as it was given
     score, sign, value : the event: an order parameter of the flight, < <= > or >=, and a number in its unit
     rate, unit : how often at most: per flock hour (h), per drone hour (drone-h) or per flight; None: only to be bounded
-    timed : whether the event, once it has happened, stays true for the rest of the flight
+    is_timed : whether the event, once it has happened, stays true for the rest of the flight
     """
 
     text: str
@@ -49,7 +49,7 @@ class EventLimit:
         return f"{self.score}{self.sign}{self.value:g}"
 
     def has_happened(self, scores: Mapping[str, Any]) -> bool:
-        """Whether the event happened in a flight; a score that is nan counts as one."""
+        """Return True if the event happened in a flight; nan counts as an event."""
         found = scores.get(self.score)
         if self.score == "r_min" and scores.get("closest") is not None:
             found = scores["closest"]
@@ -117,7 +117,7 @@ def parse_limit(text: str, scenario: Scenario) -> EventLimit:
 
 
 def _lasting(scenario: Scenario, score: str, sign: str, value: float) -> bool:
-    """Whether an event stays true once it has happened: of a minimum, a maximum, or a count that only grows."""
+    """Return True if an event stays true once it has happened: of a minimum, a maximum, or a growing count."""
     if score == "phi_wall":  # mean over those outside: above 0 from the first moment on
         return sign == ">" and value == 0.0
     for metric in scenario.order_parameters:
@@ -157,26 +157,29 @@ def parse_limits(texts: list[str], scenario: Scenario) -> tuple[EventLimit, ...]
 
 
 EARLY = 16  # flights at the first look that could refute
+# Sizes fixed in advance, look k pays alpha / (k (k + 1)): all bounds hold together, whatever the reason to stop. The
+# price is 23 % more flights at 95 % than for one fixed look.
 GROWTH = 1.5  # ratio of two sizes: a limit is shown after at most so many times the flights that would do
 
 
 def lower_bound(events: int, flights: int, confidence: float) -> float:
-    """Smallest probability of an event per flight that so many events allow (Clopper and Pearson 1934, one-sided)."""
+    """Return the one-sided lower bound on the probability of an event per flight (Clopper and Pearson 1934)."""
     return 1.0 - upper_probability_bound(flights - events, flights, confidence)
 
 
 def alpha_share(look: int) -> float:
-    """Share of alpha that look 1, 2, 3, ... pays; all of them sum up to 1."""
+    """Return the share of alpha that look 1, 2, 3, ... pays; all shares sum up to 1."""
     return 1.0 / (look * (look + 1.0))
 
 
 def flights_needed(limit: float, alpha: float) -> int:
-    """Flights without any event after which the bound lies below a limit per flight."""
+    """Return the number of flights without any event after which the bound lies below a limit per flight."""
     return max(1, math.ceil(math.log(alpha) / math.log1p(-limit)))
 
 
 def look_schedule(limit: float, alpha: float) -> Iterator[tuple[int, float, float]]:
-    """Looks in their order: flights, and the alpha of the upper bound (0: not looked at) and of the lower one."""
+    """Yield looks in their order: flights, alpha of the upper bound (0: not used), alpha of the lower bound."""
+    # Before the first size that could show the limit only refutation is possible, so only the lower bound pays there.
     shows, turn, size = flights_needed(limit, alpha * alpha_share(1)), 0, float(EARLY)
     while math.ceil(size) < shows:
         turn += 1
@@ -203,7 +206,7 @@ class InterimLook:
 
 
 def take_look(flights: int, events: int, upper_alpha: float, lower_alpha: float) -> InterimLook:
-    """Both bounds, the upper one with confidence 1 - above, the lower one with 1 - below."""
+    """Return both bounds: the upper one with confidence 1 - upper_alpha, the lower one with 1 - lower_alpha."""
     low = lower_bound(events, flights, 1.0 - lower_alpha) if lower_alpha > 0.0 else 0.0
     high = upper_probability_bound(events, flights, 1.0 - upper_alpha) if upper_alpha > 0.0 else 1.0
     return InterimLook(flights, events, upper_alpha, lower_alpha, low, high)
@@ -228,7 +231,7 @@ ScoreRow = Mapping[str, Any] | None  # scores of a flight; None: it failed
 
 
 def reliability_indices(limit: EventLimit, flights: Sequence[Sequence[ScoreRow]]) -> NDArray[np.float64]:
-    """Reliability index of each candidate (candidate,): standard deviations between its mean and the limit's event.
+    """Return the reliability index (candidate,): standard deviations between a candidate's mean and the event.
 
     flights : of each candidate; a flight that failed counts as the event
     """
@@ -250,23 +253,25 @@ def reliability_indices(limit: EventLimit, flights: Sequence[Sequence[ScoreRow]]
 
 
 def estimated_probability(limit: EventLimit, flights: Sequence[ScoreRow]) -> float:
-    """Estimated probability of the limit's event per flight of one candidate: no less than what was counted."""
+    """Estimate the probability of an event per flight of one candidate: no less than the counted share."""
     counted = sum(row is None or limit.has_happened(row) for row in flights) / len(flights)
     return max(counted, float(norm.sf(reliability_indices(limit, [flights])[0])) if counted < 1.0 else 1.0)
 
 
 def reliability_index(probability: float) -> float:
-    """The reliability index beyond which an event has this probability."""
+    """Return the reliability index of a probability."""
     return float(norm.isf(probability))
 
 
 def _of_share(events: int, flights: int) -> float:
-    """Index of a share of flights; infinite where nothing happened, finite where it always did."""
+    """Return the index of a share of flights; infinite without events, finite if all flights have one."""
     return reliability_index(min(events, flights - 0.5) / flights) if events else math.inf
 
 
 def _of_tail(room: NDArray[np.float64]) -> float:
-    """Index of one candidate, from how far its nearest flights are from the limit; infinite where that cannot tell."""
+    """Return the index of one candidate by an exponential tail of its nearest flights; infinite if it has none."""
+    # The nearest tenth as an exponential tail was 0.88 to 2.91 times the truth in 80 % of trials, a normal one 0.08 to
+    # 3.11 times.
     nearest = np.sort(room)[: max(FEWEST, round(NEAREST * len(room))) + 1]
     begin, excess = nearest[-1], float((nearest[-1] - nearest[:-1]).mean())
     if begin <= 0.0 or excess == 0.0:
@@ -275,9 +280,12 @@ def _of_tail(room: NDArray[np.float64]) -> float:
 
 
 def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Index of each candidate (candidate,), from how far their flights are from the limit."""
+    """Return the index of each candidate (candidate,) from the distances of all flights to the limit."""
+    # Shrunk towards all candidates (James & Stein): without it the lucky ones win, and their sets then collide in up to
+    # 4e-3 of flights where 1.7e-4 was allowed.
     sizes, own = np.array([len(room) for room in rooms]), np.array([room.mean() for room in rooms])
     squares, freedom = np.array([((room - room.mean()) ** 2).sum() for room in rooms]), sizes - 1
+    # The share of differences between candidates that chance does not explain (one-way analysis of variance).
     left, flat = 1.0, not freedom.any()  # left of each difference, after what chance explains
     if not flat and len(rooms) > 1:
         within, between = float(squares.sum()) / int(freedom.sum()), float(own.var(ddof=1))
@@ -285,14 +293,16 @@ def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     means = own.mean() + left * (own - own.mean())
     around = np.full(len(rooms), own.mean()) if flat else means  # where each flew once: around the common mean
     away = np.concatenate([room - mean for room, mean in zip(rooms, around, strict=True)])
+    # Deviations towards the event only: distances above the mean say nothing of the dangerous side of a skew score.
     below = away[away < 0.0]
     counted = len(away) - (1.0 if flat else left * len(rooms))
     variance = float((below**2).mean()) * len(away) / counted if len(below) else 0.0
-    alike = variance
+    pooled = variance
     if not flat:
+        # Spread is pooled over candidates of similar means: wide flocks' distances vary more than narrow ones'.
         near = np.argsort(np.abs(own[:, None] - own[None, :]), axis=1, kind="stable")[:, :LIKE]
-        alike = squares[near].sum(axis=1) / np.maximum(freedom[near].sum(axis=1), 1)
-    spread = np.sqrt(left * alike + (1.0 - left) * variance)
+        pooled = squares[near].sum(axis=1) / np.maximum(freedom[near].sum(axis=1), 1)
+    spread = np.sqrt(left * pooled + (1.0 - left) * variance)
     if len(rooms) == 1:
         spread = np.array([math.sqrt(variance)])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -300,6 +310,6 @@ def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 def _room(limit: EventLimit, row: ScoreRow) -> float:
-    """How far a flight's score lies on the safe side of the event, in its unit; nan where there is none."""
+    """Return how far a score lies on the safe side of the event, in its unit; nan without a score."""
     found = math.nan if row is None or row.get(limit.score) is None else float(row[limit.score])
     return found - limit.value if limit.sign in ("<", "<=") else limit.value - found

@@ -1,7 +1,7 @@
 """Splitting: the probability of a rare fall of a score, by flights that branch off from those that came near it.
 
 Subset simulation (Au & Beck 2001) over whole flights. A flight is a lineage: a seed, and moments from which on other
-random numbers are drawn. Among the flights below a level, Metropolis-Hastings steps draw all noise anew from a moment
+random numbers are drawn. Among the flights below a level, Metropolis-Hastings steps draw all noise again from a moment
 before the level was first crossed, and keep what crosses it again; a share of them lies below the next level.
 
 This finds and ranks rare flights. As a number it is an estimate with a known weakness: what happens once in a hundred
@@ -43,7 +43,7 @@ class Lineage:
     branches: tuple[tuple[int, int], ...] = ()
 
     def branch(self, sample: int, world: int) -> "Lineage":
-        """The same flight up to a sample, another one from there on."""
+        """Return a lineage with this flight up to a sample and new noise from there on."""
         return Lineage(self.seed, (*(b for b in self.branches if b[0] < sample), (sample, world)))
 
 
@@ -110,15 +110,18 @@ def run_repetition(
     """Go down level by level until `target`.
 
     start : the flights with the least values among `counted` independent ones
-    back  : mean number of samples before the first crossing from which noise is drawn anew
+    mean_branch_lead : mean number of samples before the first crossing from which noise is drawn again
     size  : flights of a level
     """
+    # Subset simulation: each level is a quantile of the scores below the level before, so that its conditional
+    # probability is about SHARE. The product of these probabilities is that of the target.
     level = max(particle.least for particle in start)
     p, below = len(start) / counted, list(start)
     made = Repetition([(level, p)], below)
     for number in range(MOST):
         if level <= target or not below:
             break
+        # Resampled in a random order: each survivor is copied as evenly as possible.
         flock = [below[i] for i in rng.permutation(np.resize(np.arange(len(below)), size))]
         states: list[LineageFlight] = []
         for move in range(MOVES):
@@ -140,14 +143,17 @@ def run_repetition(
 def _moved(
     flock: list[LineageFlight], level: float, fly: FlyLineages, batch: int, back: float, rng: np.random.Generator
 ) -> list[LineageFlight]:
-    """One step for each flight. The moment of branching depends on the crossing: the ratio exp(-(new - old) / back)."""
+    """Move each flight by one Metropolis-Hastings step: branch it before its crossing, accept or keep the old one."""
+    # The moment of branching depends on the crossing, so its ratio exp(-(new - old) / back) enters the acceptance.
     size = len(flock)
     gaps, chances = rng.exponential(back, size), rng.random(size)
     crossings = [particle.crossing(level) for particle in flock]
     moments = [max(0, math.floor(at - gap)) for at, gap in zip(crossings, gaps, strict=True)]
-    asked = [p.lineage.branch(at, 1 + batch * size + i) for i, (p, at) in enumerate(zip(flock, moments, strict=True))]
+    branched = [
+        p.lineage.branch(at, 1 + batch * size + i) for i, (p, at) in enumerate(zip(flock, moments, strict=True))
+    ]
     found = []
-    for i, (lineage, falls) in enumerate(zip(asked, fly(batch, asked), strict=True)):
+    for i, (lineage, falls) in enumerate(zip(branched, fly(batch, branched), strict=True)):
         new = LineageFlight(lineage, falls)
         taken = new.least <= level and math.log(chances[i]) < -(new.crossing(level) - crossings[i]) / back
         found.append(new if taken else flock[i])
@@ -156,7 +162,7 @@ def _moved(
 
 @dataclass(frozen=True)
 class SplittingEstimate:
-    """What the repetitions show together.
+    """Estimate of all repetitions together.
 
     probability, low, high : per flight, mean and 95 % t-interval of the logarithms; nan where refused says why
     """
@@ -194,6 +200,7 @@ def _interval(found: Sequence[float]) -> tuple[float, float, float]:
     """Mean, and the 95 % interval of the mean logarithm, stretched to hold the mean."""
     if len(found) < 2 or min(found) <= 0.0:
         return math.nan, math.nan, math.nan
+    # Estimates of a product of probabilities are skewed; their logarithms are nearly normal.
     logs = np.log(found)
     half = float(t.ppf(0.975, len(found) - 1)) * float(logs.std(ddof=1)) / math.sqrt(len(found))
     mean = float(np.mean(found))
@@ -214,6 +221,7 @@ def _disagreement(repetitions: Sequence[Repetition], levels: Sequence[float], va
     """The first level at which repetitions and counting cannot both be right; empty if there is none."""
     n, rest = len(values), 0.5 * (1.0 - SURE)
     for level in levels:
+        # Exact binomial interval of counting against the t-interval of splitting: they have to overlap.
         k = sum(value <= level for value in values)
         least = float(beta.ppf(rest, k, n - k + 1)) if k else 0.0
         most = float(beta.ppf(1.0 - rest, k + 1, n - k)) if k < n else 1.0
@@ -225,15 +233,16 @@ def _disagreement(repetitions: Sequence[Repetition], levels: Sequence[float], va
 
 
 REPETITIONS = 5
+# 100 flights a level gave three of four repetitions inside the interval of counting, 200 gave 29 of 30.
 SIZE = 200  # flights of a level
 FEWEST = 2000  # flights from which repetitions start, each from its share of them
 START = 100  # flights with which a repetition goes on: the nearest ones of its share
-BACK = 4.0  # s, mean time before the first crossing from which noise is drawn anew
+BACK = 4.0  # s, mean time before the first crossing from which noise is drawn again
 WORST = 5
 
 
 def check_split(campaign: Campaign) -> None:
-    """Refuse what cannot be split, before anything flies."""
+    """Refuse a campaign that cannot be split, before anything flies."""
     faults = []
     if not any(limit.score == "r_min" for limit in campaign.limits):
         faults.append("--split needs a limit on r_min, such as --limit 'r_min<1 at 1e-4/h'")
@@ -250,7 +259,7 @@ def estimate_by_splitting(
 ) -> dict[str, Any]:
     """Estimate how often r_min falls to the smallest limit, starting from the flights that were counted.
 
-    where : file of the scenario, by which flights are flown again
+    scenario_file : file of the scenario, by which flights are flown again
     Returns plain values: target, statements, probability with its interval or why it is refused, worst flights.
     """
     campaign = flyer.campaign
@@ -261,6 +270,7 @@ def estimate_by_splitting(
         seeds, least = _topped_up(flyer, own, values)
     except BudgetSpent:
         return _refused(target, "time ran out before there were enough flights to start from")
+    # Repetitions start from disjoint flights, so that they are independent and their spread is an honest interval.
     share, runs, period = len(least) // REPETITIONS, [], sample_period(campaign.scenario)
     for number in range(REPETITIONS):
         fly = LineageFlyer(flyer, number, threads, len(counted_rows.rows))
@@ -288,7 +298,7 @@ def start_repetition(
     rng: np.random.Generator,
     notify: Callable[[float, float], None] | None = None,
 ) -> Repetition:
-    """One repetition, from the nearest of its flights (seed, smallest distance) on; `period` between samples, s."""
+    """Run one repetition from its nearest flights (seed, smallest distance) on; `period` between samples, s."""
     nearest = sorted(range(len(seeds)), key=lambda i: smallest_distances[i])[:START]
     lineages = [Lineage(seeds[i]) for i in nearest]
     start = [LineageFlight(x, falls) for x, falls in zip(lineages, fly(-1, lineages), strict=True)]
@@ -319,7 +329,7 @@ class BudgetSpent(Exception):
 class LineageFlyer:
     """Flies lineages of one repetition, and keeps how their distances fell.
 
-    counted : flights from which splitting starts; from more of them it starts anew
+    counted : flights from which splitting starts; with more of them it starts again
     """
 
     def __init__(self, flyer: CampaignFlyer, repetition: int, threads: int | None, counted: int):
@@ -367,7 +377,7 @@ def record_falls(scenario: Scenario, lineage: Lineage, precision: int = 32, devi
 
 
 def lineage_events(scenario: Scenario, lineage: Lineage) -> list[Event]:
-    """What is done to a flight so that it is that of a lineage."""
+    """Return the events that make a flight that of a lineage."""
     every = max(1, round(sample_period(scenario) / scenario.flight.dt))
     return [Event(sample * every, "branch", {"world": world}) for sample, world in lineage.branches]
 
@@ -392,7 +402,7 @@ def sample_period(scenario: Scenario) -> float:
 
 
 def _refused(target: float, reason: str) -> dict[str, Any]:
-    """What is said of splitting that gives no number."""
+    """Return the plain values of a splitting that gives no number."""
     return {"target": target, "refused": reason, "statements": [f"splitting: r_min<{target:g}: no number: {reason}"]}
 
 

@@ -39,7 +39,7 @@ TIME_OVER = "time was over"
 
 
 def find_tolerances(flyer: CampaignFlyer, counted: CountResult, keys: Sequence[str]) -> dict[str, Any]:
-    """Largest value of each key at which the events of all limits stay below a level, and the next that is not shown.
+    """Find the largest value of each key at which the events of all limits stay below a level, and the next value.
 
     Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal; of zero
     none), flights, and the interval that the scenario's file gives, if any.
@@ -48,26 +48,26 @@ def find_tolerances(flyer: CampaignFlyer, counted: CountResult, keys: Sequence[s
     level = screening_level(campaign)
     screen = ValueScreen(flyer, level)
     events = sum(any(limit.has_happened(row) for limit in campaign.limits) for row in counted.rows)
-    told: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
+    result: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
     if not counted.rows or take_look(len(counted.rows), events, 1.0 - campaign.confidence, 0.0).high > level:
-        told["reason"] = f"without any change, the scenario is not shown to stay below {100.0 * level:g} % per flight"
-        return told
+        result["reason"] = f"without any change, the scenario is not shown to stay below {100.0 * level:g} % per flight"
+        return result
     known, said = environment_numbers(campaign.scenario), read_intervals(campaign.scenario.document)
     for done, key in enumerate(keys):
         flyer.report(f"tolerance of {key}")
         screen.share_time(len(keys) - done)
         axis = _axis(screen, key, *known[key])
-        told["axis"].append(axis | ({"interval": list(said[key])} if key in said else {}))
-    return told
+        result["axis"].append(axis | ({"interval": list(said[key])} if key in said else {}))
+    return result
 
 
 def screening_level(campaign: Campaign) -> float:
-    """Probability per flight against which values are judged: that of the limits, or LEVEL where they are rarer."""
+    """Return the probability per flight against which values are judged: that of the limits, at least LEVEL."""
     return max([LEVEL, *(p for p in map(campaign.probability, campaign.limits) if p is not None)])
 
 
 class ValueScreen:
-    """Judges one value at a time against a level per flight, on seeds that all values share.
+    """Screen that judges one value at a time against a level per flight, on seeds that all values share.
 
     end : moment of `time.monotonic` at which the time for all values is spent, s
     """
@@ -85,6 +85,7 @@ class ValueScreen:
             return
         for _ in self.flyer.fly(batch, [flight]):
             pass
+        # A new kind of number (a delay above zero) compiles another driver. That takes seconds and is no flight time.
         waited = time.monotonic() - began
         self.end += waited
         self.flyer = replace(self.flyer, until=self.flyer.until + waited)
@@ -103,7 +104,8 @@ class ValueScreen:
         ]
 
     def judged(self, batch: CandidateBatch, parameters: Mapping[str, float]) -> tuple[str, InterimLook | None]:
-        """safe, unsafe, open, or a reason why it cannot be flown; and the last look."""
+        """Return safe, unsafe, open, or a reason why it cannot be flown; and the last look."""
+        # Flights in rounds between looks: a value that is clearly safe or unsafe needs few of them.
         campaign = self.flyer.campaign
         flown = {number: values for (_, number), values in self.flyer.store.flown(batch).items()}
         events, done, last = 0, 0, None
@@ -128,7 +130,7 @@ class ValueScreen:
 
 
 def value_batch(stage: str, parameters: Mapping[str, float]) -> CandidateBatch:
-    """Where flights at these values are kept: told by the values, so that a campaign may go on with other keys."""
+    """Return the batch of flights at these values. Its name holds them: a campaign may resume with other keys."""
     return CandidateBatch(f"{stage}: {', '.join(f'{key} = {value!r}' for key, value in parameters.items())}", 0, 0)
 
 
@@ -144,7 +146,7 @@ class ValueTrials:
         self.flights, self.verdict = 0, ""
 
     def safe(self, value: float) -> bool | None:
-        """Whether a value is safe; None where time was over before that was known."""
+        """Return True if a value is safe, None if time ended before that was known."""
         parameters = {self._key: value}
         batch = value_batch("tolerance", parameters)
         self._screen.flyer.store.ask(batch, [[value]], [parameters])
@@ -157,6 +159,7 @@ class ValueTrials:
 
 def _axis(screen: ValueScreen, key: str, how: Quantity, nominal: float) -> dict[str, Any]:
     """Move one number until it is no longer safe, then halve the way between."""
+    # Doubling brackets the first unsafe value in few trials. Bisection is geometric: tolerances are factors.
     first = nominal or FIRST_VALUE[key]
     last, end = first * REACH ** worse_direction(key), ""
     trials, safe, bad = ValueTrials(screen, key, compiles=not nominal), nominal, math.nan
@@ -186,7 +189,7 @@ def _axis(screen: ValueScreen, key: str, how: Quantity, nominal: float) -> dict[
 
 
 def _kind(campaign: Campaign, key: str) -> str:
-    """The kind of a fault whose number this is."""
+    """Return the kind of the fault to which a number belongs; else empty."""
     place = key.removeprefix("faults[").partition("]")[0]
     return campaign.scenario.faults[int(place)].fault.name if place.isdecimal() else ""
 
@@ -239,5 +242,5 @@ def map_bounds(flyer: CampaignFlyer, axes: Mapping[str, Sequence[float]]) -> dic
             cell |= {"low": found.low, "high": found.high, "flights": found.flights, "events": found.events}
         cells.append(cell)
     units = [declared_numbers(flyer.campaign.scenario)[key][0].unit for key in axes]
-    told: dict[str, Any] = {"level": screen.level, "keys": list(axes), "units": units}
-    return told | {"axes": [list(values) for values in axes.values()], "cell": cells}
+    result: dict[str, Any] = {"level": screen.level, "keys": list(axes), "units": units}
+    return result | {"axes": [list(values) for values in axes.values()], "cell": cells}

@@ -56,26 +56,27 @@ class DaskCluster:
     ):
         """Connect.
 
-        tasks   : what is run on a worker, by the place of a flight
-        timeout : s that one flight may take; answer : s to wait for the scheduler
-        kept    : whether what has landed is stored, so that it can be gone on with
+        tasks           : called on a worker, by the place of a flight
+        timeout         : s that one flight may take
+        connect_timeout : s to wait for the scheduler
+        is_stored       : True if landed flights are stored, so that the run can be resumed
 
         Raises StudyError if nobody answers at the address, or nobody works there.
         """
         try:
             from distributed import Client
-        except ModuleNotFoundError as fault:
-            raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from fault
+        except ModuleNotFoundError as error:
+            raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from error
         self.tasks, self.timeout, self.kept = tuple(tasks), timeout, is_stored
         self.seen = 0.0  # when there was a worker, s of the monotonic clock
         try:
             self.client: Any = Client(address, timeout=connect_timeout, set_as_default=False)
             self.client.wait_for_workers(1, timeout=connect_timeout)
-        except Exception as fault:  # whatever the network and its libraries raise
+        except Exception as error:  # whatever the network and its libraries raise
             reason = "has no workers" if hasattr(self, "client") else "does not answer"
             if hasattr(self, "client"):
                 self.client.close()
-            raise StudyError(f"--scheduler {address}: {reason} ({connect_timeout:g} s waited)") from fault
+            raise StudyError(f"--scheduler {address}: {reason} ({connect_timeout:g} s waited)") from error
         self._warn_of_mixed_processors()
 
     def _warn_of_mixed_processors(self) -> None:
@@ -90,6 +91,7 @@ class DaskCluster:
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield each flight as soon as it is over; hand out only so many at a time."""
+        # With a time limit one flight per thread: waiting in a worker's queue must not count as flying.
         from distributed import wait
 
         waiting = list(reversed(flights))
@@ -127,8 +129,8 @@ class DaskCluster:
         after = "; what has landed is stored, continue with --resume" if self.kept else ""
         try:
             threads = int(sum(self.client.nthreads().values()))
-        except Exception as fault:  # whatever the network raises
-            raise StudyError(f"the scheduler answers no more{after}") from fault
+        except Exception as error:  # whatever the network raises
+            raise StudyError(f"the scheduler answers no more{after}") from error
         if threads:
             self.seen = time.monotonic()
         elif time.monotonic() - self.seen > DESERTED:
@@ -138,7 +140,7 @@ class DaskCluster:
     def _landed(
         self, future: Any, flight: Flight, began: float, tries: dict[tuple[int, int], int]
     ) -> FlightResult | None:
-        """The outcome of a task that is over; None if it has to fly again."""
+        """Return the result of a task that is over; None if it has to fly again."""
         key = (flight.candidate_index, flight.repeat)
         if future.status == "finished":
             values, reason, duration, worker = future.result()
@@ -146,6 +148,7 @@ class DaskCluster:
         fault = future.exception() if future.status == "error" else None
         lost = fault is None or type(fault).__name__ in ("KilledWorker", "CommClosedError", "CancelledError")
         tries[key] = tries.get(key, 0) + 1
+        # A flight is rarely the cause of a lost worker, so it flies again; after LOSSES workers it fails.
         if lost and tries[key] < LOSSES:
             return None
         reason = f"its worker was lost {tries[key]} times" if lost else f"{type(fault).__name__}: {fault}"
@@ -160,6 +163,7 @@ class DaskCluster:
         late = [future for future, (_, began) in out.items() if time.monotonic() - began > self.timeout]
         if not late:
             return
+        # A running flight cannot be stopped: its worker process is restarted.
         flying = self.client.who_has() | self.client.processing()
         workers = [worker for worker, keys in flying.items() if {future.key for future in late} & set(keys)]
         for future in late:
@@ -181,17 +185,17 @@ class DaskCluster:
 
 
 class ScenarioTask:
-    """What a worker is sent to fly one scenario: small, and picklable wherever the worker's code comes from."""
+    """Task by which a worker flies one scenario: small, and picklable wherever the code of its law stands."""
 
     def __init__(self, scenario: Scenario, precision: int):
         """The scenario as JSON text; raises StudyError for one whose code exists only in this process."""
         self.text, self.where, self.precision = json.dumps(scenario.document), scenario.name, precision
         try:
             rebuild_scenario(self.text, self.where)
-        except AirflockError as fault:
+        except AirflockError as error:
             raise StudyError(
-                f"{scenario.name}: workers cannot rebuild this scenario; put its law into a file: {fault}"
-            ) from fault
+                f"{scenario.name}: workers cannot rebuild this scenario; put its law into a file: {error}"
+            ) from error
 
     def __call__(self, parameters: Mapping[str, float], seed: int) -> tuple[Any, str, float, str]:
         """Fly on a worker: order parameters or None, reason, duration (s), who flew."""
@@ -202,7 +206,7 @@ class ScenarioTask:
         return landed.values, landed.reason, landed.duration, landed.worker
 
     def flown(self, scenario: Scenario) -> Scenario:
-        """The scenario whose driver flies."""
+        """Return the scenario whose driver flies."""
         return scenario
 
     def score_function(self, scenario: Scenario) -> ScoreFunction:

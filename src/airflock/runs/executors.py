@@ -1,4 +1,7 @@
-"""Executors: who flies the flights of a study. Workers are stateless: (parameters, seed) in, order parameters out."""
+"""Executors fly the flights of a study: in threads of this process, or (`dask_cluster`) on workers of a scheduler.
+
+Workers are stateless: parameters and a seed in, order parameters out.
+"""
 
 import os
 import platform
@@ -50,28 +53,30 @@ class Executor(Protocol):
         """Yield each flight as soon as it is over; on Ctrl-C only those in the air."""
 
     def close(self) -> None:
-        """Give back what was taken."""
+        """Release threads and connections."""
 
 
 def fly_task(score: ScoreFunction, task: Flight, worker: str = "") -> FlightResult:
-    """Fly one flight; what goes wrong on purpose is a reason, and no error of the study."""
+    """Fly one flight; an expected error becomes the reason of a failed flight and does not end the study."""
     begin = time.perf_counter()
     try:
         values, reason = score(task.parameters, task.seed), ""
-    except (AirflockError, ArithmeticError) as fault:
-        values, reason = None, str(fault).splitlines()[0] if str(fault) else type(fault).__name__
+    except (AirflockError, ArithmeticError) as error:
+        values, reason = None, str(error).splitlines()[0] if str(error) else type(error).__name__
     return FlightResult(task, values, reason, time.perf_counter() - begin, worker)
 
 
 class ThreadExecutor:
-    """A pool of threads, one per core unless told otherwise."""
+    """Executor of this process: a pool of threads."""
 
     def __init__(self, score: ScoreFunction, threads: int, other_scores: Sequence[ScoreFunction] = ()):
         """`score` turns parameters and a seed into order parameters; it is called from `threads` threads.
 
-        others : the same for further scenarios of the study
+        other_scores : functions of further scenarios of the study
         """
         self.scores, self.name = (score, *other_scores), f"{platform.node()}:{os.getpid()}"
+        # Plain threads, one flight each: a compiled flight releases the interpreter. prange would need a second
+        # compilation and see Ctrl-C only at the end.
         self.pool = ThreadPoolExecutor(max(1, threads))
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
@@ -86,6 +91,7 @@ class ThreadExecutor:
                 for future in over:
                     yield future.result()
         except KeyboardInterrupt:
+            # Flights cannot be interrupted: those in the air end and are stored, those that wait are cancelled.
             in_the_air = [future for future in waiting if not future.cancel()]
             for future in in_the_air:
                 yield future.result()
@@ -110,7 +116,7 @@ def score_scenarios(
     device: str = "cpu",
     notify: Callable[[str], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Order parameters of flight i of scenarios[i] with seeds[i].
+    """Return the order parameters of flight i of scenarios[i] with seeds[i].
 
     scheduler : address of a dask scheduler whose workers fly; None: this process, with so many threads on a device
     Raises FlightError for a flight that goes wrong, StudyError for a scheduler that does not answer.

@@ -20,6 +20,8 @@ from airflock.runs.executors import FlightResult
 from airflock.support import FormatError, StudyError, as_error, locks, parse_json, parse_json_object
 
 FILE, LOCK = "evaluations.sqlite", "writer.lock"
+# Tables have no row numbers, so contents do not depend on the order in which flights land. One flight is the unit: a
+# kill loses only what is in the air.
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS session (
   session INTEGER PRIMARY KEY, began TEXT, host TEXT, versions TEXT
@@ -35,11 +37,11 @@ CREATE TABLE IF NOT EXISTS flight (
   PRIMARY KEY (stage, run, generation, candidate, repeat)
 ) WITHOUT ROWID;
 """
-WALL = ("duration", "worker", "session")  # columns that tell of the machine and not of the study
+WALL = ("duration", "worker", "session")  # columns that describe the machine and not the study
 
 
 class CandidateBatch(NamedTuple):
-    """Which candidates: of the search's generations, or of what comes after it."""
+    """Batch of candidates: a generation of the search, or a later stage."""
 
     stage: str
     run: int
@@ -47,7 +49,7 @@ class CandidateBatch(NamedTuple):
 
 
 class FlightStore:
-    """The evaluations of one study folder. Use as a context; `write=False` only looks."""
+    """Evaluations of one study folder. Use as a context; `write=False` only reads."""
 
     def __init__(self, folder: Path, *, write: bool = True):
         """Open or create; raises StudyError where another process is writing, or where the file is no store."""
@@ -88,14 +90,14 @@ class FlightStore:
             self.lock_handle = -1
 
     def begin(self, versions: Mapping[str, str]) -> None:
-        """Note that a process begins to write: when, where, with which versions."""
+        """Store that a process begins to write: time, host and versions."""
         row = (time.strftime("%Y-%m-%dT%H:%M:%S%z"), platform.node(), json.dumps(dict(versions)))
         with as_study_error(self.path):
             cursor = self.connection.execute("INSERT INTO session (began, host, versions) VALUES (?, ?, ?)", row)
             self.session = int(cursor.lastrowid or 0)
 
     def asked(self, batch: CandidateBatch) -> list[list[float]]:
-        """Points of a batch's candidates that the store already holds, in their order."""
+        """Return the points of a batch's candidates in the store, in their order."""
         found = self.rows(
             "SELECT point FROM candidate WHERE stage=? AND run=? AND generation=? ORDER BY candidate", batch
         )
@@ -179,10 +181,10 @@ def _lock(folder: Path) -> int:
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         locks.lock(handle)
-    except OSError as fault:
+    except OSError as error:
         holder = os.read(handle, 200).decode(errors="replace").strip()
         os.close(handle)
-        raise StudyError(f"{folder}: another process ({holder or 'unknown'}) is writing this study") from fault
+        raise StudyError(f"{folder}: another process ({holder or 'unknown'}) is writing this study") from error
     os.ftruncate(handle, 0)
     os.write(handle, f"process {os.getpid()} on {platform.node()}\n".encode())
     return handle
@@ -193,10 +195,10 @@ def as_study_error(path: Path) -> Iterator[None]:
     """SQLite's complaints as one line that names the file."""
     try:
         yield
-    except sqlite3.DatabaseError as fault:
-        lost = "file is not a database" in str(fault)
+    except sqlite3.DatabaseError as error:
+        lost = "file is not a database" in str(error)
         kept = "its flights cannot be read" if lost else "what was stored before is kept"
-        raise StudyError(f"{path}: {fault}; {kept}") from fault
+        raise StudyError(f"{path}: {error}; {kept}") from error
 
 
 _encode = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode

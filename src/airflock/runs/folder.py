@@ -20,16 +20,16 @@ class Interrupted(StudyError):
 
 
 class HasDocument(Protocol):
-    """What is done in a folder and can be continued there: a study, or a campaign of certify."""
+    """Work that is done in a folder and can be resumed there: a study, or a campaign of certify."""
 
     def document(self) -> dict[str, Any]:
-        """Everything that decides its result, as plain values."""
+        """Return everything that decides its result, as plain values."""
 
 
 def open_folder(folder: Path, study: HasDocument, *, resume: bool, kind: str = "study") -> None:
     """Make a study's folder, or check that it holds this very study; likewise for another kind, such as a campaign.
 
-    Raises StudyError where the folder holds another study, or this one and `resume` was not asked for.
+    Raises StudyError where the folder holds another study, or this one and `resume` is False.
     """
     found = folder / f"{kind}.toml"
     if found.is_file():
@@ -45,8 +45,8 @@ def open_folder(folder: Path, study: HasDocument, *, resume: bool, kind: str = "
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_toml_file(found, study.document(), f"A {kind} of Airflock. Written once, when it began.")
-    except OSError as fault:
-        raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
+    except OSError as error:
+        raise StudyError(f"{folder}: cannot be written: {error.strerror or error}") from error
 
 
 def remove_unfinished(folder: Path) -> None:
@@ -57,7 +57,7 @@ def remove_unfinished(folder: Path) -> None:
 
 
 def read_toml_file(path: Path) -> dict[str, Any]:
-    """A TOML file as a dict."""
+    """Read a TOML file as a dict."""
     with as_error(path, StudyError):
         return read_toml(path)
 
@@ -66,6 +66,7 @@ def write_toml_file(path: Path, document: Mapping[str, Any], comment: str = "") 
     """Write a nested dict as TOML, complete or not at all."""
     import tomlkit
 
+    # Values that are tables come last: in TOML a plain key after a table would belong to it.
     made = tomlkit.document()
     if comment:
         made.add(tomlkit.comment(comment))
@@ -98,14 +99,14 @@ def _fill(table: Any, values: Mapping[str, Any]) -> None:
 
 
 def to_toml_values(value: Any) -> Any:
-    """Values as TOML knows them: lists instead of tuples, no None."""
+    """Convert values to those of TOML: lists instead of tuples, no None."""
     if isinstance(value, Mapping):
         return {str(key): to_toml_values(entry) for key, entry in value.items() if entry is not None}
     return [to_toml_values(entry) for entry in value] if isinstance(value, (list, tuple)) else value
 
 
 def program_versions() -> dict[str, str]:
-    """Versions that the last bits of a study depend on, and the processor."""
+    """Return the versions on which the last bits of a study depend, and the processor."""
     found = {"python": platform.python_version(), "cpu": processor_name(), "airflock": __version__}
     for name in PACKAGES:
         try:
@@ -116,14 +117,14 @@ def program_versions() -> dict[str, str]:
 
 
 def fingerprint(scenario: Scenario, precision: int) -> str:
-    """Hash of everything that is compiled for a scenario: equal physics gives equal fingerprints."""
+    """Return a hash of everything compiled for a scenario: equal physics gives equal fingerprints."""
     from airflock.engine import driver_text
 
     return hashlib.sha256(driver_text(scenario, precision=precision).encode()).hexdigest()[:12]
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any], at: str = "") -> list[str]:
-    """What differs between two documents, one line each."""
+    """Return the differences of two documents, one line each."""
     found = []
     for key in [*old, *(key for key in new if key not in old)]:
         where = f"{at}{key}"
@@ -140,7 +141,7 @@ def _shown(value: Any) -> str:
 
 
 def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any], kind: str = "study") -> None:
-    """Raise StudyError, naming what differs, if a folder holds another study than the one that is asked for."""
+    """Raise StudyError, naming what differs, if a folder holds another study than the requested one."""
     found = differences(old, new)
     if not found:
         return

@@ -39,6 +39,7 @@ class SearchAxis:
 
     def value(self, x: float, floor: float = -math.inf) -> float:
         """Value at coordinate x in [0, 1], not below `floor`."""
+        # The range shrinks to what the floor leaves, so that every point of the cube is an allowed set.
         low, high = min(max(self.low, floor), self.high), self.high
         x = min(max(x, 0.0), 1.0)
         if self.integer:
@@ -138,7 +139,7 @@ def _order(axes: Sequence[SearchAxis]) -> list[int]:
 
 
 def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scenario:
-    """The scenario with other numbers, without reading it again. Raises ParameterError outside declared ranges.
+    """Return the scenario with other numbers, without reading it again. Raises ParameterError out of range.
 
     Of faults, faults[0].per_hour and faults[0].number can be changed.
     """
@@ -148,21 +149,23 @@ def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scen
         changed.setdefault(section, {})[name] = value
     fields = {section.key: section.field for section in ORDER}
     records = scenario.records
-    befalls = {section: changed.pop(section) for section in list(changed) if section.startswith("faults[")}
-    if befalls:
-        entries = (_befallen(entry, befalls.get(f"faults[{i}]", {})) for i, entry in enumerate(scenario.faults))
+    numbers_of_faults = {section: changed.pop(section) for section in list(changed) if section.startswith("faults[")}
+    if numbers_of_faults:
+        entries = (
+            _with_numbers(entry, numbers_of_faults.get(f"faults[{i}]", {})) for i, entry in enumerate(scenario.faults)
+        )
         scenario = replace(scenario, faults=tuple(entries))
     return replace(scenario, **{fields[s]: replace(records[s], **values) for s, values in changed.items()})
 
 
-def _befallen(entry: FaultEntry, values: Mapping[str, float]) -> FaultEntry:
-    """An entry of faults with other numbers; that of agents is whole."""
+def _with_numbers(entry: FaultEntry, values: Mapping[str, float]) -> FaultEntry:
+    """Return an entry of faults with other numbers; the number of agents is rounded."""
     number = round(values["number"]) if "number" in values else entry.number
     return replace(entry, per_hour=values.get("per_hour", entry.per_hour), number=number)
 
 
 def declared_numbers(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:
-    """Key → declaration and present value of every number of a scenario; of drag descent and silence where they fly."""
+    """Return key → declaration and value of each number; drag descent and silence only if the scenario flies them."""
     return {
         f"{section}.{name}".lstrip("."): (how, getattr(record, name))
         for section, record in scenario.records.items()
@@ -173,7 +176,7 @@ def declared_numbers(scenario: Scenario) -> dict[str, tuple[Quantity, float | No
 
 
 def full_space(scenario: Scenario) -> SearchSpace:
-    """All numbers of the model between their declared bounds, but for those that set the speed that is asked for."""
+    """Return the space of all numbers of the model between declared bounds, except those that set the speed."""
     axes = []
     for key, (how, value) in declared_numbers(scenario).items():
         if key.startswith("model.") and value is not None and not _sets_speed(scenario, key, how, value):
@@ -182,7 +185,8 @@ def full_space(scenario: Scenario) -> SearchSpace:
 
 
 def _sets_speed(scenario: Scenario, key: str, how: Quantity, value: float) -> bool:
-    """Whether a number changes the model's preferred speed: then it is the task, and no means to fulfil it."""
+    """Return True if a number changes the model's preferred speed."""
+    # Such a number is the task, and no means to fulfil it: a search would make the task easier.
     speed = scenario.model.preferred_speed
     if speed is None:
         return False
@@ -191,5 +195,5 @@ def _sets_speed(scenario: Scenario, key: str, how: Quantity, value: float) -> bo
 
 
 def default_scale(low: float, high: float) -> str:
-    """Logarithmic where a range is positive and DECADES wide, else linear."""
+    """Return "log" for a positive range at least DECADES wide, else "linear"."""
     return "log" if low > 0.0 and high >= low * 10.0**DECADES else "linear"

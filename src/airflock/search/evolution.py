@@ -1,4 +1,4 @@
-"""The public door: a study from beginning to end in one folder, begun or continued."""
+"""Evolve: a study from its request to its result in one folder, begun or resumed; also validation and sensitivity."""
 
 import hashlib
 import os
@@ -75,7 +75,7 @@ def evolve(
     out : str or path
         The study's folder.
     resume : bool
-        Continue the study in the folder to the identical end. What is not asked for again is as in the first call.
+        Continue the study in the folder to the identical end. Options that are not given are as in the first call.
     settings : mapping, optional
         Keys of the scenario to change, such as {"duration": 300.0}.
     space : mapping, optional
@@ -99,7 +99,7 @@ def evolve(
     timeout : float, optional
         Time that a flight may take on a dask worker, s.
     sensitivity : str
-        "sobol" or "morris": also fly what tells which parameters matter; table sensitivity.csv.
+        "sobol" or "morris": also measure which parameters matter; table sensitivity.csv.
     watch : callable, optional
         Called with a Progress after each flight.
     trust : bool
@@ -137,8 +137,8 @@ def evolve(
     True
     """
     folder = expand_path(out)
-    asked = ErrorCollector()
-    found = asked.read(
+    errors = ErrorCollector()
+    found = errors.read(
         evolve_request,
         scenario,
         settings,
@@ -152,10 +152,10 @@ def evolve(
         over_scenarios=over_scenarios,
         trust=trust,
     )
-    asked.read(check_sensitivity_method, sensitivity)
-    asked.read(check_timeout, timeout)
-    asked.read(check_study_device, device, scheduler)
-    asked.raise_errors()
+    errors.read(check_sensitivity_method, sensitivity)
+    errors.read(check_timeout, timeout)
+    errors.read(check_study_device, device, scheduler)
+    errors.raise_errors()
     study = resolve_device(found[0], device)
     open_folder(folder, study, resume=resume)
     executor = study_executor(study, scheduler, threads, timeout)
@@ -163,7 +163,7 @@ def evolve(
 
 
 def study_score(study: Study, scenario_index: int = 0) -> ScoreFunction:
-    """Parameters and a seed → order parameters, for one of the study's scenarios."""
+    """Return the function from parameters and a seed to order parameters, for one scenario of the study."""
     from airflock.engine import score_flight
 
     precision = int(study.search.precision)
@@ -175,7 +175,7 @@ def study_score(study: Study, scenario_index: int = 0) -> ScoreFunction:
 
 
 def resolve_device(study: Study, device: str) -> Study:
-    """The study for a device: cpu, cuda, or what auto picks for a generation of it. A missing one is one line."""
+    """Return the study for a device: cpu, cuda, or the choice of auto for one generation. Raises if it is missing."""
     check_study_device(device)
     if device == "cpu":
         return study
@@ -188,7 +188,7 @@ def resolve_device(study: Study, device: str) -> Study:
 def study_executor(
     study: Study, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
 ) -> Executor:
-    """Who flies: this process, or the workers of a dask scheduler."""
+    """Make the executor of a study: threads of this process, or the workers of a dask scheduler."""
     if study.device != "cpu":
         return BatchExecutor(study, study.device)
     if scheduler is not None:
@@ -214,7 +214,7 @@ def run_study(
     *,
     sensitivity: str = "",
 ) -> EvolveResult:
-    """Search and conclude in a folder that `open_folder` has accepted; closes the executor."""
+    """Search and conclude in a folder that `open_folder` has accepted; close the executor."""
     try:
         with FlightStore(folder) as store:
             store.begin(program_versions())
@@ -245,9 +245,10 @@ def evolve_request(
     folder: Path | None = None,
     **others: Any,
 ) -> tuple[Study, str]:
-    """As `study_from_request`, which takes the others; if a folder is given, what is not asked for is as that holds it.
+    """Make a study by `study_from_request`, which takes the other arguments. Values missing in a resumed one come
+    from its folder.
 
-    Also a note of what the folder gave.
+    Returns the study and a note of the values that the folder gave.
     """
 
     def ask(changes: Mapping[str, Any] | None, keys: Mapping[str, Any], limits: Any, *, quick: bool = False) -> Study:
@@ -274,11 +275,11 @@ def study_from_request(
     trust: bool = False,
     fast: bool = False,
 ) -> Study:
-    """The study that `evolve` is asked for."""
+    """Make the study of a call of `evolve` from its arguments."""
     if isinstance(what, Study):
-        asked: dict[str, Any] = {"settings": settings, "space": space, "objective": objective, "fitness": fitness}
-        asked |= {"limit": limit, "over_scenarios": over_scenarios, "fast": fast}
-        beside = [*(key for key, value in asked.items() if value), *(search_keys or {})]
+        requested: dict[str, Any] = {"settings": settings, "space": space, "objective": objective, "fitness": fitness}
+        requested |= {"limit": limit, "over_scenarios": over_scenarios, "fast": fast}
+        beside = [*(key for key, value in requested.items() if value), *(search_keys or {})]
         if beside:
             said = ", ".join(beside)
             raise StudyError(f"{said}: a Study object sets this itself; give a preset, a file or a Scenario")
@@ -305,25 +306,26 @@ def study_from_request(
 
 
 def _text_of(code: Any) -> str:
-    """Hash of what a function does, the same in every process."""
+    """Return a hash of the code of a function; it is equal in every process."""
+    # Nested code objects print their address: they would change the hash in every process.
     constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
     return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
 
 
 def check_sensitivity_method(sensitivity: str) -> None:
-    """Refuse a method of finding sensitivities that nobody knows."""
+    """Refuse an unknown method of sensitivity analysis."""
     if sensitivity and sensitivity not in SENSITIVITY_METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(SENSITIVITY_METHODS)}")
 
 
 def check_study_device(device: str, scheduler: str | None = None) -> None:
-    """Refuse a device on which no study flies, and another one than their cpu for a scheduler's workers."""
+    """Refuse an unknown device, and any device but the CPU for workers of a scheduler."""
     check_worker_device(scheduler, device)
     if device not in ("cpu", "cuda", "auto"):
         raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
 
 
-OWN = ("layout", "airflock")  # of the version that made the folder: nothing that can be asked for
+OWN = ("layout", "airflock")  # of the version that made the folder; no option sets them
 
 
 def resume_study(
@@ -334,16 +336,18 @@ def resume_study(
     limit: Sequence[str],
     make_request: Callable[[dict[str, Any], dict[str, Any], list[str]], Study],
 ) -> tuple[Study, str]:
-    """The study as its folder holds it, and a note of what was taken from there; what is asked for anew stays so.
+    """Return the study as its folder holds it, and a note of the values taken from there. New requests win.
 
-    study : as it would be without the folder; settings, search, limit : what is asked for now
-    ask   : the study for other settings, keys of the search, and limits
+    study : as it would be without the folder
+    settings, search, limit : values that this call requests
+    make_request : makes the study for other settings, keys of the search, and limits
     """
     if not (folder / STUDY_FILE).is_file():
         return study, ""
     held, now = read_toml_file(folder / STUDY_FILE), to_toml_values(study.document())
     if any(held.get(key) != now[key] for key in OWN):
         return study, ""  # `open_folder` says so
+    # A key may be given by its last name alone, so such keys win over the folder, too.
     named = {key.rpartition(".")[2] for key in settings}
     flown = {
         key: value
@@ -357,13 +361,13 @@ def resume_study(
     taken = flown | searched | held_to
     if not taken:
         return study, ""
-    told = ", ".join(f"{key} = {value_of(value)}" for key, value in taken.items())
-    said = f"goes on with what {folder} holds: {told}"
+    listed = ", ".join(f"{key} = {value_of(value)}" for key, value in taken.items())
+    said = f"goes on with what {folder} holds: {listed}"
     return make_request({**settings, **flown}, {**keys, **search}, limits if held_to or limit else []), said
 
 
 def _changed(held: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> list[tuple[str, Any]]:
-    """Keys of a scenario that have another value in the folder, with that value."""
+    """Return the keys of a scenario whose value in the folder differs, with the value in the folder."""
     found: list[tuple[str, Any]] = []
     for key, value in held.items():
         other = now.get(key)
@@ -375,7 +379,7 @@ def _changed(held: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> l
 
 
 class ValidationReport(NamedTuple):
-    """What a valid file is, in one sentence, and notes on it for a person to read."""
+    """Summary of a valid file in one sentence, with notes for the reader."""
 
     verdict: str
     notes: tuple[str, ...]
@@ -422,9 +426,9 @@ def validate(
     if text.lower().endswith(".nc"):
         same, differences = replay_recording(load_recording(name), law, settings, trust=trust)
         if not same:
-            told = "".join(f"\n{text}: {line}" for line in differences)
+            listed = "".join(f"\n{text}: {line}" for line in differences)
             reason = "see below" if differences else "although nothing relevant differs"
-            raise AirflockError(f"{text}: flown again, the positions differ, {reason}{told}")
+            raise AirflockError(f"{text}: flown again, the positions differ, {reason}{listed}")
         return ValidationReport("flown again with the same bits", tuple(differences))
     if is_study(text):
         if law is not None:
@@ -454,7 +458,7 @@ def run_sensitivity(
     samples: int = 16,
     on_flight: Callable[[bool], None] | None = None,
 ) -> pd.DataFrame:
-    """Effect of each parameter on the first objective over the study's whole space.
+    """Measure the effect of each parameter on the first objective over the study's whole space.
 
     samples : base samples: sobol takes samples · (axes + 2) candidates, samples a power of two; morris
               samples · (axes + 1), in trajectories
@@ -464,8 +468,8 @@ def run_sensitivity(
     try:
         from SALib.analyze import morris as analyse_morris, sobol as analyse_sobol
         from SALib.sample import morris as sample_morris, sobol as sample_sobol
-    except ModuleNotFoundError as fault:
-        raise StudyError("sensitivity needs SALib: pip install 'airflock[evolve]'") from fault
+    except ModuleNotFoundError as error:
+        raise StudyError("sensitivity needs SALib: pip install 'airflock[evolve]'") from error
     if method not in SENSITIVITY_METHODS:
         raise StudyError(f"method = {method!r} is none of {', '.join(SENSITIVITY_METHODS)}")
     n = len(study.space.axes)
@@ -477,11 +481,13 @@ def run_sensitivity(
         points = sample_morris.sample(problem, samples, seed=seed)
     batch = CandidateBatch(method, samples, 0)
     k = study.whole("seeds")
-    seeds = [[study.seed(3, j) for j in range(k)]] * len(points)  # common: chance must not pass for an effect
+    # Common random numbers: otherwise the chance of single flights would pass for an effect of a parameter.
+    seeds = [[study.seed(3, j) for j in range(k)]] * len(points)
     rows = Evaluator(study, store, executor, on_flight).evaluate(batch, np.asarray(points), seeds=seeds)
     values = np.array([np.nan if row[0] is None else row[0] for row in rows])
     if not np.isfinite(values).any():
         raise StudyError("every candidate failed: no sensitivity")
+    # SALib takes no gaps: a failed candidate counts as the worst value seen.
     values[~np.isfinite(values)] = np.nanmin(values) if study.objectives[0].maximise else np.nanmax(values)
     if method == "sobol":
         found = analyse_sobol.analyze(problem, values, calc_second_order=False, seed=seed)
@@ -493,7 +499,7 @@ def run_sensitivity(
 
 
 class BatchExecutor:
-    """One call of the engine for each batch; a flight that goes wrong is found by halves, and the others stand."""
+    """Fly a batch in one call of the engine; bisect it to find a flight with an error, and keep the others."""
 
     def __init__(self, study: Study, device: str):
         """`device` as `airflock.engine.score_flights` takes it."""
@@ -512,11 +518,12 @@ class BatchExecutor:
             scenarios = [with_parameters(self.study.scenarios[flight.place], flight.parameters) for flight in flights]
             precision = int(self.study.search.precision)
             rows = score_flights(scenarios, [f.seed for f in flights], precision=precision, device=self.device)
-        except (AirflockError, ArithmeticError) as fault:
+        except (AirflockError, ArithmeticError) as error:
             if len(flights) == 1:
-                reason = str(fault).splitlines()[0] if str(fault) else type(fault).__name__
+                reason = str(error).splitlines()[0] if str(error) else type(error).__name__
                 yield FlightResult(flights[0], None, reason, time.perf_counter() - begin, self.device)
                 return
+            # One bad flight ends the whole batch. Halving finds it in log2 steps, and all others keep their result.
             half = len(flights) // 2
             yield from self._fly(flights[:half])
             yield from self._fly(flights[half:])
@@ -526,19 +533,19 @@ class BatchExecutor:
             yield FlightResult(flight, values, "", each, self.device)
 
     def close(self) -> None:
-        """Nothing was taken."""
+        """Release nothing: this executor holds no threads."""
 
 
 class StudyTask(ScenarioTask):
-    """Flies a scenario with the parameters of a candidate."""
+    """Task of a dask worker that flies a scenario with the parameters of a candidate."""
 
     def score_function(self, scenario: Scenario) -> ScoreFunction:
-        """Parameters and seed → order parameters."""
+        """Return the function from parameters and a seed to order parameters."""
         from airflock.engine import score_flight
 
         return lambda p, seed: score_flight(with_parameters(scenario, p), seed, precision=self.precision)
 
 
 def study_tasks(study: Study) -> tuple[StudyTask, ...]:
-    """The task of each scenario of a study; raises StudyError for a law that exists only in this process."""
+    """Make the task of each scenario. Raises StudyError for a law that exists only in this process."""
     return tuple(StudyTask(scenario, int(study.search.precision)) for scenario in study.scenarios)

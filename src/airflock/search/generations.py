@@ -1,4 +1,4 @@
-"""The search itself: generations are asked for, flown where the store does not hold them yet, and told.
+"""Generations of a search: ask the optimiser for candidates, fly those missing in the store, report their losses.
 
 A study that was ended, however roughly, is continued by running it again: the optimiser is fed with the stored flights
 from its first generation on and comes to the very state in which it was left. No state is pickled.
@@ -27,9 +27,9 @@ FlightScores = dict[tuple[int, int], Mapping[str, Any] | None]  # (candidate, re
 
 @dataclass(frozen=True)
 class Evaluator:
-    """A study with its store of flights and who flies them.
+    """Evaluator of candidates: a study with its store of flights and its executor.
 
-    note : called after each flight, with whether it is a new one
+    note : called after each flight with True if it is new
     """
 
     study: Study
@@ -46,12 +46,12 @@ class Evaluator:
         duration_share: float = 1.0,
         racing: bool = False,
     ) -> list[list[float | None]]:
-        """Fitness (candidate, objective) of a batch; flies what the store lacks and stores it. None: failed.
+        """Return the fitness (candidate, objective) of a batch; fly and store missing flights. None: failed.
 
         points : (candidate, axis) of the unit cube
         seeds  : (candidate, repeat); by default those of the search
-        share  : of the scenarios' duration that is flown
-        racing : whether seeds are flown in turn, and no further by candidates that cannot reach the better half
+        duration_share : share of the scenarios' duration that is flown
+        racing : True flies one seed after another and drops candidates that cannot reach the better half
         """
         study = self.study
         parameters = [study.space.parameters(point) for point in points]
@@ -64,8 +64,10 @@ class Evaluator:
                 self.note(False)
         n, last = len(places), max(len(row) for row in numbers)
         alive = list(range(len(parameters)))
+        # A race flies one more seed of each remaining candidate in each pass; otherwise one pass flies all seeds.
         for seen in range(1, last + 1) if racing else [last]:
             missing = [
+                # One number holds seed and scenario, so that the scenarios of a seed lie side by side in the store.
                 Flight(i, j * n + k, {**parameters[i], **shorter}, seed, k)
                 for i in alive
                 for j, seed in enumerate(numbers[i][:seen])
@@ -97,7 +99,8 @@ class Evaluator:
                 self.note(True)
 
     def _still_needed(self, flown: FlightScores, alive: Sequence[int], seen: int, last: int) -> list[int]:
-        """Candidates that fly on after `seen` of `last` seeds; later flights that are stored already do not count."""
+        """Return the candidates that fly on after `seen` of `last` seeds."""
+        # Stored flights of later seeds must not count: a resumed search would decide with more than the first.
         first, n = self.study.objectives[0], len(self.study.scenarios)
         candidates = 1 + max(i for i, _ in flown)
         values = [
@@ -111,21 +114,23 @@ class Evaluator:
         return remaining_candidates(values, alive, last - seen, first.maximise)
 
     def _fitness(self, objective: Objective, flights: Sequence[Mapping[str, Any] | None]) -> float | None:
-        """Fitness of a candidate from its flights in their order: over the seeds of each scenario, then over these."""
+        """Return the fitness of a candidate: over the seeds of each scenario, then over the scenarios."""
         n = len(self.study.scenarios)
         each = [objective.of_candidate(flights[place::n]) for place in range(n)]
         return combine_scenarios(each, self.study.over_scenarios, objective.maximise)
 
 
 def _shortened(scenario: Scenario, share: float) -> dict[str, float]:
-    """Parameters of a flight that make it shorter than the scenario's; none for a whole one."""
+    """Return the parameters that shorten a flight; none for a whole one."""
     return {} if share == 1.0 else {DURATION_COLUMN: share * scenario.flight.duration}
 
 
 def _seeds(study: Study, batch: CandidateBatch, candidates: int) -> list[list[int]]:
-    """Seeds (candidate, repeat) of a generation of the search."""
+    """Return the seeds (candidate, repeat) of a generation of the search."""
+    # Seeds follow from the place in the search alone, so that a resumed search flies the same ones.
     k, most = study.seeds(batch.generation), max(study.whole("seeds"), study.whole("late_seeds"))
     before = sum(study.population(run) for run in range(batch.run)) * study.whole("generations")
+    # All runs before this one may have had another population: restarts grow it.
     first = before + batch.generation * study.population(batch.run)
     how = study.search.random_numbers
     return [
@@ -140,21 +145,24 @@ SeedValues = Sequence[float | None]
 def remaining_candidates(
     values: Sequence[SeedValues], remaining: Sequence[int], seeds_left: int, maximise: bool
 ) -> list[int]:
-    """Which candidates of `alive` fly on.
+    """Return the remaining candidates that fly on.
 
     values : (candidate, seed so far) of all candidates of the generation; None: failed, which ends a candidate
-    left   : seeds that are still to come
+    seeds_left : seeds that are still to come
     """
+    # CMA-ES moves by the better half, so only candidates that cannot reach it even with best luck are dropped.
     sign = 1.0 if maximise else -1.0
-    told = [[sign * value for value in row if value is not None] for row in values]
-    failed = [len(row) < len(given) for row, given in zip(told, values, strict=True)]
-    means = [-float("inf") if lost or not row else sum(row) / len(row) for row, lost in zip(told, failed, strict=True)]
-    best = max((value for row in told for value in row), default=0.0)
+    scored = [[sign * value for value in row if value is not None] for row in values]
+    failed = [len(row) < len(given) for row, given in zip(scored, values, strict=True)]
+    means = [
+        -float("inf") if lost or not row else sum(row) / len(row) for row, lost in zip(scored, failed, strict=True)
+    ]
+    best = max((value for row in scored for value in row), default=0.0)
     needed = sorted(means, reverse=True)[(len(means) + 1) // 2 - 1]
     return [
         i
         for i in remaining
-        if not failed[i] and (sum(told[i]) + seeds_left * best) / (len(told[i]) + seeds_left) >= needed
+        if not failed[i] and (sum(scored[i]) + seeds_left * best) / (len(scored[i]) + seeds_left) >= needed
     ]
 
 
@@ -163,7 +171,7 @@ LONGEST = 8  # of all generations, at most one in so many has each length but th
 
 
 class FlightLength:
-    """Share of a whole flight that the next generation flies; told of each generation's first objective."""
+    """Length of the next generation's flights as a share of a whole one; it grows with the first objective."""
 
     def __init__(self, generations: int, maximise: bool, *, growing: bool):
         """`generations` of the whole run; without `growing` all flights are whole."""
@@ -173,16 +181,18 @@ class FlightLength:
 
     @property
     def share(self) -> float:
-        """Of the scenario's duration."""
+        """Share of the scenario's duration."""
         return self.left[0]
 
     @property
     def whole(self) -> bool:
-        """Whether flights are as long as the scenario says."""
+        """Return True if flights are as long as the scenario says."""
         return len(self.left) == 1
 
     def end_generation(self, values: Sequence[float | None]) -> None:
-        """First objective of all candidates of a generation; None: failed, worse than all others."""
+        """Take the first objective of all candidates of a generation (None: failed) and lengthen flights if due."""
+        # Values of one length are compared with each other only, so the rule holds for any objective. Fixed thresholds
+        # (0.35, 0.5, 0.6) were tried and fitted one law.
         if self.whole:
             return
         found = [-float("inf") if value is None else self.sign * value for value in values]
@@ -227,7 +237,7 @@ def refuse_flat(study: Study, store: FlightStore, generation: int, values: Seque
 
 
 def dead_reason(study: Study, scores: Sequence[Mapping[str, Any] | None]) -> str:
-    """Why a winner does not fly, if its fitness, a product, is zero in all flights on fresh seeds; else empty."""
+    """Return why a winner does not fly, if its fitness, a product, is zero in all fresh flights; else empty."""
     sound = [row for row in scores if row is not None]
     if study.objectives[0].name != "fitness" or not sound or not _parts(sound):
         return ""
@@ -237,25 +247,25 @@ def dead_reason(study: Study, scores: Sequence[Mapping[str, Any] | None]) -> str
 
 
 def search_scores(store: FlightStore) -> list[Mapping[str, Any]]:
-    """Scores of all flights of the search."""
+    """Return the scores of all flights of the search."""
     return [
         parse_values(scores) for (scores,) in store.rows("SELECT scores FROM flight WHERE stage='search'") if scores
     ]
 
 
 def zero_fitness_reason(scores: Sequence[Mapping[str, Any]]) -> str:
-    """Which partial fitness is zero most often, in how many flights, and what may be changed; empty if none is."""
+    """Say which partial fitness is zero most often, in how many flights, and what may be changed; empty if none is."""
     shares = {name: sum(float(row[name]) < ZERO_FITNESS for row in scores) / len(scores) for name in _parts(scores)}
     worst = sorted(((share, name) for name, share in shares.items() if share > 0.5), reverse=True)
     if not worst:
         return ""
-    told = ", ".join(f"{name} is zero in {100.0 * share:.0f} % of flights" for share, name in worst)
+    zeros = ", ".join(f"{name} is zero in {100.0 * share:.0f} % of flights" for share, name in worst)
     advice = ADVICE.get(worst[0][1], "")
-    return f": {told}{f'; {advice}' if advice else ''}"
+    return f": {zeros}{f'; {advice}' if advice else ''}"
 
 
 def _parts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Partial fitnesses that all flights have."""
+    """Return the names of the partial fitnesses that all flights have."""
     names = [name for name, value in (rows[0] if rows else {}).items() if name.startswith("f_") and _number(value)]
     return [name for name in names if all(_number(row.get(name)) for row in rows)]
 
@@ -269,7 +279,7 @@ SAME = 1e-9  # a rebuilt optimiser may differ from the stored points by rounding
 
 @dataclass(frozen=True)
 class SearchProgress:
-    """How far a search is, after each flight and each generation.
+    """Progress of a search, after each flight and each generation.
 
     done, total : flights, those of the store included; fresh : flights of this process
     best, mean  : first objective of the best candidate so far and of the last generation, of those that keep all
@@ -290,7 +300,7 @@ OnSearchProgress = Callable[[SearchProgress], None]
 
 @dataclass
 class ProgressTally:
-    """Counts of a search so far, reported to `watch`."""
+    """Counts of a search so far, passed to `watch`."""
 
     total: int
     watch: OnSearchProgress | None
@@ -302,7 +312,7 @@ class ProgressTally:
     mean: float | None = None
 
     def note(self, is_new: bool) -> None:
-        """One more flight, flown now or found in the store."""
+        """Count one more flight, flown now or read from the store."""
         self.done, self.fresh = self.done + 1, self.fresh + is_new
         if self.watch:
             self.watch(
@@ -310,7 +320,7 @@ class ProgressTally:
             )
 
     def end_generation(self, values: Sequence[float | None], maximise: bool) -> None:
-        """First objective of a generation's candidates."""
+        """Update the best and the mean value from the first objective of a generation's candidates."""
         found = [value for value in values if value is not None]
         if not found:
             return
@@ -320,7 +330,7 @@ class ProgressTally:
 
 
 def total_flights(study: Study) -> int:
-    """Flights of the whole search."""
+    """Return the number of flights of the whole search."""
     runs = range(study.whole("restarts") + 1)
     each = sum(study.seeds(generation) for generation in range(study.whole("generations")))
     return sum(study.population(run) for run in runs) * each * len(study.scenarios)
@@ -329,9 +339,9 @@ def total_flights(study: Study) -> int:
 def run_search(
     study: Study, store: FlightStore, executor: Executor, on_progress: OnSearchProgress | None = None
 ) -> list[NDArray[np.float64]]:
-    """Run a study to its end, or to Ctrl-C.
+    """Run the search of a study to its end, or to Ctrl-C.
 
-    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if asked for.
+    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if requested.
     """
     tally = ProgressTally(total_flights(study), on_progress)
     evaluator = Evaluator(study, store, executor, tally.note)
@@ -345,7 +355,9 @@ def run_search(
 
 
 def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[np.float64]]:
-    """One run of the optimiser; returns its mean (axis,) after each generation of whole flights, if it has one."""
+    """Run the optimiser once; return its mean (axis,) after each generation of whole flights, if it has one."""
+    # Optimiser state is not stored: replay with the stored flights takes 4 ms a generation and notices another version
+    # of pycma, which a pickle would follow astray.
     study, store = evaluator.study, evaluator.store
     first = study.objectives[0]
     state = make_optimiser(
@@ -363,17 +375,19 @@ def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[n
         begun = tally.done
         racing = study.search.racing == "optimistic"
         rows = evaluator.evaluate(batch, points, duration_share=length.share, racing=racing)
+        # A race flies fewer flights than planned: the total shrinks by those that it saved.
         tally.total -= len(points) * study.seeds(generation) * len(study.scenarios) - (tally.done - begun)
-        values, told = [row[0] for row in rows], candidate_losses(rows, study.objectives)
+        values, losses = [row[0] for row in rows], candidate_losses(rows, study.objectives)
         sound = values
         if study.limits:
             broken = batch_excess(study, store, batch, length.share)
-            told, sound = (
-                rank_by_excess(told, broken),
+            losses, sound = (
+                rank_by_excess(losses, broken),
                 [v for v, much in zip(values, broken, strict=True) if much == 0.0],
             )
-        state.tell(points, told)
+        state.tell(points, losses)
         centre = state.centre()
+        # Means of generations with short flights are no finalists: their fitness is on another scale.
         if length.whole:
             tally.end_generation(sound, first.maximise)
             seen += values
@@ -386,7 +400,7 @@ def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[n
 
 
 def averaged_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
-    """Average (axis,) of the last half of all means, of the last quarter, and so on, as many as asked for.
+    """Return averages (axis,) of the last half of all means, of the last quarter, and so on.
 
     On a plateau a mean wanders by chance; the average of many wanders less (Polyak & Juditsky 1992).
     """
@@ -395,7 +409,7 @@ def averaged_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[N
 
 
 def windowed_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
-    """Average (axis,) of the means in each of so many equal parts of the last half.
+    """Return averages (axis,) of the means in each of so many equal parts of the last half.
 
     CMA-ES ranks single flights and so ends where most flights are good, which is not where their mean is best if a few
     are bad: on its way it may pass a better place.
@@ -405,7 +419,7 @@ def windowed_means(means: Sequence[NDArray[np.float64]], windows: int) -> list[N
 
 
 def _start(study: Study) -> NDArray[np.float64] | None:
-    """Where the optimiser starts: None for the middle, or the scenario's own numbers."""
+    """Return the start of the optimiser: None for the middle, or the scenario's own numbers."""
     if study.search.start == "middle":
         return None
     known = declared_numbers(study.scenario)
@@ -413,11 +427,13 @@ def _start(study: Study) -> NDArray[np.float64] | None:
 
 
 def _asked(store: FlightStore, batch: CandidateBatch, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The points that an optimiser asks for, as the store has them if it has."""
+    """Return the next points of the optimiser, as stored if the store has them."""
     stored = store.asked(batch)
     if not stored:
         return points
     known = np.array(stored)
+    # A rebuilt optimiser may differ in the last bits on another machine. A larger difference is another optimiser,
+    # which would learn from flights of points that are not its own.
     if known.shape != points.shape or not np.allclose(known, points, rtol=0.0, atol=SAME):
         raise StudyError(
             f"{store.path}: run {batch.run}, generation {batch.generation} cannot be rebuilt here: the optimiser asks "

@@ -41,6 +41,7 @@ from airflock.search.study_result import mean_interval
 from airflock.support import ScenarioError
 
 SAFETY = ("f_coll", "f_disc", "f_cluster", "f_wall")  # partial fitnesses that are constraints; the others are its price
+# The recipe of Table S4, flown to its end, moved the partial fitness of walls from 0.995 to 0.14 in an L-shaped field.
 SLACK = 0.02  # by which the mean of one may fall, and the share of flights with a contact may rise
 WALLS = ("clearance", "phi_wall", "n_contacts", "f_wall")  # scores of what flies into walls and obstacles
 RESERVE = SearchSettings().reserve  # how many times rarer than allowed an event is to look, as in a search
@@ -48,7 +49,7 @@ RESERVE = SearchSettings().reserve  # how many times rarer than allowed an event
 
 @dataclass(frozen=True)
 class Constraints:
-    """What must go on to hold in each of several scenarios; flights are one table for each of them.
+    """Constraints that each step must keep in all scenarios; flights are one table for each scenario.
 
     limits : events that may happen so rarely; cost : fitness that may be given up in all
     """
@@ -58,7 +59,7 @@ class Constraints:
 
     @property
     def wall_limits(self) -> list[EventLimit]:
-        """Limits of walls and obstacles."""
+        """Limits of contacts with walls and obstacles."""
         return [limit for limit in self.limits if limit.score in WALLS]
 
     @property
@@ -69,22 +70,24 @@ class Constraints:
     def refused(
         self, scenarios: Sequence[Scenario], before: Sequence[ScoreColumns], after: Sequence[ScoreColumns]
     ) -> str:
-        """What a step breaks, or that it costs too much, in words; empty if it may stay."""
+        """Return why a step is refused: the constraint that it breaks, or its cost; empty if it may stay."""
         for scenario, was, now in zip(scenarios, before, after, strict=True):
             if found := violation_text(was, now) or self._limit_broken(scenario, was, now):
                 return f"{found}, in {scenario.name}" if len(scenarios) > 1 else found
+        # Safety is worth more than the price: a step towards limits that are not kept yet may cost any fitness.
         if self.short(scenarios, after) < self.short(scenarios, before):
             return ""
         price = float((join_scenarios(before)["fitness"] - join_scenarios(after)["fitness"]).mean())
         return f"costs {price:.3g} of fitness, more than {self.cost:g}" if price > self.cost else ""
 
     def short(self, scenarios: Sequence[Scenario], tables: Sequence[ScoreColumns]) -> float:
-        """How far flights are from keeping all limits in all scenarios; 0: they keep them."""
+        """Return how far flights are from keeping all limits in all scenarios; 0: they keep them."""
         return scenarios_excess(self.limits, scenarios, tables)
 
     def _limit_broken(self, scenario: Scenario, before: ScoreColumns, after: ScoreColumns) -> str:
         """Return which limit that was kept is broken, or broken more than before, in words; empty if none."""
         for limit in self.limits:
+            # With the reserve: an estimate from some flights is uncertain by about that factor.
             most = allowed_probability(limit, scenario)
             was, now = (estimated_probability(limit, table_rows(table)) for table in (before, after))
             if now > max(was, most / RESERVE):
@@ -95,7 +98,7 @@ class Constraints:
 def scenarios_excess(
     limits: Sequence[EventLimit], scenarios: Sequence[Scenario], tables: Sequence[ScoreColumns]
 ) -> float:
-    """How far flights are from keeping these limits in all scenarios, in standard deviations added up."""
+    """Return how far flights are from keeping these limits, in standard deviations added up over scenarios."""
     return math.fsum(
         float(limit_excess(limits, scenario, [table_rows(table)], RESERVE)[0])
         for scenario, table in zip(scenarios, tables, strict=True)
@@ -107,6 +110,7 @@ def violation_text(before: ScoreColumns, after: ScoreColumns) -> str:
     for name in SAFETY:
         if name in before:
             drop, _, low, _ = mean_interval((before[name] - after[name]).tolist())
+            # Both: a mean may drop by chance, and with many seeds a harmless drop is significant.
             if drop > SLACK and low > 0.0:
                 return f"{name} falls from {before[name].mean():.3g} to {after[name].mean():.3g}"
     for name, what in (("phi_wall", "leave the arena or enter obstacles"), ("n_coll", "have collisions")):
@@ -118,7 +122,7 @@ def violation_text(before: ScoreColumns, after: ScoreColumns) -> str:
 
 
 def has_gained(before: ScoreColumns, after: ScoreColumns) -> bool:
-    """Whether distances or clearances grew or excursions shrank, each with 95 % confidence."""
+    """Return True if distances or clearances grew or excursions shrank, each with 95 % confidence."""
     wider = mean_interval((after["r_min"] - before["r_min"]).tolist())[2] > 0.0
     if "phi_wall" not in before:
         return wider
@@ -133,7 +137,7 @@ MAX_FRESH_ROUNDS = 3  # of fresh seeds: 4 % of flights with a contact pass 60 se
 
 
 class HardeningCandidate:
-    """Parameters that were kept so far, and their flights; each step is judged against them and the optimum.
+    """Candidate of hardening: the kept parameters and their flights; steps are judged against them and the optimum.
 
     Flights are one table for each scenario.
 
@@ -156,20 +160,20 @@ class HardeningCandidate:
         self.kept, self.seen = [optimum], [optimum[1]]
         for scenario, table in zip(scenarios, self.optimum, strict=True):
             if float(table["fitness"].max()) < ZERO_FITNESS:
-                told = {name: values.tolist() for name, values in table.items()}
-                rows = [dict(zip(told, row, strict=True)) for row in zip(*told.values(), strict=True)]
+                columns = {name: values.tolist() for name, values in table.items()}
+                rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
                 raise ScenarioError(
                     [f"{scenario.name}: does not fly, so it cannot be hardened{zero_fitness_reason(rows)}"]
                 )
         self.first = compare_with_optimum(join_scenarios(self.optimum), join_scenarios(self.optimum), *optimum)
 
     def touches(self) -> bool:
-        """Whether what was kept so far touches walls or obstacles in some flight, or more often than a limit allows."""
+        """Return True if the kept set touches walls or obstacles in a flight, or more often than a limit allows."""
         seen = any("phi_wall" in table and float(table["phi_wall"].max()) > 0.0 for table in self.table)
         return seen or scenarios_excess(self.constraints.wall_limits, self.scenarios, self.table) > 0.0
 
     def is_short_at_walls(self) -> bool:
-        """Whether limits of walls and obstacles are farther from being kept than the others."""
+        """Return True if the limits of walls and obstacles are farther from being kept than the others."""
         walls, others = (
             scenarios_excess(limits, self.scenarios, self.table)
             for limits in (self.constraints.wall_limits, self.constraints.other_limits)
@@ -177,7 +181,7 @@ class HardeningCandidate:
         return walls > others
 
     def tried(self, step: HardeningStep) -> list[StepResult]:
-        """The step and, where it breaks something or costs too much, half of it."""
+        """Try the step and, if it breaks a constraint or costs too much, half of it."""
         found = []
         for part, name in ((1.0, step.name), (0.5, f"half of: {step.name}")):
             parameters = parameters_after_step(self.scenarios[0], self.kept[-1][1], step, part)
@@ -198,17 +202,18 @@ class HardeningCandidate:
         return found
 
     def _gained(self, table: Sequence[ScoreColumns]) -> bool:
-        """Whether a step that breaks nothing comes nearer to the limits, or gains distance or room at walls."""
+        """Return True if a step comes nearer to the limits, or gains distance or room at walls."""
         nearer = self.constraints.short(self.scenarios, table) < self.constraints.short(self.scenarios, self.table)
         return nearer or has_gained(join_scenarios(self.table), join_scenarios(table))
 
     def verify_on_fresh_seeds(self) -> StepResult:
-        """What was kept, on seeds that chose nothing; the last step is undone until everything that held holds.
+        """Fly the kept set on seeds that chose nothing; undo the last step until all constraints hold.
 
-        Seeds come in rounds, so that what breaks much is undone after the first; the optimum alone flies one round.
+        Seeds come in rounds, so that a set that breaks much is undone after the first. The optimum flies one round.
         """
         before = [self._fly(self.kept[0][1], self.fresh[0])]
         after: list[list[ScoreColumns]] = []
+        # From the last step backwards: later steps were judged on top of the earlier ones.
         while len(self.kept) > 1 and not after:
             after = self._lasting(before)
             if not after:
@@ -222,7 +227,7 @@ class HardeningCandidate:
         return replace(found, verdict=said, kept=bool(left))
 
     def beside(self) -> list[StepResult]:
-        """What measures beside the numbers of the law would gain for what was kept, where agents come too near."""
+        """Measure what programs on board would gain for the kept set, if agents come too near."""
         now, parameters = self.table or self._fly(self.kept[-1][1], self.seeds), self.kept[-1][1]
         before = join_scenarios(now)
         near = scenarios_excess(self.constraints.other_limits, self.scenarios, now) > 0.0
@@ -237,7 +242,7 @@ class HardeningCandidate:
         return found
 
     def _lasting(self, before: list[list[ScoreColumns]]) -> list[list[ScoreColumns]]:
-        """Rounds of flights with what is kept, none if they break what held; `before` is of the optimum and grows."""
+        """Return rounds of flights of the kept set; none if they break a constraint. `before` (optimum) grows."""
         after: list[list[ScoreColumns]] = []
         for count, seeds in enumerate(self.fresh, start=1):
             if len(before) < count:
@@ -270,23 +275,23 @@ def harden(
     threads: int | None = None,
     done: Callable[[], None] | None = None,
 ) -> list[StepResult]:
-    """Make an optimum safer by the steps of Vásárhelyi et al. 2018, Table S4, as far as they keep what held.
+    """Make an optimum safer by the steps of Vásárhelyi et al. 2018, Table S4, as far as all constraints hold.
 
     Parameters
     ----------
     scenario : Scenario, str or path
         An optimum: a scenario, or its name or file, such as best.toml of a study. Of several, which hold the same
-        numbers of the law, a step must keep what held in each; means are over all of them.
+        numbers of the law, a step must keep the constraints in each; means are over all of them.
     seeds : sequence of int
         Seeds of the flights of each step; the result is judged on three times as many seeds after the largest of them.
     steps : sequence of Step
-        What is tried, one after another; earlier braking is added where agents touch walls or obstacles, and comes
-        first where that is what is short.
+        Steps to try, one after another. Earlier braking is added if agents touch walls or obstacles; it comes first if
+        walls are the larger problem.
     cost : float
         Fitness, 0 to 1, that may be given up in all; a step towards limits that are not kept yet may cost more.
     limit : str or sequence of str
-        What may happen how rarely, as `airflock.certify` takes it. A step must not raise the estimated probability of
-        an event above its limit, with a reserve of ten.
+        Events and their largest rates, as `airflock.certify` has them. A step must not raise the estimated probability
+        of an event above its limit, with a reserve of ten.
     threads : int, optional
         Flights side by side; by default one per core.
     done : callable, optional
@@ -294,10 +299,10 @@ def harden(
 
     Returns
     -------
-    list of Measured
-        The optimum, each step that was tried with whether it was kept and why, where agents still come too near what
-        measures beside the law would gain (`search.measures`), and last what is left on fresh seeds: parameters,
-        fitness, r_min (m), what it costs and gains, partial fitnesses, contacts with walls.
+    list of StepResult
+        The optimum, each tried step with its verdict, the gain of programs on board if agents still come too near, and
+        last the kept set on fresh seeds: parameters, fitness, r_min (m), cost and gain, partial fitnesses, contacts
+        with walls.
 
     Raises
     ------
@@ -323,6 +328,7 @@ def harden(
         threads,
         done,
     )
+    # Walls first if they are hit more often than agents: a step that widens distances drives agents into walls.
     found = [trial.first]
     hit = float((join_scenarios(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()
@@ -339,7 +345,7 @@ def harden(
 
 
 def hardening_request(scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[str] = ()) -> Constraints:
-    """What must go on to hold. Raises ScenarioError, all faults together."""
+    """Return the constraints of a request. Raises ScenarioError with all errors together."""
     held, faults = read_limits({"limits": limit}, scenarios)
     faults += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
     if faults:
@@ -348,7 +354,7 @@ def hardening_request(scenarios: Sequence[Scenario], cost: float, limit: str | S
 
 
 def hardened_document(scenario: Scenario, step: StepResult) -> dict[str, Any]:
-    """A scenario file with the parameters of a step, each with its reason."""
+    """Return a scenario file with the parameters of a step, each with its reason."""
     found: dict[str, Any] = {formats.KEY: formats.FORMAT, **to_toml_values(scenario.document)}
     found.pop("published", None)
     known = declared_numbers(scenario)

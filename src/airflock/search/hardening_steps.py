@@ -22,7 +22,7 @@ S4 = "Table S4"
 class HardeningStep:
     """One change of the recipe: factors on keys, and why.
 
-    earlier : time of flight (s) by which r0_shill grows, so that agents brake earlier at walls and obstacles
+    braking_lead : time of flight (s) by which r0_shill grows, so that agents brake earlier at walls and obstacles
     """
 
     name: str
@@ -95,7 +95,7 @@ class StepResult:
 def recipe_parameters(
     scenario: Scenario, steps: Sequence[HardeningStep] = TABLE_S4_STEPS
 ) -> list[tuple[HardeningStep, dict[str, float]]]:
-    """Parameters after each step, the optimum first. Values stay inside their declared ranges."""
+    """Return the parameters after each step, the optimum first; values stay inside their declared ranges."""
     known = declared_numbers(scenario)
     keys = {key for step in (*steps, *TABLE_S4_STEPS) for key in step.factors} | {"model.r0_shill"}
     missing = sorted(key for key in keys if key not in known)
@@ -117,7 +117,7 @@ def recipe_parameters(
 def parameters_after_step(
     scenario: Scenario, parameters: Mapping[str, float], step: HardeningStep, step_share: float = 1.0
 ) -> dict[str, float]:
-    """Parameters after a step, or after a part of it; values stay inside their declared ranges."""
+    """Return the parameters after a step or a part of it; values stay inside their declared ranges."""
     known, found = declared_numbers(scenario), dict(parameters)
     for key, factor in step.factors.items():
         found[key] = _inside(found[key] * factor**step_share, known[key][0])
@@ -138,7 +138,7 @@ def fly_parameters(
     threads: int | None,
     on_done: Callable[[], None] | None,
 ) -> list[dict[str, NDArray[np.float64]]]:
-    """Scores (seed,) of each set of parameters on the same seeds."""
+    """Return scores (seed,) of each set of parameters on the same seeds."""
     from airflock.engine import score_flights
 
     varied = [with_parameters(scenario, each) for each in parameters]
@@ -158,7 +158,7 @@ def compare_with_optimum(
     step: HardeningStep,
     parameters: Mapping[str, float],
 ) -> StepResult:
-    """A step against the optimum, both on the same seeds."""
+    """Compare a step with the optimum on the same seeds."""
     mean, _, low, high = mean_interval((before["fitness"] - after["fitness"]).tolist())
     won, _, least, most = mean_interval((after["r_min"] - before["r_min"]).tolist())
     parts = {name: float(values.mean()) for name, values in after.items() if name.startswith("f_")}
@@ -170,20 +170,20 @@ def compare_with_optimum(
 
 
 def table_rows(table: ScoreColumns) -> list[dict[str, float]]:
-    """Scores of each flight, from a table of them."""
+    """Return the scores of each flight as a row."""
     names = list(table)
     return [dict(zip(names, row, strict=True)) for row in np.array([table[name] for name in names]).T.tolist()]
 
 
 def join_rounds(rounds: Sequence[Sequence[ScoreColumns]]) -> list[ScoreColumns]:
-    """One table for each scenario, of the flights of all rounds."""
+    """Join the flights of all rounds to one table for each scenario."""
     return [
         {name: np.concatenate([t[name] for t in tables]) for name in tables[0]} for tables in zip(*rounds, strict=True)
     ]
 
 
 def join_scenarios(tables: Sequence[ScoreColumns]) -> ScoreColumns:
-    """One table of the flights in all scenarios, of what is measured in each of them."""
+    """Join the flights of all scenarios to one table of the scores that all of them have."""
     if len(tables) == 1:
         return tables[0]
     names = [name for name in tables[0] if all(name in table for table in tables)]
@@ -195,7 +195,8 @@ STOPS = "stop near a lost neighbour"
 
 
 def measures(scenarios: Sequence[Scenario]) -> list[tuple[HardeningStep, list[Scenario], str]]:
-    """Measures that could change a flight in any of the scenarios: step, scenarios with it, and what to set."""
+    """Return measures that could change a flight in any scenario: step, changed scenarios, and what to set."""
+    # Reported, never applied: whether the drones have such a program is not for a search to decide.
     found = []
     for name, reason, settings in (
         (CARRIED, "Vásárhelyi et al. 2018, Drone setup: positions are carried forward by velocities", _carried),
@@ -216,7 +217,7 @@ def measures(scenarios: Sequence[Scenario]) -> list[tuple[HardeningStep, list[Sc
 
 
 def _carried(scenario: Scenario) -> dict[str, Any]:
-    """The same packets, none of them lost that is not lost without it, and carried forward until the next one comes."""
+    """Return settings by which each packet is carried forward until the next one; no further packet is lost."""
     if scenario.transceiver.name != "constant" or scenario.radio.delay <= 0.0:
         return {}
     rate = max(10.0, 1.0 / max(scenario.sensors.period, scenario.flight.dt))
@@ -226,7 +227,7 @@ def _carried(scenario: Scenario) -> dict[str, Any]:
 
 
 def _stops(scenario: Scenario) -> dict[str, Any]:
-    """Stopping where a neighbour that is lost could be near, where some may be lost."""
+    """Return settings by which an agent stops near a lost neighbour, if packets may be lost."""
     deaf = any(entry.fault.radio is not None for entry in scenario.faults)
     lost = deaf or scenario.transceiver.name not in ("constant", "vision") or scenario.radio.loss > 0.0
     return {"silence.rule": "stop"} if lost and scenario.silence.rule == "fly_on" else {}

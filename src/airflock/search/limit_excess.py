@@ -17,12 +17,12 @@ from airflock.runs import CandidateBatch, FlightStore
 from airflock.scenarios import Scenario
 from airflock.search.study import Study
 
-TIE = 1e-6  # by which fitness orders those who break limits equally
-FARTHEST = 1e6  # standard deviations; where all flights are alike there is none
+TIE = 1e-6  # weight by which fitness orders candidates that break limits equally
+FARTHEST = 1e6  # standard deviations; equal flights have no standard deviation
 
 
 def allowed_probability(limit: EventLimit, scenario: Scenario, duration_share: float = 1.0) -> float:
-    """Probability of the event that a limit with a rate allows per flight of a share of the scenario's duration."""
+    """Return the probability per flight that a limit with a rate allows, for a share of the duration."""
     found = limit.probability(duration_share * scenario.flight.duration / 3600.0, scenario.agents)
     assert found is not None, "limits without a rate are refused where they are read"
     return found
@@ -35,15 +35,16 @@ def limit_excess(
     reserve: float,
     duration_share: float = 1.0,
 ) -> NDArray[np.float64]:
-    """How far candidates are from keeping all limits (candidate,): standard deviations, added up; 0 keeps them.
+    """Return how far candidates are from keeping all limits (candidate,): standard deviations, added up.
 
-    flights : of each candidate in the scenario; reserve : how many times rarer than allowed an event is to look
+    flights : of each candidate in the scenario; reserve : how many times rarer than allowed an event has to look
     """
     found = np.zeros(len(flights))
     for limit in limits:
         short = reliability_index(allowed_probability(limit, scenario, duration_share) / reserve) - reliability_indices(
             limit, flights
         )
+        # Without spread the index is infinite: a finite bound keeps sums and ranks of excesses defined.
         found += np.clip(short, 0.0, FARTHEST)
     return found
 
@@ -51,7 +52,7 @@ def limit_excess(
 def batch_excess(
     study: Study, store: FlightStore, batch: CandidateBatch, duration_share: float = 1.0
 ) -> NDArray[np.float64]:
-    """The excess of each candidate of a batch that has flown (candidate,), added up over the study's scenarios."""
+    """Return the excess (candidate,) of a batch that has flown, added up over the study's scenarios."""
     flown: dict[int, dict[int, ScoreRow]] = {}
     for (candidate, repeat), row in store.flown(batch).items():
         flown.setdefault(candidate, {})[repeat] = row
@@ -63,14 +64,16 @@ def batch_excess(
 
 
 def rank_by_excess(losses: NDArray[np.float64], excess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Losses (candidate, objective) in which each that breaks limits is worse than all that keep them."""
+    """Return losses (candidate, objective) by which candidates that break limits rank after all that keep them."""
+    # Ranks, not penalties: CMA-ES is invariant to the scale of fitness, and a weight is a number that nobody can know.
+    # The augmented Lagrangian ended between 2e-6 and 1e-2 where 1.7e-3 was allowed.
     worst = losses.max(axis=0)
     broken = worst + excess[:, None] + TIE * (losses - worst) / np.maximum(np.ptp(losses, axis=0), TIE)
     return np.where(excess[:, None] > 0.0, broken, losses)
 
 
 def limit_reports(study: Study, flights: Sequence[ScoreRow]) -> list[dict[str, Any]]:
-    """What flights of one candidate say of each limit, one entry a limit and scenario, as plain values."""
+    """Report each limit in the flights of one candidate: one entry a limit and scenario, as plain values."""
     n = len(study.scenarios)
     found = []
     for place, (label, scenario) in enumerate(zip(study.labels, study.scenarios, strict=True)):
@@ -89,7 +92,7 @@ def limit_reports(study: Study, flights: Sequence[ScoreRow]) -> list[dict[str, A
 
 
 def limit_report_line(entry: Mapping[str, Any]) -> str:
-    """One entry of `limit_reports` in words."""
+    """Format one entry of `limit_reports` as a sentence."""
     where = f" in {entry['scenario']}" if "scenario" in entry else ""
     verdict = "looks kept" if entry["keeps"] else "looks broken"
     near = ", by how near they came" if entry["estimated"] > entry["events"] / entry["flights"] else ""
@@ -100,10 +103,10 @@ def limit_report_line(entry: Mapping[str, Any]) -> str:
 
 
 def rarest_probability(limits: Sequence[EventLimit], scenario: Scenario) -> float:
-    """The smallest probability per flight that a limit allows; 1 without limits."""
+    """Return the smallest probability per flight that a limit allows; 1 without limits."""
     return min((allowed_probability(limit, scenario) for limit in limits), default=1.0)
 
 
 def flights_per_event(limits: Sequence[EventLimit], scenario: Scenario) -> int:
-    """Flights among which one event of the rarest limit is to be expected where it is just kept."""
+    """Return the number of flights in which one event of the rarest limit is expected if it is just kept."""
     return math.ceil(1.0 / rarest_probability(limits, scenario))

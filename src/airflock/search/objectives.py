@@ -75,22 +75,22 @@ class Objective:
 
 
 def user_fitness(function: UserFitness, name: str, values: Mapping[str, Any]) -> float:
-    """What a function of the user's own gives for one flight; whatever goes wrong in it is one line with its place."""
+    """Call the user's own function for one flight; an error in it becomes one line with its place."""
     try:
         return float(function(values))
-    except Exception as fault:  # the user's own function may fail in any way
-        last = traceback.extract_tb(fault.__traceback__)[-1]
+    except Exception as error:  # the user's own function may fail in any way
+        last = traceback.extract_tb(error.__traceback__)[-1]
         code = getattr(function, "__code__", None)
         place = f"{last.filename}:{last.lineno}"
         if last.filename == __file__ and code is not None:  # it returned, but no number
             place = f"{code.co_filename}:{code.co_firstlineno}"
-        raise StudyError(f"objective {name}: {place}: {describe_error(fault)}") from fault
+        raise StudyError(f"objective {name}: {place}: {describe_error(error)}") from error
 
 
 def candidate_losses(
     fitness_rows: Sequence[Sequence[float | None]], objectives: Sequence[Objective]
 ) -> NDArray[np.float64]:
-    """What an optimiser minimises (candidate, objective). A failed candidate is worse than all of its generation."""
+    """Return losses (candidate, objective) to minimise; a failed candidate is worse than all of its generation."""
     signs = [-1.0 if objective.maximise else 1.0 for objective in objectives]
     table = np.array(
         [[math.nan if v is None else s * v for s, v in zip(signs, row, strict=True)] for row in fitness_rows], float
@@ -163,8 +163,8 @@ def read_limits(table: Any, scenarios: Sequence[Scenario]) -> tuple[tuple[EventL
         try:
             found = found or parse_limits(list(texts), scenario)
             parse_limits(list(texts), scenario)
-        except ScenarioError as fault:
-            faults += [f"objective.limits: {line}" for line in fault.faults]
+        except ScenarioError as error:
+            faults += [f"objective.limits: {line}" for line in error.faults]
     faults += [
         f"objective.limits: limit '{limit.text}': does not say how rarely; write {limit.event} at 0.01/h, for instance"
         for limit in found
@@ -183,9 +183,9 @@ def _own(name: Any, folder: Path | None, trust: bool) -> tuple[dict[str, UserFit
     try:
         text = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
         module = import_user_file(path, f"objective.own = {name!r}", trust=trust)
-    except RuleError as fault:
-        return {}, "", [f"objective.own: {fault}"]
-    except ScenarioError as fault:
-        return {}, "", fault.faults
+    except RuleError as error:
+        return {}, "", [f"objective.own: {error}"]
+    except ScenarioError as error:
+        return {}, "", error.faults
     own = {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}
     return own, text, []

@@ -47,18 +47,18 @@ class CMAES:
             if start is not None:
                 first[:dimension] = np.clip(start, INSIDE, 1.0 - INSIDE).tolist()
             self.strategy: Any = cma.CMAEvolutionStrategy(first, sigma, options)
-        self.asked: list[Any] = []
+        self.generation: list[Any] = []
 
     def ask(self) -> NDArray[np.float64]:
-        """Next generation (candidate, axis)."""
-        self.asked = self.strategy.ask()
-        return np.array(self.asked)[:, : self.dimension]
+        """Return the next generation (candidate, axis)."""
+        self.generation = self.strategy.ask()
+        return np.array(self.generation)[:, : self.dimension]
 
     def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
-        """Losses (candidate, 1) of the points that were asked for."""
+        """Take the losses (candidate, 1) of the last generation."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of flat fitness: a first generation of which nobody flies
-            self.strategy.tell(self.asked, losses[:, 0].tolist())
+            self.strategy.tell(self.generation, losses[:, 0].tolist())
 
     def centre(self) -> NDArray[np.float64]:
         """Mean of the distribution (axis,): where the evolution stands, and not the luckiest of its candidates."""
@@ -92,17 +92,17 @@ class BinaryGenetic:
                 f"population = {population} is odd: pairs of parents have two children; give an even number"
             )
         self.algorithm = _pymoo_genetic(bits, population, seed, mutation, crossover)
-        self.asked: Any = None
+        self.generation: Any = None
 
     def ask(self) -> BitArray:
-        """Next generation (candidate, bit)."""
-        self.asked = self.algorithm.ask()
-        return np.array(self.asked.get("X"), bool)
+        """Return the next generation (candidate, bit)."""
+        self.generation = self.algorithm.ask()
+        return np.array(self.generation.get("X"), bool)
 
     def tell(self, losses: NDArray[np.float64]) -> None:
-        """Losses (candidate,) of the generation that was asked for; less is better."""
-        self.asked.set("F", np.asarray(losses, float).reshape(-1, 1))
-        self.algorithm.tell(infills=self.asked)
+        """Take the losses (candidate,) of the last generation; less is better."""
+        self.generation.set("F", np.asarray(losses, float).reshape(-1, 1))
+        self.algorithm.tell(infills=self.generation)
 
 
 class GeneticResult(NamedTuple):
@@ -147,15 +147,15 @@ class GeneticSearch:
         self.state = BinaryGenetic(BITS * dimension, population, seed)
 
     def ask(self) -> NDArray[np.float64]:
-        """Next generation (candidate, axis)."""
+        """Return the next generation (candidate, axis)."""
         return decode(self.state.ask())
 
     def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
-        """Losses (candidate, 1) of the points that were asked for."""
+        """Take the losses (candidate, 1) of the last generation."""
         self.state.tell(losses[:, 0])
 
     def centre(self) -> None:
-        """None: a population of chromosomes has no mean."""
+        """Return None: a population of chromosomes has no mean."""
 
 
 def _pymoo_genetic(bits: int, population: int, seed: int, mutation: float, crossover: float) -> Any:
@@ -167,9 +167,10 @@ def _pymoo_genetic(bits: int, population: int, seed: int, mutation: float, cross
         from pymoo.operators.mutation.bitflip import BitflipMutation
         from pymoo.operators.sampling.rnd import BinaryRandomSampling
         from pymoo.operators.selection.tournament import TournamentSelection
-    except ModuleNotFoundError as fault:
-        raise StudyError("the genetic algorithm needs pymoo: pip install 'airflock[evolve]'") from fault
+    except ModuleNotFoundError as error:
+        raise StudyError("the genetic algorithm needs pymoo: pip install 'airflock[evolve]'") from error
 
+    # pymoo merges parents and children and keeps the best. The published algorithm replaces the whole population.
     class Generational(GA):  # type: ignore[misc]
         """Children replace their parents, even better ones."""
 
@@ -198,24 +199,25 @@ class NonDominatedSorting:
     def __init__(self, dimension: int, objectives: int, population: int, seed: int):
         """Set up NSGA-II with pymoo's default operators."""
         self.algorithm = _pymoo_nsga2(dimension, objectives, population, seed)
-        self.asked: Any = None
+        self.generation: Any = None
 
     def ask(self) -> NDArray[np.float64]:
-        """Next generation (candidate, axis)."""
-        self.asked = self.algorithm.ask()
-        return np.array(self.asked.get("X"), float)
+        """Return the next generation (candidate, axis)."""
+        self.generation = self.algorithm.ask()
+        return np.array(self.generation.get("X"), float)
 
     def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
-        """Losses (candidate, objective) of the points that were asked for."""
-        self.asked.set("F", np.asarray(losses, float))
-        self.algorithm.tell(infills=self.asked)
+        """Take the losses (candidate, objective) of the last generation."""
+        self.generation.set("F", np.asarray(losses, float))
+        self.algorithm.tell(infills=self.generation)
 
     def centre(self) -> None:
-        """None: a front has no mean."""
+        """Return None: a front has no mean."""
 
 
 def pareto_front(losses: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Indices of the candidates that no other one betters in all objectives; losses (candidate, objective)."""
+    """Return the indices of candidates that no other dominates; losses (candidate, objective)."""
+    # Sorted by the first objective, a candidate can only be dominated by one before it: one pass over the front so far.
     order = np.lexsort(losses.T[::-1])
     kept = np.empty(len(losses), np.int64)
     n = 0
@@ -232,8 +234,8 @@ def _pymoo_nsga2(dimension: int, objectives: int, population: int, seed: int) ->
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.core.problem import Problem
         from pymoo.core.termination import NoTermination
-    except ModuleNotFoundError as fault:
-        raise StudyError("nsga2 needs pymoo: pip install 'airflock[evolve]'") from fault
+    except ModuleNotFoundError as error:
+        raise StudyError("nsga2 needs pymoo: pip install 'airflock[evolve]'") from error
     algorithm = NSGA2(pop_size=population, eliminate_duplicates=False)
     problem = Problem(n_var=dimension, n_obj=objectives, xl=np.zeros(dimension), xu=np.ones(dimension))
     algorithm.setup(problem, termination=NoTermination(), seed=seed, verbose=False)
@@ -248,7 +250,7 @@ class Optimiser(Protocol):
     """State of a search. The same seed and the same losses give the same points, bit by bit."""
 
     def ask(self) -> NDArray[np.float64]:
-        """Next generation (candidate, axis)."""
+        """Return the next generation (candidate, axis)."""
 
     def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
         """Losses (candidate, objective) of those points; less is better."""

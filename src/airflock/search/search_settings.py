@@ -17,6 +17,8 @@ CONSTANT_SEEDS_SHARE = (
 FEWEST = 8  # generations of a search with growing flights: one at least of each length but the last
 
 
+# More generations, larger populations and averages alone all ended 0.035 below Table S1 at 6 m/s: single flights rank
+# sets that are mostly good and sometimes bad. More flights late stay at the optimum.
 # A third of the published study's flights. Measured with benchmarks/time_to_target.py: 9 of 10 searches reach the
 # fitness of Table S1 at 6 m/s.
 FAST: Mapping[str, Any] = {
@@ -26,7 +28,7 @@ FAST: Mapping[str, Any] = {
 
 
 def fast_search_keys(search_keys: Mapping[str, Any], *, limits: bool) -> dict[str, Any]:
-    """Keys of the fast search, and those that are given; with limits nobody flies again, as nothing compares them."""
+    """Return the keys of the fast search, overridden by `search_keys`; with limits no finalist flies a second time."""
     return {key: value for key, value in FAST.items() if key != "again" or not limits} | dict(search_keys)
 
 
@@ -160,7 +162,11 @@ def search_errors(
     *,
     limits: bool = False,
 ) -> list[str]:
-    """What of a search cannot be, one line each; `space` as far as it could be read; limits: whether it has some."""
+    """Return the errors of search settings, one line each.
+
+    space  : None if it could not be read
+    limits : True if the study has limits
+    """
     faults = [
         f"search.{name} = {value:g} is not a whole number"
         for name in WHOLE

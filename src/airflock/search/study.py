@@ -24,11 +24,11 @@ LAYOUT = 1  # of the study folder; raised whenever an older folder could not be 
 
 @dataclass(frozen=True)
 class Study:
-    """Everything that decides the result of an optimisation.
+    """An optimisation: everything that decides its result.
 
     others : further scenarios in which each candidate flies; over_scenarios: mean or worst of them all
     labels : what to call each scenario, the first included
-    limits : what may happen how rarely; who keeps them comes before all who do not
+    limits : events and their largest rates; candidates that keep them rank before all others
     """
 
     scenario: Scenario
@@ -47,26 +47,27 @@ class Study:
         return f"<{study_summary(self)}>"
 
     def _repr_html_(self) -> str:
-        """A table of what varies, for a notebook."""
+        """Return a table of the varied parameters, for a notebook."""
         return study_html(self)
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
-        """All scenarios in which each candidate flies."""
+        """Scenarios in which each candidate flies."""
         return (self.scenario, *self.others)
 
     def whole(self, name: str) -> int:
-        """A whole number of the search."""
+        """Return a setting of the search as a whole number."""
         return int(getattr(self.search, name))
 
     def population(self, run: int) -> int:
-        """Candidates of a generation in a run: restarts may enlarge it."""
+        """Return the candidates of a generation in a run; restarts may enlarge it."""
         return round(self.search.population * self.search.growth**run)
 
     def seeds(self, generation: int) -> int:
-        """Flights of a candidate in a generation of the search: from `seeds` up to `late_seeds` in equal ratios."""
+        """Return the flights of a candidate in a generation: from `seeds` up to `late_seeds` in equal ratios."""
         first, last = self.search.seeds, self.search.late_seeds
         begin, end = CONSTANT_SEEDS_SHARE * self.search.generations, max(1.0, self.search.generations - 1.0)
+        # Early candidates differ much and one flight ranks them; late ones differ by less than chance does.
         grown = min(max(0.0, (generation - begin) / max(end - begin, 1.0)), 1.0)
         return round(float(first * (max(first, last) / first) ** grown))
 
@@ -75,7 +76,7 @@ class Study:
         return ((self.whole("seed") + 1) << SEED_BITS) + (purpose << (SEED_BITS - 4)) + index
 
     def document(self) -> dict[str, Any]:
-        """The study as plain values: what study.toml holds, and what a resumed study is compared with."""
+        """Return the study as plain values, for study.toml and for the comparison on resume."""
         q = self.search
         return {
             "layout": LAYOUT,
@@ -106,7 +107,7 @@ class Study:
         }
 
     def _several(self) -> dict[str, Any]:
-        """What a study of several scenarios adds to its document."""
+        """Return the entries of several scenarios for the document."""
         if not self.others:
             return {}
         found = {f"scenario_{i}": _unpublished(scenario) for i, scenario in enumerate(self.others, 2)}
@@ -118,13 +119,13 @@ def _unpublished(scenario: Scenario) -> dict[str, Any]:
 
 
 def shipped_studies() -> dict[str, Path]:
-    """Name → file of every study shipped with the package; a study for a preset bears the preset's name."""
+    """Return name → file of each shipped study; a study for a preset bears the preset's name."""
     root = Path(str(resources.files("airflock"))) / "scenarios" / "studies"
     return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
 
 
 def is_study(name: str | os.PathLike[str]) -> bool:
-    """Whether a name is that of a study, rather than of a scenario; a preset's name is the preset's."""
+    """Return True if a name is that of a study and not of a scenario; presets win over shipped studies."""
     path = expand_path(name)
     if str(name) in shipped_studies() and str(name) not in presets():
         return True
@@ -145,14 +146,14 @@ def load_study(
     limits: Sequence[str] = (),
     trust: bool = False,
 ) -> Study:
-    """Study from a file, from a shipped study's name, or of a scenario as it is, between bounds of its own.
+    """Load a study from a file or by the name of a shipped one, or make one of a scenario with default bounds.
 
     settings : keys of the scenario to change, such as "duration"
     search   : keys of the table [search] to change, such as "population"
     tables   : tables "space" or "objective" that replace the file's
-    limits   : what may happen how rarely, in place of what the file says
-    trust    : whether code that the files name may run: a law, fitness functions
-    Raises ScenarioError with one line per fault.
+    limits   : events and their largest rates, in place of the file's
+    trust    : True lets code run that the files name: a law, fitness functions
+    Raises ScenarioError with one line for each error.
     """
     known = shipped_studies()
     text = str(name)
@@ -162,6 +163,7 @@ def load_study(
         if path.suffix == ".toml" and is_file(path):
             document = read_toml(path)
         if not tells_of_study(document):
+            # A scenario is a study without a space and an objective: both are defaults then.
             document = {"scenario": text, **(tables or {})}
             return make_study(document, text, settings=settings, search=search, limits=limits, trust=trust)
         where = text if text in known else str(path)
@@ -172,7 +174,7 @@ def load_study(
 
 
 def _once(where: str, fault: str) -> str:
-    """A fault that begins with the name it is of, but not twice."""
+    """Prefix an error with the name of its file, but not twice."""
     return fault if fault.startswith(f"{where}: ") else f"{where}: {fault}"
 
 
@@ -187,7 +189,7 @@ def make_study(
     limits: Sequence[str] = (),
     trust: bool = False,
 ) -> Study:
-    """Study from a nested dict; `trust` lets code run that it names.
+    """Make a study from a nested dict; `trust` lets code run that it names.
 
     scenario : in place of its key of that name; or several, in place of `scenarios`
     limits   : in place of those of its objective; each candidate then flies twice at least, unless `search` has seeds
@@ -224,6 +226,7 @@ def make_study(
     kept, of_limits = read_limits({"limits": list(limits)} if limits else document.get("objective", {}), scenarios)
     faults += more + of_limits
     if found is not None:
+        # One flight has no spread, and limits are judged by the spread of flights.
         if limits and "seeds" not in (search or {}) and found.seeds < 2.0:
             found = replace(found, seeds=2.0)
         faults += search_errors(found, objectives, space, str(over), limits=bool(kept))
@@ -282,21 +285,21 @@ def read_scenarios(
         try:
             path = beside if beside is not None and is_file(beside) else name
             found.append(load(path, {**keys, **own, **settings}, trust=trust))
-        except ScenarioError as fault:
-            faults += fault.faults
+        except ScenarioError as error:
+            faults += error.faults
             continue
-        told = ", ".join(f"{key} = {value}" for key, value in own.items())
-        labels.append(f"{name} with {told}" if told else name)
+        detail = ", ".join(f"{key} = {value}" for key, value in own.items())
+        labels.append(f"{name} with {detail}" if detail else name)
     return tuple(found), distinct_labels(labels), faults
 
 
 def distinct_labels(labels: Sequence[str]) -> tuple[str, ...]:
-    """Labels with a number where two would be the same."""
+    """Return labels with a number added where two are equal."""
     return tuple(f"{label} ({i + 1})" if label in labels[:i] else label for i, label in enumerate(labels))
 
 
 def _entry(entry: Any, number: int) -> tuple[str, Mapping[str, Any], list[str]]:
-    """Name and own settings of an entry of `scenarios`, and its faults."""
+    """Return name and own settings of an entry of `scenarios`, and its errors."""
     at = f"scenarios[{number}]"
     if isinstance(entry, str):
         return entry, {}, []
@@ -311,14 +314,15 @@ def _entry(entry: Any, number: int) -> tuple[str, Mapping[str, Any], list[str]]:
 
 
 def common_space(scenarios: Sequence[Scenario]) -> tuple[SearchSpace, list[str]]:
-    """The usual space of the first, its bounds stretched to hold those of the others; and what was done."""
+    """Return the default space of the first scenario, with bounds that hold those of the others; and notes."""
+    # One set of numbers has to fly in all scenarios, so the search sees every region that is usual in one of them.
     space, notes = default_space(scenarios[0])
     if len(scenarios) == 1:
         return space, notes
     axes = {axis.key: axis for axis in space.axes}
     for scenario in scenarios[1:]:
-        more, told = default_space(scenario)
-        notes += [note for note in told if note not in notes]
+        more, more_notes = default_space(scenario)
+        notes += [note for note in more_notes if note not in notes]
         for axis in more.axes:
             known = axes.get(axis.key, axis)
             axes[axis.key] = replace(known, low=min(known.low, axis.low), high=max(known.high, axis.high))
@@ -344,7 +348,7 @@ def joint_errors(
 
 
 def study_summary(study: Study) -> str:
-    """What is sought, and by how many flights."""
+    """Summarise a study in one sentence: its goals and its flights."""
     q, goals = study.search, ", ".join(objective.name for objective in study.objectives)
     return (
         f"Study of {', '.join(s.name for s in study.scenarios)}: {len(study.space.axes)} parameters for {goals}, "
@@ -353,6 +357,6 @@ def study_summary(study: Study) -> str:
 
 
 def study_html(study: Study) -> str:
-    """A table of what varies."""
+    """Return a table of the varied parameters as HTML."""
     rows = [(a.key, f"{a.low:g} … {a.high:g}", a.unit, a.scale) for a in study.space.axes]
     return f"<p><b>{escape(study_summary(study))}</b></p>{html_table(('parameter', 'range', 'unit', 'scale'), rows)}"

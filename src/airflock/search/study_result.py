@@ -24,7 +24,7 @@ RESULT_FILE, BEST_FILE = "result.toml", "best.toml"
 
 @dataclass(frozen=True)
 class EvolveResult:
-    """What a study found.
+    """Result of a study: the winner, its score, working ranges and finalists.
 
     parameters : of the winner, by key; scenario : with these parameters
     fitness, sd, low, high, seeds : of the winner on fresh seeds, with Student's 95 % interval of the
@@ -36,7 +36,7 @@ class EvolveResult:
     failed     : candidates of the search that failed
     scenarios  : of several: what each is called → mean, low and high of the winner's fitness in it
     limits     : what the winner's fresh flights say of each limit: events, flights, estimated and allowed probability
-    dead       : why nothing flies, in words; then no best.toml is written; empty if something flies
+    dead_reason : why nothing flies; then no best.toml is written; empty if something flies
     """
 
     folder: Path
@@ -106,7 +106,7 @@ def _told(name: str, mean: float, low: float, high: float) -> dict[str, Any]:
 
 
 def best_files(study: Study) -> list[str]:
-    """Files that hold the winner: best.toml, and best_2.toml and so on for further scenarios."""
+    """Return the names of the winner's files: best.toml, and best_2.toml and so on for further scenarios."""
     return [BEST_FILE, *(f"best_{place}.toml" for place in range(2, len(study.scenarios) + 1))]
 
 
@@ -119,9 +119,9 @@ def further_best_files(folder: Path) -> list[Path]:
 def best_document(
     study: Study, parameters: dict[str, float], result: EvolveResult, folder: Path, scenario_index: int = 0
 ) -> dict[str, Any]:
-    """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along.
+    """Return a scenario file with the winner's parameters and their source; copy a law in a file of its own.
 
-    place : which of the study's scenarios
+    scenario_index : which of the study's scenarios
     """
     scenario = study.scenarios[scenario_index]
     document = {formats.KEY: formats.FORMAT, **to_toml_values(scenario.document)}
@@ -143,7 +143,7 @@ def best_document(
 
 
 def result_summary(result: EvolveResult) -> str:
-    """How good the winner is, on fresh seeds."""
+    """Summarise a result in one sentence: the winner's fitness on fresh seeds."""
     if result.dead_reason:
         return f"Result {result.folder}: nothing flies: {result.dead_reason}"
     span = f"{result.fitness:.3g} (95 %: {result.low:.3g} to {result.high:.3g}) on {result.seeds} fresh seeds"
@@ -151,7 +151,7 @@ def result_summary(result: EvolveResult) -> str:
 
 
 def result_html(result: EvolveResult) -> str:
-    """A table of the winner's parameters, and of the ranges in which candidates of the search were as good."""
+    """Return a table of the winner's parameters and working ranges as HTML."""
     units = {
         f"{section}.{name}".lstrip("."): declared.unit
         for section, record in result.scenario.records.items()
@@ -172,7 +172,7 @@ KEY = ["stage", "run", "generation", "candidate"]
 
 
 def candidate_table(store: FlightStore, objectives: Sequence[str], stage: str = "search") -> pd.DataFrame:
-    """One row a candidate: its parameters by key, then its fitness, one column for each objective; nan: failed."""
+    """Return one row a candidate: its parameters by key, then its fitness by objective; nan: failed."""
     rows = store.rows(
         "SELECT run, generation, candidate, parameters, fitness FROM candidate WHERE stage=? AND fitness IS NOT NULL "
         "ORDER BY run, generation, candidate",
@@ -182,15 +182,15 @@ def candidate_table(store: FlightStore, objectives: Sequence[str], stage: str = 
     for run, generation, candidate, parameters, fitness in rows:
         place = {"run": run, "generation": generation, "candidate": candidate}
         with as_error(f"{store.path}: candidate {candidate} of generation {generation}", StudyError):
-            told = dict(zip(objectives, _fitness(fitness, len(objectives)), strict=True))
-            found.append({**place, **parse_values(parameters), **told})
+            fitnesses = dict(zip(objectives, _fitness(fitness, len(objectives)), strict=True))
+            found.append({**place, **parse_values(parameters), **fitnesses})
     return pd.DataFrame(found)
 
 
 def flight_table(store: FlightStore, stage: str | None = None) -> pd.DataFrame:
-    """One row a flight: parameters by key, seed, order parameters, why it failed, duration (s), worker, versions.
+    """Return one row a flight: parameters, seed, order parameters, why it failed, duration (s), worker, versions.
 
-    A flight of another length than the scenario's tells it as `duration_flown` (s, simulated).
+    A flight of another length than the scenario's has it as `duration_flown` (s, simulated).
     """
     rows = store.rows(
         "SELECT f.stage, f.run, f.generation, f.candidate, f.repeat, f.seed, c.parameters, f.scores, f.reason, "
@@ -211,7 +211,7 @@ def flight_table(store: FlightStore, stage: str | None = None) -> pd.DataFrame:
 
 
 def _fitness(text: Any, count: int) -> list[float]:
-    """Fitness of a row, one number for each objective; nan: failed."""
+    """Decode the fitness of a row, one number for each objective; nan: failed."""
     found = parse_json(text)
     sound = isinstance(found, list) and len(found) == count
     if not sound or not all(value is None or isinstance(value, (int, float)) for value in found):
@@ -222,7 +222,7 @@ def _fitness(text: Any, count: int) -> list[float]:
 def export(store: FlightStore, folder: Path, scenarios: Sequence[str] = ()) -> list[Path]:
     """Write all flights as evaluations.csv, and as evaluations.parquet where pyarrow is installed.
 
-    scenarios : what those of the study are called; of several, each flight tells its own
+    scenarios : labels of the study's scenarios; with several, each row has its own
     """
     table = flight_table(store)
     if len(scenarios) > 1:
@@ -234,8 +234,8 @@ def export(store: FlightStore, folder: Path, scenarios: Sequence[str] = ()) -> l
             written.append(folder / "evaluations.parquet")
             with atomic.atomic_path(written[1]) as temporary:
                 table.to_parquet(temporary, index=False)
-    except OSError as fault:
-        raise StudyError(f"{folder}: tables cannot be written: {fault.strerror or fault}") from fault
+    except OSError as error:
+        raise StudyError(f"{folder}: tables cannot be written: {error.strerror or error}") from error
     return written
 
 
@@ -248,13 +248,13 @@ def _has_parquet() -> bool:
 
 
 def sort_by_fitness(table: pd.DataFrame, objective: str, maximise: bool) -> Any:
-    """Candidates without the failed ones, the best first; of equals the earlier."""
+    """Return the candidates without the failed ones, the best first; of equals the earlier."""
     sound = table[table[objective].notna()]
     return sound.sort_values(objective, ascending=not maximise, kind="stable")
 
 
 def full_length_candidates(table: pd.DataFrame, growing: bool) -> pd.DataFrame:
-    """Candidates that flew as long as the scenario says; those of a search's short flights compare with each other."""
+    """Return the candidates of whole flights; fitness of short flights is on another scale."""
     return table[table[DURATION_COLUMN].isna()] if growing and DURATION_COLUMN in table else table
 
 
@@ -267,7 +267,7 @@ def mean_interval(values: Sequence[float]) -> tuple[float, float, float, float]:
 
 
 def draw_study(study: Study, store: FlightStore, result: EvolveResult, folder: Path) -> list[Path]:
-    """Convergence, fitness against parameters, pairwise slices; with several objectives the front."""
+    """Draw convergence, fitness against parameters, slices of pairs and, with several objectives, the front."""
     from airflock.view import convergence, fitness_scatter, pareto, save_figure, slices
 
     first = study.objectives[0]

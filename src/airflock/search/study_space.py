@@ -81,7 +81,7 @@ def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
 
 
 def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapping[str, Any]) -> list[str]:
-    """What is wrong with one entry by itself."""
+    """Return the errors of one entry by itself."""
     faults = []
     for name, value in entry.items():
         numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
@@ -122,7 +122,9 @@ def _range_faults(axis: SearchAxis) -> list[str]:
     return []
 
 
-def _faults_between(space: SearchSpace, known: Mapping[str, tuple[Quantity, float | None]], told: bool) -> list[str]:
+def _faults_between(
+    space: SearchSpace, known: Mapping[str, tuple[Quantity, float | None]], is_reported: bool
+) -> list[str]:
     """Ties and orders that cannot hold."""
     faults = []
     axes = {axis.key: axis for axis in space.axes}
@@ -150,7 +152,7 @@ def _faults_between(space: SearchSpace, known: Mapping[str, tuple[Quantity, floa
             if not how.low <= value <= how.high:
                 reached = format_with_unit(f"{value:g}", how.unit)
                 faults.append(f"space.{key} = {reached} at {tie.of} = {end:g} lies outside {how.span}")
-    if not space.axes and not told:
+    if not space.axes and not is_reported:
         faults.append("space: nothing varies; give at least one key low and high")
     return faults
 
@@ -172,8 +174,8 @@ def default_space(scenario: Scenario) -> tuple[SearchSpace, list[str]]:
         ratio = _speed(scenario) / speed if speed else 1.0
         # what the study held fixed stays as the scenario has it
         axes = [_scaled(scenario, known[axis.key], axis, ratio) for axis in searched if axis.key in known]
-        told = f", lengths and speeds times {ratio:.3g}" if ratio != 1.0 else ""
-        notes = [f"bounds of the study {name}{told}"]
+        scaled = f", lengths and speeds times {ratio:.3g}" if ratio != 1.0 else ""
+        notes = [f"bounds of the study {name}{scaled}"]
     if dead:
         notes.append(f"not searched, because nothing reads them here: {', '.join(sorted(dead))}")
     return SearchSpace(tuple(_ordered(axes))), notes

@@ -94,7 +94,7 @@ def report_html(
 
 
 def _summary(found: TuneResult) -> list[str]:
-    """What was tuned, and whether all limits are shown."""
+    """Return the head of the report: the scenario, and if all limits are shown."""
     shown, start = found.certificate.shown, found.start
     return [
         f"<h1>{escape(str(start.document.get('title') or start.name))}</h1>",
@@ -105,7 +105,7 @@ def _summary(found: TuneResult) -> list[str]:
 
 
 def _assumed(found: TuneResult) -> list[str]:
-    """What the tuning took for granted."""
+    """Return the section of assumptions."""
     return [
         "<h2>What was assumed</h2>",
         _table(
@@ -126,7 +126,7 @@ def _flown(found: TuneResult) -> list[str]:
 
 
 def _searched(found: TuneResult) -> list[str]:
-    """What the search found: fitness, limits, and each number before and after."""
+    """Return the section of the search: fitness, limits, and each number before and after."""
     r, before = found.result, declared_numbers(found.start)
     rows = [
         (
@@ -148,7 +148,7 @@ def _searched(found: TuneResult) -> list[str]:
 
 
 def _hardened(found: TuneResult) -> list[str]:
-    """What each step of hardening cost and gained."""
+    """Return the section of hardening: cost and gain of each step."""
     rows = [
         (s.name, f"{s.fitness:.3f}", _between(s.cost, ".3f"), f"{s.r_min:.2f}", _between(s.gain, ".2f"),
          _known(100.0 * s.contacts, ".1f"), _known(s.clearance, ".2f"), s.verdict)
@@ -164,9 +164,9 @@ def _hardened(found: TuneResult) -> list[str]:
     ]
 
 
-def _between(told: tuple[float, float, float], form: str) -> str:
+def _between(interval: tuple[float, float, float], form: str) -> str:
     """A mean with its interval."""
-    mean, low, high = (format(value, form) for value in told)
+    mean, low, high = (format(value, form) for value in interval)
     return f"{mean} ({low} to {high})"
 
 
@@ -227,24 +227,24 @@ def _range(span: tuple[float, float] | None) -> str:
     return "" if span is None else f"{span[0]:.3g} to {span[1]:.3g}"
 
 
-def _identified(told: Mapping[str, Any]) -> list[str]:
-    """What logs told of the drones; nothing where it did not begin with logs."""
-    if not told:
+def _identified(fleet: Mapping[str, Any]) -> list[str]:
+    """Return the section of numbers identified from logs; empty if the tuning did not begin with logs."""
+    if not fleet:
         return []
     rows = []
-    for number in told["numbers"]:
+    for number in fleet["numbers"]:
         key, unit = str(number["key"]), KEY_UNITS.get(str(number["key"]), "")
         if "reason" in number:
-            rows.append((key, "", "", f"as in {told['name']}: {number['reason']}"))
+            rows.append((key, "", "", f"as in {fleet['name']}: {number['reason']}"))
         else:
             span = f"{number['low']:.3g} to {number['high']:.3g}"
             rows.append((key, format_with_unit(f"{number['value']:.4g}", unit), span, str(number["origin"])))
-    files = ", ".join(f"{name} ({digest})" for name, digest in told["logs"].items())
+    files = ", ".join(f"{name} ({digest})" for name, digest in fleet["logs"].items())
     return [
         "<h2>What was identified</h2>",
-        f"<p>From the logs of {told['drones']} drones: {escape(files)}.</p>",
+        f"<p>From the logs of {fleet['drones']} drones: {escape(files)}.</p>",
         _table(("number", "value", "95 % interval", "from"), rows),
-        _list([str(note) for note in told["notes"]]),
+        _list([str(note) for note in fleet["notes"]]),
     ]
 
 
@@ -272,7 +272,7 @@ ALWAYS = ("sensors.period", "radio.delay")  # a driver reads them as numbers of 
 
 
 def document_rows(scenario: Scenario, searched: Collection[str]) -> list[ReportRow]:
-    """Key, value and source of everything that the scenario's file says but the numbers that are searched."""
+    """Return key, value and source of all entries of the scenario's file except the searched numbers."""
     rows = []
     for section, table in scenario.document.items():
         if section in LEFT_OUT:
@@ -296,7 +296,7 @@ def _row(key: str, entry: Any, unit: str) -> ReportRow:
 
 
 def _unit(scenario: Scenario, section: str, name: str) -> str:
-    """Unit of a key as its record declares it; none where it is no number."""
+    """Return the unit of a key as its record declares it; empty if it is no number."""
     field = {"model": "parameters"}.get(section, section)
     record = getattr(scenario, field, None) if name else scenario.flight
     if not hasattr(record, "__dataclass_fields__"):
@@ -306,7 +306,7 @@ def _unit(scenario: Scenario, section: str, name: str) -> str:
 
 
 def default_rows(scenario: Scenario) -> list[ReportRow]:
-    """Numbers of drones, sensors, radio and wind that the file leaves as they are, are not zero, and are read."""
+    """Return defaults of drones, sensors, radio and wind that the file does not set, are not zero, and are read."""
     read = _read(scenario)
     rows = []
     for key, (how, value) in declared_numbers(scenario).items():
@@ -320,7 +320,7 @@ def default_rows(scenario: Scenario) -> list[ReportRow]:
 
 
 def _read(scenario: Scenario) -> set[str]:
-    """Keys of drones, sensors, radio and wind that a flight of a scenario reads.
+    """Return the keys of drones, sensors, radio and wind that a flight of a scenario reads.
 
     Where groups have numbers of their own, drivers read these by agent: then all keys of the section count as read.
     """
@@ -346,7 +346,7 @@ BY_STAGE = "SELECT stage, count(*), min(seed), max(seed) FROM flight GROUP BY st
 
 
 def flight_rows(result: TuneResult) -> list[tuple[str, str, str]]:
-    """What for, number of flights, and their seeds; in the order of the stages."""
+    """Return purpose, number of flights and their seeds, in the order of the stages."""
     plan = read_plan(result.folder / PLAN_FILE)[0]
     rows = _stored(result.folder / STUDY_FOLDER)
     if result.steps:
@@ -363,7 +363,7 @@ def flight_rows(result: TuneResult) -> list[tuple[str, str, str]]:
 
 
 def _stored(folder: Path) -> list[tuple[str, str, str]]:
-    """Flights that a folder keeps; those at all values of all numbers together."""
+    """Return the stored flights of a folder by stage; flights of all tolerance values count as one stage."""
     kept: dict[str, tuple[int, int, int]] = {}
     with FlightStore(folder, write=False) as store:
         for stage, count, low, high in store.rows(BY_STAGE):
@@ -377,7 +377,7 @@ def _stored(folder: Path) -> list[tuple[str, str, str]]:
 
 
 def _place(stage: str) -> int:
-    """Of a stage in their order; others behind."""
+    """Return the place of a stage in their order; unknown stages come last."""
     return list(STAGES).index(stage) if stage in STAGES else len(STAGES)
 
 
@@ -436,8 +436,8 @@ def flight_card_limits(result: TuneResult) -> tuple[list[tuple[str, str, str]], 
     members = range(1, int(scenario.flight.agents) + 1)
     try:
         document = make_card_document(scenario, site=(0.0, 0.0, 0.0), members=members, mission=1, expires=0)
-    except CardError as fault:
-        return [], f"No flight card can be made of it: {str(fault).splitlines()[0]}"
+    except CardError as error:
+        return [], f"No flight card can be made of it: {str(error).splitlines()[0]}"
     from airflock.drones import SafetyLimits
 
     known = {name: how for name, how, _ in declarations(SafetyLimits())}

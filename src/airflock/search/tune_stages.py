@@ -33,7 +33,7 @@ SEARCH, HARDEN, CERTIFY_SHARE = 0.45, 0.15, 0.4  # shares of the budget
 TRIED = 15  # rounds of flights that hardening is planned with; all whole and half steps and fresh seeds would be 19
 POPULATION = 24  # reaches a good set in less time than 100 do: small flocks' flights are few
 LEAST = 6  # generations
-FLIGHTS = 2  # of a candidate: from two on, chance can be told from merit
+FLIGHTS = 2  # of a candidate: from two on, chance and merit can be separated
 AVERAGES = 2  # of the last means of the search, which also fly in its final
 USUAL = 100  # flights of a finalist
 DEFAULT_CONFIDENCE = 0.95
@@ -45,7 +45,7 @@ class BudgetPlan:
 
     search : keys of the table [search]; seeds: flights of each step of hardening; seconds: of certifying
     rate   : flights per second that the plan was made with
-    limits, confidence : what is to be shown; goes on with these unless others are given
+    limits, confidence : of the certificate; a resumed tuning keeps them unless others are given
     """
 
     search: dict[str, Any]
@@ -56,16 +56,18 @@ class BudgetPlan:
     confidence: float = DEFAULT_CONFIDENCE
 
     def document(self) -> dict[str, Any]:
-        """The plan as plain values."""
+        """Return the plan as plain values."""
         return {"airflock": __version__, **asdict(self)}
 
 
 def make_plan(budget: float, rate: float, *, warm: bool = False, flights_for_limits: int = USUAL) -> BudgetPlan:
-    """A plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
+    """Make a plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
 
-    telling : flights that tell whether the rarest limit is kept: at most so many for each finalist and each step
-    StudyError where nothing sensible fits into it.
+    flights_for_limits : flights that show if the rarest limit is kept: at most so many for each finalist and each step
+    Raises StudyError if the budget is too small.
     """
+    # Fixed when it begins and kept on resume: the same flights are flown, whatever the machine is doing by then.
+    # A quarter of the search is left for its finals: race, final and score. The generations take the rest.
     flights = budget * SEARCH * rate
     finals = flights / 4.0
     top = 4
@@ -96,13 +98,13 @@ PLAN_FILE, START_FILE, STUDY_FOLDER, TUNED_FILE, CERTIFICATE_FILE, STEPS_FILE = 
 
 @dataclass(frozen=True)
 class TuneResult:
-    """What tuning found: the scenario to fly, and what each stage said.
+    """Result of a tuning: the scenario to fly, and the result of each stage.
 
     start      : the scenario that tuning began from; notes : what was noticed on the way
     result     : of the search
     steps      : of hardening; empty where the law has no recipe, and `why` says so
     seconds    : that it took, s
-    identified : what logs said, where it began with logs
+    identify_report : what logs said, where it began with logs
     """
 
     folder: Path
@@ -118,7 +120,7 @@ class TuneResult:
 
     @property
     def shown(self) -> bool:
-        """Whether the certificate shows all limits."""
+        """True if the certificate shows all limits."""
         return self.certificate.shown
 
     def __repr__(self) -> str:
@@ -130,7 +132,7 @@ class TuneResult:
         return head + self.certificate._repr_html_() + self.scenario._repr_html_()
 
     def document(self) -> dict[str, Any]:
-        """What was found as plain values, for --json."""
+        """Return the result as plain values, for --json."""
         return {
             "folder": str(self.folder),
             "tuned": str(self.folder / TUNED_FILE),
@@ -148,7 +150,7 @@ MOST_SEEDS = 1_000_000  # of each step of hardening
 
 
 def load_plan(folder: Path, start: Scenario, resume: bool) -> BudgetPlan | None:
-    """The plan that a folder keeps, or None where it is new. Raises StudyError for a folder of something else."""
+    """Return the plan of a folder, or None if the folder is new. Raises StudyError for a folder of something else."""
     if (folder / PLAN_FILE).is_file():
         if not resume:
             raise StudyError(f"{folder}: holds a tuning already; continue it with --resume, or give another --out")
@@ -173,20 +175,20 @@ def save_plan(folder: Path, start: Scenario, plan: BudgetPlan) -> None:
             {**plan.document(), "identity": scenario_identity(start)},
             "A tuning of Airflock. Written once, when it began.",
         )
-    except OSError as fault:
-        raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
+    except OSError as error:
+        raise StudyError(f"{folder}: cannot be written: {error.strerror or error}") from error
 
 
 def read_plan(path: Path) -> tuple[BudgetPlan, str]:
-    """The plan that a folder keeps, and the identity of its scenario; StudyError where the file is damaged."""
+    """Read the plan of a folder and the identity of its scenario. Raises StudyError for a damaged file."""
     found = read_toml_file(path)
     try:
         search = {str(key): value for key, value in found["search"].items()}
         limits = [str(text) for text in found.get("limits", ())]
         sure = float(found.get("confidence", DEFAULT_CONFIDENCE))
         made = BudgetPlan(search, int(found["seeds"]), float(found["seconds"]), float(found["rate"]), limits, sure)
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
-        raise StudyError(f"{path}: is damaged: no plan of a tuning is in it; give another --out") from fault
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
+        raise StudyError(f"{path}: is damaged: no plan of a tuning is in it; give another --out") from error
     if found.get("margins"):  # of a version that could widen them
         raise StudyError(f"{path}: margins are no longer widened; remove the line `margins` to go on without them")
     if not (0 < made.seeds <= MOST_SEEDS and 0.0 <= made.seconds < 1e9 and 0.0 < made.rate < 1e9):
@@ -195,44 +197,44 @@ def read_plan(path: Path) -> tuple[BudgetPlan, str]:
 
 
 def scenario_text_document(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as a file holds it, without what a paper prints of it."""
+    """Return the document of a scenario file without published values of a paper."""
     return {formats.KEY: formats.FORMAT, **{k: v for k, v in scenario.document.items() if k != "published"}}
 
 
 def read_steps(path: Path) -> tuple[list[StepResult], str]:
-    """Steps of hardening that a folder keeps, and why there are none; StudyError where the file is damaged."""
+    """Read the steps of hardening, and why there are none. Raises StudyError for a damaged file."""
     with as_error(path, StudyError):
-        told = parse_json_object(read_text(path))
+        stored = parse_json_object(read_text(path))
     try:
-        return [_measured(step) for step in told["steps"]], str(told["why"])
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
-        raise StudyError(f"{path}: is damaged; remove it, and the hardening is done once more") from fault
+        return [_measured(step) for step in stored["steps"]], str(stored["why"])
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
+        raise StudyError(f"{path}: is damaged; remove it, and the hardening is done once more") from error
 
 
-def _measured(told: Mapping[str, Any]) -> StepResult:
-    """One step from plain values; raises what its constructors raise."""
+def _measured(row: Mapping[str, Any]) -> StepResult:
+    """Make one step from plain values; errors of the constructors pass through."""
 
     def three(values: Any) -> tuple[float, float, float]:
         mean, low, high = map(float, values)
         return mean, low, high
 
     def table(name: str) -> dict[str, float]:
-        return {str(key): float(value) for key, value in told[name].items()}
+        return {str(key): float(value) for key, value in row[name].items()}
 
     return StepResult(
-        name=str(told["name"]), reason=str(told["reason"]), parameters=table("parameters"),
-        fitness=float(told["fitness"]), r_min=float(told["r_min"]), n_coll=float(told["n_coll"]),
-        cost=three(told["cost"]), gain=three(told["gain"]), parts=table("parts"), contacts=float(told["contacts"]),
-        clearance=float(told.get("clearance", "nan")), kept=bool(told["kept"]), verdict=str(told["verdict"]),
+        name=str(row["name"]), reason=str(row["reason"]), parameters=table("parameters"),
+        fitness=float(row["fitness"]), r_min=float(row["r_min"]), n_coll=float(row["n_coll"]),
+        cost=three(row["cost"]), gain=three(row["gain"]), parts=table("parts"), contacts=float(row["contacts"]),
+        clearance=float(row.get("clearance", "nan")), kept=bool(row["kept"]), verdict=str(row["verdict"]),
     )  # fmt: skip
 
 
-PILOT = 4  # flights per core that tell how long one takes
+PILOT = 4  # flights per core by which the time of one flight is measured
 Notify = Callable[[str], None]
 
 
 class TuneProgress(NamedTuple):
-    """What tuning is at: its stage, what that has found so far in a few words, its flights and how many there will be.
+    """Progress of a tuning: its stage, a short message, flights so far and in total.
 
     total : None where it is not known; hardening often ends before its total
     """
@@ -247,10 +249,11 @@ OnTuneProgress = Callable[[TuneProgress], None]
 
 
 def measure_flight_rate(scenario: Scenario, threads: int | None) -> float:
-    """Flights per second, from a few of them."""
+    """Measure flights per second by a few flights."""
     from airflock.engine import compile_for, score_flights
     from airflock.support import available_cores
 
+    # Compiled first: the time of the compiler says nothing of the rate of flights.
     compile_for(scenario)
     count = PILOT * (threads or available_cores())
     began = time.perf_counter()
@@ -266,7 +269,7 @@ def run_search_stage(
     threads: int | None,
     on_progress: OnTuneProgress,
 ) -> EvolveResult:
-    """What the search of the folder found."""
+    """Run or continue the search in the folder; return its result."""
     on_progress(TuneProgress("search"))
 
     def searched(p: Searched) -> None:
@@ -282,7 +285,8 @@ def run_search_stage(
 def run_hardening_stage(
     folder: Path, plan: BudgetPlan, limits: Sequence[str], threads: int | None, trust: bool, on_progress: OnTuneProgress
 ) -> tuple[Scenario, list[StepResult], str]:
-    """The scenario after hardening, its steps, and why there are none."""
+    """Harden or read the hardened set; return the scenario, its steps, and why there are none."""
+    # steps.json is written last: if it is there, the stage is complete.
     if (folder / STEPS_FILE).is_file():
         steps, why = read_steps(folder / STEPS_FILE)
         return load(folder / TUNED_FILE, trust=trust), steps, why
@@ -300,14 +304,14 @@ def run_hardening_stage(
         write_toml_file(
             folder / TUNED_FILE, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune."
         )
-    except ScenarioError as fault:
-        why = fault.faults[0]
+    except ScenarioError as error:
+        why = error.faults[0]
         law = folder / STUDY_FOLDER / str(best.document.get("model", {}).get("kind", ""))
         if law.suffix == ".py" and law.is_file():
             atomic.write_file(folder / law.name, law.read_bytes())
         write_toml_file(folder / TUNED_FILE, scenario_text_document(best), "Evolved by airflock tune; not hardened.")
-    told = {"why": why, "steps": [step.as_dict() for step in steps]}
-    atomic.write_file(folder / STEPS_FILE, json.dumps(told))
+    outcome = {"why": why, "steps": [step.as_dict() for step in steps]}
+    atomic.write_file(folder / STEPS_FILE, json.dumps(outcome))
     return load(folder / TUNED_FILE, trust=trust), steps, why
 
 
@@ -320,7 +324,7 @@ def run_certificate_stage(
     threads: int | None,
     on_progress: OnTuneProgress,
 ) -> Certificate:
-    """The certificate of the tuned set, saved in the folder."""
+    """Certify the tuned set; save the certificate in the folder and return it."""
     on_progress(TuneProgress("certificate"))
 
     def counted(p: Counted) -> None:

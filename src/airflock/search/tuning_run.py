@@ -1,4 +1,7 @@
-"""The public door: start, evolve, harden, certify, report; each stage is continued where it was left."""
+"""Tune a flock: from a scenario or logs through search, hardening and certificate to a report, in one folder.
+
+Each stage is kept in the folder and continued where it was interrupted.
+"""
 
 import hashlib
 import json
@@ -54,42 +57,44 @@ Paths = Sequence[str | os.PathLike[str]]
 
 @dataclass(frozen=True)
 class IdentifiedFleet:
-    """What logs say of a fleet: the scenario with its numbers, its file's content, and what to tell of it.
+    """A fleet identified from logs: the scenario with its numbers, its file, and a report.
 
-    told : files with their hashes, the law's scenario, numbers with intervals or the reason why not, notes
+    report : files with their hashes, the law's scenario, numbers with intervals or the reason why not, notes
     """
 
     scenario: Scenario
     document: Mapping[str, Any]
-    told: Mapping[str, Any]
+    report: Mapping[str, Any]
 
     def save(self, folder: Path) -> None:
         """Write identified.toml and identified.json, the latter last: it says that the stage is over."""
         write_toml_file(folder / SCENARIO, self.document, "Identified from logs by airflock tune.")
-        atomic.write_file(folder / REPORT_FILE, json.dumps(self.told))
+        atomic.write_file(folder / REPORT_FILE, json.dumps(self.report))
 
 
 def identify_fleet(folder: Path, logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> IdentifiedFleet:
-    """What the folder holds of these logs, or what they say now.
+    """Return the identified fleet of the folder, or identify it now from the logs.
 
     Raises StudyError where the folder holds what other logs said, RecordingError or AirflockError for bad logs.
     """
-    asked = _asked(logs, like, heard)
+    request = _identify_request(logs, like, heard)
     if (folder / REPORT_FILE).is_file():
         with as_error(folder / REPORT_FILE, StudyError):
-            told = parse_json_object(read_text(folder / REPORT_FILE))
-        for key, value in asked.items():
-            if told.get(key) != value:
+            report = parse_json_object(read_text(folder / REPORT_FILE))
+        for key, value in request.items():
+            if report.get(key) != value:
                 raise StudyError(f"{folder}: holds the tuning of other logs ({key} differs); give another --out")
-        return IdentifiedFleet(load(folder / SCENARIO), {}, told)
+        return IdentifiedFleet(load(folder / SCENARIO), {}, report)
     found = identify(list(logs), like, heard=None if heard is None else read_heard(heard))
     document = found.document()
     # by the name of the file that it becomes, so that a tuning that is resumed is the same one
-    return IdentifiedFleet(build_scenario(document, str(folder / SCENARIO)), document, {**asked, **_told(found)})
+    return IdentifiedFleet(
+        build_scenario(document, str(folder / SCENARIO)), document, {**request, **_identify_report(found)}
+    )
 
 
-def _asked(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> dict[str, Any]:
-    """What decides the outcome, as plain values."""
+def _identify_request(logs: Paths, like: Scenario, heard: str | os.PathLike[str] | None) -> dict[str, Any]:
+    """Return everything that decides the outcome, as plain values."""
     files = [*logs, *([] if heard is None else [heard])]
     like_document = {key: value for key, value in like.document.items() if key != "published"}
     return {
@@ -102,11 +107,11 @@ def _hash(path: str | os.PathLike[str]) -> str:
     try:
         with expand_path(path).open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()[:12]
-    except OSError as fault:
-        raise RecordingError(f"{path}: {fault.strerror or fault}") from fault
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}") from error
 
 
-def _told(found: IdentifyResult) -> dict[str, Any]:
+def _identify_report(found: IdentifyResult) -> dict[str, Any]:
     """Every number with its interval, or the reason why the logs do not tell it; and notes."""
     numbers = [
         {"key": n.key, "value": n.value, "low": n.low, "high": n.high, "origin": n.origin}
@@ -121,28 +126,28 @@ SCALES = "vasarhelyi_2018"  # the law whose scaling with the speed is published
 
 
 def prepare_start(scenario: Scenario) -> tuple[Scenario, list[str]]:
-    """The scenario to start from, and what was set, for a person to read.
+    """Return the scenario to start from, and notes on the numbers that were set.
 
     Only numbers that the scenario's document does not give are set; every other value stays.
     """
-    values, told = _scaled(scenario)
+    values, remarks = _scaled(scenario)
     start = rebuilt(scenario, values) if values else scenario
     for room in _off_the_walls(scenario):
         with suppress(ScenarioError):  # they have no place so far from the walls
             why = f"no agent starts nearer than {room:g} m to walls and obstacles"
             away = rebuilt(start, {"start.wall_clearance": room})
-            return away, [*told, f"{why} (start.wall_clearance, which is not given)"]
-    return start, told
+            return away, [*remarks, f"{why} (start.wall_clearance, which is not given)"]
+    return start, remarks
 
 
 def measures_walls(scenario: Scenario) -> bool:
-    """Whether its order parameters tell how near agents come to walls and obstacles, and some stand there."""
+    """Return True if there are walls or obstacles and the metrics measure clearance to them."""
     stand = scenario.world.arena != "none" or bool(scenario.world.obstacles)
     return stand and "clearance" in scalar_names(scenario.measures, scenario.metrics)
 
 
 def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
-    """Numbers of the law, scaled to the speed of the scenario."""
+    """Return numbers of the law scaled to the speed of the scenario, and notes."""
     if scenario.model.name != SCALES:
         return {}, [
             f"{scenario.model.name}: no scaling with the speed is published; the search starts from its own values"
@@ -161,11 +166,12 @@ def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
 
 
 def _off_the_walls(scenario: Scenario) -> list[float]:
-    """Room at walls and obstacles when a flight begins, m, where the document gives none; less where that is too much.
+    """Return clearances (m) to walls and obstacles at the start to try, largest first; none if the document has one.
 
-    Half of what agents have between them, or r_coll. Without it the nearest that most flights come to a wall is where
-    somebody was put at the start, whatever the law does.
+    Half of the distance between agents, or r_coll.
     """
+    # Starts as close as 1 cm to a wall decided `clearance` of most flights, whatever the law: a fitness of 0.05, with
+    # room at the start 0.777.
     drawn = scenario.start.kind in ("arena", "ball", "box")
     if not (measures_walls(scenario) and drawn) or "wall_clearance" in scenario.document.get("start", {}):
         return []
@@ -175,7 +181,7 @@ def _off_the_walls(scenario: Scenario) -> list[float]:
 
 @dataclass(frozen=True)
 class TuneRequest:
-    """What a tuning is asked for.
+    """Request of a tuning.
 
     campaign : what its certificate is to show; limits: the texts of its limits
     """
@@ -190,15 +196,15 @@ def make_request(
     confidence: float | None = None,
     plan: BudgetPlan | None = None,
 ) -> TuneRequest:
-    """What is asked for; what is not given is as in the plan of a tuning that goes on, or else as usual.
+    """Make a request. Missing values come from the plan of a resumed tuning, or are defaults.
 
     Raises ScenarioError, all faults together.
     """
-    asked = ErrorCollector()
-    limits = list(limit) or (plan.limits if plan else []) or asked.read(default_limits, start)
+    errors = ErrorCollector()
+    limits = list(limit) or (plan.limits if plan else []) or errors.read(default_limits, start)
     sure = (plan.confidence if plan else DEFAULT_CONFIDENCE) if confidence is None else confidence
-    campaign = asked.read(campaign_from_request, start, limits, sure)
-    asked.raise_errors()
+    campaign = errors.read(campaign_from_request, start, limits, sure)
+    errors.raise_errors()
     return TuneRequest(campaign, limits)
 
 
@@ -223,7 +229,7 @@ def default_limits(scenario: Scenario) -> list[str]:
 
 
 def infeasible_limit_lines(campaign: Campaign, plan: BudgetPlan) -> list[str]:
-    """A line for each limit that the plan's flights could not show even if nothing ever happened in them."""
+    """Return a line for each limit that the plan's flights could not show even without any event."""
     able = int(COUNT_BUDGET_SHARE * plan.seconds * plan.rate)
     return [
         f"{limit.text}: needs {flights:,} flights without an event to be shown, and there is time for {able:,}; "
@@ -235,7 +241,7 @@ def infeasible_limit_lines(campaign: Campaign, plan: BudgetPlan) -> list[str]:
 
 
 def _time(seconds: float) -> str:
-    """At least so long, as --budget takes it."""
+    """Format a time, rounded up, as --budget takes it."""
     return f"{math.ceil(seconds / 3600.0)}h" if seconds > 7200.0 else f"{math.ceil(seconds / 60.0)}min"
 
 
@@ -286,8 +292,8 @@ def tune(
     threads : int, optional
         Flights side by side; by default one per core.
     watch, note : callable, optional
-        Told as each stage begins and of its flights (`airflock.search.tune_stages.TuneProgress`); told in a line,
-        before they begin, of each limit that the budget leaves too little time to show.
+        Called as each stage begins and after its flights (`airflock.search.tune_stages.TuneProgress`); called with a
+        line for each limit that the budget leaves too little time to show.
     trust : bool
         Whether code that files name may run.
 
@@ -317,21 +323,22 @@ def tune(
     if like is not None:
         parts.raise_errors()  # before logs are read, which takes long
     begun = parts.read(_begun, scenario, like, heard, settings, folder, trust)
+    # Each part that could be read is checked further, so that one message names all errors.
     start = parts.read(lambda found: found.start, begun)
     plan = parts.read(load_plan, folder, start, resume)
-    asked = parts.read(make_request, start, limit, confidence, value_or_default(plan, None))
+    request = parts.read(make_request, start, limit, confidence, value_or_default(plan, None))
     parts.raise_errors()
     logs = begun.logs
-    sure, rated = asked.campaign.confidence, [each for each in asked.campaign.limits if each.rate is not None]
+    sure, rated = request.campaign.confidence, [each for each in request.campaign.limits if each.rate is not None]
     if plan is None:
         telling = flights_per_event(rated, start)
         made = make_plan(budget, measure_flight_rate(start, threads), warm=warm, flights_for_limits=telling)
-        plan = replace(made, limits=asked.limits, confidence=sure)
+        plan = replace(made, limits=request.limits, confidence=sure)
         save_plan(folder, start, plan)
     searched = [each.text for each in rated]
     if logs is not None and not (folder / REPORT_FILE).is_file():
         logs.save(folder)
-    short = infeasible_limit_lines(asked.campaign, plan)
+    short = infeasible_limit_lines(request.campaign, plan)
     for line in short:
         if note is not None:
             note(line)
@@ -342,10 +349,10 @@ def tune(
         if result.dead_reason:
             raise StudyError(f"{start.name}: {result.dead_reason}")
         tuned, steps, why = run_hardening_stage(folder, plan, searched, threads, trust, watch)
-        shown = run_certificate_stage(folder, tuned, asked.limits, sure, plan, threads, watch)
+        shown = run_certificate_stage(folder, tuned, request.limits, sure, plan, threads, watch)
         found = TuneResult(
             folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
-            {} if logs is None else logs.told,
+            {} if logs is None else logs.report,
         )  # fmt: skip
         watch(TuneProgress("report"))
         from airflock.search.tune_report import save
@@ -357,7 +364,7 @@ def tune(
 
 
 class _Begun(NamedTuple):
-    """Where a tuning begins: its scenario, what was set in it, and what logs told if it began with logs."""
+    """Start of a tuning: its scenario, notes on numbers that were set, and the fleet identified from logs."""
 
     start: Scenario
     notes: list[str]
