@@ -1,4 +1,4 @@
-"""Which function does what a command does, and which of its arguments stands for each option.
+"""Python counterparts of the commands: the function of each, and the argument that stands for each option.
 
 A test compares this table with the commands and with the functions, so that neither can grow alone.
 """
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class PythonCounterpart(NamedTuple):
-    """One command: how it is called in Python, the function, and option → argument (or what stands for it).
+    """Counterpart of one command: the call in Python, the function, and option → argument (or a replacement).
 
     A function without a dot is a public name of `airflock`; the others, with their module, take more preparation.
     """

@@ -1,4 +1,4 @@
-"""Verb fleet: a scenario flown by nodes and vehicles that speak MAVLink, beside the simulator if wanted."""
+"""Verbs fleet and fly: fly a fleet in software; prepare and fly missions of real drones."""
 
 import gc
 import time
@@ -129,7 +129,7 @@ def fleet(
 
 
 def _broken(file: Path | None, members: tuple[int, ...], live: bool) -> Sequence[Any]:
-    """Faults of a file, if there is one, that such a fleet can suffer."""
+    """Return the faults of a file, if there is one, that such a fleet can simulate."""
     from airflock.fleets import read_injected_faults, realtime
 
     found = () if file is None else read_injected_faults(file, members)
@@ -144,7 +144,7 @@ def _check_one_card(file: Path | None, scenario: Any, seeds: Sequence[int]) -> N
 
 
 def _option_errors(vehicle: str, body: str | None, mode: str, card_file: Path | None, against: str | None) -> list[str]:
-    """What is wrong with options that do not concern the scenario."""
+    """Return errors of options that do not concern the scenario."""
     from airflock.fleets import FLEET_MODES, VEHICLE_BODIES, VEHICLE_KINDS
 
     faults = [
@@ -165,7 +165,7 @@ def _option_errors(vehicle: str, body: str | None, mode: str, card_file: Path | 
 
 @contextmanager
 def _frozen_imports() -> Iterator[None]:
-    """Let the collector leave alone what is there already; a look at it all takes a tenth of a second, now and then."""
+    """Keep the garbage collector off existing objects: one full collection takes a tenth of a second."""
     gc.freeze()
     try:
         yield
@@ -184,7 +184,7 @@ def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:
 
 
 def _print_runs(series: Any, as_json: bool) -> None:
-    """Print what was flown."""
+    """Print the results of all flights."""
     from airflock.parts.metrics import reported_values
 
     scenario, lines, seeds = series.scenario, series.comparison, len(series.runs)
@@ -220,7 +220,7 @@ def _print_runs(series: Any, as_json: bool) -> None:
 
 
 def _print_load(load: dict[str, Any] | None) -> None:
-    """Tell what a fleet on the real clock cost, and how late it was."""
+    """Print the load of a fleet on the real clock, and its lateness."""
     if load is None:
         return
     parts = ""
@@ -321,7 +321,7 @@ def prepare(
 
 
 class MissionFiles(NamedTuple):
-    """What a preparation writes: the card, the mission's key and the operator's key."""
+    """Files of a preparation: the card, the mission's key and the operator's key."""
 
     card: Path
     key: Path
@@ -329,7 +329,7 @@ class MissionFiles(NamedTuple):
 
 
 class Airtime(NamedTuple):
-    """How much of a radio's time a flock takes.
+    """Share of a radio's time that a flock takes.
 
     radio : fast or slow; limit : which of the card's limits sets its rate; share : of the time, 0 to 1
     """
@@ -339,7 +339,7 @@ class Airtime(NamedTuple):
     share: float
 
     def fault(self, count: int) -> str:
-        """Why so many drones cannot use it, and what helps."""
+        """Return why so many drones cannot use it, and a remedy."""
         return (
             f"{self.radio} radio: {count} drones would take {self.share:.0%} of its time; "
             f"at most {MAX_AIRTIME_SHARE:.0%}: "
@@ -348,7 +348,7 @@ class Airtime(NamedTuple):
 
 
 def radio_airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
-    """What `count` drones take of the fast and the slow radio, from their rates in bit/s and the card's limits."""
+    """Return the airtime of `count` drones on the fast and the slow radio, from bit/s and the card's limits."""
     loads = []
     for radio, limit, bits in (("fast", "status_period", fast), ("slow", "slow_period", slow)):
         packet = PREAMBLE_SECONDS + 8.0 * (DATAGRAM_BYTES + OVERHEAD_BYTES) / bits
@@ -357,7 +357,7 @@ def radio_airtimes(count: int, safety: dict[str, Any], fast: float, slow: float)
 
 
 def _check_airtimes(systems: list[int], document: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
-    """What the drones of a card take of their radios. Raises CardError where that is too much."""
+    """Return the airtime of the drones of a card. Raises CardError where it is too much."""
     loads = radio_airtimes(len(systems), document["safety"], fast, slow)
     if faults := [each.fault(len(systems)) for each in loads if each.share > MAX_AIRTIME_SHARE]:
         raise CardError(faults)
@@ -365,7 +365,7 @@ def _check_airtimes(systems: list[int], document: dict[str, Any], fast: float, s
 
 
 def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> dict[str, Any]:
-    """Limits of the card that --limit changes; what is wrong is noted, and left out."""
+    """Return the limits of the card that --limit changes; errors are noted, and their limits left out."""
     from airflock.core import declarations
     from airflock.drones import SafetyLimits
     from airflock.fleets import default_safety
@@ -380,7 +380,7 @@ def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> d
 
 
 def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes) -> Any:
-    """Write card and keys, all of them or none; private: the operator's key. The card that was written."""
+    """Write card and keys, all of them or none; private: the operator's key. Return the written card."""
     import secrets
 
     from airflock.drones import write_card, write_key
@@ -397,7 +397,7 @@ def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes
 
 
 def _print_summary(files: MissionFiles, card: Any, loads: list[Airtime]) -> None:
-    """Say what was written, how high the drones may fly, and how autopilots have to be set."""
+    """Print the written files, the height limits, and the settings that autopilots need."""
     terminal.print_message(f"wrote {files.card} (hash {card.hash[:8]}), {files.key}, {files.operator}")
     top = card.layer(card.members[-1])
     terminal.print_message(f"fence {card.low:g} to {card.high:g} m above the site; layers up to {top:g} m")
@@ -409,7 +409,7 @@ def _print_summary(files: MissionFiles, card: Any, loads: list[Airtime]) -> None
 
 
 def _members(text: str) -> list[int]:
-    """System ids, as they are written in a line."""
+    """Parse the system ids of a line."""
     members: list[int] = []
     for part in text.split(","):
         first, dash, last = part.partition("-")
@@ -489,7 +489,7 @@ def _check_target(card: Any, target: int) -> None:
 
 
 def _check_inside_fence(card: Any, option: tuple[float, float, float], point: str) -> None:
-    """Refuse what no drone would obey: a point outside the card's fence, which they refuse, each by itself."""
+    """Refuse a point outside the card's fence, which every drone would refuse by itself."""
     x, y, z = card.site.local(*option)
     if not card.low <= z <= card.high:
         line = (
@@ -506,10 +506,10 @@ def _check_inside_fence(card: Any, option: tuple[float, float, float], point: st
 
 
 class FlyGroup(TyperGroup):
-    """Subcommands; anything else is a flight card, which is flown."""
+    """Subcommands of fly; any other word is a flight card, which is flown."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """A subcommand by its name; `run_node` for the name of a file."""
+        """Return a subcommand by its name; `run_node` for the name of a file."""
         if args and args[0] not in self.commands and (Path(args[0]).suffix or is_file(args[0])):
             args = ["card", *args]
         return super().resolve_command(ctx, args)

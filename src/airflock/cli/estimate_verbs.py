@@ -1,4 +1,4 @@
-"""Verb identify: flight logs to the numbers of a scenario."""
+"""Verbs import, export, identify and infer: recordings of others, and the numbers and laws behind them."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -47,7 +47,7 @@ Delimiter = Annotated[str, typer.Option(help="Separator between columns of a tex
 
 
 def parse_mapping(pairs: list[str] | None) -> dict[str, str]:
-    """Targets and expressions of --map; := and = are the same."""
+    """Parse the targets and expressions of --map; := and = mean the same."""
     columns: dict[str, str] = {}
     faults = []
     for pair in pairs or []:
@@ -128,7 +128,7 @@ def import_tracks(
 
 
 def reading_progress(files: int, quiet: bool) -> Any:
-    """A bar that follows the share of each file that has been read."""
+    """Show a bar that follows the share of each file that has been read."""
     from contextlib import contextmanager
 
     @contextmanager
@@ -303,7 +303,7 @@ def _span(text: str) -> tuple[float, float] | None:
 
 
 def _checked(result: Any, flights: int, quiet: bool) -> Any:
-    """Posterior check, if there is something to check."""
+    """Run the posterior check, if there is something to check."""
     from airflock.estimate import check_against_logs
 
     if not flights or not result.settings():
@@ -332,7 +332,7 @@ def _parameter_table(result: Any) -> None:
 
 
 def _reasons(result: Any) -> list[str]:
-    """Why numbers are not told, a line each reason."""
+    """Return why numbers cannot be identified, a line for each reason."""
     keys: dict[str, list[str]] = {}
     for key, number in result.numbers.items():
         if not number.told:
@@ -341,7 +341,7 @@ def _reasons(result: Any) -> list[str]:
 
 
 def _numbers_table(result: Any) -> Any:
-    """Numbers that the logs tell, as a table."""
+    """Return the identified numbers, as a table."""
     from rich import box
     from rich.table import Table
 
@@ -483,7 +483,7 @@ def infer(
 
 @contextmanager
 def _fit_progress(quiet: bool) -> Iterator[Callable[[str], None]]:
-    """Progress: which law is fitted, and how many steps that took so far."""
+    """Show which law is fitted, and how many steps that took so far."""
     with progress_line(quiet) as told:
         told.update("reading")
         steps: dict[str, int] = {}
@@ -552,7 +552,7 @@ def _check(result: Any) -> None:
 
 
 def _inferred_json(result: Any) -> dict[str, Any]:
-    """What was found as plain values."""
+    """Return the result as plain values."""
     laws = [
         {name: getattr(law, name) for name in ("name", "gain", "error", "ahead", "criterion", "inside", "missed")}
         | {"numbers": {key: number.value for key, number in law.numbers.items()}}

@@ -1,4 +1,4 @@
-"""Verbs run and score: fly a scenario, or measure a recording."""
+"""Verbs run, score, sweep, plot, video, replay, display and watch: fly a scenario, and look at flights."""
 
 import math
 import re
@@ -80,7 +80,7 @@ def run(
 def _print_scores(
     scenario: Any, numbers: Sequence[int], rows: Sequence[ScoreValues], changed_keys: ScoreValues, as_json: bool
 ) -> None:
-    """Print what flights came to, beside the paper's figures; changed : keys that are not as in the file."""
+    """Print the scores of flights, beside the paper's; changed : keys that are not as in the file."""
     from airflock.parts.metrics import reported_values
     from airflock.recordings import rare_event_notes, upper_probability_bound
 
@@ -109,7 +109,7 @@ def _print_scores(
 def _record(
     scenario: Any, numbers: Sequence[int], precision: int, device: str, save: Path | None, plot: Path | None
 ) -> None:
-    """Fly again with the trajectories kept (the same bits), and write what was asked for."""
+    """Fly again with the trajectories kept (the same bits), and write the requested files."""
     from airflock.recordings import save as save_recording, simulate
 
     for seed in numbers if save else numbers[:1]:
@@ -180,7 +180,7 @@ def score(
 def _print_group_scores(
     sources: Sequence[Any], files: Sequence[Path], changed: ScoreValues, trust: bool, as_json: bool
 ) -> None:
-    """Measure the groups of recordings, and print what was found."""
+    """Measure the groups of recordings, and print the results."""
     from airflock.parts.metrics import reported_values
     from airflock.recordings import PAIR_METRICS, group_scores, load_recording, scenario_of_recording
 
@@ -253,7 +253,9 @@ def _save_series(measured: Sequence[MeasuredRecording], path: Path) -> None:
 
 
 def _print_measured(measured: Sequence[MeasuredRecording], as_json: bool) -> None:
-    """Print order parameters of recordings, what befell their agents, and what could not be measured."""
+    """Print order parameters of recordings, faults of their agents, and order parameters that could not be
+    measured.
+    """
     from airflock.recordings import faults_line, missing_lengths_note as told_unsaid
 
     rows = [each.values for each in measured]
@@ -352,14 +354,14 @@ def sweep(
 
 
 def _axes(over: list[str], plot: Path | None, errors: ErrorCollector) -> dict[str, list[Any]]:
-    """Keys that are swept, with the values of each; of those that can be read, the rest being noted."""
+    """Return the swept keys with their values; unreadable ones are noted as errors."""
     axes = [found for text in over if (found := errors.read(parse_axis, text)) is not INVALID]
     errors.read(check_distinct_keys, [text.partition("=")[0].strip() for text in over], plot)
     return errors.read(_bounded, axes)
 
 
 def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
-    """Axes of a grid that is not too large."""
+    """Return the axes of a grid that is not too large."""
     size = math.prod(len(values) for _, values in axes)
     if size > MAX_GRID_POINTS:
         raise ScenarioError([f"--over: a grid of {size} points is more than {MAX_GRID_POINTS}"])
@@ -367,7 +369,7 @@ def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
 
 
 def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | None, plot: Path | None) -> None:
-    """Write the table and the picture that were asked for."""
+    """Write the requested table and picture."""
     if table is not None:
         from airflock.support import atomic
 
@@ -381,7 +383,7 @@ def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | No
 
 
 def merge_similar_notes(notes: Iterable[str]) -> Iterator[str]:
-    """The first of all notes that differ in numbers alone, and how many are like it."""
+    """Return the first of all notes that differ in numbers alone, and how many are similar."""
     kinds: dict[str, list[str]] = {}
     for note in notes:
         kinds.setdefault(re.sub(r"[-+]?\d[\d.e+-]*", "", note), []).append(note)
@@ -400,7 +402,7 @@ def check_distinct_keys(keys: Sequence[str], plot: Path | None) -> None:
 
 
 def parse_axis(text: str, option: str = "--over") -> tuple[str, list[Any]]:
-    """Key and values from KEY=a,b,c or KEY=low:high:count, as an option was given."""
+    """Parse KEY=a,b,c or KEY=low:high:count into key and values."""
     key, equals, values = text.partition("=")
     key = key.strip()
     parts = values.split(":")
@@ -441,7 +443,7 @@ def _print_sweep(tidy: Any, keys: list[str], show: str) -> None:
 
 
 class PictureKind(StrEnum):
-    """What to draw."""
+    """Kinds of picture."""
 
     TRAJECTORIES = "trajectories"
     SERIES = "series"
@@ -724,7 +726,7 @@ def watch(
 
 
 def _comparison(value: list[str]) -> str | dict[str, Any] | None:
-    """What flies beside the scenario: a name, or keys with values."""
+    """Return the comparison beside the scenario: a name, or keys with values."""
     if any("=" not in each for each in value) and len(value) > 1:
         raise StudioError(f"--against {' '.join(value)}: give one preset or file, or only KEY=VALUE")
     if value and "=" not in value[0]:

@@ -1,4 +1,4 @@
-"""The command `airflock`: its verbs, and one line for everything that goes wrong."""
+"""The command `airflock`: its verbs, and one line for every error."""
 
 import _thread
 import atexit
@@ -36,7 +36,7 @@ INTERRUPT_DELAY = 0.05  # s
 
 
 class VerbGroup(TyperGroup):
-    """The verbs; a wrong command line and Ctrl-C end like any other fault, with one line and status 2."""
+    """Group of the verbs; a wrong command line and Ctrl-C end like any other error, with one line and status 2."""
 
     def main(
         self,
@@ -123,7 +123,7 @@ def _root_callback(
 
 
 def main() -> None:
-    """Run the command; bad input ends with one line per fault and exit status 2, and so does SIGTERM."""
+    """Run the command; bad input ends with one line per error and exit status 2, and so does SIGTERM."""
     if threading.current_thread() is threading.main_thread():  # only there are signals heard
         signal.signal(signal.SIGTERM, _on_sigterm)
         sys.unraisablehook = _repeat_interrupt
@@ -154,19 +154,19 @@ def main() -> None:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
-    """What Airflock warns of, as a line; what libraries say to programmers is not for who gives commands."""
+    """Print warnings of Airflock as a line; drop those that libraries address to programmers."""
     if category is UserWarning:
         sys.stderr.write(f"note: {shortened(printable(str(message)))}\n")
 
 
 def _on_sigterm(number: int, _: Any) -> NoReturn:
-    """SIGTERM, as batch systems send it, ends like Ctrl-C; a second one does not disturb what is being put away."""
+    """End like Ctrl-C on SIGTERM, which batch systems send; a second one does not disturb the cleaning up."""
     signal.signal(number, signal.SIG_IGN)
     raise KeyboardInterrupt
 
 
 def _repeat_interrupt(lost: Any) -> None:
-    """An interruption that fell into a finaliser, where Python can only tell of it, comes again a moment later.
+    """Repeat an interruption that fell into a finaliser, where Python can only print it, a moment later.
 
     Numba's compiler drops objects with finalisers at every turn: Ctrl-C and SIGTERM were lost in one of 200 tries.
     """

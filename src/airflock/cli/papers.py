@@ -1,4 +1,4 @@
-"""The door to the papers, which are a distribution of their own: airflock-papers."""
+"""airflock.paper and its verb: recompute papers, which are a distribution of their own: airflock-papers."""
 
 from collections import Counter
 from importlib import import_module
@@ -62,7 +62,7 @@ def paper(
 
 
 def find_paper(name: str) -> Any:
-    """The publication of this name.
+    """Return the publication of this name.
 
     Raises AirflockError if airflock-papers is not installed, or there is no such paper.
     """
@@ -126,7 +126,7 @@ def paper_verb(
 def _all(
     quick: bool, breaks: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]
 ) -> None:
-    """Every paper: in its small form, or every claim under its change, against what is committed."""
+    """Recompute every paper: in its small form, or every claim under its change, against the committed verdicts."""
     from airflock.cli.papers import require_papers
     from airflock.support import AirflockError, cache_folder
 
@@ -159,7 +159,7 @@ def _all(
 
 
 def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
-    """Every claim of every paper under its change, against what is committed."""
+    """Check every claim of every paper under its change, against the committed verdicts."""
     from airflock_papers import breaks
 
     before = breaks.committed()
@@ -179,7 +179,7 @@ def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
 
 
 def _breaks(name: str, only: str | None, seeds: int | None, threads: int | None, as_json: bool) -> None:
-    """Each claim under the change that must break it."""
+    """Check each claim under the change that must break it."""
     from airflock.cli.papers import find_paper
 
     paper_verb = find_paper(name)

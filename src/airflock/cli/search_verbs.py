@@ -1,4 +1,4 @@
-"""Verb evolve: repeat or begin an optimisation."""
+"""Verbs evolve, harden, tune and certify: search for parameters, make them safer, and bound their risks."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -243,14 +243,14 @@ def harden(
 
 
 def _output_files(out: Path, optima: int, where: str) -> list[Path]:
-    """Files to write, one for each optimum."""
+    """Return the files to write, one for each optimum."""
     places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, optima + 1))]
     options.check_writable(*((place, SCENARIOS) for place in places), reads=[where])
     return places
 
 
 def _optima(source: str, settings: dict[str, Any], trust: bool) -> list[Any]:
-    """The optimum, or that of each scenario of a study's folder."""
+    """Return the optimum, or that of each scenario of a study's folder."""
     from airflock.scenarios import load
     from airflock.search import BEST_FILE, further_best_files
 
@@ -262,7 +262,7 @@ def _optima(source: str, settings: dict[str, Any], trust: bool) -> list[Any]:
 
 
 def _print_hardened(name: str, steps: list[Any], seeds: int) -> None:
-    """A table of what each step flies like, and below it a line for each: what it costs and gains, and its verdict."""
+    """Print a table of the scores of each step, and below it a line for each: costs, gains, and verdict."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -382,7 +382,7 @@ def tune(
 
 
 def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -> str:
-    """The scenario that names law, field and speed: the one that is tuned or, with logs, what they are like."""
+    """Return the scenario that names law, field and speed: the tuned one or, with logs, that of --like."""
     if like is not None:
         return like
     if len(scenario) > 1 or heard is not None:
@@ -393,14 +393,14 @@ def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -
 
 
 def _tuned_scenario(base: Any, like: str | None) -> Any:
-    """The scenario from which tuning starts; with logs it is not known yet, but takes the same limits."""
+    """Return the scenario from which tuning starts; with logs it is not known yet, but takes the same limits."""
     from airflock.search import prepare_start
 
     return base if like is not None else prepare_start(base)[0]
 
 
 def _print_campaign(tuning: Any, shown: list[str]) -> None:
-    """What was found, and those notes that were not told while it was sought."""
+    """Print the result, and the notes that were not printed during the search."""
     from rich.console import Console
 
     from airflock.search import limit_report_line
@@ -427,7 +427,7 @@ def _print_campaign(tuning: Any, shown: list[str]) -> None:
 
 
 def print_certificate(certificate: Any) -> None:
-    """Print all that it says, and what it does not say."""
+    """Print everything that a certificate shows, and what it does not show."""
     from rich.console import Console
 
     console = Console()
@@ -452,7 +452,7 @@ def print_certificate(certificate: Any) -> None:
 
 
 def _verdicts(console: Any, certificate: Any) -> None:
-    """One row a limit."""
+    """Print one row a limit."""
     from rich import box
     from rich.table import Table
 
@@ -514,7 +514,7 @@ def _tolerances(console: Any, tolerance: Any) -> None:
 
 
 def _map(console: Any, bounds: Any) -> None:
-    """Upper bounds in percent of flights, first key downwards, second across."""
+    """Print upper bounds in percent of flights, first key downwards, second across."""
     if not bounds:
         return
     from rich import box
@@ -671,7 +671,7 @@ def _flown(
     campaign: Any, seconds: float, out: Path | None, resume: bool, flying: dict[str, Any], extras: dict[str, Any], *,
     quiet: bool,
 ) -> Any:  # fmt: skip
-    """Fly a campaign, in the folder beside `out` or one that is gone afterwards; its certificate.
+    """Fly a campaign, in the folder beside `out` or a temporary one, and return its certificate.
 
     flying : scheduler, threads and timeout; also: what is asked for besides counting
     """
@@ -699,7 +699,7 @@ def _flown(
 
 
 def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:
-    """Write, print, and leave with status 1 where something is not shown."""
+    """Write, print, and exit with status 1 where something is not shown."""
     if out is not None:
         result.save(out)
         terminal.print_message(f"saved {out}")
@@ -718,7 +718,7 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
 
 @contextmanager
 def counting_progress(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[str], None]]]:
-    """Progress of counting: flights up to the coming look, events so far, flights per second; then what else begins."""
+    """Show flights up to the next look, events so far, flights per second; then the later stages."""
     with progress_line(quiet) as told:
 
         def watch(p: Any) -> None:
@@ -729,7 +729,7 @@ def counting_progress(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Call
 
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
-    """Check a certificate; status 1 where it does not hold."""
+    """Check a certificate; exit with status 1 where it does not hold."""
     from airflock.certificates import check_certificate
 
     with counting_parts(f"{path}: flights again", quiet=as_json) as done:

@@ -1,4 +1,4 @@
-"""Door: who may open a page. A token in the address, then a cookie; everything else is turned away.
+"""Access to a page: a token in the address, then a cookie; every other request is refused.
 
 The web server of viser has no such check. It serves through `websockets`, whose one call is wrapped while the server
 starts; the same place gives the page a few lines of its own (keys on a slider do not turn the camera; sliders, fields
@@ -69,7 +69,7 @@ addEventListener("DOMContentLoaded", () => {
 def check_access(
     path: str, cookies: str, cookie_name: str, token: str, origin: str = "", host: str = ""
 ) -> tuple[bool, bool]:
-    """Whether a request may pass, and whether it came with the token in its address.
+    """Return two booleans: whether a request may pass, and whether it came with the token in its address.
 
     path   : with its query; cookies : the header; name : of the cookie that holds the token
     origin : header that names the page that asks, if any; host : header that names the address that it asks
@@ -90,7 +90,7 @@ def check_access(
 
 @contextmanager
 def require_token(token: str, port: int) -> Iterator[None]:
-    """Servers of websockets started meanwhile ask for the token."""
+    """Let the servers of websockets that start inside require the token."""
     serve, name = websockets.asyncio.server.serve, f"airflock_{port}"
 
     def with_check(handler: Any, *where: Any, process_request: Callable[..., Any], **rest: Any) -> Any:

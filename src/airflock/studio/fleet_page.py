@@ -1,4 +1,6 @@
-"""Page of a running fleet: drones where they are, their phases, links and faults, and what happened. It only looks."""
+"""Page of a running fleet: positions, phases, links and faults of its drones, and a list of events. It sends
+nothing.
+"""
 
 import html
 import time
@@ -46,7 +48,9 @@ TABLE_TAG = "<table style='width:100%;font-size:0.8em;border-collapse:collapse;t
 
 
 def members_html(observer: FleetObserver, now: float) -> str:
-    """A row for each drone: phase, height, speed, battery, whom it hears, age of its last packet."""
+    """Return a table with a row for each drone: phase, height, speed, battery, drones heard, age of its last
+    packet.
+    """
     heads = ("", "phase", "m", "m/s", "%", "hears", "s ago")
     rows = [f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"]
     members = observer.card.members
@@ -69,7 +73,7 @@ def _member_row(member: int, peer: Peer, now: float) -> str:
 
 
 def drone_html(observer: FleetObserver, member: int, now: float) -> str:
-    """All that one drone tells of itself."""
+    """Return everything that one drone reports about itself."""
     peer = observer.peers[member]
     if peer.status is None or peer.state is None:
         return small_print_html(f"<b>drone {member}</b>: not heard yet")
@@ -86,7 +90,7 @@ def drone_html(observer: FleetObserver, member: int, now: float) -> str:
 
 
 def faults_html(observer: FleetObserver) -> str:
-    """Faults that hold, with what they do."""
+    """Return the active faults and their effects."""
     said = (
         INJECTED_KINDS
         | FAULT_TEXTS
@@ -97,12 +101,12 @@ def faults_html(observer: FleetObserver) -> str:
 
 
 def _first_sentence(doc: str) -> str:
-    """What a kind of fault does, by the first sentence of its own words."""
+    """Return the first sentence of a fault's description."""
     return doc.partition(": ")[2].partition(".")[0]
 
 
 def notes_html(observer: FleetObserver) -> str:
-    """What happened, newest first."""
+    """Return the events, newest first."""
     lines = []
     for told in list(observer.notes)[: -MAX_NOTES - 1 : -1]:
         who = f"drone {told.member}: " if told.member else ""
@@ -111,7 +115,7 @@ def notes_html(observer: FleetObserver) -> str:
 
 
 def fleet_warning(observer: FleetObserver, now: float) -> str:
-    """What is wrong with the whole: nothing arrives, or what arrives is not believed."""
+    """Return a warning for the whole fleet: no packets arrive, or their signatures are not valid."""
     refused = observer.refused
     most = max(refused, key=refused.__getitem__, default="")
     if not observer.accepted_count and sum(refused.values()) >= MIN_REFUSED:
@@ -154,7 +158,7 @@ ONE_WAY_GREY = 225  # grey of a link on which packets arrive one way only
 
 
 class FleetScene:
-    """The scene of a page that watches a fleet.
+    """Scene of a page that watches a fleet.
 
     way, links, follow : what its controls say; trails : behind the drones
     shown : the last shade, whose key stands on the page
@@ -188,7 +192,7 @@ class FleetScene:
         view.look_at(field.centre + field.span * PANEL_OFFSET, field.span, False)
 
     def frame(self, now: float, selected: int | None) -> None:
-        """Draw the fleet as it is known now; `chosen`: place of a drone among the members."""
+        """Draw the fleet as it is known now; `chosen`: index of a drone among the members."""
         position, velocity, known = self._motion(now)
         self.shown = self._agent_colours(now, velocity, position)
         tone = self.shown.colours
@@ -207,11 +211,11 @@ class FleetScene:
             self.view.follow(position[selected].astype(float))
 
     def positions(self, now: float) -> NDArray[np.float64]:
-        """Places of all members (drone, 3), m; far below who was never heard."""
+        """Return the positions of all members (drone, 3), m; drones never heard lie far below."""
         return self._motion(now)[0].astype(float)
 
     def _motion(self, now: float) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
-        """Positions and velocities (drone, 3), and who was ever heard."""
+        """Return positions and velocities (drone, 3), and a mask of the drones that were ever heard."""
         count = len(self.members)
         position, velocity, known = np.zeros((count, 3), np.float32), np.zeros((count, 3), np.float32), []
         for number, member in enumerate(self.members):
@@ -340,7 +344,7 @@ class FleetPage:
         self.frame(True)
 
     def ask(self, action: Callable[[], None]) -> None:
-        """Do something before the next frame; from any thread."""
+        """Queue an action for the next frame; from any thread."""
         self._asked.put(action)
 
     def stop(self) -> None:
@@ -374,11 +378,11 @@ class FleetPage:
     # -------------------------------------------------------------------------------------------------- selecting
 
     def select(self, number: int | None) -> None:
-        """Select a drone by its place among the members, or none."""
+        """Select a drone by its index among the members, or none."""
         self.chosen = number
 
     def select_next(self, count: int) -> None:
-        """Select a drone some places on."""
+        """Select a drone some indices on."""
         now = -1 if self.chosen is None and count > 0 else self.chosen or 0
         self.select((now + count) % len(self.observer.card.members))
 
@@ -408,7 +412,7 @@ class FleetPage:
             self.about.content = drone_html(observer, card.members[self.chosen], now)
 
     def _measure(self, now: float) -> None:
-        """Add the present moment to the charts, once somebody was heard."""
+        """Add the present moment to the charts, once any drone was heard."""
         observer, flying = self.observer, self.observer.flying(now)
         if not observer.accepted_count:
             return

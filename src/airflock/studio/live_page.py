@@ -1,4 +1,4 @@
-"""Watch: a page in the browser that shows a flight and lets it be played, tuned and measured; or a fleet that flies."""
+"""airflock.watch: open a page in the browser that shows a live flight, or a fleet that flies."""
 
 import os
 import time
@@ -92,7 +92,7 @@ def watch(
 
 
 def _check_unused(subject: str, options: Mapping[str, Any], needed: str) -> None:
-    """Raise StudioError for what was given and would do nothing."""
+    """Raise StudioError for options that would have no effect."""
     given = [name for name, value in options.items() if value]
     if given:
         raise StudioError(f"{subject}; {' and '.join(given)} need{'s' * (len(given) == 1)} {needed}")
@@ -104,13 +104,13 @@ DEFAULT_RADIOS = (f"udp:{DEFAULT_WATCH_ADDRESS[0]}:{DEFAULT_WATCH_ADDRESS[1]}",)
 
 
 class ListeningRadios:
-    """Open radios that are only listened to: pieces of a serial line are put together to frames."""
+    """Open radios that only listen: pieces of a serial line are joined to frames."""
 
     def __init__(self, ports: Sequence[Port]):
         self._ports_and_streams = [(port, FrameStream() if isinstance(port, SerialPort) else None) for port in ports]
 
     def __call__(self) -> Iterator[bytes]:
-        """Datagrams that have arrived."""
+        """Yield the datagrams that have arrived."""
         for port, line in self._ports_and_streams:
             for data in port.read():
                 yield from [data] if line is None else line.whole_frames(data)
@@ -124,7 +124,7 @@ class ListeningRadios:
 def open_card_and_radios(
     card: Path, key: Path | None, radios: Sequence[str]
 ) -> tuple[FlightCard, bytes, ListeningRadios]:
-    """Card, key and open radios. Raises CardError with all faults at once, and leaves nothing open."""
+    """Return card, key and open radios. Raises CardError with all errors at once, and leaves nothing open."""
     faults: list[str] = []
     found, secret, ports = None, b"", []
     with collect_errors(faults):

@@ -1,4 +1,4 @@
-"""Selecting: the agent that was clicked, what it perceives, and a push."""
+"""Selection panel: the clicked agent, its percepts, and a push."""
 
 import html
 import math
@@ -39,14 +39,14 @@ class PerceptDrawing(NamedTuple):
 
 
 class PerceptLines:
-    """Eyes of the selected agent; remembers the world that it looked at, and how strong each term has been."""
+    """Percepts of the selected agent as lines; keeps the world last seen, and the strongest value of each term."""
 
     def __init__(self) -> None:
         self._world: tuple[Scenario, FlightWorld] | None = None
         self._strongest: dict[str, float] = {}
 
     def of(self, pane: FlightPane, agent: int, dart_length: float, max_speed: float) -> PerceptDrawing:
-        """What an agent perceives.
+        """Return the percepts of an agent.
 
         size : of a dart, m; top : speed that gives the longest arrow, m/s
         """
@@ -72,7 +72,7 @@ class PerceptLines:
     def _term_arrows(
         self, seen: Seen, own: NDArray[Any], size: float, model: Model
     ) -> tuple[NDArray[Any], NDArray[Any], list[str]]:
-        """Arrows of what the law was given: of all neighbours, of each, and of all surfaces.
+        """Return arrows of the law's terms: of all neighbours, of each, and of all surfaces.
 
         Terms of a law have units of their own, so each is as long as it is beside the strongest of its kind so far.
         """
@@ -98,7 +98,7 @@ class PerceptLines:
     def _ray_lines(
         self, scenario: Scenario, memory: Memory, seen: Seen
     ) -> tuple[tuple[NDArray[Any], NDArray[Any]], str]:
-        """The fan of rays that the agent casts: green where free, red up to what it met."""
+        """Return the fan of rays that the agent casts: green where free, red up to the hit."""
         if self._world is None or self._world[0] is not scenario:
             self._world = scenario, FlightWorld(scenario)
         place, course = self._world[1], GoalCourse(scenario)
@@ -119,7 +119,7 @@ class PerceptLines:
 
 
 def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], list[NDArray[Any]]]]:
-    """What the law was given, by its own words: each vector, and what each neighbour adds to it; then the surfaces.
+    """Return the law's vectors by its own words: each with the part of each neighbour; then the surfaces.
 
     A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour that flies alike
     would cause, too, and alignment, which is the rest.
@@ -146,7 +146,7 @@ def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], li
 
 
 def _neighbour_lines(view: Seen, own: NDArray[Any], size: float, measured: NDArray[Any]) -> dict[str, Any]:
-    """Lines to those whom its law takes notice of; crosses where it heard them, and where each now believes to be.
+    """Return lines to the neighbours that the law uses; crosses at their measured and believed positions.
 
     measured : (component, agent), what each believes of itself, m and m/s
     """
@@ -167,18 +167,18 @@ def _neighbour_lines(view: Seen, own: NDArray[Any], size: float, measured: NDArr
 
 
 def _noticed_neighbours(view: Seen) -> list[bool]:
-    """Of each that is heard, whether the law made anything of it; all where the law has no rule of one neighbour."""
+    """Return a mask of the heard neighbours that change the law's result; all if it has no rule of one neighbour."""
     return [any(term) for term in view.terms] if view.terms else [True] * len(view.heard)
 
 
 def cross_segments(places: NDArray[Any], half: float) -> NDArray[Any]:
-    """Two strokes at each place (place, 3), m."""
+    """Return two strokes at each place (place, 3), m."""
     cross = half * np.array([[[-1, -1, 0], [1, 1, 0]], [[-1, 1, 0], [1, -1, 0]]], float)
     return np.asarray((places[:, None, None] + cross).reshape(-1, 2, 3))
 
 
 def _agent_words(view: Seen, scenario: Scenario) -> list[str]:
-    """What is said of any agent."""
+    """Return the text about an agent."""
     oldest = max((other.age for other in view.heard), default=0.0)
     off = math.dist(view.true[:3], view.own[:3])
     wish = ", ".join(f"{part:.2f}" for part in view.command)
@@ -206,7 +206,7 @@ def _colour_mark_html(tone: tuple[int, int, int], mark: str = "━") -> str:
 
 
 def _wake_segments(scenario: Scenario, motion: tuple[NDArray[Any], NDArray[Any]]) -> NDArray[Any]:
-    """The two outermost trailing legs of every wing, straight back."""
+    """Return the two outermost trailing legs of every wing, straight back."""
     position, velocity = (part.astype(float) for part in motion)
     span, ahead = float(scenario.wing.span), np.array([1.0, 0.0, 0.0])
     if scenario.wing.frame == "ground":
@@ -218,7 +218,7 @@ def _wake_segments(scenario: Scenario, motion: tuple[NDArray[Any], NDArray[Any]]
 
 
 def _drag_text(memory: Memory, agent: int) -> str:
-    """Drag of a bird, and what the wash of the others makes of it."""
+    """Return the drag of a bird, and the effect of the others' wash on it."""
     which = "power" if "shared_power_drag" in memory.driver.ROWS else "model"
     drag = float(memory.rows([f"shared_{which}_drag"])[0, agent])
     said = f"{_colour_mark_html(agent_colours.SKY)} wakes; induced drag {drag:.3g} N"
@@ -235,7 +235,7 @@ NOTHING_SELECTED_TEXT = small_print_html("click an agent, or press S")
 
 
 class SelectionPanel(PagePanel):
-    """Whoever is selected, counted through the agents of all sides."""
+    """Panel of the selected agent, counted through the agents of all panes."""
 
     def __init__(self, page: "FlightPage"):
         super().__init__(page)
@@ -258,11 +258,11 @@ class SelectionPanel(PagePanel):
         self.widgets.command("Next agent", "S", self.ask(lambda: self.select_next(1)))
 
     def rebuild(self) -> None:
-        """Nobody is selected in another flight."""
+        """Clear the selection for another flight."""
         self.chosen, self.percept_lines = None, PerceptLines()
 
     def select(self, agent: int | None) -> None:
-        """Select an agent, or nobody."""
+        """Select an agent, or none."""
         self.chosen = agent
         self.page.frame(True)
 
@@ -286,7 +286,7 @@ class SelectionPanel(PagePanel):
             self.player.push(agent, 2.0 * self.scene.top / 1.5, side)
 
     def refresh(self) -> None:
-        """What the selected agent perceives and commands."""
+        """Show percepts and command of the selected agent."""
         if self.chosen is None:
             self.about.content = NOTHING_SELECTED_TEXT
             for kind in AGENT_LINE_KINDS:
@@ -310,7 +310,7 @@ class SelectionPanel(PagePanel):
         self.about.content = small_print_html(drawn.html.replace("</b>", f"{where}</b>", 1))
 
     def begin_fault(self) -> None:
-        """Let the fault that the menu names begin in the selected agent."""
+        """Begin the fault that the menu names in the selected agent."""
         if self.chosen is not None:
             side, agent = self.scene.pane_and_agent(self.chosen)
             self.player.sides[side].flight.fault(self.fault.value, agent, wait=False)

@@ -1,4 +1,6 @@
-"""Order parameters over time (Vásárhelyi et al. 2018, Figs 3 and 4 D)."""
+"""Plots of order parameters: over time, over goals, over swept keys, and as transfer functions (Vásárhelyi et al.
+2018).
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -41,7 +43,7 @@ def series(
     settings: Mapping[str, Any] | None = None,
     ax: Axes | None = None,
 ) -> Figure:
-    """Correlation, speed in units of v_flock, nearest neighbours (m) and rotation at every instant.
+    """Plot correlation, speed in units of v_flock, nearest neighbours (m) and rotation at every instant.
 
     recording   : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; by default the whole flight
@@ -90,7 +92,7 @@ def series(
 
 
 def _mark_faults(recording: xr.Dataset, course: pd.DataFrame, upper: Axes, lower: Axes) -> None:
-    """A line where each fault begins, with its kind and agent where there are few."""
+    """Draw a line where each fault begins, with its kind and agent where there are few."""
     shown = [told for told in recorded_faults(recording) if course.index[0] <= told["begin"] <= course.index[-1]]
     for told in shown:
         for axes in (upper, lower):
@@ -103,7 +105,7 @@ def _mark_faults(recording: xr.Dataset, course: pd.DataFrame, upper: Axes, lower
 
 
 class SmoothedLines:
-    """Draws courses smoothed, with every instant faint behind.
+    """Lines that are smoothed, with every instant faint behind.
 
     course : order parameters over time, s; smooth : window, s; None for a two-hundredth of the course, 0 for none
     """
@@ -120,7 +122,7 @@ class SmoothedLines:
 
     @property
     def told(self) -> str:
-        """What a title says of the window."""
+        """Words of the title that describe the window."""
         return f" · means over {self.window_seconds:.3g} s" if self.count > 1 else ""
 
     def draw(self, axes: Axes, values: pd.Series, color: str, label: str, *, least: bool = False) -> list[Any]:
@@ -135,7 +137,7 @@ class SmoothedLines:
 
 
 def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax: Axes | None) -> Figure:
-    """Every value of a metric set that has no picture of its own, one below the other; none of what is not there."""
+    """Plot every value of a metric set without a picture of its own, one below the other; skip missing values."""
     walled = scenario_or_none(recording) is not None
     names = [name for name in course.columns if course[name].notna().any() and (walled or name not in WALL_METRICS)]
     units = course.attrs.get("units", {})
@@ -162,7 +164,7 @@ def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax:
 def rotations(
     flights: Mapping[str, xr.Dataset], *, start: float | None = None, stop: float | None = None, ax: Axes | None = None
 ) -> Figure:
-    """phi_LAP of several flights on one axis (Vásárhelyi et al. 2018, Fig. 4 D): near ±1 where they circle.
+    """Plot phi_LAP of several flights on one axis (Vásárhelyi et al. 2018, Fig. 4 D): near ±1 where they circle.
 
     flights     : label → recording, (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; ax : axes to draw into, instead of a new figure
@@ -216,7 +218,7 @@ def flocked(
     settings: Mapping[str, Any] | None = None,
     ax: Axes | None = None,
 ) -> Figure:
-    """Share of agents flocked and their polarisation, sub-swarms and collisions at every instant; lines mark goals.
+    """Plot the share of flocked agents, polarisation, sub-swarms and collisions over time; lines mark goals.
 
     recording   : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; settings : keys that replace those the recording was flown with
@@ -277,7 +279,7 @@ def heatmap(
     scenario: Scenario | None = None,
     ax: Axes | None = None,
 ) -> Figure:
-    """One order parameter over one or two swept keys.
+    """Plot one order parameter over one or two swept keys.
 
     table    : tidy, one row per flight: a column for each key, one for `value`, usually `seed`
     keys     : one or two swept keys; the first is the horizontal axis
@@ -335,7 +337,7 @@ def _are_numbers(levels: list[Any]) -> bool:
 
 
 def _named_ticks(axes: Axes, axis: str, levels: list[Any]) -> None:
-    """Levels as names at 0, 1, 2, ...; every so many of them when there are many."""
+    """Label levels as names at 0, 1, 2, ...; only every n-th of them when there are many."""
     every = max(1, -(-len(levels) // 12))
     names = [f"{v:g}" if isinstance(v, (int, float, np.number)) else str(v) for v in levels]
     getattr(axes, f"set_{axis}ticks")(range(0, len(levels), every), names[::every])
@@ -375,7 +377,7 @@ def _map(figure: Figure, axes: Axes, table: pd.DataFrame, keys: Sequence[str], v
 
 
 def _write(axes: Axes, mesh: Any, edges: list[Any], cells: Any) -> None:
-    """The number in each cell, dark or light, whichever reads better on its colour."""
+    """Write the number into each cell, dark or light, whichever reads better on its colour."""
     size = style.SMALL_SIZE - 1.0 if max(cells.shape) <= 8 else style.SMALL_SIZE - 2.5
     for (row, column), number in np.ndenumerate(cells):
         if np.ma.is_masked(cells[row, column]):
@@ -387,7 +389,7 @@ def _write(axes: Axes, mesh: Any, edges: list[Any], cells: Any) -> None:
 
 
 def _cell_edges(axes: Axes, axis: str, levels: list[Any]) -> Any:
-    """Borders of cells: to scale where levels are evenly spaced numbers, else of equal size and named one by one."""
+    """Return the borders of cells: to scale for evenly spaced numbers, else cells of equal size with a name each."""
     steps = np.diff(np.array(levels, dtype=float)) if _are_numbers(levels) else np.zeros(0)
     if len(levels) > 12 and steps.size and steps.max() < 1.01 * steps.min():
         places: Any = np.array(levels, dtype=float)
@@ -404,7 +406,7 @@ def _cell_edges(axes: Axes, axis: str, levels: list[Any]) -> Any:
 
 
 def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Figure:
-    """F1, F2 and F3 (Vásárhelyi et al. 2018, Eqs 17-20 and Fig. 7), each over the order parameter that it judges.
+    """Plot F1, F2 and F3 (Vásárhelyi et al. 2018, Eqs 17-20 and Fig. 7), each over its order parameter.
 
     scenario : draws them with its v_flock, tolerances and units; without it, in units of their own parameters
     ax       : axes of a grid, whose place the panels take, instead of a new figure

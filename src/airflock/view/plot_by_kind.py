@@ -1,4 +1,4 @@
-"""One door to the pictures of a scenario or a recording, by the name of the kind."""
+"""`airflock.plot`: draw a scenario or a recording, by the name of the kind of picture."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -129,7 +129,7 @@ def recording_or_flight(
     source: PlotSource, seed: int, settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False,
     keep: Sequence[str] = (),
 ) -> xr.Dataset:  # fmt: skip
-    """The recording that is given or named, or a flight of the scenario that is."""
+    """Return the recording, open the named recording, or fly the scenario."""
     if isinstance(source, xr.Dataset) or _is_recording_file(source):
         if settings or law is not None:
             raise AirflockError(
@@ -141,7 +141,7 @@ def recording_or_flight(
 
 @contextmanager
 def naming_file(source: Any) -> Iterator[None]:
-    """Faults of a recording that are told inside begin with the name of its file, where it is one."""
+    """Put the name of the recording's file in front of the RecordingErrors raised inside."""
     try:
         yield
     except RecordingError as fault:

@@ -81,7 +81,7 @@ def pack_positions(position: NDArray[Any], rows: Sequence[NDArray[np.uint8]] = (
 
 
 def unpack_positions(packed: PackedPositions) -> tuple[NDArray[np.float64], list[NDArray[np.uint8]]]:
-    """Positions (time, axis, agent), m, within half a quantum of those packed, and the rows of bytes."""
+    """Return positions (time, axis, agent), m, within half a quantum of those packed, and the rows of bytes."""
     frames, axes, agents = packed.shape
     data = np.frombuffer(zlib.decompress(packed.data), np.uint8)
     halves = data[: 2 * frames * axes * agents].reshape(2, -1).astype(np.uint16)
@@ -114,7 +114,8 @@ class ColourLayer(NamedTuple):
 def colour_layers(
     recording: xr.Dataset, scenario: Scenario | None, position: NDArray[Any], present: NDArray[np.bool_], stride: int
 ) -> list[ColourLayer]:
-    """Layers of a recording: clusters, groups, faults, numbers that differ among agents, and its own variables.
+    """Return the layers of a recording: clusters, groups, faults, numbers that differ among agents, its own
+    variables.
 
     position : (frame, axis, agent), m, and present : (frame, agent), of every `stride`-th instant
     """
@@ -136,7 +137,7 @@ def colour_layers(
 
 
 def scenario_layer_names(scenario: Scenario) -> list[str]:
-    """Names of the layers of a flight of a scenario, before it is flown."""
+    """Return the names of the layers of a flight of a scenario, before it is flown."""
     clustered = math.isfinite(cluster_distance(scenario))
     return [
         *(["cluster"] if clustered else []),
@@ -148,7 +149,7 @@ def scenario_layer_names(scenario: Scenario) -> list[str]:
 
 
 def _cluster_layer(scenario: Scenario, position: NDArray[Any], present: NDArray[np.bool_]) -> Iterator[ColourLayer]:
-    """Clusters at each frame, of a scenario whose order parameters or law say how near a neighbour is."""
+    """Return the clusters at each frame, if an order parameter or the law defines how near a neighbour is."""
     reach = cluster_distance(scenario)
     if not math.isfinite(reach):
         return
@@ -168,7 +169,7 @@ def _cluster_layer(scenario: Scenario, position: NDArray[Any], present: NDArray[
 
 
 def _variable_layers(recording: xr.Dataset, stride: int) -> Iterator[ColourLayer]:
-    """Every variable of the recording that holds one number for each individual, at each time or for good."""
+    """Return every variable that holds one number for each individual, at each time or for the whole flight."""
     for name, variable in recording.data_vars.items():
         sizes = dict(variable.sizes)
         if str(name) in NO_LAYER_VARIABLES or "individual" not in sizes or variable.dtype.kind not in "fiub":
@@ -188,7 +189,7 @@ def _variable_layers(recording: xr.Dataset, stride: int) -> Iterator[ColourLayer
 
 
 def _to_layer(shade: AgentColours, values: NDArray[Any]) -> ColourLayer:
-    """Values (time, agent) as bytes."""
+    """Encode values (time, agent) as bytes."""
     whole = np.asarray(values, float)
     known = np.isfinite(whole) & ((whole >= 0.0) | (shade.kind == NUMBERS))
     part = np.where(known, whole, 0.0)
@@ -232,7 +233,7 @@ class Replay:
 
 
 def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "speed") -> Replay:
-    """Page that plays a recording; it opens from disk without network and displays itself in a notebook.
+    """Build a page that plays a recording; it opens from disk without network and displays itself in a notebook.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     rate      : frames per second that are kept at most
@@ -297,7 +298,7 @@ def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "spee
 
 
 def check_colour(scenario: Scenario, colour: str) -> None:
-    """Raise RecordingError for a colour that a replay of a flight of a scenario would refuse: before it is flown."""
+    """Raise RecordingError for a colour that the replay of a scenario would refuse, before the flight."""
     _check_colour(colour, [*_motion_colourings(scenario.dimensions), *scenario_layer_names(scenario)], scenario.name)
 
 
@@ -312,7 +313,7 @@ def _check_colour(colour: str, colourings: Sequence[str], owner: str) -> None:
 
 
 def _page_html(name: str, about: dict[str, Any], data: bytes) -> str:
-    """The template with everything in its place."""
+    """Fill the template."""
     root = resources.files("airflock.view") / "replays"
     text = (root / "replay.html").read_text(encoding="utf-8")
     parts = {
@@ -326,7 +327,7 @@ def _page_html(name: str, about: dict[str, Any], data: bytes) -> str:
 
 
 def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
-    """Frames in which an absent agent stays where it was last, or where it will be first."""
+    """Keep an absent agent at its last position, or at its first one before it appears."""
     if present.all():
         return frames
     times = np.arange(len(frames))[:, None]
@@ -339,19 +340,19 @@ def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
 
 
 def _charts(courses: Mapping[str, NDArray[Any]]) -> list[list[Any]]:
-    """Charts, as titles and values, of what is known at some time: a lone agent has no nearest pair."""
+    """Return charts, as titles and values, of what is known at some time: a lone agent has no nearest pair."""
     return [[title, _rounded(values)] for title, values in courses.items() if np.isfinite(values).any()]
 
 
 def _mean_over_present(speed: NDArray[Any]) -> NDArray[Any]:
-    """Mean (time,) over those present; nan where nobody is."""
+    """Return the mean (time,) over present agents; nan where there is none."""
     known = np.isfinite(speed)
     total = np.where(known, speed, 0.0).sum(axis=1)
     return np.asarray(np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan))
 
 
 def _layer_json(shade: AgentColours) -> dict[str, Any]:
-    """What the page needs to know of a layer."""
+    """Return the entries of the page for one layer."""
     words = f"{COLOURING_NOTES.get(shade.name, shade.name)}; {shade.told}" if shade.kind == IDENTITIES else shade.told
     return {
         "name": shade.name, "kind": shade.kind, "ends": [f"{shade.low:.3g}", f"{shade.high:.3g} {shade.unit}".strip()],
@@ -363,7 +364,7 @@ def _layer_json(shade: AgentColours) -> dict[str, Any]:
 def _nearest_and_collisions(
     position: NDArray[Any], present: NDArray[np.bool_], period: float, scenario: Any
 ) -> tuple[NDArray[Any], list[tuple[float, int, int]]]:
-    """Smallest distance at each frame (m; nan of one agent), and when which pair came nearer than a collision."""
+    """Return the smallest distance at each frame (m; nan of one agent), and the collisions: time and pair."""
     measured = scenario.resolved_metrics() if scenario else None
     limit = (
         float(measured.r_coll)
@@ -392,7 +393,7 @@ def _nearest_and_collisions(
 
 
 def _event_rows(recording: xr.Dataset, scenario: Any) -> list[list[Any]]:
-    """What was done to the flight: when, s, and what."""
+    """Return the events of a flight: time, s, and text."""
     found = [] if scenario is None else to_events(attributes.recorded_events(recording))[:MAX_EVENTS]
     return [[event.step * scenario.flight.dt, _event_text(event)] for event in found]
 
@@ -402,7 +403,7 @@ def _event_text(event: Event) -> str:
 
 
 def _scene_json(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> dict[str, Any]:
-    """What stands in the world, as plain lists."""
+    """Return the scene as plain lists."""
     axes = position.shape[1]
     low, high = position.min(axis=(0, 2)), position.max(axis=(0, 2))
     centre, span = [*(0.5 * (low + high)), *[0.0] * (3 - axes)], 0.55 * float(max(np.ptp([low, high], axis=0)))
@@ -419,15 +420,15 @@ def _scene_json(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> d
 
 
 def _longest_step(scenario: Any) -> float | None:
-    """Longest way between two frames that is flown, not a way through a periodic face, m; None without one."""
+    """Return the longest step between two frames that is not a jump through a periodic face, m; None if unbounded."""
     return 0.5 * float(scenario.world.side) if scenario and scenario.world.edges == "periodic" else None
 
 
 def _rounded(values: NDArray[Any]) -> list[float | None]:
-    """Numbers of five digits, for JSON; null for what is not finite."""
+    """Round numbers to five digits, for JSON; null for numbers that are not finite."""
     return [float(f"{v:.5g}") if np.isfinite(v) else None for v in np.asarray(values, float).tolist()]
 
 
 def _rounded_up(value: float) -> float:
-    """A little more than a value, of two digits."""
+    """Round a value up to two digits."""
     return float(f"{max(value, 1e-6) * 1.1:.2g}")

@@ -1,4 +1,4 @@
-"""A certificate in panels: how the bound fell, how near agents came, how far numbers may move, bounds over two."""
+"""Plots of results: certificates, identified bodies, inferred laws, reception of the radio, and displays."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> Figure:
-    """Upper bounds by flights, smallest distances, tolerances of the environment, and a map of two of its numbers.
+    """Plot upper bounds by flights, smallest distances, tolerances of the environment, and a map of two numbers.
 
     Panels without data are left out.
     """
@@ -48,7 +48,7 @@ def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> F
 
 
 def _bounds(axes: Axes, certificate: "Certificate") -> None:
-    """Upper and lower bound of every limit at every look, and the limit itself."""
+    """Draw the upper and lower bound of every limit at every look, and the limit itself."""
     for verdict, color in zip(certificate.verdicts, style.LINE_COLOURS, strict=False):
         if verdict.looks:
             n = [look.flights for look in verdict.looks]
@@ -70,7 +70,7 @@ def _bounds(axes: Axes, certificate: "Certificate") -> None:
 
 
 def _distances(axes: Axes, certificate: "Certificate") -> None:
-    """Share of flights whose smallest distance was below a value; dashed: limits on it.
+    """Draw the share of flights whose smallest distance was below a value; dashed: limits on it.
 
     Dotted: the tail as extreme value theory extrapolates it (`extrapolated_tail`), to look at; no bound comes from it.
     """
@@ -93,7 +93,7 @@ def _distances(axes: Axes, certificate: "Certificate") -> None:
 
 
 def extrapolated_tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Distances (point,), m, and the share of flights below them (point,), extrapolated from the nearest flights.
+    """Extrapolate the share of flights (point,) below distances (point,), m, from the nearest flights.
 
     distances : smallest one of each flight, growing
 
@@ -120,7 +120,7 @@ def extrapolated_tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float6
 
 
 def _tolerances(axes: Axes, certificate: "Certificate") -> None:
-    """Tornado: factor by which each number may move, from its nominal value; those from zero without a bar.
+    """Draw a tornado plot: the factor by which each number may move; numbers with nominal value zero get no bar.
 
     Black: the interval that the scenario's file gives, as identified.
     """
@@ -151,7 +151,7 @@ def _tolerances(axes: Axes, certificate: "Certificate") -> None:
 
 
 def _bound_map(axes: Axes, certificate: "Certificate") -> None:
-    """Upper bound over two numbers; the line is the level below which a cell is safe."""
+    """Draw the upper bound over two numbers; the line is the level below which a cell is safe."""
     told = certificate.over
     rows, columns = (np.array(values) for values in told["axes"])
     high = np.array([cell["high"] for cell in told["cell"]]).reshape(len(rows), len(columns))
@@ -178,7 +178,9 @@ MAX_POINTS = 4000  # points in the second
 
 
 def plot_identified(result: IdentifyResult, check: LogCheck | None = None, *, ax: Axes | None = None) -> Figure:
-    """Commanded, flown and computed velocity; limit of acceleration; noise by lag; standing error; reception; order."""
+    """Plot commanded, flown and computed velocity; acceleration limit; noise by lag; ground error; reception;
+    order.
+    """
     figure, panels = style.figure_and_panels(ax, 2, 3, 10.0, 5.6)
     axes = panels.reshape(-1)
     flying = result.logs.flying()
@@ -206,7 +208,7 @@ def _empty(panel: Axes, text: str) -> None:
 
 
 def _draw_step_response(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
-    """Velocity east: commanded, logged, and computed from its first row on by the fitted body."""
+    """Draw velocity east: commanded, logged, and computed from its first row on by the fitted body."""
     rows = logs.of(int(logs.who[0]))
     run = np.cumsum(logs.is_new[rows])
     rows = rows[run == np.bincount(run).argmax()]
@@ -231,7 +233,7 @@ def _draw_step_response(panel: Axes, logs: FlightLogs, result: IdentifyResult) -
 
 
 def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
-    """Acceleration along the gap against gap / tau, with the limit."""
+    """Draw acceleration along the gap against gap / tau, with the limit."""
     run = np.cumsum(logs.is_new)
     k = np.arange(len(run) - 3)
     k = k[(run[k] == run[k + 3]) & (np.abs(logs.command[k + 2] - logs.command[k]).max(axis=1) < 1e-9)]
@@ -258,7 +260,7 @@ def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> N
 
 
 def _noise(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
-    """Mean square of what one row predicts wrongly, by lag, below saturation: the log's floor and the outer noise."""
+    """Draw the mean squared error of one-row predictions by lag, below saturation: log noise and outer noise."""
     value, step = result.body.value, logs.step
     run = np.cumsum(logs.is_new)
     rate = held.decay_rate(value["tau"], result.like.flight.dt)
@@ -294,7 +296,7 @@ def _noise(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
 
 
 def _draw_ground_error(panel: Axes, result: IdentifyResult) -> None:
-    """Variogram of the velocity on the ground, with that of the fitted error."""
+    """Draw the variogram of the velocity on the ground, with that of the fitted error."""
     ground, value = result.logs.grounded_rows(), result.sensors.value
     if len(ground.time) < 50 or not np.isfinite(value["noise"]):
         _empty(panel, "no drone stood on the ground")
@@ -326,7 +328,7 @@ def _draw_ground_error(panel: Axes, result: IdentifyResult) -> None:
 
 
 def _reception(panel: Axes, result: IdentifyResult) -> None:
-    """Share of decisions with a packet, by distance (Vásárhelyi et al. 2018, Fig. 8 in this form)."""
+    """Draw the share of decisions with a packet, by distance (Vásárhelyi et al. 2018, Fig. 8 in this form)."""
     if result.radio is None or not len(result.radio.picture_bins):
         _empty(panel, "no table of packets")
         return
@@ -339,7 +341,7 @@ def _reception(panel: Axes, result: IdentifyResult) -> None:
 
 
 def _order(panel: Axes, check: LogCheck | None) -> None:
-    """Polarisation of the log inside the band of the flights."""
+    """Draw the polarisation of the log inside the band of the flights."""
     if check is None or not check.band.size or not np.isfinite(check.polarisation).any():
         _empty(panel, "no flights to compare with")
         return
@@ -360,7 +362,7 @@ MAX_LAWS = 5  # laws that are drawn
 
 
 def plot_inferred(result: InferResult, *, ax: Axes | None = None) -> Figure:
-    """Force maps, the tracks' first and then each law's, best first: along the heading above, to the left below.
+    """Plot force maps, the tracks' first and then each law's, best first: along the heading above, to the left below.
 
     Katz et al., PNAS 108, 18720 (2011). A law that acts by velocities alone, such as alignment, shows no map.
     """
@@ -398,7 +400,7 @@ MIN_PAIRS = 10  # pairs of a bin below which it is not drawn
 
 
 def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | None = None) -> Figure:
-    """Ages of what agents have of each other: median, half of all, nine tenths of all; and the share heard so far.
+    """Plot how old the agents' data of each other are: median, 50 % and 90 % bands; and the share heard so far.
 
     heard : a recording with `age` (time, receiver, sender), s, or a table of packets (`recordings.reception`)
     bins  : of distance; ax : axes of a grid, whose place the panels take, instead of a new figure
@@ -447,7 +449,7 @@ def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | N
 
 
 def stood(show: Show, titles: list[str], *, ax: Axes | None = None) -> Figure:
-    """Every shape from the south, at the end of its leg; drones that failed are not shown.
+    """Plot every shape from the south, at the end of its leg; failed drones are not shown.
 
     titles : one for each shape; ax : axes of a grid, whose place the panels take, instead of a new figure
 

@@ -1,4 +1,4 @@
-"""A model's own rules drawn against distance (Vásárhelyi et al. 2018, Fig. 6), in the words of the law.
+"""Plot of a model's own rules against distance (Vásárhelyi et al. 2018, Fig. 6), named as the law names them.
 
 A law whose neighbours act through several terms (TERMS, or several vectors among its Sums) gets a panel for each.
 """
@@ -27,14 +27,16 @@ MAX_DIFFERENCE = 1e3  # m/s; a larger allowed difference is drawn as none
 
 
 class RuleResponse(NamedTuple):
-    """Answer of a pair rule along one axis: to each vector among its sums."""
+    """Response of a pair rule along one axis, for each vector among its sums."""
 
     name: str
     values: Array
 
 
 def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
-    """What `neighbour` returns for a neighbour r (m) ahead of an agent at rest that moves sideways at dv (m/s)."""
+    """Return the sums of `neighbour` for a neighbour r (m) ahead of an agent at rest that moves sideways at dv
+    (m/s).
+    """
     side = 1.0 if dv > 0.0 else 0.0
     given = {
         "dx": r, "dy": 0.0, "dz": 0.0, "r": r, "r2": r * r, "dvx": 0.0, "dvy": dv, "dvz": 0.0, "dv": dv,
@@ -50,7 +52,9 @@ def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
 
 
 def repulsion_curve(model: Model, p: Any, r: Array) -> list[RuleResponse]:
-    """Push away from a neighbour at rest at distances r (m), positive outwards; one Response per vector."""
+    """Return the push away from a resting neighbour at distances r (m), positive outwards; one response per
+    vector.
+    """
     sums = [pair_sums(model, p, float(d)) for d in r]
     return [
         RuleResponse(name, np.array([-getattr(s, x) for s in sums], dtype=float))
@@ -59,7 +63,9 @@ def repulsion_curve(model: Model, p: Any, r: Array) -> list[RuleResponse]:
 
 
 def alignment_curve(model: Model, p: Any, r: Array, dv: float) -> list[RuleResponse]:
-    """Response along a velocity difference dv (m/s) at distances r (m), beyond what a neighbour at rest causes."""
+    """Return the response to a velocity difference dv (m/s) at distances r (m), beyond that to a resting
+    neighbour.
+    """
     rest = [pair_sums(model, p, float(d)) for d in r]
     moved = [pair_sums(model, p, float(d), dv) for d in r]
     return [
@@ -71,7 +77,7 @@ def alignment_curve(model: Model, p: Any, r: Array, dv: float) -> list[RuleRespo
 
 
 def allowed_difference_curve(model: Model, p: Any, r: Array) -> Array:
-    """Largest velocity difference (m/s) at distances r (m) that causes no alignment; nan where none does.
+    """Return the largest velocity difference (m/s) at distances r (m) that causes no alignment, or nan.
 
     Found by halving an interval, from the rule alone: any difference above it must cause some.
     """
@@ -98,7 +104,7 @@ def _largest_allowed_difference(model: Model, p: Any, r: float) -> float:
 
 
 def wall_curve(model: Model, p: Any, distance: Array, v: float) -> list[RuleResponse]:
-    """What one wall adds to the command of an agent that flies straight at it at v (m/s), positive inwards."""
+    """Return what one wall adds to the command of an agent that flies straight at it at v (m/s), positive inwards."""
     if model.boundary is None:
         raise RuleError(f"model {model.name} has no rule boundary")
     names = argument_names(model.boundary, "boundary", model.name)
@@ -120,7 +126,8 @@ def rules(
     scenario: Scenario, *, difference: float | None = None, speed: float | None = None, farthest: float | None = None,
     ax: Axes | None = None,
 ) -> Figure:  # fmt: skip
-    """Repulsion, largest allowed velocity difference and alignment, or each term of the law by its own word; walls.
+    """Plot repulsion, largest allowed velocity difference and alignment, or each term of the law by its own word;
+    walls.
 
     scenario   : whose law is drawn, with its numbers
     difference : velocity difference of the pair, m/s; by default the model's preferred speed
@@ -173,7 +180,7 @@ def _largest_distance(scenario: Scenario) -> float:
 
 
 def _term_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, stem: str) -> None:
-    """One term of a law: what a neighbour at rest adds to it, and what its motion adds, up to the law's own reach."""
+    """Draw one term of a law: the part of a resting neighbour and the part of its motion, up to the law's reach."""
     word, unit = term_name_and_unit(model, stem)
     assert model.neighbour is not None
     by_velocity = bool({"dvx", "dvy", "dv"} & set(argument_names(model.neighbour, "neighbour", model.name)))
@@ -198,7 +205,7 @@ def _term_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, stem: 
 
 
 def _pair_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
-    """Fig. 6 itself: repulsion, largest allowed difference, and the difference at hand."""
+    """Draw Fig. 6 itself: repulsion, largest allowed difference, and the difference at hand."""
     pushes = repulsion_curve(model, p, r)
     allowed = allowed_difference_curve(model, p, r)
     shared = unit == "m/s"  # one axis serves both

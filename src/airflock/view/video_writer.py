@@ -55,7 +55,7 @@ CHART_WIDTH = 0.62  # width of the chart beside the picture, in heights of it
 
 
 class VideoFrame:
-    """Everything that stands still, drawn once; and a picture of what moves at any instant."""
+    """Still parts of a video, drawn once, and a method that draws the moving parts at any instant."""
 
     def __init__(
         self, recording: xr.Dataset, start: float | None, stop: float | None, *, tail: float, height: int, speed: float,
@@ -106,7 +106,7 @@ class VideoFrame:
         self.still = self.canvas.copy_from_bbox(self.canvas.figure.bbox)
 
     def render(self, instant: float) -> Array:
-        """Picture at an instant (s): (row, column, red green blue alpha), 8 bits each; valid until the next one."""
+        """Draw an instant (s): (row, column, red green blue alpha), 8 bits each; valid until the next call."""
         where = self._positions(instant)
         x, y = self.view(where, axis=0)
         x0, y0, tempo = self._velocities(instant)
@@ -133,18 +133,18 @@ class VideoFrame:
                 axes.plot(x, y, color=color, linewidth=1.4)
 
     def _positions(self, instant: float) -> Array:
-        """Positions of all agents (axis, agent), m."""
+        """Return positions of all agents (axis, agent), m."""
         return _interpolated(self.paths.times, self.paths.position, instant, self._periodic_halves)
 
     @property
     def _periodic_halves(self) -> Array | None:
-        """Ways along each axis that lead through a periodic face, m."""
+        """Return half the periods of the world along each axis, m: longer steps lead through a periodic face."""
         if self.world.edges != "periodic":
             return None
         return np.array(half_sizes(self.world)[: self.paths.position.shape[1]])
 
     def _velocities(self, instant: float) -> tuple[Array, Array, Array]:
-        """Velocities of all agents along the picture, and their speeds, m/s."""
+        """Return velocities of all agents along the picture, and their speeds, m/s."""
         values = _interpolated(self.paths.times, self.paths.velocity, instant)
         return *self.view(values, axis=0), np.sqrt((values**2).sum(0))
 
@@ -167,7 +167,7 @@ class VideoFrame:
 
 
 def _canvas(size: tuple[int, int]) -> Any:
-    """A canvas of so many pixels (width, height), on a figure whose text grows with its height."""
+    """Make a canvas of so many pixels (width, height), on a figure whose text grows with its height."""
     dots = DPI_PER_PIXEL * size[1]
     figure = style.NotebookFigure((size[0] + 1e-3) / dots, (size[1] + 1e-3) / dots)
     figure.set_dpi(dots)
@@ -177,7 +177,7 @@ def _canvas(size: tuple[int, int]) -> Any:
 
 
 def _head(axes: Any, recording: xr.Dataset, speed: float) -> Any:
-    """Title and details above the picture; returns the clock, which is drawn with what moves."""
+    """Draw title and details above the picture; return the clock, which is drawn with the moving parts."""
     words: dict[str, Any] = {"va": "top", "transform": axes.transAxes}
     large: dict[str, Any] = {"fontsize": 12, "color": style.INK}
     small: dict[str, Any] = {"fontsize": 9, "color": style.GREY}
@@ -189,14 +189,14 @@ def _head(axes: Any, recording: xr.Dataset, speed: float) -> Any:
 
 
 def check_chart(chart: str, known_charts: Sequence[str], owner: str) -> None:
-    """Raise RecordingError for a chart of an order parameter that a flight does not have: also before it is flown."""
+    """Raise RecordingError for a chart of an order parameter that a flight does not have, also before the flight."""
     if chart and chart not in known_charts:
         hint = suggest(chart, known_charts, lead="; ")
         raise RecordingError(f"chart = {chart!r} is none that {owner} has: {', '.join(known_charts)}{hint}")
 
 
 def _chart(figure: Any, recording: xr.Dataset, name: str, share: float, first: FlightPaths) -> Any:
-    """An order parameter over time beside the picture; returns the line that moves."""
+    """Draw an order parameter over time beside the picture; return the line that moves."""
     course = over_time(recording)
     check_chart(name, list(course.columns), "this recording")
     values = course[name].dropna()
@@ -208,7 +208,7 @@ def _chart(figure: Any, recording: xr.Dataset, name: str, share: float, first: F
 
 
 def _interpolated(times: Array, values: Array, instant: float, period: Array | None = None) -> Array:
-    """Values (time, axis, agent) at an instant, linear between frames; the nearer frame's where one leaps farther."""
+    """Interpolate values (time, axis, agent) linearly between frames; at a jump take the nearer frame's."""
     after = int(np.clip(np.searchsorted(times, instant), 1, max(len(times) - 1, 1)))
     if len(times) == 1:
         return np.asarray(values[0])
@@ -222,7 +222,7 @@ def _interpolated(times: Array, values: Array, instant: float, period: Array | N
 
 
 def _dart_corners(x: Array, y: Array, along: Array, up: Array, length: float) -> Array:
-    """Corners (agent, corner, axis) of darts at (x, y) that point along the velocities (along, up); all m, m/s."""
+    """Return corners (agent, corner, axis) of darts at (x, y) along the velocities (along, up); all m, m/s."""
     pace = np.hypot(along, up)
     still = ~(pace > 1e-9)
     hx, hy = np.where(still, 1.0, along / np.maximum(pace, 1e-9)), np.where(still, 0.0, up / np.maximum(pace, 1e-9))
@@ -233,7 +233,7 @@ def _dart_corners(x: Array, y: Array, along: Array, up: Array, length: float) ->
 
 
 def _key(axes: Any, scale: Normalize) -> None:
-    """Small colour bar of speed in the second line of the head."""
+    """Draw a small colour bar of speed in the second line of the head."""
     low, high = float(scale.vmin or 0.0), float(scale.vmax or 1.0)
     inset = axes.inset_axes((0.42, 0.929, 0.16, 0.014))
     inset.imshow(np.linspace(0.0, 1.0, 256)[None, :], cmap=style.SPEED_COLOURS, aspect="auto")
@@ -244,7 +244,7 @@ def _key(axes: Any, scale: Normalize) -> None:
 
 
 def to_even(pixels: float) -> int:
-    """The nearest even number of pixels, which encoders ask for."""
+    """Return the nearest even number of pixels, which encoders need."""
     return 2 * max(16, round(pixels / 2.0))
 
 
@@ -334,7 +334,7 @@ def video(
 
 
 def import_ffmpeg() -> Any:
-    """The package imageio_ffmpeg, which brings an ffmpeg; raises PictureError with what to install."""
+    """Import the package imageio_ffmpeg, which brings an ffmpeg; raise PictureError with an install hint."""
     try:
         import imageio_ffmpeg
     except ModuleNotFoundError as fault:
@@ -352,12 +352,12 @@ def frame_count(
     start: float | None = None,
     stop: float | None = None,
 ) -> int:
-    """Number of pictures in such a video."""
+    """Return the number of frames of such a video."""
     return len(_frame_times(recording, fps, speed, start, stop))
 
 
 def _frame_times(recording: xr.Dataset, fps: float, speed: float, start: float | None, stop: float | None) -> Array:
-    """Instants of the pictures, s."""
+    """Return the instants of the frames, s."""
     check_positive(fps=fps, speed=speed)
     if fps > 240.0:
         raise AirflockError(f"fps = {fps:g} lies outside (0, 240] 1/s")
@@ -370,7 +370,7 @@ def _frame_times(recording: xr.Dataset, fps: float, speed: float, start: float |
 
 
 def _film(path: Path, size: tuple[int, int], fps: float) -> Any:
-    """A running ffmpeg that takes one picture at a time."""
+    """Start an ffmpeg that takes one frame at a time."""
     given: dict[str, Any] = {"fps": fps, "pix_fmt_in": "rgba", "macro_block_size": 1, "ffmpeg_log_level": "quiet"}
     if path.suffix.lower() == ".gif":
         given |= {
@@ -387,7 +387,7 @@ def _film(path: Path, size: tuple[int, int], fps: float) -> Any:
 
 
 def _complete(path: Path, frames: int) -> None:
-    """Raise unless the file holds what was handed over; ffmpeg itself says nothing about a full disk at the end."""
+    """Raise unless the file holds every frame; ffmpeg itself reports nothing when the disk is full at the end."""
     try:
         found, _ = import_ffmpeg().count_frames_and_secs(str(path))
     except (RuntimeError, OSError) as fault:

@@ -1,4 +1,4 @@
-"""Wash: the air that a formation leaves, from above, and what it makes of each bird's induced drag (Dimock & Selig)."""
+"""Plot of a formation's wash from above, and of each bird's induced drag (Dimock & Selig 2003)."""
 
 import math
 from types import FunctionType, SimpleNamespace
@@ -34,7 +34,7 @@ MAX_BIRDS = 60  # birds; the lifting line of more takes long without a compiler
 
 
 class SolvedFormation(NamedTuple):
-    """A flock as its lifting line sees it.
+    """Solution of a flock's lifting line.
 
     place       : (bird, axis) m: ahead, across (to the left), up
     circulation : (bird, segment) m²/s
@@ -66,7 +66,9 @@ def solve_formation(scenario: Scenario, position: Array, velocity: Array) -> Sol
 
 
 def downwash(scenario: Scenario, formation: SolvedFormation, points: Array, without: int = -1) -> Array:
-    """Downwash, m/s, that all wings (but one) induce at points (point, axis), m, in the formation's own axes."""
+    """Return the downwash, m/s, that all wings (but one) induce at points (point, axis), m, in the formation's
+    axes.
+    """
     wing = scenario.wing
     m, h, core = segments_of(wing), pitch(wing), wing.core * wing.span
     total = np.zeros(len(points))
@@ -82,7 +84,7 @@ def downwash(scenario: Scenario, formation: SolvedFormation, points: Array, with
 
 
 def _over_arrays(rule: Any) -> Any:
-    """A scalar rule of the aero package, as it stands, over arrays: its `math` is NumPy's."""
+    """Return a scalar rule of the aero package that works on arrays: its `math` is NumPy's."""
     return FunctionType(rule.__code__, {**rule.__globals__, "math": SimpleNamespace(sqrt=np.sqrt)})
 
 
@@ -90,7 +92,8 @@ _filament_leg = _over_arrays(filaments.leg)
 
 
 def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None = None) -> Figure:
-    """A formation from above, flying up the picture: up- and downwash in its mean plane, each wing with its drag.
+    """Plot a formation from above, flying up the picture: up- and downwash in its mean plane, each wing with its
+    drag.
 
     The number beside a wing is its induced drag against a lone bird's: -30 % is saved.
 
