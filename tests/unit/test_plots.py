@@ -406,7 +406,7 @@ def test_pictures_leave_the_global_state_of_matplotlib_alone():
 
     code = (
         "import sys, matplotlib; before = matplotlib.rcParams.copy()\n"
-        "from airflock.plots.transfer import transfer; transfer()._repr_png_()\n"
+        "from airflock.view.order_parameter_plots import transfer; transfer()._repr_png_()\n"
         "assert matplotlib.rcParams.copy() == before and 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -163,7 +163,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         'airflock.plot("flight.nc", "series")',
         "plot",
         {
-            "what": "what",
+            "what": "source",
             "kind": "kind",
             "seed": "seed",
             "begin": "start",

@@ -344,7 +344,7 @@ def sweep(
         options.announce_run_time([found for found in scenarios for _ in numbers], threads, device)
         options.compile_before_bar(scenarios[0], precision, device)
     with counting_parts(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
-        chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
+        chosen: dict[str, Any] = {"threads": threads, "precision": precision, "on_done": done, "device": device}
         tidy = fly_points(points, scenarios, numbers, **chosen, notify=terminal.print_message, scheduler=scheduler)
     _keep(tidy, list(axes), name, scenarios[0], table, plot)
     if as_json:

@@ -27,7 +27,7 @@ PlotSource = Scenario | xr.Dataset | str | os.PathLike[str]
 
 
 def plot(
-    what: PlotSource,
+    source: PlotSource,
     kind: str = "trajectories",
     *,
     seed: int = 0,
@@ -42,7 +42,7 @@ def plot(
 
     Parameters
     ----------
-    what : Scenario, xarray.Dataset, str or path
+    source : Scenario, xarray.Dataset, str or path
         A scenario or the name of one, which is flown; or a recording (time, space, keypoint, individual), or a
         file (.nc) of one.
     kind : str
@@ -83,12 +83,12 @@ def plot(
     if kind not in KINDS:
         raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}{suggest(kind, KINDS, lead='; ')}")
     if kind in SCENARIO_KINDS:
-        _refuse_tracks(what, kind)
-        scenario = _scenario(what, settings, law, trust)
+        _refuse_tracks(source, kind)
+        scenario = _scenario(source, settings, law, trust)
         return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)
     keep = ("heard",) if kind == "reception" else ()
-    recording = recording_or_flight(what, seed, settings, law, trust=trust, keep=keep)
-    with naming_file(what):
+    recording = recording_or_flight(source, seed, settings, law, trust=trust, keep=keep)
+    with naming_file(source):
         return _of_recording(recording, kind, start, stop, ax)
 
 
