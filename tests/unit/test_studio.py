@@ -426,8 +426,8 @@ def test_agents_are_coloured_by_group_fault_cluster_and_their_own_numbers(interp
 
 
 def test_two_flocks_have_one_scale_and_one_list_of_names():
-    first = AgentColours("fault", "names", np.array([0, -1]), names=("motor",), told="sound")
-    second = AgentColours("fault", "names", np.array([1, 0]), names=("stuck", "motor"), told="sound")
+    first = AgentColours("fault", "names", np.array([0, -1]), names=("motor",), note="sound")
+    second = AgentColours("fault", "names", np.array([1, 0]), names=("stuck", "motor"), note="sound")
     both = joined_colours([first, second])
     assert both.names == ("motor", "stuck") and both.values.tolist() == [0, -1, 0, 1]
 

@@ -177,8 +177,8 @@ class VerbCommand(TyperCommand):
         carried = True  # whether everything that is wrong is a number
         try:
             rest = super().parse_args(ctx, list(args))
-        except Exception as fault:
-            if type(fault).__name__ not in VALUE_ERROR_NAMES:
+        except Exception as error:
+            if type(error).__name__ not in VALUE_ERROR_NAMES:
                 raise
             rest, faults, carried = self._one_by_one(ctx, args)
         for name, line in non_finite_errors(ctx):
@@ -196,12 +196,12 @@ class VerbCommand(TyperCommand):
         for parameter in self.get_params(ctx):
             try:
                 _, rest = parameter.handle_parse_result(ctx, given, rest)
-            except Exception as fault:
-                if type(fault).__name__ not in VALUE_ERROR_NAMES:
+            except Exception as error:
+                if type(error).__name__ not in VALUE_ERROR_NAMES:
                     raise
-                faults.append(usage_error(fault, args))
+                faults.append(usage_error(error, args))
                 number = (
-                    type(fault).__name__ == VALUE_ERROR_NAMES[0] and type(parameter.type).__name__ in NUMBER_TYPE_NAMES
+                    type(error).__name__ == VALUE_ERROR_NAMES[0] and type(parameter.type).__name__ in NUMBER_TYPE_NAMES
                 )
                 carried = carried and number and not parameter.multiple
                 ctx.params[parameter.name] = INVALID
@@ -209,8 +209,8 @@ class VerbCommand(TyperCommand):
             carried = False
             try:
                 ctx.begin_fault(f"Got unexpected extra argument(s) ({' '.join(rest)})")
-            except Exception as fault:
-                faults.append(usage_error(fault, args))
+            except Exception as error:
+                faults.append(usage_error(error, args))
         return rest, faults, carried
 
 

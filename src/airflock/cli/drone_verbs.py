@@ -100,21 +100,21 @@ def fleet(
     """
     from airflock.fleets import SECONDS_BEFORE_START, compare, flying
 
-    asked, live = options.collect_option_errors(ctx), mode != flying.LOCKSTEP_MODE
-    asked.read(options.check_writable, (save, RECORDINGS), (card_file, (".json",)))
-    settings = options.collect_settings(asked, changes, agents, duration)
+    errors, live = options.collect_option_errors(ctx), mode != flying.LOCKSTEP_MODE
+    errors.read(options.check_writable, (save, RECORDINGS), (card_file, (".json",)))
+    settings = options.collect_settings(errors, changes, agents, duration)
     if body in flying.VEHICLE_BODIES:
-        settings = asked.read(lambda given: given | {"body.kind": body}, settings)
-    loaded = options.collect_scenario(asked, scenario, settings, trust=trust)
-    loaded = asked.read(
+        settings = errors.read(lambda given: given | {"body.kind": body}, settings)
+    loaded = options.collect_scenario(errors, scenario, settings, trust=trust)
+    loaded = errors.read(
         lambda found: compare.with_metric_period(found, found.sensors.period or found.flight.dt), loaded
     )
-    numbers = asked.read(options.seeds_from, first_seed, seeds)
-    members = asked.read(lambda found: tuple(range(1, found.agents + 1)), loaded)
-    broken = asked.read(_broken, faults, value_or_default(members, ALL_SYSTEM_IDS), live)
-    asked.note(*_option_errors(vehicle, body, mode, card_file, against))
-    asked.read(_check_one_card, card_file, loaded, numbers)
-    asked.raise_errors()
+    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    members = errors.read(lambda found: tuple(range(1, found.agents + 1)), loaded)
+    broken = errors.read(_broken, faults, value_or_default(members, ALL_SYSTEM_IDS), live)
+    errors.note(*_option_errors(vehicle, body, mode, card_file, against))
+    errors.read(_check_one_card, card_file, loaded, numbers)
+    errors.raise_errors()
     terminal.print_notes(loaded.notes)
     how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "ground": ground, "join": join, "card_file": card_file}
     how["silent"] = True if silence is None and not against else silence
@@ -282,13 +282,13 @@ def prepare(
     from airflock.drones import card_hash, new_operator_keys, parse_card
     from airflock.fleets import DEFAULT_FENCE_MARGIN, deviation_notes, make_card_document, omission_notes
 
-    asked = options.collect_option_errors(ctx)
-    where, systems = asked.read(options.parse_position, "--site", site), asked.read(_members, members)
-    asked.read(options.check_writable, (out, (".json",)))
+    errors = options.collect_option_errors(ctx)
+    where, systems = errors.read(options.parse_position, "--site", site), errors.read(_members, members)
+    errors.read(options.check_writable, (out, (".json",)))
     files = MissionFiles(out, out.with_suffix(".key"), out.with_suffix(".operator"))
-    asked.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
-    loaded = options.collect_scenario(asked, scenario, asked.read(options.parse_settings, changes), trust=trust)
-    safety = _limits(limits, loaded, asked)
+    errors.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
+    loaded = options.collect_scenario(errors, scenario, errors.read(options.parse_settings, changes), trust=trust)
+    safety = _limits(limits, loaded, errors)
     private, public = new_operator_keys()
 
     def card_for(scenario: Any) -> dict[str, Any]:
@@ -307,9 +307,9 @@ def prepare(
         parse_card({**made, "hash": card_hash(made)}, str(out))
         return made
 
-    document = asked.read(card_for, loaded)
-    loads = asked.read(_check_airtimes, systems, document, fast_bits, slow_bits)
-    asked.raise_errors()
+    document = errors.read(card_for, loaded)
+    loads = errors.read(_check_airtimes, systems, document, fast_bits, slow_bits)
+    errors.raise_errors()
     card = _write_mission(files, document, private)
     beside = deviation_notes(loaded, card.safety, len(card.members))
     terminal.print_notes([*loaded.notes, *omission_notes(loaded), *beside])
@@ -444,21 +444,21 @@ def order(
     """
     from airflock.drones import PacketSigner, check_port, orders, read_card, read_key
 
-    asked = ErrorCollector()
+    errors = ErrorCollector()
     what = orders.OrderKind.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
     if what is None or do == "confirm_kill":
-        asked.note(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
+        errors.note(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
     if (do == "goto") != (point is not None):
-        asked.note("--point LAT,LON,ALT belongs to goto, and goto needs it")
-    where = asked.read(options.parse_position, "--point", point) if point else (0.0, 0.0, 0.0)
-    card = asked.read(read_card, card_file)
-    asked.read(_check_target, card, target)
+        errors.note("--point LAT,LON,ALT belongs to goto, and goto needs it")
+    where = errors.read(options.parse_position, "--point", point) if point else (0.0, 0.0, 0.0)
+    card = errors.read(read_card, card_file)
+    errors.read(_check_target, card, target)
     if point:
-        asked.read(_check_inside_fence, card, where, point)
-    key = asked.read(read_key, card_file.with_suffix(".key"))
-    private = asked.read(read_key, card_file.with_suffix(".operator"))
-    asked.read(check_port, radio)
-    asked.raise_errors()
+        errors.read(_check_inside_fence, card, where, point)
+    key = errors.read(read_key, card_file.with_suffix(".key"))
+    private = errors.read(read_key, card_file.with_suffix(".operator"))
+    errors.read(check_port, radio)
+    errors.raise_errors()
     assert what is not None
     utc = time.time_ns() // 1000
     place = (round(where[0] * 1e7), round(where[1] * 1e7), round(where[2] * 1e3))

@@ -295,8 +295,8 @@ def _span(text: str) -> tuple[float, float] | None:
     begin, colon, end = text.partition(":")
     try:
         span = float(begin or 0.0), float(end)
-    except ValueError as fault:
-        raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60") from fault
+    except ValueError as error:
+        raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60") from error
     if not colon or not 0.0 <= span[0] < span[1]:
         raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60")
     return span
@@ -484,13 +484,13 @@ def infer(
 @contextmanager
 def _fit_progress(quiet: bool) -> Iterator[Callable[[str], None]]:
     """Show which law is fitted, and how many steps that took so far."""
-    with progress_line(quiet) as told:
-        told.update("reading")
+    with progress_line(quiet) as line:
+        line.update("reading")
         steps: dict[str, int] = {}
 
         def show_step(name: str) -> None:
             steps[name] = steps.get(name, 0) + 1
-            told.update(f"{name}, step {steps[name]}")
+            line.update(f"{name}, step {steps[name]}")
 
         yield show_step
 

@@ -56,13 +56,13 @@ def run(
     from airflock.engine import pick_device
     from airflock.runs import score_scenarios
 
-    asked = options.collect_option_errors(ctx)
-    asked.read(options.check_writable, (save, RECORDINGS), (plot, PICTURES))
-    changed = options.collect_settings(asked, changes, agents, duration)
-    found = options.collect_scenario(asked, scenario, changed, law, trust=trust)
-    numbers = asked.read(options.seeds_from, first_seed, seeds)
-    asked.read(options.check_flight_options, device, precision, scheduler)
-    asked.raise_errors()
+    errors = options.collect_option_errors(ctx)
+    errors.read(options.check_writable, (save, RECORDINGS), (plot, PICTURES))
+    changed = options.collect_settings(errors, changes, agents, duration)
+    found = options.collect_scenario(errors, scenario, changed, law, trust=trust)
+    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    errors.read(options.check_flight_options, device, precision, scheduler)
+    errors.raise_errors()
     terminal.print_notes(found.notes)
     flights = [found] * seeds
     if scheduler is None:
@@ -327,18 +327,18 @@ def sweep(
     """
     from airflock.recordings import fly_points, grid_points, metric_to_show, scenarios_at
 
-    asked = options.collect_option_errors(ctx)
-    asked.read(options.check_writable, (table, TABLES), (plot, PICTURES))
-    fixed = options.collect_settings(asked, changes, agents, duration)
-    axes = _axes(over, plot, asked)
-    points = asked.read(grid_points, axes)
+    errors = options.collect_option_errors(ctx)
+    errors.read(options.check_writable, (table, TABLES), (plot, PICTURES))
+    fixed = options.collect_settings(errors, changes, agents, duration)
+    axes = _axes(over, plot, errors)
+    points = errors.read(grid_points, axes)
     scenarios = invalid_if(
-        fixed, asked.read(scenarios_at, scenario, points, value_or_default(fixed, {}), law, trust=trust)
+        fixed, errors.read(scenarios_at, scenario, points, value_or_default(fixed, {}), law, trust=trust)
     )
-    name = asked.read(metric_to_show, show, scenarios)
-    numbers = asked.read(options.seeds_from, first_seed, seeds)
-    asked.read(options.check_flight_options, device, precision, scheduler)
-    asked.raise_errors()
+    name = errors.read(metric_to_show, show, scenarios)
+    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    errors.read(options.check_flight_options, device, precision, scheduler)
+    errors.raise_errors()
     terminal.print_notes(merge_similar_notes(dict.fromkeys(note for found in scenarios for note in found.notes)))
     if scheduler is None:
         options.announce_run_time([found for found in scenarios for _ in numbers], threads, device)
@@ -409,8 +409,8 @@ def parse_axis(text: str, option: str = "--over") -> tuple[str, list[Any]]:
     if equals and len(parts) == 3:
         try:
             low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
-        except ValueError as fault:
-            raise ScenarioError([f"{option} {text}: write low:high:count, for instance radio.delay=0:2:5"]) from fault
+        except ValueError as error:
+            raise ScenarioError([f"{option} {text}: write low:high:count, for instance radio.delay=0:2:5"]) from error
         if not 1 <= count <= MAX_GRID_POINTS:
             raise ScenarioError([f"{option} {text}: the count lies outside [1, {MAX_GRID_POINTS}]"])
         step = (high - low) / max(count - 1, 1)

@@ -53,13 +53,13 @@ class VerbGroup(TyperGroup):
             result = super().main(words, prog_name, complete_var, False, windows_expand_args, **extra)
         except typer.Abort as stop:
             raise AirflockError("interrupted") from stop
-        except Exception as fault:
-            if not hasattr(fault, "format_message"):
+        except Exception as error:
+            if not hasattr(error, "format_message"):
                 raise
-            if type(fault).__name__ == "NoArgsIsHelpError":
-                fault.show()  # type: ignore[attr-defined]
+            if type(error).__name__ == "NoArgsIsHelpError":
+                error.show()  # type: ignore[attr-defined]
                 sys.exit(2)
-            raise AirflockError(usage_error(fault, words)) from fault
+            raise AirflockError(usage_error(error, words)) from error
         return sys.exit(result if isinstance(result, int) else 0) if standalone_mode else result
 
     def invoke(self, ctx: Any) -> Any:
@@ -68,8 +68,8 @@ class VerbGroup(TyperGroup):
             return super().invoke(ctx)
         except KeyboardInterrupt as stop:
             raise AirflockError("interrupted; files that were not announced as saved were not written") from stop
-        except EOFError as fault:  # typer takes it for Ctrl-D
-            raise AirflockError(f"unexpected end of a file: {fault}; AIRFLOCK_DEBUG=1 shows where") from fault
+        except EOFError as error:  # typer takes it for Ctrl-D
+            raise AirflockError(f"unexpected end of a file: {error}; AIRFLOCK_DEBUG=1 shows where") from error
 
 
 app = typer.Typer(
@@ -134,23 +134,23 @@ def main() -> None:
             app(standalone_mode=True)
         finally:
             sys.stdout.flush()  # a full disk behind stdout tells so here, and not after the last line of Python
-    except AirflockError as fault:
-        _end(str(fault), fault)
+    except AirflockError as error:
+        _end(str(error), error)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except (KeyboardInterrupt, BdbQuit) as stop:  # while the verb is looked up, or after it; a debugger that is left
         _end("interrupted", stop)
-    except OSError as fault:
-        _end(f"{fault.filename or 'output'}: {os_error_message(fault)}", fault)
-    except MemoryError as fault:
-        _end(f"needs more memory than there is: {fault}; ask for fewer agents, flights or samples", fault)
-    except Exception as fault:  # the border: whatever else goes wrong is one line, too
+    except OSError as error:
+        _end(f"{error.filename or 'output'}: {os_error_message(error)}", error)
+    except MemoryError as error:
+        _end(f"needs more memory than there is: {error}; ask for fewer agents, flights or samples", error)
+    except Exception as error:  # the border: whatever else goes wrong is one line, too
         from airflock.scenarios import user_error_line
 
-        if told := user_error_line(fault):  # on the device python: compiled, a rule raises nothing
-            _end(told, fault)
-        _end(f"unexpected {type(fault).__name__}: {fault}; please report it; AIRFLOCK_DEBUG=1 shows where", fault)
+        if message := user_error_line(error):  # on the device python: compiled, a rule raises nothing
+            _end(message, error)
+        _end(f"unexpected {type(error).__name__}: {error}; please report it; AIRFLOCK_DEBUG=1 shows where", error)
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:

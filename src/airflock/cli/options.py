@@ -209,6 +209,6 @@ def parse_position(option: str, text: str) -> tuple[float, float, float]:
         latitude, longitude, altitude = (float(part) for part in text.split(","))
         if not math.isfinite(latitude + longitude + altitude):
             raise ValueError
-    except ValueError as fault:
-        raise ScenarioError([f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120"]) from fault
+    except ValueError as error:
+        raise ScenarioError([f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120"]) from error
     return latitude, longitude, altitude

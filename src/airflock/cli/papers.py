@@ -74,8 +74,8 @@ def require_papers() -> None:
     """Raise AirflockError, with what to install, unless airflock-papers is there."""
     try:
         import_module(PACKAGE)
-    except ModuleNotFoundError as fault:
-        raise AirflockError("papers need airflock-papers: pip install -e ./papers in a clone of Airflock") from fault
+    except ModuleNotFoundError as error:
+        raise AirflockError("papers need airflock-papers: pip install -e ./papers in a clone of Airflock") from error
 
 
 # ---- airflock paper
@@ -135,9 +135,9 @@ def _all(
 
     wrong = [option for option, given in others.items() if given]
     if wrong or quick == breaks:
-        told = "takes days; add --quick or --breaks, or name one paper"
-        told = "give --quick or --breaks, not both" if quick else told
-        raise AirflockError(f"all: {', '.join(wrong)} is of one paper; name it" if wrong else f"all: {told}")
+        message = "takes days; add --quick or --breaks, or name one paper"
+        message = "give --quick or --breaks, not both" if quick else message
+        raise AirflockError(f"all: {', '.join(wrong)} is of one paper; name it" if wrong else f"all: {message}")
     if breaks:
         _all_breaks(keep or cache_folder() / "papers" / "breaks", threads, as_json)
         return
@@ -148,9 +148,9 @@ def _all(
         terminal.print_json({"claims": [row._asdict() for row in rows], "changed": [row._asdict() for row in changed]})
     else:
         for row in changed:
-            told = f"{row.committed or 'not committed'} is now {row.found or 'not flown'}"
+            message = f"{row.committed or 'not committed'} is now {row.found or 'not flown'}"
             why = f" (not judged: committed as flown on {row.elsewhere})" if row.elsewhere else ""
-            typer.echo(f"{row.paper} {row.id}: {told}{why}")
+            typer.echo(f"{row.paper} {row.id}: {message}{why}")
         typer.echo(f"{len(rows)} claims in their small form, {len(changed)} of another verdict than the committed one")
         if any(row.elsewhere for row in changed):
             typer.echo("On another kind of processor the same seeds give other flights; a few verdicts may differ.")
@@ -172,8 +172,8 @@ def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
         for row, elsewhere in worse:
             why = f" (not judged: turned red on {elsewhere})" if elsewhere else ""
             typer.echo(f"{row.paper} {row.id}: {row.result} with {row.change} ({row.ours}, then {row.changed}){why}")
-        told = ", ".join(f"{number} {result}" for result, number in Counter(row.result for row in rows).items())
-        typer.echo(f"{len(rows)} claims under their changes: {told}")
+        message = ", ".join(f"{number} {result}" for result, number in Counter(row.result for row in rows).items())
+        typer.echo(f"{len(rows)} claims under their changes: {message}")
     if not all(each.elsewhere for each in worse):
         raise typer.Exit(1)
 

@@ -103,7 +103,7 @@ def evolve(
         study_executor,
     )
 
-    asked = options.collect_option_errors(ctx)
+    errors = options.collect_option_errors(ctx)
     given = {
         "algorithm": algorithm,
         "population": population,
@@ -116,20 +116,20 @@ def evolve(
         "start": start,
         "averages": averages,
     }
-    found = asked.read(
+    found = errors.read(
         evolve_request,
         scenario,
-        value_or_default(options.collect_settings(asked, changes, agents, duration), {}),
+        value_or_default(options.collect_settings(errors, changes, agents, duration), {}),
         search_keys={key: value for key, value in given.items() if value is not None and value is not INVALID},
         limit=limit or (),
         trust=trust,
         fast=fast,
         folder=out if resume else None,
     )
-    asked.read(check_sensitivity_method, sensitivity)
-    asked.read(check_timeout, timeout)
-    asked.read(check_study_device, device, scheduler)
-    asked.raise_errors()
+    errors.read(check_sensitivity_method, sensitivity)
+    errors.read(check_timeout, timeout)
+    errors.read(check_study_device, device, scheduler)
+    errors.raise_errors()
     study, taken = found
     study = resolve_device(study, device)
     open_folder(out, study, resume=resume)
@@ -220,13 +220,13 @@ def harden(
     from airflock.runs import write_toml_file
     from airflock.search import MAX_ROUNDS, harden, hardened_document, hardening_request
 
-    asked = options.collect_option_errors(ctx)
-    settings = asked.read(options.parse_settings, changes, None, duration)
-    optima = invalid_if(settings, asked.read(_optima, scenario, value_or_default(settings, {}), trust))
-    places = asked.read(_output_files, out, len(value_or_default(optima, [])), scenario)
-    asked.read(hardening_request, optima, value_or_default(cost, 0.0), limit or ())
-    numbers = asked.read(options.seeds_from, first_seed, seeds)
-    asked.raise_errors()
+    errors = options.collect_option_errors(ctx)
+    settings = errors.read(options.parse_settings, changes, None, duration)
+    optima = invalid_if(settings, errors.read(_optima, scenario, value_or_default(settings, {}), trust))
+    places = errors.read(_output_files, out, len(value_or_default(optima, [])), scenario)
+    errors.read(hardening_request, optima, value_or_default(cost, 0.0), limit or ())
+    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    errors.raise_errors()
     terminal.print_notes(note for each in optima for note in each.notes)
     with counting_parts(f"{scenario}: flights", MAX_ROUNDS * seeds * len(optima), quiet=as_json) as done:
         steps = harden(optima, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
@@ -282,8 +282,8 @@ def _print_hardened(name: str, steps: list[Any], seeds: int) -> None:
     console.print(table)
     for step in steps[1:]:
         (cost, least, most), (gain, low, high) = step.cost, step.gain
-        told = f"cost {cost:.3g} ({least:.3g} to {most:.3g}), gain {gain:.3g} m ({low:.3g} to {high:.3g}), 95 %"
-        console.print(f"{step.name}: {step.verdict}; {told}", highlight=False, markup=False, soft_wrap=True)
+        costs = f"cost {cost:.3g} ({least:.3g} to {most:.3g}), gain {gain:.3g} m ({low:.3g} to {high:.3g}), 95 %"
+        console.print(f"{step.name}: {step.verdict}; {costs}", highlight=False, markup=False, soft_wrap=True)
 
 
 # ---- tune
@@ -346,16 +346,16 @@ def tune(
     from airflock.certificates import check_confidence
     from airflock.search import load_plan, make_request, tune
 
-    asked = options.collect_option_errors(ctx)
-    seconds = asked.read(options.parse_seconds, budget)
-    settings = options.collect_settings(asked, changes, agents, duration)
-    base = options.collect_scenario(asked, asked.read(_start_scenario, scenario, like, heard), settings, trust=trust)
-    start = asked.read(_tuned_scenario, base, like)
-    plan = asked.read(load_plan, out, start, resume) if like is None else None  # with logs, of what they will tell
+    errors = options.collect_option_errors(ctx)
+    seconds = errors.read(options.parse_seconds, budget)
+    settings = options.collect_settings(errors, changes, agents, duration)
+    base = options.collect_scenario(errors, errors.read(_start_scenario, scenario, like, heard), settings, trust=trust)
+    start = errors.read(_tuned_scenario, base, like)
+    plan = errors.read(load_plan, out, start, resume) if like is None else None  # with logs, of what they will tell
     if confidence is not None:
-        asked.read(check_confidence, confidence)
-    asked.read(make_request, start, limit or (), confidence, value_or_default(plan, None))
-    asked.raise_errors()
+        errors.read(check_confidence, confidence)
+    errors.read(make_request, start, limit or (), confidence, value_or_default(plan, None))
+    errors.raise_errors()
     terminal.print_notes(start.notes)
     options.compile_before_bar(base, 32, "cpu")
     what: Any = base if like is None else scenario
@@ -363,14 +363,14 @@ def tune(
     if like is not None:
         how |= {"like": base, "heard": heard}
     shown: list[str] = []
-    with progress_line(as_json) as told:
+    with progress_line(as_json) as line:
 
         def watch(p: Any) -> None:
-            told.update(p.stage + (f", {p.told}" if p.told else ""), p.done, p.total)
+            line.update(p.stage + (f", {p.told}" if p.told else ""), p.done, p.total)
 
         def note(text: str) -> None:
             shown.append(text)
-            told.say(text)
+            line.say(text)
 
         tuning = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
     if as_json:
@@ -622,9 +622,9 @@ def certify(
 
     Example: airflock certify vasarhelyi_2018/real_6ms --limit "r_min<1 at 0.1/h" --budget 10min --out certificate.toml
     """
-    asked = options.collect_option_errors(ctx)
+    errors = options.collect_option_errors(ctx)
     if check:
-        asked.raise_errors()
+        errors.raise_errors()
         others = {
             "--limit": limit, "--flights": flights, "--out": out, "--resume": resume, "--tolerance": tolerance,
             "--tolerance-of": tolerance_of, "--split": split, "--map": over, "--uncertain": uncertain, "--plot": plot,
@@ -639,27 +639,27 @@ def certify(
     from airflock.certificates import check_map_axes, check_split, request
     from airflock.cli.flight_verbs import parse_axis
 
-    asked.read(options.check_writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
-    seconds = asked.read(options.parse_seconds, budget)
+    errors.read(options.check_writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
+    seconds = errors.read(options.parse_seconds, budget)
     loaded = options.collect_scenario(
-        asked, scenario, options.collect_settings(asked, changes, agents, duration), law, trust=trust
+        errors, scenario, options.collect_settings(errors, changes, agents, duration), law, trust=trust
     )
-    asked.read(request.check_confidence, confidence)
-    asked.read(request.check_flight_count, flights)
-    asked.read(request.check_flight_options, precision, device)
+    errors.read(request.check_confidence, confidence)
+    errors.read(request.check_flight_count, flights)
+    errors.read(request.check_flight_options, precision, device)
     how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-    campaign = asked.read(request.campaign_from_request, loaded, limit or [], confidence, flights, **how)
+    campaign = errors.read(request.campaign_from_request, loaded, limit or [], confidence, flights, **how)
     also: dict[str, Any] = {"split": split, "axes": {}}
-    also["keys"] = asked.read(request.tolerance_keys, loaded, tolerance_of or tolerance)
+    also["keys"] = errors.read(request.tolerance_keys, loaded, tolerance_of or tolerance)
     if split:
-        asked.read(check_split, campaign)
+        errors.read(check_split, campaign)
     if over:
-        axes = asked.collect_each(partial(parse_axis, option="--map"), over)
-        also["axes"] = asked.read(check_map_axes, loaded, asked.read(dict, axes))
-    asked.read(request.check_workers, timeout, scheduler, device)
+        axes = errors.collect_each(partial(parse_axis, option="--map"), over)
+        also["axes"] = errors.read(check_map_axes, loaded, errors.read(dict, axes))
+    errors.read(request.check_workers, timeout, scheduler, device)
     if resume and out is None:
-        asked.note("--resume: name the certificate whose flights are to be continued with --out")
-    asked.raise_errors()
+        errors.note("--resume: name the certificate whose flights are to be continued with --out")
+    errors.raise_errors()
     terminal.print_notes(campaign.scenario.notes)
     if scheduler is None:
         options.compile_before_bar(campaign.flown, precision, device)
@@ -719,13 +719,13 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
 @contextmanager
 def counting_progress(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[str], None]]]:
     """Show flights up to the next look, events so far, flights per second; then the later stages."""
-    with progress_line(quiet) as told:
+    with progress_line(quiet) as line:
 
         def watch(p: Any) -> None:
             events = ", ".join(str(count) for count in p.events)
-            told.update(f"counting, {events} events, {p.rate:.1f} flights/s", p.done, p.total)
+            line.update(f"counting, {events} events, {p.rate:.1f} flights/s", p.done, p.total)
 
-        yield watch, told.update
+        yield watch, line.update
 
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:

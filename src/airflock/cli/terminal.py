@@ -254,16 +254,16 @@ def _progress_bar() -> Iterator[ProgressLine]:
 @contextmanager
 def counting_parts(label: str, total: int | None = None, quiet: bool = False) -> Iterator[Callable[[], None]]:
     """Show the progress of so many equal parts (None: unknown); yields a function to call after each."""
-    with progress_line(quiet) as told:
+    with progress_line(quiet) as line:
         lock, done = Lock(), 0
 
         def one() -> None:
             nonlocal done
             with lock:
                 done += 1
-                told.update(label, done, total)
+                line.update(label, done, total)
 
-        told.update(label, 0, total)
+        line.update(label, 0, total)
         yield one
 
 
@@ -275,7 +275,7 @@ def search_progress(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], N
     finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
     finals += round(sum(share * seeds for share, seeds in RACE_ROUNDS) * study.whole("pool"))
     began, flown = time.perf_counter(), itertools.count(1)
-    with progress_line(quiet) as told:
+    with progress_line(quiet) as line:
 
         def watch(p: Any) -> None:
             rate = p.fresh / max(time.perf_counter() - began, 1e-9)
@@ -283,9 +283,9 @@ def search_progress(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], N
             found += "" if p.mean is None else f", mean {p.mean:.4f}"
             where = f"run {p.run + 1}, " if study.whole("restarts") else ""
             text = f"{where}generation {p.generation + 1}/{study.whole('generations')}{found}, {rate:.1f} flights/s"
-            told.update(text, p.done, p.total)
+            line.update(text, p.done, p.total)
 
         def note(_: bool) -> None:
-            told.update("finalists on fresh seeds", min(next(flown), finals), finals)
+            line.update("finalists on fresh seeds", min(next(flown), finals), finals)
 
         yield watch, note

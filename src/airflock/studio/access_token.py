@@ -81,11 +81,11 @@ def check_access(
         if hmac.compare_digest(given.encode(), token.encode()):
             return True, True
         kept = SimpleCookie(cookies)
-        asks = urlsplit(origin).netloc
+        origin_host = urlsplit(origin).netloc
     except (CookieError, ValueError):  # what a stranger sends may be no address at all
         return False, False
     value = kept[cookie_name].value if cookie_name in kept else ""
-    return hmac.compare_digest(value.encode(), token.encode()) and (not origin or asks == host), False
+    return hmac.compare_digest(value.encode(), token.encode()) and (not origin or origin_host == host), False
 
 
 @contextmanager
@@ -96,7 +96,7 @@ def require_token(token: str, port: int) -> Iterator[None]:
     def with_check(handler: Any, *where: Any, process_request: Callable[..., Any], **rest: Any) -> Any:
         def check(connection: Any, request: Any) -> Any:
             cookies, origin, host = ("; ".join(request.headers.get_all(n)) for n in ("Cookie", "Origin", "Host"))
-            passes, anew = check_access(request.path, cookies, name, token, origin, host)
+            passes, sets_cookie = check_access(request.path, cookies, name, token, origin, host)
             if not passes:
                 return Response(
                     HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Type": "text/plain"}), REFUSAL_PAGE
@@ -109,7 +109,7 @@ def require_token(token: str, port: int) -> Iterator[None]:
                 answer.body = answer.body.replace(b"<head>", b"<head>" + PAGE_SCRIPT, 1)
                 del answer.headers["Content-Length"]
                 answer.headers["Content-Length"] = str(len(answer.body))
-            if anew and answer is not None:
+            if sets_cookie and answer is not None:
                 answer.headers["Set-Cookie"] = f"{name}={token}; HttpOnly; SameSite=Strict; Path=/"
             return answer
 

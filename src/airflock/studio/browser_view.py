@@ -76,9 +76,9 @@ class Chart:
 
     @data.setter
     def data(self, columns: tuple[NDArray[np.float64], ...]) -> None:
-        if (told := axis_ranges(columns)) != self._axis_ranges:
-            self._axis_ranges = told
-            self._handle.scales = {axis: uplot.Scale(time=False, range=given) for axis, given in told.items()}
+        if (ranges := axis_ranges(columns)) != self._axis_ranges:
+            self._axis_ranges = ranges
+            self._handle.scales = {axis: uplot.Scale(time=False, range=given) for axis, given in ranges.items()}
         self._handle.data = columns
 
     def remove(self) -> None:
@@ -460,10 +460,10 @@ def _free_port(host: str) -> int:
     with socket.socket() as probe:
         try:
             probe.bind((host, 0))
-        except OSError as fault:
+        except OSError as error:
             raise StudioError(
-                f"host = {host}: {fault.strerror or fault}; give a name or IPv4 address of this machine, or 0.0.0.0"
-            ) from fault
+                f"host = {host}: {error.strerror or error}; give a name or IPv4 address of this machine, or 0.0.0.0"
+            ) from error
         return int(probe.getsockname()[1])
 
 
@@ -473,10 +473,10 @@ def _check_port_free(host: str, port: int) -> None:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
-        except OSError as fault:
+        except OSError as error:
             raise StudioError(
-                f"{host}:{port}: {fault.strerror or fault}; give another port with --port, or --port 0 for any free one"
-            ) from fault
+                f"{host}:{port}: {error.strerror or error}; give another port with --port, or --port 0 for any free one"
+            ) from error
 
 
 def _round_length(length: float) -> float:

@@ -77,15 +77,15 @@ def drone_html(observer: FleetObserver, member: int, now: float) -> str:
     peer = observer.peers[member]
     if peer.status is None or peer.state is None:
         return small_print_html(f"<b>drone {member}</b>: not heard yet")
-    s, told = peer.state, peer.status
+    s, data = peer.state, peer.status
     hears = [b if a == member else a for a, b in observer.links(now) if member in (a, b)]
     linked = f"; packets between it and {', '.join(map(str, sorted(hears)))}" if hears else ""
     others, age = len(observer.card.members) - 1, now - peer.heard_at
     return small_print_html(
-        f"<b>drone {member}</b>: {peer.phase.name.lower()}, {'in the air' if told.is_airborne else 'on the ground'}<br>"
-        f"at east {s.x:.1f}, north {s.y:.1f}, {s.z:.1f} m above the site, known to {told.accuracy:.1f} m<br>"
-        f"flies {s.vx:.1f}, {s.vy:.1f}, {s.vz:.1f} m/s; battery {told.battery} %; clock off by {told.clock_error:.2f} s"
-        f"<br>hears {told.peers} of {others}{linked}; last packet {age:.1f} s ago"
+        f"<b>drone {member}</b>: {peer.phase.name.lower()}, {'in the air' if data.is_airborne else 'on the ground'}<br>"
+        f"at east {s.x:.1f}, north {s.y:.1f}, {s.z:.1f} m above the site, known to {data.accuracy:.1f} m<br>"
+        f"flies {s.vx:.1f}, {s.vy:.1f}, {s.vz:.1f} m/s; battery {data.battery} %; clock off by {data.clock_error:.2f} s"
+        f"<br>hears {data.peers} of {others}{linked}; last packet {age:.1f} s ago"
     )
 
 
@@ -94,7 +94,7 @@ def faults_html(observer: FleetObserver) -> str:
     said = (
         INJECTED_KINDS
         | FAULT_TEXTS
-        | {told: _first_sentence(OURS[kind].doc) for kind, told in SCENARIO_FAULT_NAMES.items()}
+        | {name: _first_sentence(OURS[kind].doc) for kind, name in SCENARIO_FAULT_NAMES.items()}
     )
     lines = [f"<b>{kind}</b>, {observer.named(who)}: {said[kind]}" for kind, who in observer.faults.items()]
     return small_print_html("<br>".join(lines)) if lines else ""
@@ -108,9 +108,9 @@ def _first_sentence(doc: str) -> str:
 def notes_html(observer: FleetObserver) -> str:
     """Return the events, newest first."""
     lines = []
-    for told in list(observer.notes)[: -MAX_NOTES - 1 : -1]:
-        who = f"drone {told.member}: " if told.member else ""
-        lines.append(f"{told.time - observer.begun:.1f} s · {who}{html.escape(told.text)}")
+    for note in list(observer.notes)[: -MAX_NOTES - 1 : -1]:
+        who = f"drone {note.member}: " if note.member else ""
+        lines.append(f"{note.time - observer.begun:.1f} s · {who}{html.escape(note.text)}")
     return small_print_html("<br>".join(lines))
 
 
@@ -254,13 +254,13 @@ class FleetScene:
             values = [-1 if is_on_ground(peer.phase) else AIR_PHASES.index(peer.phase) for peer in peers]
             names = tuple(phase.name.lower() for phase in AIR_PHASES)
             return AgentColours(
-                way, agent_colours.CATEGORIES, np.array(values), names=names, told="on the ground, or silent"
+                way, agent_colours.CATEGORIES, np.array(values), names=names, note="on the ground, or silent"
             )
         if way == "fault":
             faults = self.observer.faults
             values = [next((k for k, who in enumerate(faults.values()) if m in who), -1) for m in self.members]
             return AgentColours(
-                way, agent_colours.CATEGORIES, np.array(values), names=tuple(faults), told="none, or silent"
+                way, agent_colours.CATEGORIES, np.array(values), names=tuple(faults), note="none, or silent"
             )
         if way == "drone":
             return agent_colours.individual_colours(len(peers))
@@ -318,7 +318,7 @@ class FleetPage:
                 "follow",
                 FLEET_FOLLOW_CHOICES,
                 FLEET_FOLLOW_CHOICES[0],
-                lambda whom: setattr(drawing, "follow_choice", whom),
+                lambda choice: setattr(drawing, "follow_choice", choice),
             )
             with panel.folder("Selected drone"):
                 self.about = panel.text()

@@ -93,9 +93,9 @@ def watch(
 
 def _check_unused(subject: str, options: Mapping[str, Any], needed: str) -> None:
     """Raise StudioError for options that would have no effect."""
-    given = [name for name, value in options.items() if value]
-    if given:
-        raise StudioError(f"{subject}; {' and '.join(given)} need{'s' * (len(given) == 1)} {needed}")
+    useless = [name for name, value in options.items() if value]
+    if useless:
+        raise StudioError(f"{subject}; {' and '.join(useless)} need{'s' * (len(useless) == 1)} {needed}")
 
 
 # ---- Fleets
@@ -125,19 +125,19 @@ def open_card_and_radios(
     card: Path, key: Path | None, radios: Sequence[str]
 ) -> tuple[FlightCard, bytes, ListeningRadios]:
     """Return card, key and open radios. Raises CardError with all errors at once, and leaves nothing open."""
-    faults: list[str] = []
-    found, secret, ports = None, b"", []
-    with collect_errors(faults):
-        found = read_card(card)
-    with collect_errors(faults):
+    errors: list[str] = []
+    flight_card, secret, ports = None, b"", []
+    with collect_errors(errors):
+        flight_card = read_card(card)
+    with collect_errors(errors):
         secret = read_key(key or card.with_suffix(".key"))
     for text in radios or DEFAULT_RADIOS:
-        with collect_errors(faults):
+        with collect_errors(errors):
             ports.append(open_port(text))
-    if faults or found is None:
+    if errors or flight_card is None:
         ListeningRadios(ports).close()
-        raise CardError(faults)
-    return found, secret, ListeningRadios(ports)
+        raise CardError(errors)
+    return flight_card, secret, ListeningRadios(ports)
 
 
 def watch_fleet(
@@ -148,15 +148,15 @@ def watch_fleet(
 
     Raises CardError for card, key and radios, all faults at once, and StudioError for a port in use.
     """
-    found, secret, heard = open_card_and_radios(expand_path(card), expand_path(key) if key else None, radios)
+    flight_card, secret, heard = open_card_and_radios(expand_path(card), expand_path(key) if key else None, radios)
     try:
-        if time.time() >= found.expires:
+        if time.time() >= flight_card.expires:
             notify(f"note: {card} has expired; its drones no longer start")
         from airflock.studio.browser_view import BrowserView
         from airflock.studio.fleet_page import FleetPage
 
-        observer = FleetObserver(found, secret, now=time.monotonic(), utc=time.time_ns() // 1000)
-        view = BrowserView(host, port, found.name)
+        observer = FleetObserver(flight_card, secret, now=time.monotonic(), utc=time.time_ns() // 1000)
+        view = BrowserView(host, port, flight_card.name)
         try:
             page = FleetPage(observer, view, heard)
             notify(f"listening at {', '.join(radios or DEFAULT_RADIOS)}; watch at {view.address}  (Ctrl-C ends)")

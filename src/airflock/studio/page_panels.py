@@ -359,13 +359,13 @@ def read_scenario_text(name: str, content: bytes) -> str:
             raise TextError(f"is larger than {MAX_BYTES / 1e6:g} MB, more than any file of this kind needs")
         text = content.decode("utf-8-sig")
         parse_toml(text)
-    except UnicodeDecodeError as fault:
-        wrong = f"is not text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}"
-        raise StudioError(f"{name}: is not a scenario file (TOML): {wrong}") from fault
-    except FormatError as fault:
-        raise StudioError(f"{name}: is not a scenario file (TOML): {fault}") from fault
-    except TextError as fault:
-        raise StudioError(f"{name}: {fault}") from fault
+    except UnicodeDecodeError as error:
+        wrong = f"is not text in UTF-8: byte {error.start} is 0x{content[error.start]:02x}"
+        raise StudioError(f"{name}: is not a scenario file (TOML): {wrong}") from error
+    except FormatError as error:
+        raise StudioError(f"{name}: is not a scenario file (TOML): {error}") from error
+    except TextError as error:
+        raise StudioError(f"{name}: {error}") from error
     if "\0" in name:
         raise StudioError(f"{printable(name)}: holds a character (NUL) that no file name may have")
     if not name.lower().endswith(".toml"):

@@ -197,7 +197,7 @@ def joined_colours(parts: Sequence[AgentColours]) -> AgentColours:
         values = [np.array([names.index(part.names[v]) if v >= 0 else -1 for v in part.values]) for part in parts]
     return first._replace(
         values=np.concatenate(values), names=names, low=min(part.low for part in parts),
-        high=max(part.high for part in parts), told=" and ".join(dict.fromkeys(part.told for part in parts)),
+        high=max(part.high for part in parts), note=" and ".join(dict.fromkeys(part.note for part in parts)),
     )  # fmt: skip
 
 

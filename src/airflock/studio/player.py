@@ -412,23 +412,23 @@ class Player(ComparedFlights):
         """Run queued actions, then fly the steps due after `elapsed` s of real time. Return True if anything
         moved.
         """
-        asked = self._asked.answer(self._safely)
+        acted = self._asked.answer(self._safely)
         if self.is_compiling and all(side.is_compiled for side in self.sides):
-            asked = self._settled() or asked
+            acted = self._settled() or acted
         if self.is_paused or self.failure_message or self.over:
-            return asked
+            return acted
         steps = min(self.clock.due(elapsed), max(1, int(self._steps_per_second * MAX_BUSY_SECONDS)))
         if not steps:
-            return asked
+            return acted
         began, moved = perf_counter(), self.fly(steps)
         self._steps_per_second = steps / max(perf_counter() - began, 1e-6)
-        return moved or asked
+        return moved or acted
 
     def _settled(self) -> bool:
         try:
             self.switch_to_compiled()
-        except AirflockError as fault:
-            self.failure_message = f"stopped: {fault}"
+        except AirflockError as error:
+            self.failure_message = f"stopped: {error}"
             self.fault(self.failure_message)
         return True
 
@@ -436,12 +436,12 @@ class Player(ComparedFlights):
         """Run an action; an error becomes a note on the page and a line in the terminal, and the flight goes on."""
         try:
             action()
-        except AirflockError as fault:
-            self._report_error(str(fault))
-        except OSError as fault:  # a full disk, a folder that is gone
-            self._report_error(": ".join(part for part in (fault.filename, os_error_message(fault)) if part))
-        except Exception as fault:  # the last resort: somebody's flight must not be lost to one press of a button
-            self._report_error(f"unexpected {describe_error(fault)}; please report it")
+        except AirflockError as error:
+            self._report_error(str(error))
+        except OSError as error:  # a full disk, a folder that is gone
+            self._report_error(": ".join(part for part in (error.filename, os_error_message(error)) if part))
+        except Exception as error:  # the last resort: somebody's flight must not be lost to one press of a button
+            self._report_error(f"unexpected {describe_error(error)}; please report it")
 
     def _report_error(self, line: str) -> None:
         self.note = line
@@ -456,11 +456,11 @@ class Player(ComparedFlights):
         try:
             for side in self.sides:
                 side.fly_to(end)
-        except Exception as fault:  # a rule of the user's own may raise anything, until it is compiled
-            told = str(fault) if isinstance(fault, AirflockError) else user_error_line(fault)
-            if not told:
+        except Exception as error:  # a rule of the user's own may raise anything, until it is compiled
+            message = str(error) if isinstance(error, AirflockError) else user_error_line(error)
+            if not message:
                 raise
-            self.failure_message = f"stopped: {told}"
+            self.failure_message = f"stopped: {message}"
             self.fault(self.failure_message)
             return False
         return True

@@ -135,10 +135,10 @@ def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], li
         ):
             found.append((term_name_and_unit(model, name)[0], vector, parts))
             continue
-        alike = [vector_values(term)[name] for term in view.alike]
-        apart = [part - same for part, same in zip(parts, alike, strict=True)]
+        resting = [vector_values(term)[name] for term in view.alike]
+        moving = [part - same for part, same in zip(parts, resting, strict=True)]
         found += [
-            (word, sum(terms, np.zeros(3)), terms) for word, terms in (("repulsion", alike), ("alignment", apart))
+            (word, sum(terms, np.zeros(3)), terms) for word, terms in (("repulsion", resting), ("alignment", moving))
         ]
     if view.walls:
         found += [(f"walls {name}".strip(), vector, []) for name, vector in vector_values(view.walls).items()]

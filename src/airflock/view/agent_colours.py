@@ -121,7 +121,7 @@ class AgentColours(NamedTuple):
     kind   : scale, from `low` to `high` in `unit`; turn, shares of a full turn; names, numbers of `names`;
              marks, whole numbers that only tell agents apart. Names and marks: -1 for none
     values : (agent,)
-    told   : what the key says beside it
+    note   : text beside the key
     """
 
     name: str
@@ -131,7 +131,7 @@ class AgentColours(NamedTuple):
     high: float = 1.0
     unit: str = ""
     names: tuple[str, ...] = ()
-    told: str = ""
+    note: str = ""
 
     @property
     def colours(self) -> NDArray[np.uint8]:
@@ -153,7 +153,7 @@ class AgentColours(NamedTuple):
         """Return the key to the colours, as HTML."""
         if self.kind == IDENTITIES:
             words = COLOURING_NOTES.get(self.name, self.name)
-            return _small_print_html(", ".join(part for part in (words, self.told) if part))
+            return _small_print_html(", ".join(part for part in (words, self.note) if part))
         if self.kind == CATEGORIES:
             chips = [
                 _colour_chip_html(tone, name)
@@ -161,7 +161,7 @@ class AgentColours(NamedTuple):
             ]
             return _small_print_html(
                 " ".join(
-                    [f"{html.escape(self.name)}:", *chips, _colour_chip_html(NO_VALUE_COLOUR, self.told or "none")]
+                    [f"{html.escape(self.name)}:", *chips, _colour_chip_html(NO_VALUE_COLOUR, self.note or "none")]
                 )
             )
         if self.kind == HEADING:
@@ -222,18 +222,18 @@ def fault_colours(
         over = fault["end"] is not None and time >= float(fault["end"])
         if float(fault["begin"]) <= time and not over and 0 <= int(fault["agent"]) < count:
             values[int(fault["agent"])] = names.index(str(fault["kind"]))
-    return AgentColours("fault", CATEGORIES, values, names=names, told="sound")
+    return AgentColours("fault", CATEGORIES, values, names=names, note="sound")
 
 
 def varied_number_units(scenario: Scenario) -> dict[str, str]:
     """Return the units of the numbers of law and body that differ among agents, such as model.v_flock."""
-    found = {}
+    units = {}
     records = {"model": scenario.parameters, "body": scenario.body, "sensors": scenario.sensors}
     for section, record in records.items():
         for name, declared, _ in declarations(record):
             if (LETTERS[section], name) in scenario.varied and isinstance(declared, Quantity):
-                found[f"{section}.{name}"] = "" if declared.unit == "1" else declared.unit
-    return found
+                units[f"{section}.{name}"] = "" if declared.unit == "1" else declared.unit
+    return units
 
 
 def varied_colours(scenario: Scenario, key: str, seed: int) -> AgentColours:
@@ -248,7 +248,7 @@ def cluster_colours(least: NDArray[Any]) -> AgentColours:
     """Colour by the clusters that `cluster_labels` returns."""
     known, sizes = np.unique(least[least >= 0], return_counts=True)
     most = f", the largest of {sizes.max()}" if len(known) else ""
-    return AgentColours("cluster", IDENTITIES, least, told=f"{len(known)} of two and more{most}, grey: alone")
+    return AgentColours("cluster", IDENTITIES, least, note=f"{len(known)} of two and more{most}, grey: alone")
 
 
 def category_colours(count: int) -> NDArray[np.uint8]:

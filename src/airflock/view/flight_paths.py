@@ -120,29 +120,29 @@ class WorldOutline(NamedTuple):
 def _outline_heights(world: arena.Parameters) -> list[tuple[float, float]]:
     """Return the lowest and the highest height of each outline of a 3-D arena, m."""
     whole = arena.heights_of(world)
-    found = [] if world.arena == "none" else [whole]
-    return found + [(h[0], h[1]) for h in world.heights or [whole] * len(world.obstacles)]
+    heights = [] if world.arena == "none" else [whole]
+    return heights + [(h[0], h[1]) for h in world.heights or [whole] * len(world.obstacles)]
 
 
 def world_outlines(world: arena.Parameters) -> list[WorldOutline]:
     """Return the ground plans of the arena (first, if there is one) and of the obstacles, as closed polygons."""
     plan = ground_plan(world)
-    found = [] if plan is None else [WorldOutline(np.array(plan.exterior.coords), False)]
+    outlines = [] if plan is None else [WorldOutline(np.array(plan.exterior.coords), False)]
     for corners in world.obstacles:
-        found.append(WorldOutline(np.array([*corners, corners[0]]), True))
-    return found
+        outlines.append(WorldOutline(np.array([*corners, corners[0]]), True))
+    return outlines
 
 
 def wall_lines(world: arena.Parameters) -> list[WorldOutline]:
     """Return faces and edges to draw: in the plane the outlines, in space floor, ceiling and uprights of each."""
     if world.dimensions == "2":
         return world_outlines(world)
-    found = []
+    outlines = []
     for (corners, obstacle), (low, high) in zip(world_outlines(world), _outline_heights(world), strict=True):
-        found += [WorldOutline(_at_height(corners, z), obstacle) for z in (low, high)]
+        outlines += [WorldOutline(_at_height(corners, z), obstacle) for z in (low, high)]
         step = max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1  # a circle gets eight uprights
-        found += [WorldOutline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
-    return found
+        outlines += [WorldOutline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
+    return outlines
 
 
 def _at_height(corners: Array, z: float) -> Array:

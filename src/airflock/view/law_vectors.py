@@ -18,12 +18,12 @@ def vector_fields(record: Any) -> dict[str, tuple[str, str]]:
     Sums(x, y, z) is one vector without a name; Sums(away_x, away_y, away_z, n) one called away.
     """
     fields = record._fields
-    found = {}
+    vectors = {}
     for field in fields:
         stem = field[:-1]
         if field.endswith("x") and f"{stem}y" in fields:
-            found[stem.strip("_")] = (field, f"{stem}y")
-    return found
+            vectors[stem.strip("_")] = (field, f"{stem}y")
+    return vectors
 
 
 def term_name_and_unit(model: Model, stem: str) -> tuple[str, str]:
@@ -92,8 +92,8 @@ def rays_and_command(
     senses = RecordingPercept.of(world, own, time, course.of(agent), (0, 0, agent))
     senses.cast_rays = []
     period = step_counts(scenario)["decide_every"] * scenario.flight.dt
-    made = decide(
+    decision = decide(
         scenario.model, scenario.parameters, own, list(heard), (), None,
         time=time, period=period, index=agent, percept=senses,
     )  # fmt: skip
-    return senses.cast_rays, made.command
+    return senses.cast_rays, decision.command

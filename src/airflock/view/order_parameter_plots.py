@@ -87,20 +87,20 @@ def series(
     _rotation(lower, course, style.PURPLE, ROTATION_LABEL, pen)
     _mark_faults(recording, course, upper, lower)
     lower.set_xlim(float(course.index[0]), float(course.index[-1]) if len(course) > 1 else None)
-    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.told}")
+    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
     return style.root_figure(figure)
 
 
 def _mark_faults(recording: xr.Dataset, course: pd.DataFrame, upper: Axes, lower: Axes) -> None:
     """Draw a line where each fault begins, with its kind and agent where there are few."""
-    shown = [told for told in recorded_faults(recording) if course.index[0] <= told["begin"] <= course.index[-1]]
-    for told in shown:
+    shown = [fault for fault in recorded_faults(recording) if course.index[0] <= fault["begin"] <= course.index[-1]]
+    for fault in shown:
         for axes in (upper, lower):
-            axes.axvline(told["begin"], color="0.55", linewidth=0.7, linestyle=":", zorder=0)
+            axes.axvline(fault["begin"], color="0.55", linewidth=0.7, linestyle=":", zorder=0)
         if len(shown) <= MAX_NAMED_FAULTS:
-            label = f" {told['kind']} ({told['agent']})"
+            label = f" {fault['kind']} ({fault['agent']})"
             lower.text(
-                told["begin"], 0.98, label, transform=lower.get_xaxis_transform(), rotation=90, va="top", fontsize=6
+                fault["begin"], 0.98, label, transform=lower.get_xaxis_transform(), rotation=90, va="top", fontsize=6
             )
 
 
@@ -116,12 +116,12 @@ class SmoothedLines:
         span = float(times[-1] - times[0]) if len(times) else 0.0
         if smooth is not None and smooth < 0.0:
             raise AirflockError(f"smooth = {smooth:g} s must not be below 0")
-        wanted = float(f"{span / WINDOW_SHARE:.1g}") if smooth is None else smooth
-        self.count = round(wanted / period) if period > 0.0 else 0
+        seconds = float(f"{span / WINDOW_SHARE:.1g}") if smooth is None else smooth
+        self.count = round(seconds / period) if period > 0.0 else 0
         self.window_seconds = self.count * period
 
     @property
-    def told(self) -> str:
+    def window_text(self) -> str:
         """Words of the title that describe the window."""
         return f" · means over {self.window_seconds:.3g} s" if self.count > 1 else ""
 
@@ -157,7 +157,7 @@ def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax:
         if spread < MIN_RELATIVE_SPREAD * abs(middle):  # rounding is no course
             axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
     figure.align_ylabels(list(panels))
-    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.told}")
+    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
     return style.root_figure(figure)
 
 
@@ -261,7 +261,7 @@ def flocked(
     lower.set_ylim(bottom=0.0)
     style.style_axes(lower, "time (s)", "number")
     style.add_legend(lower, lower.get_lines(), columns=2)
-    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.told}")
+    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
     return style.root_figure(figure)
 
 

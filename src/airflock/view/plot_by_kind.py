@@ -144,11 +144,11 @@ def naming_file(source: Any) -> Iterator[None]:
     """Put the name of the recording's file in front of the RecordingErrors raised inside."""
     try:
         yield
-    except RecordingError as fault:
-        before, colon, said = str(fault).partition(": ")
+    except RecordingError as error:
+        before, colon, rest = str(error).partition(": ")
         if before != "recording" or not colon or not _is_recording_file(source):
             raise
-        raise RecordingError(f"{source}: {said}") from fault
+        raise RecordingError(f"{source}: {rest}") from error
 
 
 def _source_name(source: Any) -> str:

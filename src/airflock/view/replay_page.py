@@ -67,16 +67,16 @@ class PackedPositions(NamedTuple):
 
 def pack_positions(position: NDArray[Any], rows: Sequence[NDArray[np.uint8]] = ()) -> PackedPositions:
     """Pack positions (time, axis, agent), m, all finite, and rows of bytes (time, agent) beside them."""
-    given = np.asarray(position, float)
-    low, high = given.min(axis=(0, 2)), given.max(axis=(0, 2))
+    positions = np.asarray(position, float)
+    low, high = positions.min(axis=(0, 2)), positions.max(axis=(0, 2))
     quantum = np.maximum((high - low) / MAX_QUANTA, 1e-12)
-    whole = np.round((given - low[:, None]) / quantum[:, None]).astype(np.uint16)
+    whole = np.round((positions - low[:, None]) / quantum[:, None]).astype(np.uint16)
     steps = whole.copy()
     steps[1:] -= whole[:-1]  # modulo 2^16, which adding up undoes
     series = np.ascontiguousarray(steps.transpose(1, 2, 0)).ravel()
     data = (series & 0xFF).astype(np.uint8).tobytes() + (series >> 8).astype(np.uint8).tobytes()
     data += b"".join(np.diff(row, axis=0, prepend=row[:1] * 0).T.tobytes() for row in rows)  # modulo 2^8
-    frames, axes, agents = given.shape
+    frames, axes, agents = positions.shape
     return PackedPositions(low.tolist(), quantum.tolist(), (frames, axes, agents), zlib.compress(data, 9))
 
 
@@ -120,20 +120,20 @@ def colour_layers(
     position : (frame, axis, agent), m, and present : (frame, agent), of every `stride`-th instant
     """
     frames, agents = present.shape
-    found = [] if scenario is None else list(_cluster_layer(scenario, position, present))
+    layers = [] if scenario is None else list(_cluster_layer(scenario, position, present))
     if scenario is not None and scenario.agents == agents:
         fixed = [group_colours(scenario.groups, agents)] if scenario.groups else []
         seed = attributes.read_integer(recording, "airflock_seed", 0)
         fixed += [varied_colours(scenario, key, seed) for key in varied_number_units(scenario)]
-        found += [_to_layer(shade, np.tile(shade.values, (frames, 1))) for shade in fixed]
+        layers += [_to_layer(shade, np.tile(shade.values, (frames, 1))) for shade in fixed]
     faults = attributes.recorded_faults(recording)
     armed = [] if scenario is None else [entry.fault.name for entry in scenario.faults]
     if faults or armed:
         times = recording["time"].values[::stride]
         kinds = tuple(dict.fromkeys([*armed, *(str(fault["kind"]) for fault in faults)]))
         shade = fault_colours(faults, 0.0, agents, kinds)
-        found.append(_to_layer(shade, np.array([fault_colours(faults, t, agents, kinds).values for t in times])))
-    return [*found, *_variable_layers(recording, stride)]
+        layers.append(_to_layer(shade, np.array([fault_colours(faults, t, agents, kinds).values for t in times])))
+    return [*layers, *_variable_layers(recording, stride)]
 
 
 def scenario_layer_names(scenario: Scenario) -> list[str]:
@@ -163,7 +163,7 @@ def _cluster_layer(scenario: Scenario, position: NDArray[Any], present: NDArray[
         of = cluster_labels(position[first][:, there].T, reach, box)
         least[first : first + every, there] = np.where(of >= 0, there[of], -1)
     yield _to_layer(
-        AgentColours("cluster", IDENTITIES, np.zeros(0), told=f"linked over less than {reach:.3g} m; grey: alone"),
+        AgentColours("cluster", IDENTITIES, np.zeros(0), note=f"linked over less than {reach:.3g} m; grey: alone"),
         least,
     )
 
@@ -219,9 +219,9 @@ class Replay:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the page as .html."""
         target = expand_path(path)
-        wrong = suffix_error(target, PAGES)
-        if wrong:
-            raise RecordingError(wrong)
+        error = suffix_error(target, PAGES)
+        if error:
+            raise RecordingError(error)
         atomic.write_file(target, self.text)
         return target
 
@@ -333,10 +333,10 @@ def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
     times = np.arange(len(frames))[:, None]
     last = np.maximum.accumulate(np.where(present, times, -1), axis=0)
     source = np.where(last >= 0, last, present.argmax(axis=0))
-    found = np.take_along_axis(frames, source[:, None, :], axis=0)
+    kept = np.take_along_axis(frames, source[:, None, :], axis=0)
     ever = present.any(axis=0)
-    found[:, :, ~ever] = found[:, :, [int(ever.argmax())]]
-    return found
+    kept[:, :, ~ever] = kept[:, :, [int(ever.argmax())]]
+    return kept
 
 
 def _charts(courses: Mapping[str, NDArray[Any]]) -> list[list[Any]]:
@@ -353,7 +353,7 @@ def _mean_over_present(speed: NDArray[Any]) -> NDArray[Any]:
 
 def _layer_json(shade: AgentColours) -> dict[str, Any]:
     """Return the entries of the page for one layer."""
-    words = f"{COLOURING_NOTES.get(shade.name, shade.name)}; {shade.told}" if shade.kind == IDENTITIES else shade.told
+    words = f"{COLOURING_NOTES.get(shade.name, shade.name)}; {shade.note}" if shade.kind == IDENTITIES else shade.note
     return {
         "name": shade.name, "kind": shade.kind, "ends": [f"{shade.low:.3g}", f"{shade.high:.3g} {shade.unit}".strip()],
         "names": list(shade.names), "tones": category_colours(len(shade.names)).tolist(),
@@ -371,7 +371,7 @@ def _nearest_and_collisions(
         if measured and COLLISION_METRICS & set(scalar_names(scenario.measures, measured))
         else 0.0
     )
-    nearest, found = np.full(len(position), np.nan), []
+    nearest, collisions = np.full(len(position), np.nan), []
     touching: set[tuple[int, int]] = set()
     for number, frame in enumerate(position):
         who = np.flatnonzero(present[number])
@@ -387,15 +387,15 @@ def _nearest_and_collisions(
         nearest[number] = tree.query(points, k=2)[0][:, 1].min()
         near = tree.query_pairs(limit) if limit > 0.0 and nearest[number] < limit else set()
         now = {(int(who[i]), int(who[j])) for i, j in near}
-        found += [(number * period, i, j) for i, j in sorted(now - touching)]
+        collisions += [(number * period, i, j) for i, j in sorted(now - touching)]
         touching = now
-    return nearest, found[:MAX_EVENTS]
+    return nearest, collisions[:MAX_EVENTS]
 
 
 def _event_rows(recording: xr.Dataset, scenario: Any) -> list[list[Any]]:
     """Return the events of a flight: time, s, and text."""
-    found = [] if scenario is None else to_events(attributes.recorded_events(recording))[:MAX_EVENTS]
-    return [[event.step * scenario.flight.dt, _event_text(event)] for event in found]
+    events = [] if scenario is None else to_events(attributes.recorded_events(recording))[:MAX_EVENTS]
+    return [[event.step * scenario.flight.dt, _event_text(event)] for event in events]
 
 
 def _event_text(event: Event) -> str:

@@ -41,8 +41,8 @@ def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> F
     for axes, draw, name in zip(panels[0], draws, "ABCD", strict=False):
         draw(axes, certificate)
         style.set_panel_letter(axes, name)
-    said = "shown" if certificate.shown else "not shown"
-    details = f"{said}, {100.0 * certificate.campaign.confidence:g} % confidence"
+    verdict = "shown" if certificate.shown else "not shown"
+    details = f"{verdict}, {100.0 * certificate.campaign.confidence:g} % confidence"
     style.set_figure_title(figure, certificate.campaign.scenario.name, details)
     return style.root_figure(figure)
 
@@ -152,17 +152,17 @@ def _tolerances(axes: Axes, certificate: "Certificate") -> None:
 
 def _bound_map(axes: Axes, certificate: "Certificate") -> None:
     """Draw the upper bound over two numbers; the line is the level below which a cell is safe."""
-    told = certificate.over
-    rows, columns = (np.array(values) for values in told["axes"])
-    high = np.array([cell["high"] for cell in told["cell"]]).reshape(len(rows), len(columns))
+    table = certificate.over
+    rows, columns = (np.array(values) for values in table["axes"])
+    high = np.array([cell["high"] for cell in table["cell"]]).reshape(len(rows), len(columns))
     shown = axes.pcolormesh(
-        columns, rows, high, norm=LogNorm(told["level"] / 10.0, 1.0), cmap="viridis_r", shading="nearest"
+        columns, rows, high, norm=LogNorm(table["level"] / 10.0, 1.0), cmap="viridis_r", shading="nearest"
     )
-    if high.min() < told["level"] < high.max():
-        axes.contour(columns, rows, high, levels=[told["level"]], colors=style.RED, linewidths=1.2)
-    axes.plot([], [], color=style.RED, label=f"{100.0 * told['level']:g} % of flights")
+    if high.min() < table["level"] < high.max():
+        axes.contour(columns, rows, high, levels=[table["level"]], colors=style.RED, linewidths=1.2)
+    axes.plot([], [], color=style.RED, label=f"{100.0 * table['level']:g} % of flights")
     across, down = (
-        key if unit == "1" else f"{key} ({unit})" for key, unit in zip(told["keys"], told["units"], strict=True)
+        key if unit == "1" else f"{key} ({unit})" for key, unit in zip(table["keys"], table["units"], strict=True)
     )
     style.style_axes(axes, down, across, grid=False)
     style.add_legend(axes, above=True)
@@ -244,11 +244,11 @@ def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> N
     step = (logs.time[k + 2] - logs.time[k + 1])[:, None]
     pull = ((logs.velocity[k + 2] - logs.velocity[k + 1]) / step * gap).sum(axis=1) / size
     value = result.body.value
-    asked = size / value["tau"]
-    panel.plot(asked, pull, ".", color=style.SKY, markersize=1.5, alpha=0.4, rasterized=True)
-    edges = np.linspace(0.0, float(np.quantile(asked, 0.998)), 15)
+    demanded = size / value["tau"]
+    panel.plot(demanded, pull, ".", color=style.SKY, markersize=1.5, alpha=0.4, rasterized=True)
+    edges = np.linspace(0.0, float(np.quantile(demanded, 0.998)), 15)
     for low, high in zip(edges[:-1], edges[1:], strict=True):
-        inside = (asked >= low) & (asked < high)
+        inside = (demanded >= low) & (demanded < high)
         if inside.sum() >= 20 and 0.5 * (low + high) > 3.0 * value["white"] / value["tau"]:  # else noise hides the gap
             panel.plot(0.5 * (low + high), np.median(pull[inside]), "o", color=style.BLUE, markersize=3.5)
     panel.plot([], [], "o", color=style.BLUE, markersize=3.5, label="median of the log")

@@ -38,7 +38,7 @@ def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
     (m/s).
     """
     side = 1.0 if dv > 0.0 else 0.0
-    given = {
+    arguments = {
         "dx": r, "dy": 0.0, "dz": 0.0, "r": r, "r2": r * r, "dvx": 0.0, "dvy": dv, "dvz": 0.0, "dv": dv,
         "vx": 0.0, "vy": 0.0, "vz": 0.0, "hx": 0.0, "hy": 0.0, "hz": 0.0,
         "nhx": 0.0, "nhy": side, "nhz": 0.0, "age": 0.0, "lower": 0.0, "kin": 1.0, "group": -1.0, "p": p,
@@ -47,8 +47,8 @@ def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
         raise RuleError(f"model {model.name} has no rule neighbour")
     names = argument_names(model.neighbour, "neighbour", model.name)
     if "dv" in names and dv == 0.0:
-        given["dv"] = 1e-6  # as a driver guards it: the length of nothing divides safely
-    return model.neighbour(*(given[name] for name in names))
+        arguments["dv"] = 1e-6  # as a driver guards it: the length of nothing divides safely
+    return model.neighbour(*(arguments[name] for name in names))
 
 
 def repulsion_curve(model: Model, p: Any, r: Array) -> list[RuleResponse]:
@@ -108,8 +108,8 @@ def wall_curve(model: Model, p: Any, distance: Array, v: float) -> list[RuleResp
     if model.boundary is None:
         raise RuleError(f"model {model.name} has no rule boundary")
     names = argument_names(model.boundary, "boundary", model.name)
-    given = {"nx": 1.0, "ny": 0.0, "nz": 0.0, "vx": -v, "vy": 0.0, "vz": 0.0, "p": p}
-    answers = [model.boundary(*({**given, "distance": float(d)}[name] for name in names)) for d in distance]
+    arguments = {"nx": 1.0, "ny": 0.0, "nz": 0.0, "vx": -v, "vy": 0.0, "vz": 0.0, "p": p}
+    answers = [model.boundary(*({**arguments, "distance": float(d)}[name] for name in names)) for d in distance]
     return [
         RuleResponse(name, np.array([getattr(a, x) for a in answers], dtype=float))
         for name, (x, _) in vector_fields(model.Walls).items()

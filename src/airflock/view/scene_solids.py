@@ -104,7 +104,7 @@ def shapes_by_kind(rows: NDArray[Any]) -> dict[float, NDArray[Any]]:
 
 def scenery_solids(shapes: dict[float, NDArray[Any]], plane_height: float | None) -> list[SceneSolid]:
     """Return boxes, trees, triangles and walls; in a plane everything is `tall` m high."""
-    found = []
+    solids = []
     boxes = [_box_mesh(*_with_height(row, plane_height)) for row in shapes[BOX]]
     trunks = []
     for row in shapes[CYLINDER]:
@@ -122,11 +122,11 @@ def scenery_solids(shapes: dict[float, NDArray[Any]], plane_height: float | None
         ("walls", walls, OBSTACLE_COLOUR),
     ):
         if parts:
-            found.append(SceneSolid(name, *_joined_meshes(parts), colour))
+            solids.append(SceneSolid(name, *_joined_meshes(parts), colour))
     triangles = shapes[TRIANGLE][:, 7:16].reshape(-1, 3)
     if len(triangles):
-        found.append(SceneSolid("mesh", triangles, np.arange(len(triangles)).reshape(-1, 3), BLOCK_COLOUR))
-    return found
+        solids.append(SceneSolid("mesh", triangles, np.arange(len(triangles)).reshape(-1, 3), BLOCK_COLOUR))
+    return solids
 
 
 def _with_height(row: NDArray[Any], plane_height: float | None) -> NDArray[Any]:
@@ -157,8 +157,8 @@ def _prism_mesh(corners: NDArray[Any], low: float, high: float) -> tuple[NDArray
 def _roof_triangles(corners: NDArray[Any]) -> list[tuple[int, int, int]]:
     """Return triangles that fill a simple polygon, by the numbers of its corners."""
     place = {(float(x), float(y)): number for number, (x, y) in enumerate(corners)}
-    found = constrained_delaunay_triangles(Polygon(corners)).geoms
-    return [tuple(place[corner] for corner in triangle.exterior.coords[:3]) for triangle in found]  # type: ignore[misc]
+    triangles = constrained_delaunay_triangles(Polygon(corners)).geoms
+    return [tuple(place[corner] for corner in triangle.exterior.coords[:3]) for triangle in triangles]  # type: ignore[misc]
 
 
 def _joined_meshes(parts: list[tuple[NDArray[Any], NDArray[Any]]]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -170,14 +170,14 @@ def _joined_meshes(parts: list[tuple[NDArray[Any], NDArray[Any]]]) -> tuple[NDAr
 
 def prism_edges(corners: NDArray[Any], low: float, high: float) -> NDArray[Any]:
     """Return the edges of an upright prism over a closed outline (corner, 2), as segments."""
-    found = []
+    edges = []
     for z in {low, high}:
         ring = np.column_stack([corners, np.full(len(corners), z)])
-        found.append(np.stack([ring[:-1], ring[1:]], 1))
+        edges.append(np.stack([ring[:-1], ring[1:]], 1))
     if low < high:
         some = corners[: -1 : max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1]
-        found.append(np.array([[[x, y, low], [x, y, high]] for x, y in some]))
-    return np.vstack(found)
+        edges.append(np.array([[[x, y, low], [x, y, high]] for x, y in some]))
+    return np.vstack(edges)
 
 
 def dart_mesh(size: float) -> tuple[NDArray[Any], NDArray[Any]]:

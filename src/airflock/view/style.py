@@ -154,12 +154,12 @@ def set_figure_title(figure: Figure, heading: str, details: str = "") -> None:
 
 def add_legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 4, *, above: bool = False) -> None:
     """Add a legend without a frame; above the axes, or where it hides least."""
-    found = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
-    if not found:
+    entries = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
+    if not entries:
         return
     if above:
         axes.legend(
-            handles=found,
+            handles=entries,
             loc="lower right",
             bbox_to_anchor=(1.0, 1.0),
             ncols=columns,
@@ -170,7 +170,7 @@ def add_legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 
             borderaxespad=0.2,
         )
     else:
-        axes.legend(handles=found, loc="best", frameon=False, fontsize=SMALL_SIZE, handlelength=1.6)
+        axes.legend(handles=entries, loc="best", frameon=False, fontsize=SMALL_SIZE, handlelength=1.6)
 
 
 def add_colour_bar(
@@ -245,9 +245,9 @@ def print_settings() -> Iterator[None]:
 def atomic_picture(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Iterator[Path]:
     """Yield a temporary path to write to, renamed at the end; report every error in one line."""
     target = expand_path(path)
-    fault = suffix_error(target, suffixes)
-    if fault:
-        raise PictureError(fault)
+    error = suffix_error(target, suffixes)
+    if error:
+        raise PictureError(error)
     if target.is_dir():
         raise PictureError(f"{target}: is a folder; give a file name")
     try:

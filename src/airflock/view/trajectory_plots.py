@@ -319,12 +319,12 @@ def trajectories(
         _in_space(axes, shown, world, labels)
     else:
         _from_above(axes, shown, world, labels)
-    said = title_details(recording, shown) + (" · each agent in its own colour" if way == "agent" else "")
-    said += " · dots: at the end" + (f" · thick: {_agent_label(recording, chosen)}" if chosen >= 0 else "")
+    details = title_details(recording, shown) + (" · each agent in its own colour" if way == "agent" else "")
+    details += " · dots: at the end" + (f" · thick: {_agent_label(recording, chosen)}" if chosen >= 0 else "")
     if space and ax is None:
-        style.set_figure_title(figure, short_name(recording), said)
+        style.set_figure_title(figure, short_name(recording), details)
     else:
-        style.set_title(axes, short_name(recording), said)
+        style.set_title(axes, short_name(recording), details)
     if way != "agent":
         bar = style.add_colour_bar(
             figure, ScalarMappable(scale, cmap), axes, "heading" if way == "heading" else "speed (m/s)",
@@ -389,13 +389,13 @@ def _agent_segments(
     kept = np.unique(np.append(np.arange(0, count, stride), count - 1))
     where, speed = paths.position[kept], values[kept]
     step = np.diff(speed, axis=0)
-    found = []
+    per_agent = []
     for number in range(paths.agents):
         line = where[:, :, number]
         segments, mean = np.stack([line[:-1], line[1:]], axis=1), speed[:-1, number] + middle * step[:, number]
         inside = ~crosses_periodic_face(segments, world)
-        found.append((segments[inside], mean[inside]))
-    return found
+        per_agent.append((segments[inside], mean[inside]))
+    return per_agent
 
 
 def _draw(
@@ -523,15 +523,15 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, a
         frame = int(max(few, key=lambda k: len(rays_at_frame(recording, agent, int(k))[0])))
     else:
         frame = int(np.abs(times - start).argmin())
-    found, command = rays_at_frame(recording, agent, frame)
+    cast, command = rays_at_frame(recording, agent, frame)
     scenario, shown = scenario_or_none(recording), paths_in_window(recording)
     assert scenario is not None
     x, y = (float(c) for c in shown.position[frame, :2, agent])
-    reach = 1.3 * max(ray.length for ray in found)
+    reach = 1.3 * max(ray.length for ray in cast)
     figure, axes = style.figure_and_axes(ax, 6.0, 5.6)
     draw_ground_plans(axes, shapes_near_paths(scenario, shown))
-    lines = [[(x, y), (x + ray.free * ray.x, y + ray.free * ray.y)] for ray in found]
-    colours = [style.GREEN if ray.free >= ray.length else style.RED for ray in found]
+    lines = [[(x, y), (x + ray.free * ray.x, y + ray.free * ray.y)] for ray in cast]
+    colours = [style.GREEN if ray.free >= ray.length else style.RED for ray in cast]
     axes.add_collection(LineCollection(lines, colors=colours, linewidths=0.8, alpha=0.8, zorder=3))
     pace = max(float(np.linalg.norm(command)), 1e-9)
     tip = (x + reach / 1.3 * command[0] / pace, y + reach / 1.3 * command[1] / pace)
@@ -542,6 +542,6 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, a
     axes.set(xlim=(x - reach, x + reach), ylim=(y - reach, y + reach))
     axes.set_aspect("equal")
     style.style_axes(axes, "east (m)", "north (m)", grid=False)
-    words = f"agent {agent} at {times[frame]:.4g} s · {len(found)} rays cast"
+    words = f"agent {agent} at {times[frame]:.4g} s · {len(cast)} rays cast"
     style.set_title(axes, short_name(recording), f"{words} · {title_details(recording)}")
     return figure

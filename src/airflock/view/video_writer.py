@@ -323,8 +323,8 @@ def video(
             for number, instant in enumerate(instants):
                 try:
                     film.send(stage.render(float(instant)))
-                except OSError as fault:  # a broken pipe: ffmpeg is gone and does not say why
-                    raise RuntimeError(f"ffmpeg stopped after {number} pictures; is the disk full?") from fault
+                except OSError as error:  # a broken pipe: ffmpeg is gone and does not say why
+                    raise RuntimeError(f"ffmpeg stopped after {number} pictures; is the disk full?") from error
                 if done is not None:
                     done()
         finally:
@@ -337,10 +337,10 @@ def import_ffmpeg() -> Any:
     """Import the package imageio_ffmpeg, which brings an ffmpeg; raise PictureError with an install hint."""
     try:
         import imageio_ffmpeg
-    except ModuleNotFoundError as fault:
+    except ModuleNotFoundError as error:
         raise PictureError(
             "videos need imageio-ffmpeg: pip install 'airflock[video]'; airflock replay makes a page without it"
-        ) from fault
+        ) from error
     return imageio_ffmpeg
 
 
@@ -371,17 +371,17 @@ def _frame_times(recording: xr.Dataset, fps: float, speed: float, start: float |
 
 def _film(path: Path, size: tuple[int, int], fps: float) -> Any:
     """Start an ffmpeg that takes one frame at a time."""
-    given: dict[str, Any] = {"fps": fps, "pix_fmt_in": "rgba", "macro_block_size": 1, "ffmpeg_log_level": "quiet"}
+    options: dict[str, Any] = {"fps": fps, "pix_fmt_in": "rgba", "macro_block_size": 1, "ffmpeg_log_level": "quiet"}
     if path.suffix.lower() == ".gif":
-        given |= {
+        options |= {
             "codec": "gif",
             "pix_fmt_out": "pal8",
             "output_params": ["-filter_complex", GIF_PALETTE_FILTER],
             "quality": None,
         }
     else:
-        given |= {"codec": "libx264", "quality": 8, "output_params": ["-movflags", "+faststart", "-f", "mp4"]}
-    film: Iterator[Any] = import_ffmpeg().write_frames(str(path), size, **given)
+        options |= {"codec": "libx264", "quality": 8, "output_params": ["-movflags", "+faststart", "-f", "mp4"]}
+    film: Iterator[Any] = import_ffmpeg().write_frames(str(path), size, **options)
     next(film)
     return film
 
@@ -389,8 +389,8 @@ def _film(path: Path, size: tuple[int, int], fps: float) -> Any:
 def _complete(path: Path, frames: int) -> None:
     """Raise unless the file holds every frame; ffmpeg itself reports nothing when the disk is full at the end."""
     try:
-        found, _ = import_ffmpeg().count_frames_and_secs(str(path))
-    except (RuntimeError, OSError) as fault:
-        raise RuntimeError("ffmpeg wrote no complete video; is the disk full?") from fault
-    if found != frames:
-        raise RuntimeError(f"ffmpeg kept {found} of {frames} pictures; is the disk full?")
+        count, _ = import_ffmpeg().count_frames_and_secs(str(path))
+    except (RuntimeError, OSError) as error:
+        raise RuntimeError("ffmpeg wrote no complete video; is the disk full?") from error
+    if count != frames:
+        raise RuntimeError(f"ffmpeg kept {count} of {frames} pictures; is the disk full?")

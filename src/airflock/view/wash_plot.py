@@ -114,33 +114,33 @@ def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None =
     if shown.agents > MAX_BIRDS:
         raise RecordingError(f"recording: has {shown.agents} birds; the wash can be drawn for at most {MAX_BIRDS}")
     frame = len(shown.times) - 1 if start is None else int(np.abs(shown.times - start).argmin())
-    found = solve_formation(scenario, shown.position[frame], shown.velocity[frame])
+    solved = solve_formation(scenario, shown.position[frame], shown.velocity[frame])
     span = float(scenario.wing.span)
-    low, high = found.place.min(axis=0), found.place.max(axis=0)
+    low, high = solved.place.min(axis=0), solved.place.max(axis=0)
     ahead = float(low[0]) - SPANS_BEHIND * span, float(high[0]) + SPANS_AHEAD * span
     right = -float(high[1]) - SPANS_BESIDE * span, -float(low[1]) + SPANS_BESIDE * span
     tall, wide = ahead[1] - ahead[0], right[1] - right[0]
     rows, columns = (max(2, math.ceil(FIELD_POINTS * side / max(tall, wide))) for side in (tall, wide))
     u, v = np.meshgrid(np.linspace(right[0], right[1], columns), np.linspace(ahead[0], ahead[1], rows))
-    points = np.column_stack([v.ravel(), -u.ravel(), np.full(u.size, found.place[:, 2].mean())])
-    field = -downwash(scenario, found, points).reshape(u.shape)
+    points = np.column_stack([v.ravel(), -u.ravel(), np.full(u.size, solved.place[:, 2].mean())])
+    field = -downwash(scenario, solved, points).reshape(u.shape)
     most = max(float(np.quantile(np.abs(field), 0.97)), 1e-6)
     figure, axes = style.figure_and_axes(ax, 6.4, float(np.clip(6.0 * tall / wide, 3.0, 8.0)))
     picture = axes.imshow(
         field, extent=(*right, *ahead), origin="lower", cmap="PuOr_r", norm=TwoSlopeNorm(0.0, -most, most),
         interpolation="bilinear", zorder=0,
     )  # fmt: skip
-    for place, drag in zip(found.place, found.drag, strict=True):
+    for place, drag in zip(solved.place, solved.drag, strict=True):
         middle = -place[1]
         axes.plot([middle - 0.5 * span, middle + 0.5 * span], [place[0]] * 2, color=style.INK, linewidth=2.4, zorder=3)
-        said = f"{100.0 * (drag / found.solo - 1.0):+.0f} %"
+        label = f"{100.0 * (drag / solved.solo - 1.0):+.0f} %"
         axes.annotate(
-            said, (middle, place[0]), (0.0, 5.0), textcoords="offset points", ha="center", fontsize=style.SMALL_SIZE,
+            label, (middle, place[0]), (0.0, 5.0), textcoords="offset points", ha="center", fontsize=style.SMALL_SIZE,
             color=style.INK, zorder=4, bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0.0, "pad": 1.0},
         )  # fmt: skip
     style.style_axes(axes, "across (m)", "ahead (m)", grid=False)
     axes.set(xlim=right, ylim=ahead, aspect="equal")
-    saving = 1.0 - found.drag.mean() / found.solo
+    saving = 1.0 - solved.drag.mean() / solved.solo
     against = f"{100.0 * abs(saving):.0f} % {'below' if saving >= 0.0 else 'above'} that of lone birds"
     instant = f"t = {shown.times[frame]:.4g} s · induced drag {against}"
     style.set_title(axes, short_name(recording), f"{title_details(recording)} · {instant}")
