@@ -180,6 +180,7 @@ class VerbCommand(TyperCommand):
         except Exception as error:
             if type(error).__name__ not in VALUE_ERROR_NAMES:
                 raise
+            # typer stops at the first bad value; parsing again option by option finds the others as well.
             rest, faults, carried = self._one_by_one(ctx, args)
         for name, line in non_finite_errors(ctx):
             ctx.params[name] = INVALID
@@ -208,7 +209,7 @@ class VerbCommand(TyperCommand):
         if rest and not ctx.allow_extra_args:
             carried = False
             try:
-                ctx.begin_fault(f"Got unexpected extra argument(s) ({' '.join(rest)})")
+                ctx.fail(f"Got unexpected extra argument(s) ({' '.join(rest)})")
             except Exception as error:
                 faults.append(usage_error(error, args))
         return rest, faults, carried

@@ -30,6 +30,7 @@ SEED_OPTIONS = {"seeds": "seeds", "first_seed": "seeds"}
 FLIGHT_OPTIONS = {"threads": "threads", "precision": "precision", "device": "device"}
 MANY_FLIGHT_OPTIONS = {**FLIGHT_OPTIONS, "scheduler": "scheduler"}
 
+# One row per command and option: an option without an argument of a public function fails a test.
 COUNTERPARTS: dict[str, PythonCounterpart] = {
     "run": PythonCounterpart(
         "airflock.score(scenario, seeds=4)",

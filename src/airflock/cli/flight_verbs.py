@@ -717,7 +717,7 @@ def watch(
 
     Example: airflock watch mission.json --radio udp:0.0.0.0:14600
     """
-    from airflock.studio import live_page as open_page
+    from airflock.studio import watch as open_page
 
     open_page(
         scenario, options.parse_settings(changes, agents), seed, law=law, trust=trust, host=host, port=port,

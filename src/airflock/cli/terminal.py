@@ -181,6 +181,7 @@ class LogProgress:
             now = self._clock()
             if now < self._next_line_at:
                 return
+            # The interval grows with the run, so that a log of days stays short.
             self._next_line_at = now + max(LINE_INTERVAL, INTERVAL_SHARE * (now - self._began))
             amount = f": {done:,.0f}" if done else ""
             amount = f": {done:,.0f} of {total:,.0f} ({done / total:.0%})" if total else amount
@@ -208,6 +209,7 @@ class TimeLeft:
     def update(self, done: float, total: float | None) -> None:
         """Take the amount done, and the total."""
         now = self._clock()
+        # Less than before: other work has begun, and its rate is not that of the last.
         if done < self._last:
             self._first, self._since = done, now
         self._last = done

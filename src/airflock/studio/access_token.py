@@ -78,6 +78,7 @@ def check_access(
     """
     try:
         given = parse_qs(urlsplit(path).query).get("token", [""])[0]
+        # Constant time: the time of an answer must not reveal how much of a token was right.
         if hmac.compare_digest(given.encode(), token.encode()):
             return True, True
         kept = SimpleCookie(cookies)
@@ -91,6 +92,7 @@ def check_access(
 @contextmanager
 def require_token(token: str, port: int) -> Iterator[None]:
     """Let the servers of websockets that start inside require the token."""
+    # viser has no access control, so the server is wrapped while it starts; the web socket included.
     serve, name = websockets.asyncio.server.serve, f"airflock_{port}"
 
     def with_check(handler: Any, *where: Any, process_request: Callable[..., Any], **rest: Any) -> Any:
@@ -102,6 +104,7 @@ def require_token(token: str, port: int) -> Iterator[None]:
                     HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Type": "text/plain"}), REFUSAL_PAGE
                 )
             page = urlsplit(request.path).path in ("", "/", "/index.html")
+            # The page must arrive uncompressed, because the script is inserted into its bytes.
             if page and "Accept-Encoding" in request.headers:
                 del request.headers["Accept-Encoding"]
             answer = process_request(connection, request)

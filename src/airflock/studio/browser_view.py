@@ -240,6 +240,7 @@ class BrowserView:
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection")  # to a page that has just gone
         with require_token(token, port):
             self.server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+        # viser silently takes the next port when another program was faster.
         if self.server.get_port() != port:
             self.server.stop()
             raise StudioError(f"port {port} is in use; give another one with --port, or --port 0 for any free one")
@@ -411,6 +412,7 @@ class BrowserView:
         node = self._trails[self._turn % TRAIL_PIECES]
         self._turn += is_complete
         node.points = np.stack([begin, end], 1)
+        # Trails are mixed with the background instead of being transparent: segments of viser have no opacity each.
         pale = _linear_light(0.45 * colour + 0.55 * 235)
         node.colors = np.repeat(pale[:, None], 2, axis=1)
 
@@ -470,6 +472,7 @@ def _free_port(host: str) -> int:
 def _check_port_free(host: str, port: int) -> None:
     """Raise StudioError where nothing can listen at a port; viser would take the next one without a word."""
     with socket.socket() as probe:
+        # A port that a page has just left may be used again at once, as viser does.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
@@ -492,6 +495,7 @@ def camera_for_aspect(camera_aim: Mapping[str, Any], aspect: float) -> dict[str,
     """
     if not camera_aim or not 0.0 < aspect < FULL_ASPECT:
         return dict(camera_aim)
+    # The field of view is that of the height: a narrow page would cut off the sides.
     closer = aspect / FULL_ASPECT
     target = np.asarray(camera_aim["look_at"])
     place = target + (np.asarray(camera_aim["position"]) - target) / closer

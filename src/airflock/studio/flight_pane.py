@@ -367,6 +367,8 @@ class FlightPane:
         """
         if self._compiled_flight is None:
             return None
+        # The compiled flight flies from the start to the present step, so that saved bits are those of a compiled
+        # flight. Carrying the interpreted state over would save a flight that nobody can fly again.
         interpreted, (self.flight, self._compiled_flight) = self.flight, (self._compiled_flight.result(), None)
         start = self.flight.snapshot()
         self._replay(interpreted.events)
@@ -375,6 +377,7 @@ class FlightPane:
 
     def fork(self) -> "FlightPane":
         """Return another pane that goes on from here, with the same noise."""
+        # Not by __init__: a new pane would compile and start again; the flight alone is branched.
         twin = object.__new__(FlightPane)
         twin.__dict__.update(self.__dict__)
         twin.flight = self.flight.branch()
@@ -420,6 +423,7 @@ class FlightPane:
         self._advance_to(time if self._gust_end is None else min(time, self._gust_end))
         if self._gust is None:
             return
+        # A change of wind may wait for its driver; the gust lasts from when it begins to blow.
         if self._gust_end is None and not self.flight.waiting:
             self._gust_end = before + self._gust[0]
         if self._gust_end is not None and self.flight.time >= self._gust_end - 1e-9:
@@ -437,6 +441,7 @@ class FlightPane:
         done = self.flight.events[len(moment.events) :]
         self.restore(moment)
         last = round(time / self.scenario.flight.dt)
+        # Events are part of the flight: without them the same seed would lead elsewhere.
         self._replay([event for event in done if event.step < last])
         self._advance_to(time)
         self.changed = self._current_changes()
@@ -475,6 +480,7 @@ class FlightPane:
 
     def change(self, settings: Mapping[str, Any]) -> None:
         """Set keys of the scenario from now on; what must be compiled comes into force when that is done."""
+        # Faults begun by hand are not in the file, so their first values must be remembered for undo.
         by_hand = {key: scenario_value(self.scenario, key) for key in settings if self._is_manual_fault(key)}
         self.flight.change(settings, wait=False)
         self._manual_fault_values = {**by_hand, **self._manual_fault_values}

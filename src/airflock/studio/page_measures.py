@@ -42,6 +42,7 @@ class AgentPairs:
         self.position = np.asarray(position, float)
         self.period = None
         if period is not None:
+            # cKDTree has no open axis beside periodic ones; a side of 1e9 m acts as one.
             box = np.array([side if side > 0.0 else 1e9 for side in period])
             self.period = box
             self._tree = cKDTree(np.mod(self.position + 0.5 * box, box), boxsize=box)
@@ -71,6 +72,8 @@ class AgentPairs:
         far = distance
         if size * size > 2 * MAX_LINKS:  # a denser flock than can be drawn: as far as so many neighbours reach
             count = min(size - 1, max(1, 2 * MAX_LINKS // size))
+            # The 90 % quantile of the distance to the n-th neighbour bounds the pairs before they are listed:
+            # all pairs of 1,000 agents within radio range would be half a million.
             far = min(distance, float(np.quantile(self._tree.query(self._tree.data, k=count + 1)[0][:, -1], 0.9)))
         pairs = self.within(far)
         length = np.linalg.norm(self.position[pairs[:, 1]] - self.position[pairs[:, 0]], axis=1)
@@ -91,6 +94,7 @@ class AgentPairs:
 
 def without_periodic_crossings(segments: NDArray[Any], period: NDArray[Any]) -> NDArray[Any]:
     """Drop the segments that cross a periodic face."""
+    # The nearest image is at most half a period away; a longer line leads the wrong way round.
     long = (np.abs(segments[:, 1] - segments[:, 0]) > 0.5 * period).any(axis=1)
     return np.asarray(segments[~long])
 
@@ -134,6 +138,7 @@ class PaneChartData:
             self._window = len(flight.windows)
             self.fresh()
         scores = flight.scores()
+        # A paused page calls again with the same moment; counting it twice would bend the histograms.
         if self.instants and self.instants[-1].time == flight.time:
             return scores
         speed, apart = np.sqrt((velocity**2).sum(1)), pairs.apart()

@@ -68,12 +68,14 @@ class CollisionList:
         for pair in sorted(pairs):
             found = self._ongoing.setdefault((pane, pair), Collision(time, pane, *pair))
             self._last_seen[found] = time
+        # A dict keeps the order of insertion, so the first entry is the oldest collision.
         while len(self._last_seen) > MAX_KEPT:
             del self._last_seen[next(iter(self._last_seen))]
 
     def go_back(self, time: float, pane_count: int) -> None:
         """Drop collisions that began after a time, s, and those of closed panes; the rest may continue."""
         kept = {c: min(last, time) for c, last in self._last_seen.items() if c.time <= time and c.side < pane_count}
+        # Pairs that touched at that moment are still the same collision when the flight goes on from there.
         still = [c for c, last in self._last_seen.items() if c in kept and last >= time]
         self._last_seen = kept
         self._ongoing = {
@@ -229,6 +231,7 @@ class DrawnFlock:
     def look(self) -> None:
         """Take the present moment; for a flight that stopped, keep the last one that can be drawn."""
         position, velocity = self.side.motion
+        # A diverged flight keeps its last finite picture: nan would spread through the meshes of the page.
         if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
             return
         self.position, self.velocity = position, velocity
@@ -246,6 +249,7 @@ class DrawnFlock:
         else:
             points = self.pairs.neighbours() if kind == LINK_CHOICES[1] else np.zeros((0, 2, 3))
             tones = np.tile(tone, (len(points), 1))
+        # Agents that left are parked far below; no line may lead to them.
         seen = (points[..., 2] > 0.5 * ABSENT_HEIGHT).all(axis=1)
         return points[seen] + self.offset, np.asarray(tones, np.uint8).reshape(-1, 3)[seen]
 

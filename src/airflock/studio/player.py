@@ -402,6 +402,7 @@ class Player(ComparedFlights):
 
     def ask(self, action: Callable[[], None]) -> None:
         """Queue an action for the next frame; from any thread."""
+        # Actions wait for the next frame: no callback of the page touches the flight from its own thread.
         self._asked.put(action)
 
     def run_actions_within(self, seconds: float) -> bool:
@@ -417,6 +418,7 @@ class Player(ComparedFlights):
             acted = self._settled() or acted
         if self.is_paused or self.failure_message or self.over:
             return acted
+        # A slow flight must not freeze the page: at most the steps that fit into one busy interval, as measured.
         steps = min(self.clock.due(elapsed), max(1, int(self._steps_per_second * MAX_BUSY_SECONDS)))
         if not steps:
             return acted
@@ -469,6 +471,7 @@ class Player(ComparedFlights):
         """Pause, and fly to the next decision: one step of the flock."""
         self.is_paused = True
         scenario, flight = self.sides[0].scenario, self.sides[0].flight
+        # A decision takes several motion steps; up to the next one is what a reader calls one step.
         every = max(1, round(scenario.sensors.period / scenario.flight.dt))
         self.fly(every - flight.step % every)
 
@@ -486,6 +489,7 @@ class Player(ComparedFlights):
         if moment is None:
             self.note = "no earlier moment is kept"
             return
+        # A snapshot from before a fork holds one flight; the second one did not exist then.
         del self.sides[len(moment) :]
         self.hand = min(self.hand, len(self.sides) - 1)
         failed = self.failure_message

@@ -78,16 +78,20 @@ def cluster_labels(position: NDArray[Any], distance: float, period: NDArray[Any]
     if count < 2 or not distance > 0.0:
         return np.full(count, -1, np.intp)
     tree = cKDTree(points if period is None else np.mod(points + 0.5 * period, period), boxsize=period)
+    # A few nearest links join almost the whole flock at the cost of one query; all pairs within the distance
+    # would grow with the square of a dense flock.
     apart, other = tree.query(tree.data, k=min(FIRST_LINKS, count), distance_upper_bound=distance)
     near = np.isfinite(apart) & (np.arange(count)[:, None] != other)
     label = _component_labels(np.nonzero(near)[0], other[near], count)
     rest = np.flatnonzero(label != np.bincount(label).argmax())
     if len(rest):  # whatever joins two clusters has an end outside the largest
+        # cKDTree includes pairs at exactly this distance; the metric of clusters excludes them.
         far = np.nextafter(distance, 0.0)
         links = cKDTree(tree.data[rest], boxsize=period).sparse_distance_matrix(tree, far, output_type="coo_matrix")
         first = np.concatenate([np.nonzero(near)[0], rest[links.row]])
         label = _component_labels(first, np.concatenate([other[near], links.col]), count)
     least = np.full(label.max() + 1, count, np.intp)
+    # Labels are renamed to the smallest agent number, so that a cluster keeps its colour from frame to frame.
     np.minimum.at(least, label, np.arange(count))
     return np.where(np.bincount(label)[label] > 1, least[label], -1)
 
@@ -137,6 +141,7 @@ class AgentColours(NamedTuple):
     def colours(self) -> NDArray[np.uint8]:
         """Return the colours (agent, 3); grey where there is no value."""
         values = np.asarray(self.values, float)
+        # Only numbers and headings may be negative; elsewhere -1 stands for no value.
         known = np.isfinite(values) & ((values >= 0.0) | (self.kind in (NUMBERS, HEADING)))
         whole = np.where(known, values, 0.0)
         if self.kind == NUMBERS:

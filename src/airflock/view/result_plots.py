@@ -104,10 +104,12 @@ def extrapolated_tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float6
     if few < 20:
         return None
     end = float(distances[few])
+    # Excesses below the 20 % quantile: enough data to fit, few enough to follow the tail alone.
     below = end - distances[:few]
     mean, variance = float(below.mean()), float(below.var(ddof=1))
     if not (mean > 0.0 and variance > 0.0):
         return None
+    # Moments instead of likelihood: they always exist here, and the curve is only looked at.
     ratio = mean * mean / variance
     shape, scale = 0.5 * (1.0 - ratio), 0.5 * mean * (1.0 + ratio)
     at = np.linspace(0.0, end, 200)
@@ -268,6 +270,7 @@ def _noise(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
     for lag in range(1, 5):
         k = np.arange(len(logs.time) - lag)
         k = k[run[k] == run[k + lag]]
+        # The command must have stood still in between, or the prediction from one row does not hold.
         for between in range(1, lag):
             k = k[np.abs(logs.command[k + between] - logs.command[k]).max(axis=1) < 1e-9]
         gap = logs.command[k] - logs.velocity[k]
@@ -306,6 +309,7 @@ def _draw_ground_error(panel: Axes, result: IdentifyResult) -> None:
     for lag in np.unique(np.geomspace(1, max(2, len(ground.time) // (4 * result.logs.drones)), 18).astype(int)):
         k = np.arange(len(ground.time) - lag)
         k = k[run[k] == run[k + lag]]
+        # Fewer pairs make a variogram that jumps more than it shows.
         if len(k) > 30:
             lags.append(lag * step)
             seen.append(0.5 * float(((ground.velocity[k + lag] - ground.velocity[k]) ** 2).mean()))

@@ -95,8 +95,10 @@ def _largest_allowed_difference(model: Model, p: Any, r: float) -> float:
     low, high = 0.0, MAX_DIFFERENCE
     if not aligns(high):
         return float("nan")
+    # Any difference aligns: the curve is zero, not a rounding error of the search.
     if aligns(1e-6):
         return 0.0
+    # 60 halvings narrow the interval to the rounding of a double.
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if aligns(middle) else (middle, high)

@@ -175,6 +175,7 @@ def prism_edges(corners: NDArray[Any], low: float, high: float) -> NDArray[Any]:
         ring = np.column_stack([corners, np.full(len(corners), z)])
         edges.append(np.stack([ring[:-1], ring[1:]], 1))
     if low < high:
+        # Round plans have many corners; eight uprights are enough to see their height.
         some = corners[: -1 : max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1]
         edges.append(np.array([[[x, y, low], [x, y, high]] for x, y in some]))
     return np.vstack(edges)
@@ -192,6 +193,7 @@ def dart_mesh(size: float) -> tuple[NDArray[Any], NDArray[Any]]:
 def velocity_quaternions(velocity: NDArray[Any]) -> NDArray[Any]:
     """Return quaternions (agent, 4), w first, that turn +x along velocities (agent, 3): yaw, then pitch."""
     yaw = np.arctan2(velocity[:, 1], velocity[:, 0])
+    # No roll: darts show where agents fly, the state holds no attitude.
     pitch = -np.arctan2(velocity[:, 2], np.hypot(velocity[:, 0], velocity[:, 1]))
     cy, sy, cp, sp = np.cos(yaw / 2), np.sin(yaw / 2), np.cos(pitch / 2), np.sin(pitch / 2)
     return np.stack([cy * cp, -sy * sp, cy * sp, sy * cp], 1).astype(np.float32)

@@ -169,6 +169,7 @@ def draw_ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection |
     patches: list[Any] = [Rectangle((r[0], r[1]), r[3] - r[0], r[4] - r[1]) for r in boxes]
     patches += [Circle((r[7], r[8]), r[9]) for r in trunks]
     if patches:
+        # Infinite shapes would take the whole range of greys.
         height = np.minimum(np.concatenate([boxes[:, 5], trunks[:, 5]]), 1000.0)
         grey = Normalize(0.0, max(float(height.max()), 1.0))
         solid = PatchCollection(
@@ -344,6 +345,7 @@ def _legible_seconds(paths: FlightPaths) -> float:
     known = paths.speed[np.isfinite(paths.speed)]  # of one frame of tracks there is none
     length = float(known.mean()) * paths.agents if known.size else 0.0
     extent = float(np.max(np.nanmax(paths.position, axis=(0, 2)) - np.nanmin(paths.position, axis=(0, 2))))
+    # All paths together may cross the picture so many times before they hide each other.
     window = MAX_CROSSINGS * extent / max(length, 1e-12)
     return MAX_SECONDS if window >= MAX_SECONDS else float(f"{max(window, 1e-9):.1g}")
 
@@ -351,6 +353,7 @@ def _legible_seconds(paths: FlightPaths) -> float:
 def _most_telling_colour(paths: FlightPaths) -> str:
     """Choose the colouring: speed, or heading where all fly equally fast; in space the agent."""
     speed = paths.speed[np.isfinite(paths.speed)]
+    # Quantiles: one agent that starts late must not decide the colouring.
     low, high = np.quantile(speed, (0.05, 0.95)) if speed.size else (0.0, 0.0)
     if high - low > EQUAL_SPEED_SHARE * max(float(high), 1e-12):
         return "speed"
@@ -363,6 +366,7 @@ def _colour_values(paths: FlightPaths, colouring: str) -> tuple[Normalize, Any, 
         angle = np.degrees(np.arctan2(paths.velocity[:, 1], paths.velocity[:, 0])) % 360.0
         return Normalize(0.0, 360.0), style.COMPASS_COLOURS, angle
     if colouring == "agent":
+        # Golden ratio: neighbouring numbers get hues far apart.
         share = np.arange(paths.agents) * 0.6180339887 % 1.0
         return Normalize(0.0, 1.0), style.COMPASS_COLOURS, np.broadcast_to(share, paths.speed.shape)
     return Normalize(*speed_range(paths)), style.SPEED_COLOURS, paths.speed
@@ -386,6 +390,7 @@ def _agent_segments(
     """
     count = len(paths.times)
     stride = max(1, -(-(count - 1) * paths.agents // MAX_SEGMENTS))
+    # The last frame is always kept: the dots at the end lie on it.
     kept = np.unique(np.append(np.arange(0, count, stride), count - 1))
     where, speed = paths.position[kept], values[kept]
     step = np.diff(speed, axis=0)
@@ -417,6 +422,7 @@ def _draw(
     look: dict[str, Any] = {"linewidths": 0.7, "alpha": 0.85, "cmap": cmap, "zorder": 2, "norm": scale}
     if is_highlighted:
         axes.add_collection(kind(segments, colors="white", linewidths=3.6, zorder=3.0, capstyle="round", label="_halo"))
+        # A white halo and a grey ramp make the chosen path readable on top of all colours.
         dark = Normalize(scale.vmin, 1.3 * float(scale.vmax or 1.0))
         look = {"linewidths": 2.0, "cmap": "gray", "zorder": 3.5, "capstyle": "round", "norm": dark}
         values = values if cmap is style.SPEED_COLOURS else np.full(len(segments), scale.vmin)

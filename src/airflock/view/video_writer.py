@@ -79,6 +79,7 @@ class VideoFrame:
         left, right, bottom, top = picture_extent(first, world, self.view, margin=0.03, around=around)
         head = HEADER_HEIGHT * (top - bottom)
         aspect = float(np.clip((right - left) / (top + head - bottom), 0.4, 3.0))
+        # The chart widens the picture; the height, and with it the size of agents, stays.
         beside = CHART_WIDTH if chart else 0.0
         share = aspect / (aspect + beside)
         self.size = (to_even(height * (aspect + beside)), to_even(height))
@@ -103,6 +104,7 @@ class VideoFrame:
         _key(axes, self.scale)
         self.chart_cursor = _chart(self.canvas.figure, recording, chart, share, first) if chart else None
         self.canvas.draw()
+        # Blitting: axes, walls and text are drawn once; each frame restores these pixels and draws what moves.
         self.still = self.canvas.copy_from_bbox(self.canvas.figure.bbox)
 
     def render(self, instant: float) -> Array:
@@ -153,6 +155,7 @@ class VideoFrame:
         if self.tail_seconds <= 0.0 or instant - begin < 1e-9:
             self.tails.set_segments([])
             return
+        # Tails are resampled at equal times, so that they fade evenly whatever the period of the recording.
         moments = np.linspace(begin, instant, POINTS_PER_TAIL)
         past = np.stack([self._positions(float(m)) for m in moments])  # (moment, axis, agent)
         pieces = np.stack([past[:-1], past[1:]], axis=1)  # (moment, end, axis, agent)
@@ -215,6 +218,7 @@ def _interpolated(times: Array, values: Array, instant: float, period: Array | N
     share = float(np.clip((instant - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0))
     step = values[after] - values[after - 1]
     if period is not None:
+        # An agent that leaves through a periodic face must not be drawn on a line across the whole world.
         through = (np.abs(step) > period[:, None]).any(axis=0)
         near = values[after if share >= 0.5 else after - 1]
         return np.asarray(np.where(through, near, values[after - 1] + share * step))
@@ -225,6 +229,7 @@ def _dart_corners(x: Array, y: Array, along: Array, up: Array, length: float) ->
     """Return corners (agent, corner, axis) of darts at (x, y) along the velocities (along, up); all m, m/s."""
     pace = np.hypot(along, up)
     still = ~(pace > 1e-9)
+    # An agent at rest has no heading; it points east instead of dividing by zero.
     hx, hy = np.where(still, 1.0, along / np.maximum(pace, 1e-9)), np.where(still, 0.0, up / np.maximum(pace, 1e-9))
     ahead, side = length * DART_OUTLINE[:, 0], length * DART_OUTLINE[:, 1]
     cx = x[:, None] + hx[:, None] * ahead - hy[:, None] * side
@@ -365,6 +370,7 @@ def _frame_times(recording: xr.Dataset, fps: float, speed: float, start: float |
     times = recording["time"].values.astype(float)
     begin, end = time_window(times, start, stop)
     begin, end = max(begin, float(times[0])), min(end, float(times[-1]))
+    # 1e-9: a window of a whole number of frames keeps its last one in spite of rounding.
     count = max(1, math.floor((end - begin) * fps / speed + 1e-9) + 1)
     return begin + np.arange(count) * (speed / fps)
 

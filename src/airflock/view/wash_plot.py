@@ -54,6 +54,7 @@ def solve_formation(scenario: Scenario, position: Array, velocity: Array) -> Sol
     wing, n = scenario.wing, position.shape[1]
     m = segments_of(wing)
     sizes = shapes(n, m, "none")
+    # Plain lists: the rules are scalar Python here, and a picture shows one instant only.
     work = type(sizes)(*(np.zeros(size).tolist() for size in sizes))
     x, y, z = (part.tolist() for part in position.astype(float))
     vx, vy = (part.tolist() for part in velocity[:2].astype(float))
@@ -78,6 +79,7 @@ def downwash(scenario: Scenario, formation: SolvedFormation, points: Array, with
         dx, dy, dz = (points - place).T
         for segment in range(m):
             y = dy - (segment - 0.5 * (m - 1)) * h
+            # A horseshoe vortex is the difference of its two trailing legs (Dimock & Selig 2003, Eqs 5 and 6).
             ends = _filament_leg(dx, y + 0.5 * h, dz, core * core) - _filament_leg(dx, y - 0.5 * h, dz, core * core)
             total += circulation[segment] * filaments.SHARE * ends
     return total
@@ -85,6 +87,7 @@ def downwash(scenario: Scenario, formation: SolvedFormation, points: Array, with
 
 def _over_arrays(rule: Any) -> Any:
     """Return a scalar rule of the aero package that works on arrays: its `math` is NumPy's."""
+    # The rule has one source: the simulator compiles it, the picture runs it over arrays.
     return FunctionType(rule.__code__, {**rule.__globals__, "math": SimpleNamespace(sqrt=np.sqrt)})
 
 
