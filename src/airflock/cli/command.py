@@ -37,14 +37,14 @@ def usage_error(error: Any, words: Sequence[str]) -> str:
 
 def non_finite_errors(context: Any) -> list[tuple[str, str]]:
     """Return, for options with a range that are nan or inf, the parameter's name and one line."""
-    faults = []
+    errors = []
     for parameter in context.command.params:
         value, ends = context.params.get(parameter.name), _range_ends(parameter)
         if isinstance(value, float) and not math.isfinite(value) and ends != (None, None):
             verb = _command_path(context).partition(" ")[2]
             said = f"{verb}: {_parameter_name(parameter)} {value:g} is not a finite number; give {_range_text(*ends)}"
-            faults.append((str(parameter.name), said))
-    return faults
+            errors.append((str(parameter.name), said))
+    return errors
 
 
 def _message(error: Any, context: Any, words: Sequence[str]) -> str:
@@ -173,7 +173,7 @@ class VerbCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of a command line."""
-        faults: list[str] = []
+        errors: list[str] = []
         carried = True  # whether everything that is wrong is a number
         try:
             rest = super().parse_args(ctx, list(args))
@@ -181,26 +181,26 @@ class VerbCommand(TyperCommand):
             if type(error).__name__ not in VALUE_ERROR_NAMES:
                 raise
             # typer stops at the first bad value; parsing again option by option finds the others as well.
-            rest, faults, carried = self._one_by_one(ctx, args)
+            rest, errors, carried = self._one_by_one(ctx, args)
         for name, line in non_finite_errors(ctx):
             ctx.params[name] = INVALID
-            faults.append(line)
-        ctx.meta[ERRORS_KEY] = faults
-        if faults and not (carried and _takes_context(self.callback)):
-            raise AirflockError("\n".join(faults))
+            errors.append(line)
+        ctx.meta[ERRORS_KEY] = errors
+        if errors and not (carried and _takes_context(self.callback)):
+            raise AirflockError("\n".join(errors))
         return rest
 
     def _one_by_one(self, ctx: Any, args: list[str]) -> tuple[list[str], list[str], bool]:
         """Return the unread words, the errors of all options, and for each whether it is a number's."""
         given, rest, _ = self.make_parser(ctx).parse_args(args=list(args))
-        faults, carried = [], True
+        errors, carried = [], True
         for parameter in self.get_params(ctx):
             try:
                 _, rest = parameter.handle_parse_result(ctx, given, rest)
             except Exception as error:
                 if type(error).__name__ not in VALUE_ERROR_NAMES:
                     raise
-                faults.append(usage_error(error, args))
+                errors.append(usage_error(error, args))
                 number = (
                     type(error).__name__ == VALUE_ERROR_NAMES[0] and type(parameter.type).__name__ in NUMBER_TYPE_NAMES
                 )
@@ -211,8 +211,8 @@ class VerbCommand(TyperCommand):
             try:
                 ctx.fail(f"Got unexpected extra argument(s) ({' '.join(rest)})")
             except Exception as error:
-                faults.append(usage_error(error, args))
-        return rest, faults, carried
+                errors.append(usage_error(error, args))
+        return rest, errors, carried
 
 
 def _takes_context(callback: Callable[..., Any] | None) -> bool:

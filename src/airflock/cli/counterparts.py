@@ -211,7 +211,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         "replay",
         {
             "source": "recording",
-            "page": "airflock.view.replays.Replay.save",
+            "page": "airflock.view.replay_page.Replay.save",
             "seed": "airflock.simulate",
             "rate": "rate",
             "colour": "colour",

@@ -147,7 +147,7 @@ def _option_errors(vehicle: str, body: str | None, mode: str, card_file: Path | 
     """Return errors of options that do not concern the scenario."""
     from airflock.fleets import FLEET_MODES, VEHICLE_BODIES, VEHICLE_KINDS
 
-    faults = [
+    errors = [
         f"{option} {word} is none of {', '.join(known)}{suggest(word, known, lead='; ')}"
         for option, word, known in (
             ("--vehicle", vehicle, VEHICLE_KINDS),
@@ -157,10 +157,10 @@ def _option_errors(vehicle: str, body: str | None, mode: str, card_file: Path | 
         if word is not None and word not in known
     ]
     if card_file is not None and mode == FLEET_MODES[0]:
-        faults.append(f"--card {card_file}: in lock-step it flies too fast to watch; add --mode tasks or processes")
+        errors.append(f"--card {card_file}: in lock-step it flies too fast to watch; add --mode tasks or processes")
     if against not in (None, "simulator"):
-        faults.append(f"--against {against}: only simulator is known")
-    return faults
+        errors.append(f"--against {against}: only simulator is known")
+    return errors
 
 
 @contextmanager
@@ -359,8 +359,8 @@ def radio_airtimes(count: int, safety: dict[str, Any], fast: float, slow: float)
 def _check_airtimes(systems: list[int], document: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
     """Return the airtime of the drones of a card. Raises CardError where it is too much."""
     loads = radio_airtimes(len(systems), document["safety"], fast, slow)
-    if faults := [each.fault(len(systems)) for each in loads if each.share > MAX_AIRTIME_SHARE]:
-        raise CardError(faults)
+    if errors := [each.fault(len(systems)) for each in loads if each.share > MAX_AIRTIME_SHARE]:
+        raise CardError(errors)
     return loads
 
 

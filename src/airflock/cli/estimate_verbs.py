@@ -49,16 +49,16 @@ Delimiter = Annotated[str, typer.Option(help="Separator between columns of a tex
 def parse_mapping(pairs: list[str] | None) -> dict[str, str]:
     """Parse the targets and expressions of --map; := and = mean the same."""
     columns: dict[str, str] = {}
-    faults = []
+    errors = []
     for pair in pairs or []:
         target, sign, text = pair.partition(":=") if ":=" in pair else pair.partition("=")
         if not sign or not target.strip() or not text.strip():
-            faults.append(f"--map {pair}: write TARGET:=COLUMNS, for instance --map x:=pos_e")
+            errors.append(f"--map {pair}: write TARGET:=COLUMNS, for instance --map x:=pos_e")
         elif target.strip() in columns:
-            faults.append(f"--map {pair}: {target.strip()} is mapped twice")
+            errors.append(f"--map {pair}: {target.strip()} is mapped twice")
         columns[target.strip()] = text.strip()
-    if faults:
-        raise RecordingError("\n".join(faults))
+    if errors:
+        raise RecordingError("\n".join(errors))
     return columns
 
 
@@ -101,14 +101,14 @@ def import_tracks(
     """
     from airflock.recordings import load_tracks, save as save_recording
 
-    faults: list[str] = []
-    with collect_errors(faults):
+    errors: list[str] = []
+    with collect_errors(errors):
         options.check_writable((save, RECORDINGS), reads=files)
-    with collect_errors(faults):
+    with collect_errors(errors):
         how = parse_mapping(map)
-    with collect_errors(faults):
+    with collect_errors(errors):
         place = _origin(origin)
-    options.raise_errors(faults)
+    options.raise_errors(errors)
     notes: list[str] = []
     with reading_progress(len(files), as_json) as done:
         recording = load_tracks(
@@ -240,20 +240,20 @@ def identify(
     from airflock.recordings import ImportOptions
     from airflock.scenarios import load
 
-    faults: list[str] = []
-    with collect_errors(faults):
+    errors: list[str] = []
+    with collect_errors(errors):
         options.check_writable((out, SCENARIOS), (plot, PICTURES), reads=[like, heard, *files])
-    with collect_errors(faults):
+    with collect_errors(errors):
         scenario = load(like, options.parse_settings(changes))
-    with collect_errors(faults):
+    with collect_errors(errors):
         how = parse_mapping(map)
-    with collect_errors(faults):
+    with collect_errors(errors):
         ground = _span(standing)
-    with collect_errors(faults):
+    with collect_errors(errors):
         packets = None if heard is None else read_heard(heard)
     if conservative is not None and not 0.0 < conservative < 1.0:
-        faults.append(f"--conservative {conservative:g} lies outside (0, 1); 0.95 is usual")
-    options.raise_errors(faults)
+        errors.append(f"--conservative {conservative:g} lies outside (0, 1); 0.95 is usual")
+    options.raise_errors(errors)
     with reading_progress(len(files), as_json) as done:
         reading = ImportOptions(
             map=how, unit=unit, time_unit=time_unit, axes=axes, decimal=decimal, delimiter=delimiter, done=done
@@ -447,17 +447,17 @@ def infer(
     """
     from airflock.estimate import infer as find
 
-    faults: list[str] = []
-    with collect_errors(faults):
+    errors: list[str] = []
+    with collect_errors(errors):
         options.check_writable((out, SCENARIOS), (plot, PICTURES), reads=[*models.split(","), *tracks])
     settings: dict[str, Any] = {}
-    with collect_errors(faults):
+    with collect_errors(errors):
         settings = options.parse_settings(changes)
     laws = [name.strip() for name in models.split(",") if name.strip()]
     if not laws:
-        faults.append("--models names no law; write for instance --models couzin_2002,vicsek_1995")
-    faults += [f"{path}: no such file" for path in tracks if not path.exists()]
-    options.raise_errors(faults)
+        errors.append("--models names no law; write for instance --models couzin_2002,vicsek_1995")
+    errors += [f"{path}: no such file" for path in tracks if not path.exists()]
+    options.raise_errors(errors)
     with _fit_progress(as_json) as done:
         result = find(tracks, laws, settings=settings, check=flights, seed=seed, trust=trust, done=done)
     if plot is not None:

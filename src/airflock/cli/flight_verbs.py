@@ -393,12 +393,12 @@ def merge_similar_notes(notes: Iterable[str]) -> Iterator[str]:
 
 def check_distinct_keys(keys: Sequence[str], plot: Path | None) -> None:
     """Refuse a key that is swept twice, and a picture of more keys than it has axes."""
-    faults = [f"--over {key}: given {keys.count(key)} times; give all its values in one --over" for key in keys]
-    faults = [fault for fault, key in zip(faults, keys, strict=True) if keys.count(key) > 1]
+    errors = [f"--over {key}: given {keys.count(key)} times; give all its values in one --over" for key in keys]
+    errors = [fault for fault, key in zip(errors, keys, strict=True) if keys.count(key) > 1]
     if plot is not None and len(set(keys)) > 2:
-        faults.append(f"--plot {plot}: a picture shows 1 or 2 keys, not {len(set(keys))}; leave it out, or sweep fewer")
-    if faults:
-        raise ScenarioError(list(dict.fromkeys(faults)))
+        errors.append(f"--plot {plot}: a picture shows 1 or 2 keys, not {len(set(keys))}; leave it out, or sweep fewer")
+    if errors:
+        raise ScenarioError(list(dict.fromkeys(errors)))
 
 
 def parse_axis(text: str, option: str = "--over") -> tuple[str, list[Any]]:

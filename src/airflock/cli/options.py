@@ -70,22 +70,22 @@ def parse_settings(
     text.
     """
     values: dict[str, Any] = {}
-    faults = []
+    errors = []
     for pair in pairs or []:
         key, equals, text = pair.partition("=")
         if not equals or not key.strip():
-            faults.append(f"{option} {pair}: write KEY=VALUE, for instance {option} model.p_rep=0.14")
+            errors.append(f"{option} {pair}: write KEY=VALUE, for instance {option} model.p_rep=0.14")
             continue
-        with collect_errors(faults):
+        with collect_errors(errors):
             values[key.strip()] = parse_option_value(text, f"{option} {key.strip()}")
     short: dict[str, tuple[str, float]] = {}
     if agents is not None:
         short["agents"] = (str(agents), agents)
     if duration is not None:
-        with collect_errors(faults):
+        with collect_errors(errors):
             short["duration"] = (duration, parse_seconds(duration, "--duration"))
-    faults += _range_errors(short)
-    raise_errors(faults)
+    errors += _range_errors(short)
+    raise_errors(errors)
     return values | {key: number for key, (_, number) in short.items()}
 
 
@@ -131,20 +131,20 @@ def check_writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequenc
     """
     import os
 
-    faults = []
+    errors = []
     for path, endings in outputs:
         if path is None:
             continue
-        folder, wrong = path.parent, suffix_error(path, endings)
-        if wrong:
-            faults.append(wrong)
+        folder, error = path.parent, suffix_error(path, endings)
+        if error:
+            errors.append(error)
         if not folder.is_dir():
-            faults.append(f"{path}: the folder {folder} does not exist")
+            errors.append(f"{path}: the folder {folder} does not exist")
         elif path.is_dir() or not os.access(folder, os.W_OK):
-            faults.append(f"{path}: cannot be written")
+            errors.append(f"{path}: cannot be written")
         elif path.exists() and any(is_file(read) and path.samefile(read) for read in reads if read is not None):
-            faults.append(f"{path}: is an input and would be overwritten; give another file to write")
-    raise_errors(faults)
+            errors.append(f"{path}: is an input and would be overwritten; give another file to write")
+    raise_errors(errors)
 
 
 def announce_run_time(scenarios: Sequence[Any], threads: int | None, device: str) -> None:
