@@ -28,7 +28,7 @@ def expand_home(word: str) -> str:
 def usage_error(error: Any, words: Sequence[str]) -> str:
     """Return one line for an error of typer; `words` are those of the command line.
 
-    Typer's classes of faults have moved between its versions, so they are told apart by what they carry.
+    Typer's error classes have moved between its versions, so they are recognised by their attributes.
     """
     context = getattr(error, "ctx", None)
     verb = _command_path(context).partition(" ")[2]

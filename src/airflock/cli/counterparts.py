@@ -325,7 +325,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             **{name: name for name in ("vehicle", "body", "mode", "join", "faults", "silence", "ground")},
         },
     ),
-    "fly": PythonCounterpart(  # missions, nodes and orders are commands' work; a program of one's own asks the law
+    "fly": PythonCounterpart(  # missions, nodes and orders are commands' work; a program of one's own calls the law
         "airflock.core.pilot.Pilot(model, p, place, index=0, period=0.2)", "airflock.core.pilot.Pilot", {}
     ),
     "paper": PythonCounterpart(

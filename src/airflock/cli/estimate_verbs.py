@@ -134,14 +134,14 @@ def reading_progress(files: int, quiet: bool) -> Any:
     @contextmanager
     def shown() -> Any:
         with counting_parts("reading", 100 * files, quiet=quiet) as step:
-            state = {"file": 0, "share": 0.0, "told": 0}
+            state = {"file": 0, "share": 0.0, "reported": 0}
 
             def done(share: float) -> None:
                 state["share"] = min(1.0, share)
                 ahead = int(100 * (state["file"] + state["share"]))
-                while state["told"] < ahead:
+                while state["reported"] < ahead:
                     step()
-                    state["told"] += 1
+                    state["reported"] += 1
                 if share >= 1.0:
                     state["file"], state["share"] = state["file"] + 1, 0.0
 

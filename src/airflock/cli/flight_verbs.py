@@ -202,7 +202,7 @@ class MeasuredRecording(NamedTuple):
     """One recording, measured.
 
     values, course : order parameters, and a table of them over time; about : unit and meaning of each by name
-    faults   : what befell its agents; not_told : order parameters for want of a length, with the keys that they need
+    faults   : of its agents; not_told : order parameters for want of a length, with the keys that they need
     coarse   : what to know of order parameters that a flight looks at between its frames, if anything
     """
 

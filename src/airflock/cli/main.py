@@ -133,7 +133,7 @@ def main() -> None:
         try:
             app(standalone_mode=True)
         finally:
-            sys.stdout.flush()  # a full disk behind stdout tells so here, and not after the last line of Python
+            sys.stdout.flush()  # a full disk behind stdout is an error here, not after the last line of Python
     except AirflockError as error:
         _end(str(error), error)
     except BrokenPipeError:

@@ -12,7 +12,7 @@ from airflock.support import AirflockError
 
 # ---- airflock.paper
 
-PACKAGE = "airflock_papers"  # looked for when it is asked for: Airflock flies without it
+PACKAGE = "airflock_papers"  # imported when a paper is recomputed: Airflock flies without it
 
 
 def paper(

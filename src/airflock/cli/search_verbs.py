@@ -351,7 +351,9 @@ def tune(
     settings = options.collect_settings(errors, changes, agents, duration)
     base = options.collect_scenario(errors, errors.read(_start_scenario, scenario, like, heard), settings, trust=trust)
     start = errors.read(_tuned_scenario, base, like)
-    plan = errors.read(load_plan, out, start, resume) if like is None else None  # with logs, of what they will tell
+    plan = (
+        errors.read(load_plan, out, start, resume) if like is None else None
+    )  # with logs it depends on their contents
     if confidence is not None:
         errors.read(check_confidence, confidence)
     errors.read(make_request, start, limit or (), confidence, value_or_default(plan, None))
@@ -673,7 +675,7 @@ def _flown(
 ) -> Any:  # fmt: skip
     """Fly a campaign, in the folder beside `out` or a temporary one, and return its certificate.
 
-    flying : scheduler, threads and timeout; also: what is asked for besides counting
+    flying : scheduler, threads and timeout; also: estimates besides counting
     """
     from airflock.certificates import (
         CAMPAIGN_KIND,

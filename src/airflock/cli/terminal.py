@@ -57,7 +57,7 @@ def print_score_table(
 ) -> None:
     """Print order parameters beside what a paper reports; about: unit and meaning by name.
 
-    What no flight has (a clearance where nothing stands) is named in one line below, not told as a number.
+    What no flight has (a clearance where nothing stands) is named in one line below instead of a number.
     """
     from rich import box
     from rich.console import Console

@@ -226,12 +226,12 @@ NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
 class BrowserView:
     """Page at an address of its own.
 
-    host : localhost, unless the page is to be seen from elsewhere; port : the one asked for, 0 for any free one
+    host : localhost, unless the page is to be seen from elsewhere; port : 0 for any free one
     Raises StudioError where the port is in use.
     """
 
     def __init__(self, host: str, port: int, title: str):
-        free = _free_port(host)  # also where a port is given: a host that is not this machine is told as such
+        free = _free_port(host)  # also where a port is given: a host that is not this machine is an error of its own
         port = port or free
         _check_port_free(host, port)
         token = secrets.token_urlsafe(12)

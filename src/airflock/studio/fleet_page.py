@@ -34,7 +34,7 @@ REFUSAL_REASONS = {
     "mission": "from another mission",
     "stranger": "from systems that are not members",
 }
-FAULT_TEXTS = {  # what is said of faults whose amount the ether does not tell
+FAULT_TEXTS = {  # of faults whose amount the channel does not report
     "loss": "some packets to these drones are lost",
     "jitter": "packets to these drones are late",
     "duplicate": "some packets to these drones arrive twice",
@@ -266,12 +266,14 @@ class FleetScene:
             return agent_colours.individual_colours(len(peers))
         if way in agent_colours.MOTION_COLOURINGS:
             return agent_colours.motion_colours(way, position, velocity, card.safety.speed_max, (0.0, card.high))
-        told = [peer.status for peer in peers]
+        reports = [peer.status for peer in peers]
         if way == "battery":
-            return AgentColours(way, agent_colours.NUMBERS, _with_nan([s and s.battery for s in told]), 0.0, 100.0, "%")
+            return AgentColours(
+                way, agent_colours.NUMBERS, _with_nan([s and s.battery for s in reports]), 0.0, 100.0, "%"
+            )
         if way == "neighbours heard":
             most = max(len(peers) - 1.0, 1.0)
-            return AgentColours(way, agent_colours.NUMBERS, _with_nan([s and s.peers for s in told]), 0.0, most)
+            return AgentColours(way, agent_colours.NUMBERS, _with_nan([s and s.peers for s in reports]), 0.0, most)
         return AgentColours(
             way, agent_colours.NUMBERS, np.array([now - peer.at for peer in peers]), 0.0, HEARD_WITHIN, "s"
         )

@@ -108,7 +108,7 @@ def world_period(scenario: Any) -> tuple[float, float, float] | None:
 
 
 class PaneChartData:
-    """What the charts show of one side: instants, the course of one order parameter of the present window, and how
+    """Data of the charts of one pane: instants, the course of one order parameter of the present window, and how
     often which speed and which distance to the nearest neighbour was seen in it.
 
     top, far : ends of the histograms, m/s and m

@@ -269,7 +269,7 @@ class PageScene:
         self.colouring, self.links, self.follow_choice = AgentColouring(), LINK_CHOICES[0], FOLLOW_CHOICES[0]
         self.trails = Trails(view)
         self.collisions = CollisionList()
-        self.draw_handles: Any = None  # is asked for goals that can be dragged: (player, drawing) → None
+        self.draw_handles: Any = None  # draws handles on goals that can be dragged: (player, drawing) → None
         self.rebuild()
 
     # ----------------------------------------------------------------------------------------------- what stands

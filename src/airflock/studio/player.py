@@ -245,7 +245,7 @@ class ComparedFlights:
     def reset(self, seed: int | None = None, settings: Mapping[str, Any] | None = None) -> None:
         """Begin another flight: of the same or another seed, or with other keys, such as the number of agents.
 
-        A fork ends with its flight; two that were opened side by side begin anew.
+        A fork ends with its flight; two that were opened side by side begin again.
         """
         known = self.seed, self.sources
         self.seed = self.seed if seed is None else seed

@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 NO_LINES = np.zeros((0, 2, 3))
 WAKE_SPANS = 6.0  # spans of a wake that are drawn
 LONGEST_ARROW = 5.0  # darts; length of the longest arrow
-VELOCITY_ARGUMENTS = {"dvx", "dvy", "dvz", "dv"}  # what a rule asks for to make velocities alike
+VELOCITY_ARGUMENTS = {"dvx", "dvy", "dvz", "dv"}  # arguments of a rule that aligns velocities
 FREE_RAY_COLOUR, HIT_RAY_COLOUR = agent_colours.GREEN, agent_colours.RED
 
 
 class PerceptDrawing(NamedTuple):
-    """Lines about one agent by kind (`view.stage.colours.LINES`): segments (segment, 2, 3) m, their colours, and words.
+    """Lines about one agent by kind (`view.agent_colours.LINE_STYLES`): segments (segment, 2, 3) m, their colours, and words.
 
     Kinds that are not named show nothing.
     """
@@ -121,7 +121,7 @@ class PerceptLines:
 def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], list[NDArray[Any]]]]:
     """Return the law's vectors by its own words: each with the part of each neighbour; then the surfaces.
 
-    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour that flies alike
+    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour with the same velocity
     would cause, too, and alignment, which is the rest.
     """
     found: list[tuple[str, NDArray[Any], list[NDArray[Any]]]] = []

@@ -112,7 +112,7 @@ def cluster_distance(scenario: Any) -> float:
 # ---- Colourings of agents
 
 NUMBERS, HEADING, CATEGORIES, IDENTITIES = "scale", "turn", "names", "marks"
-MOTION_COLOURINGS = ("speed", "heading", "height")  # what the motion alone tells
+MOTION_COLOURINGS = ("speed", "heading", "height")  # from the motion alone
 GOLDEN_TURN = 0.6180339887  # of a turn between two marks: neighbouring numbers look unlike
 NO_VALUE_COLOUR = (150, 150, 150)  # of -1: none of the names, alone
 COLOURING_NOTES = {"agent": "each agent has a colour of its own", "cluster": "a colour for each cluster"}
@@ -123,7 +123,7 @@ class AgentColours(NamedTuple):
 
     name   : what it is
     kind   : scale, from `low` to `high` in `unit`; turn, shares of a full turn; names, numbers of `names`;
-             marks, whole numbers that only tell agents apart. Names and marks: -1 for none
+             marks, whole numbers without an order. Names and marks: -1 for none
     values : (agent,)
     note   : text beside the key
     """

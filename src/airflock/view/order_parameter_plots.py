@@ -47,7 +47,7 @@ def series(
 
     recording   : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; by default the whole flight
-    smooth      : means over so many seconds, s (of the nearest pair the least value), told in the title; 0 draws
+    smooth      : means over so many seconds, s (of the nearest pair the least value), named in the title; 0 draws
                   instants alone, by default a two-hundredth of what is shown
     settings    : keys such as {"metrics.r_cluster": 60.0} that replace those the recording was flown with
     ax          : axes of a grid, whose place the panels take, instead of a new figure

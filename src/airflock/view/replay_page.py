@@ -278,7 +278,7 @@ def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "spee
     packed = pack_positions(
         kept[:, :axes], [layer.bytes for layer in rows] + ([] if whole else [there.astype(np.uint8)])
     )
-    if scenario is None:  # tracks may lie at 5,000 km north, where a graphics card tells places half a metre apart
+    if scenario is None:  # tracks may lie at 5,000 km north, where single precision resolves half a metre
         packed = packed._replace(low=[*np.subtract(packed.low[:2], stage["centre"][:2]).tolist(), *packed.low[2:]])
         stage["centre"][:2] = 0.0, 0.0
     own = [layer.colours.name for layer in rows]
