@@ -196,6 +196,7 @@ class FleetScene:
         position, velocity, known = self._motion(now)
         self.shown = self._agent_colours(now, velocity, position)
         tone = self.shown.colours
+        # Silent drones turn grey in every colouring, so that they cannot be overlooked.
         tone[self._silent(now)] = agent_colours.NO_VALUE_COLOUR
         trail = tone.copy()
         if selected is not None:
@@ -233,6 +234,7 @@ class FleetScene:
     def _lines(self, now: float, position: NDArray[np.float32], known: NDArray[np.bool_], selected: int | None) -> None:
         index = {member: number for number, member in enumerate(self.members)}
         links = {(index[a], index[b]): both for (a, b), both in self.observer.links(now).items()}
+        # A drone that was never heard has no place to draw a line to.
         links = {pair: both for pair, both in links.items() if known[list(pair)].all()}
         heard = np.zeros((0, 2, 3), np.float32)
         if selected is not None:
@@ -364,6 +366,7 @@ class FleetPage:
             refreshed = now if refresh else refreshed
             self.frame(refresh)
             drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
+            # At least a millisecond: the threads of the page server need the interpreter as well.
             self._asked.wait(max(drawn - self._clock(), 0.001))
             self._asked.answer(lambda action: action())
 

@@ -68,6 +68,7 @@ class FlightPage:
             if moved or acted or refresh:
                 self.frame(refresh)
             refreshed = now if refresh else refreshed
+            # A late frame is not caught up: after a pause of the machine the page goes on at its usual rate.
             drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
             acted = self._run_actions_until(drawn)
 
@@ -88,6 +89,7 @@ class FlightPage:
     def on_time_changed(self) -> None:
         """Forget trails, charts, and collisions that lie ahead: the flights are at another time."""
         self.scene.forget()
+        # Going back before a fork closes a pane.
         if len(self.player.sides) != len(self.scene.flocks):
             self.rebuild()
         self.measurement.clear()

@@ -77,6 +77,7 @@ class AgentPairs:
             far = min(distance, float(np.quantile(self._tree.query(self._tree.data, k=count + 1)[0][:, -1], 0.9)))
         pairs = self.within(far)
         length = np.linalg.norm(self.position[pairs[:, 1]] - self.position[pairs[:, 0]], axis=1)
+        # Stable: among equal lengths the drawn lines do not flicker from frame to frame.
         order = np.argsort(length, kind="stable")[:MAX_LINKS]
         order = order[length[order] <= distance]  # others lie beyond a periodic face
         return pairs[order], length[order]

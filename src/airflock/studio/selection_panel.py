@@ -29,7 +29,7 @@ FREE_RAY_COLOUR, HIT_RAY_COLOUR = agent_colours.GREEN, agent_colours.RED
 
 
 class PerceptDrawing(NamedTuple):
-    """Lines about one agent by kind (`view.agent_colours.LINE_STYLES`): segments (segment, 2, 3) m, their colours, and words.
+    """Lines about one agent by kind (`LINE_STYLES`): segments (segment, 2, 3) m, their colours, and words.
 
     Kinds that are not named show nothing.
     """
@@ -80,6 +80,7 @@ class PerceptLines:
         for number, (name, vector, parts) in enumerate(_named_vectors(seen, model)):
             strength = float(np.linalg.norm(vector))
             longest = max([strength, *(float(np.linalg.norm(part)) for part in parts)])
+            # Terms have units of their own: each is scaled by the strongest of its kind so far.
             most = self._strongest[name] = max(self._strongest.get(name, 0.0), longest)
             tone, scale = (
                 agent_colours.TERM_COLOURS[number % len(agent_colours.TERM_COLOURS)],
@@ -103,6 +104,7 @@ class PerceptLines:
             self._world = scenario, FlightWorld(scenario)
         place, course = self._world[1], GoalCourse(scenario)
         if len(memory.arrays["later"]):
+            # Obstacles that appear in flight are hidden in the driver's own copy until they appear.
             place.shapes[:] = memory.arrays["shapes"].astype(float).tolist()
         if course.points and scenario.goals.kind != "own":
             x, y, z = memory.arrays["aim"][:3].astype(float).tolist()
@@ -121,7 +123,7 @@ class PerceptLines:
 def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], list[NDArray[Any]]]]:
     """Return the law's vectors by its own words: each with the part of each neighbour; then the surfaces.
 
-    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour with the same velocity
+    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour of equal velocity
     would cause, too, and alignment, which is the rest.
     """
     found: list[tuple[str, NDArray[Any], list[NDArray[Any]]]] = []
@@ -135,6 +137,7 @@ def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], li
         ):
             found.append((term_name_and_unit(model, name)[0], vector, parts))
             continue
+        # The rule evaluated with equal velocities is the repulsion; the remainder is the alignment.
         resting = [vector_values(term)[name] for term in view.alike]
         moving = [part - same for part, same in zip(parts, resting, strict=True)]
         found += [
@@ -158,6 +161,7 @@ def _neighbour_lines(view: Seen, own: NDArray[Any], size: float, measured: NDArr
     believed[:, :axes] = measured[:axes, who].T
     believed[0] = view.own[:3]
     ghosts = np.vstack([cross_segments(believed[:1], 0.7 * size), cross_segments(believed[1:], 0.25 * size)])
+    # Without sensor errors belief and truth are the same, and the crosses would only hide the agents.
     off = float(np.linalg.norm(believed[0] - own)) > 0.0
     return {
         "heard": (np.stack([np.broadcast_to(own, noticed.shape), noticed], 1), None),

@@ -153,6 +153,7 @@ def crosses_periodic_face(segments: Array, world: arena.Parameters) -> Array:
     """Return a mask of the segments (segment, end, axis), m, that lead through a periodic face."""
     if world.edges != "periodic":
         return np.zeros(len(segments), bool)
+    # A step of more than half the world is a jump to the opposite face.
     halves = np.array(half_sizes(world)[: segments.shape[2]])
     return np.asarray((np.abs(segments[:, 1] - segments[:, 0]) > halves).any(axis=1))
 
@@ -178,6 +179,7 @@ def projection(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.
     if axes == 2:
         return Projection(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
     a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
+    # Oblique parallel projection: lengths compare anywhere in the picture, which perspective would spoil.
     right = np.array([-math.sin(a), math.cos(a), 0.0])
     up = np.array([-math.cos(a) * math.sin(e), -math.sin(a) * math.sin(e), math.cos(e)])
     return Projection(right, up)
@@ -204,6 +206,7 @@ def speed_range(paths: FlightPaths) -> tuple[float, float]:
     speed = paths.speed[np.isfinite(paths.speed)]
     if not speed.size:
         return 0.0, 1.0
+    # A single fast agent would leave all others in one colour.
     slow, fast = (max(float(v), 1e-3) for v in np.quantile(speed, (0.01, 0.999)))
     step = 10.0 ** math.floor(math.log10(fast)) / 2.0
     return step * math.floor(slow / step), step * math.ceil(fast / step)

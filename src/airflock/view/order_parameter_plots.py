@@ -130,6 +130,7 @@ class SmoothedLines:
         if self.count <= 1:
             return axes.plot(values.index, values, color=color, linewidth=0.9, label=label)
         axes.plot(values.index, values, color=color, linewidth=0.6, alpha=0.25)
+        # Centred, so that smoothed features stay at their time; the ends use what there is.
         around = values.rolling(self.count, center=True, min_periods=1)
         return axes.plot(
             values.index, around.min() if least else around.mean(), color=color, linewidth=1.1, label=label
@@ -338,6 +339,7 @@ def _are_numbers(levels: list[Any]) -> bool:
 
 def _named_ticks(axes: Axes, axis: str, levels: list[Any]) -> None:
     """Label levels as names at 0, 1, 2, ...; only every n-th of them when there are many."""
+    # Twelve names fit below one panel without touching.
     every = max(1, -(-len(levels) // 12))
     names = [f"{v:g}" if isinstance(v, (int, float, np.number)) else str(v) for v in levels]
     getattr(axes, f"set_{axis}ticks")(range(0, len(levels), every), names[::every])
@@ -364,6 +366,7 @@ def _map(figure: Figure, axes: Axes, table: pd.DataFrame, keys: Sequence[str], v
     edges = [_cell_edges(axes, which, v) for which, v in zip("xy", levels, strict=True)]
     cells = np.ma.masked_invalid(grid.to_numpy(dtype=float))
     low, high = (float(cells.min()), float(cells.max())) if cells.count() else (0.0, 1.0)
+    # Values of both signs get a diverging map whose white is zero.
     signed = low < 0.0 < high
     most = max(-low, high)
     axes.set_facecolor(style.PALE_GREY)  # a point that was not flown
@@ -383,6 +386,7 @@ def _write(axes: Axes, mesh: Any, edges: list[Any], cells: Any) -> None:
         if np.ma.is_masked(cells[row, column]):
             continue
         red, green, blue = to_rgb(mesh.cmap(mesh.norm(number)))
+        # Luma of ITU-R BT.601: dark text on light cells and the other way round.
         color = style.INK if 0.299 * red + 0.587 * green + 0.114 * blue > 0.5 else "white"
         x, y = (0.5 * (e[i] + e[i + 1]) for e, i in ((edges[0], column), (edges[1], row)))
         axes.text(x, y, f"{number:.3g}", ha="center", va="center", fontsize=size, color=color)

@@ -254,6 +254,7 @@ def atomic_picture(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> I
         with atomic_path(target) as temporary:
             yield temporary
     except (OSError, RuntimeError) as wrong:
+        # Matplotlib and ffmpeg raise with several lines; the first one names the cause.
         reason = getattr(wrong, "strerror", None) or (str(wrong).splitlines() or [type(wrong).__name__])[0]
         raise PictureError(f"{target}: cannot be written: {reason}; nothing was saved") from wrong
 
