@@ -389,7 +389,7 @@ def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes
         card = write_card(files.card, document)
         write_key(files.key, secrets.token_bytes(32))
         write_key(files.operator, private)
-    # All files or none: what was written before the error is removed again.
+    # All files or none.
     except BaseException:  # a full disk, Ctrl-C: a card without its keys is of no use
         for path in files:
             path.unlink(missing_ok=True)
