@@ -32,7 +32,11 @@ from airflock.recordings.scores import time_series_names
 from airflock.scenarios.families import CallerParts
 from airflock.scenarios.making import build_scenario
 from airflock.support.errors import AirflockError, RecordingError
-from airflock.view import flight_paths as flight_view, style
+from airflock.view import (
+    flight_paths as flight_view,
+    recording_or_flight,  # noqa: F401  (resolved before tests replace it)
+    style,
+)
 from airflock.view.law_vectors import vector_fields
 from airflock.view.order_parameter_plots import SmoothedLines, heatmap, rotations, series, transfer
 from airflock.view.result_plots import extrapolated_tail, plot_certificate
