@@ -72,7 +72,7 @@ def test_what_nobody_foresaw_is_told_and_the_flight_goes_on(player, monkeypatch)
     def breaks(*_):
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr(Player, "_open_panes", breaks)
+    monkeypatch.setattr(Player, "_open", breaks)
     (line,) = asked(player, lambda: player.reset(seed=8))
     assert line == "unexpected ZeroDivisionError: division by zero; please report it" and player.seed == 3
 

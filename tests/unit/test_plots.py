@@ -32,7 +32,11 @@ from airflock.recordings.scores import time_series_names
 from airflock.scenarios.part_kinds import CallerParts
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.support.errors import AirflockError, RecordingError
-from airflock.view import flight_paths as flight_view, style
+from airflock.view import (
+    flight_paths as flight_view,
+    recording_or_flight,  # noqa: F401  (resolved before tests replace it)
+    style,
+)
 from airflock.view.law_vectors import vector_fields
 from airflock.view.order_parameter_plots import SmoothedLines, heatmap, rotations, series, transfer
 from airflock.view.result_plots import extrapolated_tail, plot_certificate
@@ -406,7 +410,7 @@ def test_pictures_leave_the_global_state_of_matplotlib_alone():
 
     code = (
         "import sys, matplotlib; before = matplotlib.rcParams.copy()\n"
-        "from airflock.plots.transfer import transfer; transfer()._repr_png_()\n"
+        "from airflock.view.order_parameter_plots import transfer; transfer()._repr_png_()\n"
         "assert matplotlib.rcParams.copy() == before and 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

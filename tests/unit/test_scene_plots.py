@@ -84,19 +84,19 @@ def test_share_flocked_is_drawn_with_goals_and_collisions(monkeypatch):
     module = import_module("airflock.view.order_parameter_plots")
     index = pd.Index(np.arange(40) / 60.0, name="time")
     course = pd.DataFrame({"flocked": 1.0, "polarisation": 0.5, "n_clusters": 1.0, "n_coll": 1.0}, index=index)
-    monkeypatch.setattr(module, "measure", lambda *_: ({"time_to_goal": [0.2, np.nan]}, course))
+    monkeypatch.setattr(module, "measure_recording", lambda *_: ({"time_to_goal": [0.2, np.nan]}, course))
     upper, lower = flocked(recording()).axes
     assert len(upper.lines) == 3  # share, polarisation, and the goal that was reached
     assert [text.get_text() for text in upper.get_legend().texts] == ["flocked", "polarisation", "goal reached"]
     assert lower.lines[1].get_ydata()[-1] == 40.0 and lower.get_yscale() == "symlog"
     few = course.assign(n_coll=[1.0] * 4 + [0.0] * 36)
-    monkeypatch.setattr(module, "measure", lambda *_: ({}, few))
+    monkeypatch.setattr(module, "measure_recording", lambda *_: ({}, few))
     lower = flocked(recording()).axes[1]
     lower.figure.canvas.draw()
     low, high = lower.get_ylim()
     assert sum(low <= tick <= high and bool(text.get_text()) for tick, text in
                zip(lower.get_yticks(), lower.get_yticklabels(), strict=True)) >= 3  # fmt: skip
-    monkeypatch.setattr(module, "measure", lambda *_: ({}, course.drop(columns="flocked")))
+    monkeypatch.setattr(module, "measure_recording", lambda *_: ({}, course.drop(columns="flocked")))
     with pytest.raises(RecordingError, match="metrics.kind = 'kidger'"):
         flocked(recording())
 

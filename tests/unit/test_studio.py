@@ -426,8 +426,8 @@ def test_agents_are_coloured_by_group_fault_cluster_and_their_own_numbers(interp
 
 
 def test_two_flocks_have_one_scale_and_one_list_of_names():
-    first = AgentColours("fault", "names", np.array([0, -1]), names=("motor",), told="sound")
-    second = AgentColours("fault", "names", np.array([1, 0]), names=("stuck", "motor"), told="sound")
+    first = AgentColours("fault", "names", np.array([0, -1]), names=("motor",), note="sound")
+    second = AgentColours("fault", "names", np.array([1, 0]), names=("stuck", "motor"), note="sound")
     both = joined_colours([first, second])
     assert both.names == ("motor", "stuck") and both.values.tolist() == [0, -1, 0, 1]
 
@@ -689,13 +689,13 @@ def test_a_bird_tells_what_the_wakes_of_others_save_it():
 
 @given(st.floats(-1e3, 1e5), st.floats(0.0, 1e5), st.integers(0, 600))
 def test_an_axis_ends_at_round_numbers_just_beyond_what_is_shown(first, span, count):
-    values = first + slider_span * np.linspace(0.0, 1.0, count)
+    values = first + span * np.linspace(0.0, 1.0, count)
     low, high = browser_view.round_ends(values)
     assert low < high
     if count:
         slack = 1e-6 * (high - low)
         assert low - slack <= values[0] and values[-1] <= high + slack
-    if count > 1 and slider_span > 1e-3:
+    if count > 1 and span > 1e-3:
         part = (values[-1] - values[0]) / browser_view.PARTS_PER_SPAN * 2.5  # at most: the next of 1, 2, 5
         assert values[0] - low <= part * 1.001 and high - values[-1] <= part * 1.001
 

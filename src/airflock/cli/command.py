@@ -1,4 +1,4 @@
-"""Verb: a command that tells all that is wrong with its options at once."""
+"""Commands that report every error of a command line at once, and their messages."""
 
 import inspect
 import math
@@ -20,15 +20,15 @@ SEED_OPTION = "--seed"  # written for the seed of a flight, one letter from --se
 
 
 def expand_home(word: str) -> str:
-    """A word of a command line, ~ being the home folder, also where a shell leaves it in: --save=~/flight.nc."""
+    """Expand ~ in a word of a command line, also where a shell leaves it in: --save=~/flight.nc."""
     option, equals, value = word.partition("=")
     return f"{option}={os.path.expanduser(value)}" if equals else os.path.expanduser(word)
 
 
 def usage_error(error: Any, words: Sequence[str]) -> str:
-    """One line for what typer refuses; `words` are those of the command line.
+    """Return one line for an error of typer; `words` are those of the command line.
 
-    Typer's classes of faults have moved between its versions, so they are told apart by what they carry.
+    Typer's error classes have moved between its versions, so they are recognised by their attributes.
     """
     context = getattr(error, "ctx", None)
     verb = _command_path(context).partition(" ")[2]
@@ -36,15 +36,15 @@ def usage_error(error: Any, words: Sequence[str]) -> str:
 
 
 def non_finite_errors(context: Any) -> list[tuple[str, str]]:
-    """Options with a range that were given nan or inf: the parameter's name, and one line."""
-    faults = []
+    """Return, for options with a range that are nan or inf, the parameter's name and one line."""
+    errors = []
     for parameter in context.command.params:
         value, ends = context.params.get(parameter.name), _range_ends(parameter)
         if isinstance(value, float) and not math.isfinite(value) and ends != (None, None):
             verb = _command_path(context).partition(" ")[2]
             said = f"{verb}: {_parameter_name(parameter)} {value:g} is not a finite number; give {_range_text(*ends)}"
-            faults.append((str(parameter.name), said))
-    return faults
+            errors.append((str(parameter.name), said))
+    return errors
 
 
 def _message(error: Any, context: Any, words: Sequence[str]) -> str:
@@ -81,7 +81,7 @@ def _message(error: Any, context: Any, words: Sequence[str]) -> str:
 
 
 def _command_path(context: Any) -> str:
-    """The command as a person writes it, however Python was started."""
+    """Return the command as a person writes it, however Python was started."""
     names = []
     while context is not None and context.parent is not None:
         names.append(context.info_name)
@@ -94,14 +94,14 @@ def _suggestion(name: str, known: Sequence[str], context: Any, cutoff: float = 0
 
 
 def _example_text(context: Any) -> str:
-    """The example of a verb's help."""
+    """Return the example in a verb's help."""
     text = getattr(getattr(context, "command", None), "help", None) or ""
     match = re.search(r"Example: (.+)", text)
     return f"; for instance: {match[1].strip()}" if match else ""
 
 
 def _parameter_name(parameter: Any) -> str:
-    """What a person writes: the longest name of an option, or the metavar of an argument."""
+    """Return the name that a person writes: the longest of an option, or the metavar of an argument."""
     options = [name for name in parameter.opts if name.startswith("-")]
     if options:
         return str(max(options, key=len))
@@ -109,7 +109,7 @@ def _parameter_name(parameter: Any) -> str:
 
 
 def _value_error_text(parameter: Any, words: Sequence[str], message: str) -> str:
-    """A value that has the wrong kind, lies outside its range, or is none of its choices."""
+    """Return the message for a value of the wrong type, out of range, or not among the choices."""
     name, value = _parameter_name(parameter), _given_value(parameter, words)
     choices = _choices(parameter)
     if value is not None and choices:
@@ -128,7 +128,7 @@ def _value_error_text(parameter: Any, words: Sequence[str], message: str) -> str
 
 
 def _given_value(parameter: Any, words: Sequence[str]) -> str | None:
-    """The last value that a command line gives to an option; None if that cannot be told."""
+    """Return the last value that a command line holds for an option; None if it cannot be determined."""
     last = None
     for word, after in zip(words, [*words[1:], None], strict=True):
         name, equals, value = word.partition("=")
@@ -138,7 +138,7 @@ def _given_value(parameter: Any, words: Sequence[str]) -> str | None:
 
 
 def _range_ends(parameter: Any) -> tuple[float | None, float | None]:
-    """Lowest and highest allowed number of an option."""
+    """Return the lowest and the highest allowed number of an option."""
     ends = []
     for name in ("min", "max"):
         end = getattr(parameter, name, getattr(getattr(parameter, "type", None), name, None))
@@ -147,12 +147,12 @@ def _range_ends(parameter: Any) -> tuple[float | None, float | None]:
 
 
 def _range_text(low: float | None, high: float | None) -> str:
-    """A range for a person."""
+    """Return a range as text."""
     return f"[{'-inf' if low is None else f'{low:.10g}'}, {'inf' if high is None else f'{high:.10g}'}]"
 
 
 def _choices(parameter: Any) -> list[str]:
-    """The words that an option may be."""
+    """Return the allowed words of an option."""
     kind = getattr(parameter, "type_descriptor", None) or getattr(parameter, "type", None)
     return [str(getattr(choice, "value", choice)) for choice in getattr(kind, "choices", None) or ()]
 
@@ -165,7 +165,7 @@ NUMBER_TYPE_NAMES = ("IntParamType", "FloatParamType", "IntRange", "FloatRange")
 
 
 class VerbCommand(TyperCommand):
-    """A command whose options are judged one by one; nan and inf are refused where an option has a range.
+    """Command that checks its options one by one; nan and inf are refused where an option has a range.
 
     A verb that takes its context goes on with numbers that are `WRONG`, and refuses them with all else that it finds
     wrong (`options.collect_option_errors`); any other ends before it begins.
@@ -173,48 +173,49 @@ class VerbCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words of a command line."""
-        faults: list[str] = []
+        errors: list[str] = []
         carried = True  # whether everything that is wrong is a number
         try:
             rest = super().parse_args(ctx, list(args))
-        except Exception as fault:
-            if type(fault).__name__ not in VALUE_ERROR_NAMES:
+        except Exception as error:
+            if type(error).__name__ not in VALUE_ERROR_NAMES:
                 raise
-            rest, faults, carried = self._one_by_one(ctx, args)
+            # typer stops at the first bad value; parsing again option by option finds the others as well.
+            rest, errors, carried = self._one_by_one(ctx, args)
         for name, line in non_finite_errors(ctx):
             ctx.params[name] = INVALID
-            faults.append(line)
-        ctx.meta[ERRORS_KEY] = faults
-        if faults and not (carried and _takes_context(self.callback)):
-            raise AirflockError("\n".join(faults))
+            errors.append(line)
+        ctx.meta[ERRORS_KEY] = errors
+        if errors and not (carried and _takes_context(self.callback)):
+            raise AirflockError("\n".join(errors))
         return rest
 
     def _one_by_one(self, ctx: Any, args: list[str]) -> tuple[list[str], list[str], bool]:
-        """What is left of the words, the faults of all options, and whether each is a number's."""
+        """Return the unread words, the errors of all options, and for each whether it is a number's."""
         given, rest, _ = self.make_parser(ctx).parse_args(args=list(args))
-        faults, carried = [], True
+        errors, carried = [], True
         for parameter in self.get_params(ctx):
             try:
                 _, rest = parameter.handle_parse_result(ctx, given, rest)
-            except Exception as fault:
-                if type(fault).__name__ not in VALUE_ERROR_NAMES:
+            except Exception as error:
+                if type(error).__name__ not in VALUE_ERROR_NAMES:
                     raise
-                faults.append(usage_error(fault, args))
+                errors.append(usage_error(error, args))
                 number = (
-                    type(fault).__name__ == VALUE_ERROR_NAMES[0] and type(parameter.type).__name__ in NUMBER_TYPE_NAMES
+                    type(error).__name__ == VALUE_ERROR_NAMES[0] and type(parameter.type).__name__ in NUMBER_TYPE_NAMES
                 )
                 carried = carried and number and not parameter.multiple
                 ctx.params[parameter.name] = INVALID
         if rest and not ctx.allow_extra_args:
             carried = False
             try:
-                ctx.begin_fault(f"Got unexpected extra argument(s) ({' '.join(rest)})")
-            except Exception as fault:
-                faults.append(usage_error(fault, args))
-        return rest, faults, carried
+                ctx.fail(f"Got unexpected extra argument(s) ({' '.join(rest)})")
+            except Exception as error:
+                errors.append(usage_error(error, args))
+        return rest, errors, carried
 
 
 def _takes_context(callback: Callable[..., Any] | None) -> bool:
-    """Whether a verb asks for its context, with which it refuses what is wrong with its numbers."""
+    """Return True if a verb takes its context, with which it reports errors of its numbers."""
     wanted = () if callback is None else inspect.signature(callback).parameters.values()
     return any(each.annotation is typer.Context for each in wanted)

@@ -1,4 +1,4 @@
-"""Which function does what a command does, and which of its arguments stands for each option.
+"""Python counterparts of the commands: the function of each, and the argument that stands for each option.
 
 A test compares this table with the commands and with the functions, so that neither can grow alone.
 """
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class PythonCounterpart(NamedTuple):
-    """One command: how it is called in Python, the function, and option → argument (or what stands for it).
+    """Counterpart of one command: the call in Python, the function, and option → argument (or a replacement).
 
     A function without a dot is a public name of `airflock`; the others, with their module, take more preparation.
     """
@@ -30,6 +30,7 @@ SEED_OPTIONS = {"seeds": "seeds", "first_seed": "seeds"}
 FLIGHT_OPTIONS = {"threads": "threads", "precision": "precision", "device": "device"}
 MANY_FLIGHT_OPTIONS = {**FLIGHT_OPTIONS, "scheduler": "scheduler"}
 
+# One row per command and option: an option without an argument of a public function fails a test.
 COUNTERPARTS: dict[str, PythonCounterpart] = {
     "run": PythonCounterpart(
         "airflock.score(scenario, seeds=4)",
@@ -163,7 +164,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         'airflock.plot("flight.nc", "series")',
         "plot",
         {
-            "what": "what",
+            "what": "source",
             "kind": "kind",
             "seed": "seed",
             "begin": "start",
@@ -210,7 +211,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
         "replay",
         {
             "source": "recording",
-            "page": "airflock.view.replays.Replay.save",
+            "page": "airflock.view.replay_page.Replay.save",
             "seed": "airflock.simulate",
             "rate": "rate",
             "colour": "colour",
@@ -325,7 +326,7 @@ COUNTERPARTS: dict[str, PythonCounterpart] = {
             **{name: name for name in ("vehicle", "body", "mode", "join", "faults", "silence", "ground")},
         },
     ),
-    "fly": PythonCounterpart(  # missions, nodes and orders are commands' work; a program of one's own asks the law
+    "fly": PythonCounterpart(  # missions, nodes and orders are commands' work; a program of one's own calls the law
         "airflock.core.pilot.Pilot(model, p, place, index=0, period=0.2)", "airflock.core.pilot.Pilot", {}
     ),
     "paper": PythonCounterpart(

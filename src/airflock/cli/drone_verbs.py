@@ -1,4 +1,4 @@
-"""Verb fleet: a scenario flown by nodes and vehicles that speak MAVLink, beside the simulator if wanted."""
+"""Verbs fleet and fly: fly a fleet in software; prepare and fly missions of real drones."""
 
 import gc
 import time
@@ -100,21 +100,21 @@ def fleet(
     """
     from airflock.fleets import SECONDS_BEFORE_START, compare, flying
 
-    asked, live = options.collect_option_errors(ctx), mode != flying.LOCKSTEP_MODE
-    asked.read(options.check_writable, (save, RECORDINGS), (card_file, (".json",)))
-    settings = options.collect_settings(asked, changes, agents, duration)
+    errors, live = options.collect_option_errors(ctx), mode != flying.LOCKSTEP_MODE
+    errors.read(options.check_writable, (save, RECORDINGS), (card_file, (".json",)))
+    settings = options.collect_settings(errors, changes, agents, duration)
     if body in flying.VEHICLE_BODIES:
-        settings = asked.read(lambda given: given | {"body.kind": body}, settings)
-    loaded = options.collect_scenario(asked, scenario, settings, trust=trust)
-    loaded = asked.read(
+        settings = errors.read(lambda given: given | {"body.kind": body}, settings)
+    loaded = options.collect_scenario(errors, scenario, settings, trust=trust)
+    loaded = errors.read(
         lambda found: compare.with_metric_period(found, found.sensors.period or found.flight.dt), loaded
     )
-    numbers = asked.read(options.seeds_from, first_seed, seeds)
-    members = asked.read(lambda found: tuple(range(1, found.agents + 1)), loaded)
-    broken = asked.read(_broken, faults, value_or_default(members, ALL_SYSTEM_IDS), live)
-    asked.note(*_option_errors(vehicle, body, mode, card_file, against))
-    asked.read(_check_one_card, card_file, loaded, numbers)
-    asked.raise_errors()
+    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    members = errors.read(lambda found: tuple(range(1, found.agents + 1)), loaded)
+    broken = errors.read(_broken, faults, value_or_default(members, ALL_SYSTEM_IDS), live)
+    errors.note(*_option_errors(vehicle, body, mode, card_file, against))
+    errors.read(_check_one_card, card_file, loaded, numbers)
+    errors.raise_errors()
     terminal.print_notes(loaded.notes)
     how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "ground": ground, "join": join, "card_file": card_file}
     how["silent"] = True if silence is None and not against else silence
@@ -129,7 +129,7 @@ def fleet(
 
 
 def _broken(file: Path | None, members: tuple[int, ...], live: bool) -> Sequence[Any]:
-    """Faults of a file, if there is one, that such a fleet can suffer."""
+    """Return the faults of a file, if there is one, that such a fleet can simulate."""
     from airflock.fleets import read_injected_faults, realtime
 
     found = () if file is None else read_injected_faults(file, members)
@@ -144,10 +144,10 @@ def _check_one_card(file: Path | None, scenario: Any, seeds: Sequence[int]) -> N
 
 
 def _option_errors(vehicle: str, body: str | None, mode: str, card_file: Path | None, against: str | None) -> list[str]:
-    """What is wrong with options that do not concern the scenario."""
+    """Return errors of options that do not concern the scenario."""
     from airflock.fleets import FLEET_MODES, VEHICLE_BODIES, VEHICLE_KINDS
 
-    faults = [
+    errors = [
         f"{option} {word} is none of {', '.join(known)}{suggest(word, known, lead='; ')}"
         for option, word, known in (
             ("--vehicle", vehicle, VEHICLE_KINDS),
@@ -157,15 +157,15 @@ def _option_errors(vehicle: str, body: str | None, mode: str, card_file: Path | 
         if word is not None and word not in known
     ]
     if card_file is not None and mode == FLEET_MODES[0]:
-        faults.append(f"--card {card_file}: in lock-step it flies too fast to watch; add --mode tasks or processes")
+        errors.append(f"--card {card_file}: in lock-step it flies too fast to watch; add --mode tasks or processes")
     if against not in (None, "simulator"):
-        faults.append(f"--against {against}: only simulator is known")
-    return faults
+        errors.append(f"--against {against}: only simulator is known")
+    return errors
 
 
 @contextmanager
 def _frozen_imports() -> Iterator[None]:
-    """Let the collector leave alone what is there already; a look at it all takes a tenth of a second, now and then."""
+    """Keep the garbage collector off existing objects: one full collection takes a tenth of a second."""
     gc.freeze()
     try:
         yield
@@ -184,7 +184,7 @@ def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:
 
 
 def _print_runs(series: Any, as_json: bool) -> None:
-    """Print what was flown."""
+    """Print the results of all flights."""
     from airflock.parts.metrics import reported_values
 
     scenario, lines, seeds = series.scenario, series.comparison, len(series.runs)
@@ -220,7 +220,7 @@ def _print_runs(series: Any, as_json: bool) -> None:
 
 
 def _print_load(load: dict[str, Any] | None) -> None:
-    """Tell what a fleet on the real clock cost, and how late it was."""
+    """Print the load of a fleet on the real clock, and its lateness."""
     if load is None:
         return
     parts = ""
@@ -282,13 +282,13 @@ def prepare(
     from airflock.drones import card_hash, new_operator_keys, parse_card
     from airflock.fleets import DEFAULT_FENCE_MARGIN, deviation_notes, make_card_document, omission_notes
 
-    asked = options.collect_option_errors(ctx)
-    where, systems = asked.read(options.parse_position, "--site", site), asked.read(_members, members)
-    asked.read(options.check_writable, (out, (".json",)))
+    errors = options.collect_option_errors(ctx)
+    where, systems = errors.read(options.parse_position, "--site", site), errors.read(_members, members)
+    errors.read(options.check_writable, (out, (".json",)))
     files = MissionFiles(out, out.with_suffix(".key"), out.with_suffix(".operator"))
-    asked.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
-    loaded = options.collect_scenario(asked, scenario, asked.read(options.parse_settings, changes), trust=trust)
-    safety = _limits(limits, loaded, asked)
+    errors.note(*(f"{path}: exists; a mission is never overwritten" for path in files if path.exists()))
+    loaded = options.collect_scenario(errors, scenario, errors.read(options.parse_settings, changes), trust=trust)
+    safety = _limits(limits, loaded, errors)
     private, public = new_operator_keys()
 
     def card_for(scenario: Any) -> dict[str, Any]:
@@ -307,9 +307,9 @@ def prepare(
         parse_card({**made, "hash": card_hash(made)}, str(out))
         return made
 
-    document = asked.read(card_for, loaded)
-    loads = asked.read(_check_airtimes, systems, document, fast_bits, slow_bits)
-    asked.raise_errors()
+    document = errors.read(card_for, loaded)
+    loads = errors.read(_check_airtimes, systems, document, fast_bits, slow_bits)
+    errors.raise_errors()
     card = _write_mission(files, document, private)
     beside = deviation_notes(loaded, card.safety, len(card.members))
     terminal.print_notes([*loaded.notes, *omission_notes(loaded), *beside])
@@ -321,7 +321,7 @@ def prepare(
 
 
 class MissionFiles(NamedTuple):
-    """What a preparation writes: the card, the mission's key and the operator's key."""
+    """Files of a preparation: the card, the mission's key and the operator's key."""
 
     card: Path
     key: Path
@@ -329,7 +329,7 @@ class MissionFiles(NamedTuple):
 
 
 class Airtime(NamedTuple):
-    """How much of a radio's time a flock takes.
+    """Share of a radio's time that a flock takes.
 
     radio : fast or slow; limit : which of the card's limits sets its rate; share : of the time, 0 to 1
     """
@@ -339,7 +339,7 @@ class Airtime(NamedTuple):
     share: float
 
     def fault(self, count: int) -> str:
-        """Why so many drones cannot use it, and what helps."""
+        """Return why so many drones cannot use it, and a remedy."""
         return (
             f"{self.radio} radio: {count} drones would take {self.share:.0%} of its time; "
             f"at most {MAX_AIRTIME_SHARE:.0%}: "
@@ -348,7 +348,7 @@ class Airtime(NamedTuple):
 
 
 def radio_airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
-    """What `count` drones take of the fast and the slow radio, from their rates in bit/s and the card's limits."""
+    """Return the airtime of `count` drones on the fast and the slow radio, from bit/s and the card's limits."""
     loads = []
     for radio, limit, bits in (("fast", "status_period", fast), ("slow", "slow_period", slow)):
         packet = PREAMBLE_SECONDS + 8.0 * (DATAGRAM_BYTES + OVERHEAD_BYTES) / bits
@@ -357,15 +357,15 @@ def radio_airtimes(count: int, safety: dict[str, Any], fast: float, slow: float)
 
 
 def _check_airtimes(systems: list[int], document: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
-    """What the drones of a card take of their radios. Raises CardError where that is too much."""
+    """Return the airtime of the drones of a card. Raises CardError where it is too much."""
     loads = radio_airtimes(len(systems), document["safety"], fast, slow)
-    if faults := [each.fault(len(systems)) for each in loads if each.share > MAX_AIRTIME_SHARE]:
-        raise CardError(faults)
+    if errors := [each.fault(len(systems)) for each in loads if each.share > MAX_AIRTIME_SHARE]:
+        raise CardError(errors)
     return loads
 
 
 def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> dict[str, Any]:
-    """Limits of the card that --limit changes; what is wrong is noted, and left out."""
+    """Return the limits of the card that --limit changes; errors are noted, and their limits left out."""
     from airflock.core import declarations
     from airflock.drones import SafetyLimits
     from airflock.fleets import default_safety
@@ -380,7 +380,7 @@ def _limits(pairs: list[str] | None, scenario: Any, errors: ErrorCollector) -> d
 
 
 def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes) -> Any:
-    """Write card and keys, all of them or none; private: the operator's key. The card that was written."""
+    """Write card and keys, all of them or none; private: the operator's key. Return the written card."""
     import secrets
 
     from airflock.drones import write_card, write_key
@@ -389,6 +389,7 @@ def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes
         card = write_card(files.card, document)
         write_key(files.key, secrets.token_bytes(32))
         write_key(files.operator, private)
+    # All files or none.
     except BaseException:  # a full disk, Ctrl-C: a card without its keys is of no use
         for path in files:
             path.unlink(missing_ok=True)
@@ -397,7 +398,7 @@ def _write_mission(files: MissionFiles, document: dict[str, Any], private: bytes
 
 
 def _print_summary(files: MissionFiles, card: Any, loads: list[Airtime]) -> None:
-    """Say what was written, how high the drones may fly, and how autopilots have to be set."""
+    """Print the written files, the height limits, and the settings that autopilots need."""
     terminal.print_message(f"wrote {files.card} (hash {card.hash[:8]}), {files.key}, {files.operator}")
     top = card.layer(card.members[-1])
     terminal.print_message(f"fence {card.low:g} to {card.high:g} m above the site; layers up to {top:g} m")
@@ -409,7 +410,7 @@ def _print_summary(files: MissionFiles, card: Any, loads: list[Airtime]) -> None
 
 
 def _members(text: str) -> list[int]:
-    """System ids, as they are written in a line."""
+    """Parse the system ids of a line."""
     members: list[int] = []
     for part in text.split(","):
         first, dash, last = part.partition("-")
@@ -444,21 +445,21 @@ def order(
     """
     from airflock.drones import PacketSigner, check_port, orders, read_card, read_key
 
-    asked = ErrorCollector()
+    errors = ErrorCollector()
     what = orders.OrderKind.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
     if what is None or do == "confirm_kill":
-        asked.note(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
+        errors.note(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
     if (do == "goto") != (point is not None):
-        asked.note("--point LAT,LON,ALT belongs to goto, and goto needs it")
-    where = asked.read(options.parse_position, "--point", point) if point else (0.0, 0.0, 0.0)
-    card = asked.read(read_card, card_file)
-    asked.read(_check_target, card, target)
+        errors.note("--point LAT,LON,ALT belongs to goto, and goto needs it")
+    where = errors.read(options.parse_position, "--point", point) if point else (0.0, 0.0, 0.0)
+    card = errors.read(read_card, card_file)
+    errors.read(_check_target, card, target)
     if point:
-        asked.read(_check_inside_fence, card, where, point)
-    key = asked.read(read_key, card_file.with_suffix(".key"))
-    private = asked.read(read_key, card_file.with_suffix(".operator"))
-    asked.read(check_port, radio)
-    asked.raise_errors()
+        errors.read(_check_inside_fence, card, where, point)
+    key = errors.read(read_key, card_file.with_suffix(".key"))
+    private = errors.read(read_key, card_file.with_suffix(".operator"))
+    errors.read(check_port, radio)
+    errors.raise_errors()
     assert what is not None
     utc = time.time_ns() // 1000
     place = (round(where[0] * 1e7), round(where[1] * 1e7), round(where[2] * 1e3))
@@ -489,7 +490,7 @@ def _check_target(card: Any, target: int) -> None:
 
 
 def _check_inside_fence(card: Any, option: tuple[float, float, float], point: str) -> None:
-    """Refuse what no drone would obey: a point outside the card's fence, which they refuse, each by itself."""
+    """Refuse a point outside the card's fence, which every drone would refuse by itself."""
     x, y, z = card.site.local(*option)
     if not card.low <= z <= card.high:
         line = (
@@ -506,10 +507,10 @@ def _check_inside_fence(card: Any, option: tuple[float, float, float], point: st
 
 
 class FlyGroup(TyperGroup):
-    """Subcommands; anything else is a flight card, which is flown."""
+    """Subcommands of fly; any other word is a flight card, which is flown."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """A subcommand by its name; `run_node` for the name of a file."""
+        """Return a subcommand by its name; `run_node` for the name of a file."""
         if args and args[0] not in self.commands and (Path(args[0]).suffix or is_file(args[0])):
             args = ["card", *args]
         return super().resolve_command(ctx, args)

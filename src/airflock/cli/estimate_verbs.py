@@ -1,4 +1,4 @@
-"""Verb identify: flight logs to the numbers of a scenario."""
+"""Verbs import, export, identify and infer: recordings of others, and the numbers and laws behind them."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -47,18 +47,18 @@ Delimiter = Annotated[str, typer.Option(help="Separator between columns of a tex
 
 
 def parse_mapping(pairs: list[str] | None) -> dict[str, str]:
-    """Targets and expressions of --map; := and = are the same."""
+    """Parse the targets and expressions of --map; := and = mean the same."""
     columns: dict[str, str] = {}
-    faults = []
+    errors = []
     for pair in pairs or []:
         target, sign, text = pair.partition(":=") if ":=" in pair else pair.partition("=")
         if not sign or not target.strip() or not text.strip():
-            faults.append(f"--map {pair}: write TARGET:=COLUMNS, for instance --map x:=pos_e")
+            errors.append(f"--map {pair}: write TARGET:=COLUMNS, for instance --map x:=pos_e")
         elif target.strip() in columns:
-            faults.append(f"--map {pair}: {target.strip()} is mapped twice")
+            errors.append(f"--map {pair}: {target.strip()} is mapped twice")
         columns[target.strip()] = text.strip()
-    if faults:
-        raise RecordingError("\n".join(faults))
+    if errors:
+        raise RecordingError("\n".join(errors))
     return columns
 
 
@@ -101,14 +101,14 @@ def import_tracks(
     """
     from airflock.recordings import load_tracks, save as save_recording
 
-    faults: list[str] = []
-    with collect_errors(faults):
+    errors: list[str] = []
+    with collect_errors(errors):
         options.check_writable((save, RECORDINGS), reads=files)
-    with collect_errors(faults):
+    with collect_errors(errors):
         how = parse_mapping(map)
-    with collect_errors(faults):
+    with collect_errors(errors):
         place = _origin(origin)
-    options.raise_errors(faults)
+    options.raise_errors(errors)
     notes: list[str] = []
     with reading_progress(len(files), as_json) as done:
         recording = load_tracks(
@@ -128,20 +128,20 @@ def import_tracks(
 
 
 def reading_progress(files: int, quiet: bool) -> Any:
-    """A bar that follows the share of each file that has been read."""
+    """Show a bar that follows the share of each file that has been read."""
     from contextlib import contextmanager
 
     @contextmanager
     def shown() -> Any:
         with counting_parts("reading", 100 * files, quiet=quiet) as step:
-            state = {"file": 0, "share": 0.0, "told": 0}
+            state = {"file": 0, "share": 0.0, "reported": 0}
 
             def done(share: float) -> None:
                 state["share"] = min(1.0, share)
                 ahead = int(100 * (state["file"] + state["share"]))
-                while state["told"] < ahead:
+                while state["reported"] < ahead:
                     step()
-                    state["told"] += 1
+                    state["reported"] += 1
                 if share >= 1.0:
                     state["file"], state["share"] = state["file"] + 1, 0.0
 
@@ -240,20 +240,20 @@ def identify(
     from airflock.recordings import ImportOptions
     from airflock.scenarios import load
 
-    faults: list[str] = []
-    with collect_errors(faults):
+    errors: list[str] = []
+    with collect_errors(errors):
         options.check_writable((out, SCENARIOS), (plot, PICTURES), reads=[like, heard, *files])
-    with collect_errors(faults):
+    with collect_errors(errors):
         scenario = load(like, options.parse_settings(changes))
-    with collect_errors(faults):
+    with collect_errors(errors):
         how = parse_mapping(map)
-    with collect_errors(faults):
+    with collect_errors(errors):
         ground = _span(standing)
-    with collect_errors(faults):
+    with collect_errors(errors):
         packets = None if heard is None else read_heard(heard)
     if conservative is not None and not 0.0 < conservative < 1.0:
-        faults.append(f"--conservative {conservative:g} lies outside (0, 1); 0.95 is usual")
-    options.raise_errors(faults)
+        errors.append(f"--conservative {conservative:g} lies outside (0, 1); 0.95 is usual")
+    options.raise_errors(errors)
     with reading_progress(len(files), as_json) as done:
         reading = ImportOptions(
             map=how, unit=unit, time_unit=time_unit, axes=axes, decimal=decimal, delimiter=delimiter, done=done
@@ -295,15 +295,15 @@ def _span(text: str) -> tuple[float, float] | None:
     begin, colon, end = text.partition(":")
     try:
         span = float(begin or 0.0), float(end)
-    except ValueError as fault:
-        raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60") from fault
+    except ValueError as error:
+        raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60") from error
     if not colon or not 0.0 <= span[0] < span[1]:
         raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60")
     return span
 
 
 def _checked(result: Any, flights: int, quiet: bool) -> Any:
-    """Posterior check, if there is something to check."""
+    """Run the posterior check, if there is something to check."""
     from airflock.estimate import check_against_logs
 
     if not flights or not result.settings():
@@ -332,7 +332,7 @@ def _parameter_table(result: Any) -> None:
 
 
 def _reasons(result: Any) -> list[str]:
-    """Why numbers are not told, a line each reason."""
+    """Return why numbers cannot be identified, a line for each reason."""
     keys: dict[str, list[str]] = {}
     for key, number in result.numbers.items():
         if not number.told:
@@ -341,7 +341,7 @@ def _reasons(result: Any) -> list[str]:
 
 
 def _numbers_table(result: Any) -> Any:
-    """Numbers that the logs tell, as a table."""
+    """Return the identified numbers, as a table."""
     from rich import box
     from rich.table import Table
 
@@ -447,17 +447,17 @@ def infer(
     """
     from airflock.estimate import infer as find
 
-    faults: list[str] = []
-    with collect_errors(faults):
+    errors: list[str] = []
+    with collect_errors(errors):
         options.check_writable((out, SCENARIOS), (plot, PICTURES), reads=[*models.split(","), *tracks])
     settings: dict[str, Any] = {}
-    with collect_errors(faults):
+    with collect_errors(errors):
         settings = options.parse_settings(changes)
     laws = [name.strip() for name in models.split(",") if name.strip()]
     if not laws:
-        faults.append("--models names no law; write for instance --models couzin_2002,vicsek_1995")
-    faults += [f"{path}: no such file" for path in tracks if not path.exists()]
-    options.raise_errors(faults)
+        errors.append("--models names no law; write for instance --models couzin_2002,vicsek_1995")
+    errors += [f"{path}: no such file" for path in tracks if not path.exists()]
+    options.raise_errors(errors)
     with _fit_progress(as_json) as done:
         result = find(tracks, laws, settings=settings, check=flights, seed=seed, trust=trust, done=done)
     if plot is not None:
@@ -483,14 +483,14 @@ def infer(
 
 @contextmanager
 def _fit_progress(quiet: bool) -> Iterator[Callable[[str], None]]:
-    """Progress: which law is fitted, and how many steps that took so far."""
-    with progress_line(quiet) as told:
-        told.update("reading")
+    """Show which law is fitted, and how many steps that took so far."""
+    with progress_line(quiet) as line:
+        line.update("reading")
         steps: dict[str, int] = {}
 
         def show_step(name: str) -> None:
             steps[name] = steps.get(name, 0) + 1
-            told.update(f"{name}, step {steps[name]}")
+            line.update(f"{name}, step {steps[name]}")
 
         yield show_step
 
@@ -552,7 +552,7 @@ def _check(result: Any) -> None:
 
 
 def _inferred_json(result: Any) -> dict[str, Any]:
-    """What was found as plain values."""
+    """Return the result as plain values."""
     laws = [
         {name: getattr(law, name) for name in ("name", "gain", "error", "ahead", "criterion", "inside", "missed")}
         | {"numbers": {key: number.value for key, number in law.numbers.items()}}

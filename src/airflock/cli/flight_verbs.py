@@ -1,4 +1,4 @@
-"""Verbs run and score: fly a scenario, or measure a recording."""
+"""Verbs run, score, sweep, plot, video, replay, display and watch: fly a scenario, and look at flights."""
 
 import math
 import re
@@ -56,13 +56,13 @@ def run(
     from airflock.engine import pick_device
     from airflock.runs import score_scenarios
 
-    asked = options.collect_option_errors(ctx)
-    asked.read(options.check_writable, (save, RECORDINGS), (plot, PICTURES))
-    changed = options.collect_settings(asked, changes, agents, duration)
-    found = options.collect_scenario(asked, scenario, changed, law, trust=trust)
-    numbers = asked.read(options.seeds_from, first_seed, seeds)
-    asked.read(options.check_flight_options, device, precision, scheduler)
-    asked.raise_errors()
+    errors = options.collect_option_errors(ctx)
+    errors.read(options.check_writable, (save, RECORDINGS), (plot, PICTURES))
+    changed = options.collect_settings(errors, changes, agents, duration)
+    found = options.collect_scenario(errors, scenario, changed, law, trust=trust)
+    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    errors.read(options.check_flight_options, device, precision, scheduler)
+    errors.raise_errors()
     terminal.print_notes(found.notes)
     flights = [found] * seeds
     if scheduler is None:
@@ -80,7 +80,7 @@ def run(
 def _print_scores(
     scenario: Any, numbers: Sequence[int], rows: Sequence[ScoreValues], changed_keys: ScoreValues, as_json: bool
 ) -> None:
-    """Print what flights came to, beside the paper's figures; changed : keys that are not as in the file."""
+    """Print the scores of flights, beside the paper's; changed : keys that are not as in the file."""
     from airflock.parts.metrics import reported_values
     from airflock.recordings import rare_event_notes, upper_probability_bound
 
@@ -109,7 +109,7 @@ def _print_scores(
 def _record(
     scenario: Any, numbers: Sequence[int], precision: int, device: str, save: Path | None, plot: Path | None
 ) -> None:
-    """Fly again with the trajectories kept (the same bits), and write what was asked for."""
+    """Fly again with the trajectories kept (the same bits), and write the requested files."""
     from airflock.recordings import save as save_recording, simulate
 
     for seed in numbers if save else numbers[:1]:
@@ -180,7 +180,7 @@ def score(
 def _print_group_scores(
     sources: Sequence[Any], files: Sequence[Path], changed: ScoreValues, trust: bool, as_json: bool
 ) -> None:
-    """Measure the groups of recordings, and print what was found."""
+    """Measure the groups of recordings, and print the results."""
     from airflock.parts.metrics import reported_values
     from airflock.recordings import PAIR_METRICS, group_scores, load_recording, scenario_of_recording
 
@@ -202,7 +202,7 @@ class MeasuredRecording(NamedTuple):
     """One recording, measured.
 
     values, course : order parameters, and a table of them over time; about : unit and meaning of each by name
-    faults   : what befell its agents; not_told : order parameters for want of a length, with the keys that they need
+    faults   : of its agents; not_told : order parameters for want of a length, with the keys that they need
     coarse   : what to know of order parameters that a flight looks at between its frames, if anything
     """
 
@@ -253,7 +253,9 @@ def _save_series(measured: Sequence[MeasuredRecording], path: Path) -> None:
 
 
 def _print_measured(measured: Sequence[MeasuredRecording], as_json: bool) -> None:
-    """Print order parameters of recordings, what befell their agents, and what could not be measured."""
+    """Print order parameters of recordings, faults of their agents, and order parameters that could not be
+    measured.
+    """
     from airflock.recordings import faults_line, missing_lengths_note as told_unsaid
 
     rows = [each.values for each in measured]
@@ -325,24 +327,24 @@ def sweep(
     """
     from airflock.recordings import fly_points, grid_points, metric_to_show, scenarios_at
 
-    asked = options.collect_option_errors(ctx)
-    asked.read(options.check_writable, (table, TABLES), (plot, PICTURES))
-    fixed = options.collect_settings(asked, changes, agents, duration)
-    axes = _axes(over, plot, asked)
-    points = asked.read(grid_points, axes)
+    errors = options.collect_option_errors(ctx)
+    errors.read(options.check_writable, (table, TABLES), (plot, PICTURES))
+    fixed = options.collect_settings(errors, changes, agents, duration)
+    axes = _axes(over, plot, errors)
+    points = errors.read(grid_points, axes)
     scenarios = invalid_if(
-        fixed, asked.read(scenarios_at, scenario, points, value_or_default(fixed, {}), law, trust=trust)
+        fixed, errors.read(scenarios_at, scenario, points, value_or_default(fixed, {}), law, trust=trust)
     )
-    name = asked.read(metric_to_show, show, scenarios)
-    numbers = asked.read(options.seeds_from, first_seed, seeds)
-    asked.read(options.check_flight_options, device, precision, scheduler)
-    asked.raise_errors()
+    name = errors.read(metric_to_show, show, scenarios)
+    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    errors.read(options.check_flight_options, device, precision, scheduler)
+    errors.raise_errors()
     terminal.print_notes(merge_similar_notes(dict.fromkeys(note for found in scenarios for note in found.notes)))
     if scheduler is None:
         options.announce_run_time([found for found in scenarios for _ in numbers], threads, device)
         options.compile_before_bar(scenarios[0], precision, device)
     with counting_parts(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
-        chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
+        chosen: dict[str, Any] = {"threads": threads, "precision": precision, "on_done": done, "device": device}
         tidy = fly_points(points, scenarios, numbers, **chosen, notify=terminal.print_message, scheduler=scheduler)
     _keep(tidy, list(axes), name, scenarios[0], table, plot)
     if as_json:
@@ -352,14 +354,14 @@ def sweep(
 
 
 def _axes(over: list[str], plot: Path | None, errors: ErrorCollector) -> dict[str, list[Any]]:
-    """Keys that are swept, with the values of each; of those that can be read, the rest being noted."""
+    """Return the swept keys with their values; unreadable ones are noted as errors."""
     axes = [found for text in over if (found := errors.read(parse_axis, text)) is not INVALID]
     errors.read(check_distinct_keys, [text.partition("=")[0].strip() for text in over], plot)
     return errors.read(_bounded, axes)
 
 
 def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
-    """Axes of a grid that is not too large."""
+    """Return the axes of a grid that is not too large."""
     size = math.prod(len(values) for _, values in axes)
     if size > MAX_GRID_POINTS:
         raise ScenarioError([f"--over: a grid of {size} points is more than {MAX_GRID_POINTS}"])
@@ -367,7 +369,7 @@ def _bounded(axes: list[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
 
 
 def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | None, plot: Path | None) -> None:
-    """Write the table and the picture that were asked for."""
+    """Write the requested table and picture."""
     if table is not None:
         from airflock.support import atomic
 
@@ -381,7 +383,7 @@ def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | No
 
 
 def merge_similar_notes(notes: Iterable[str]) -> Iterator[str]:
-    """The first of all notes that differ in numbers alone, and how many are like it."""
+    """Return the first of all notes that differ in numbers alone, and how many are similar."""
     kinds: dict[str, list[str]] = {}
     for note in notes:
         kinds.setdefault(re.sub(r"[-+]?\d[\d.e+-]*", "", note), []).append(note)
@@ -391,24 +393,24 @@ def merge_similar_notes(notes: Iterable[str]) -> Iterator[str]:
 
 def check_distinct_keys(keys: Sequence[str], plot: Path | None) -> None:
     """Refuse a key that is swept twice, and a picture of more keys than it has axes."""
-    faults = [f"--over {key}: given {keys.count(key)} times; give all its values in one --over" for key in keys]
-    faults = [fault for fault, key in zip(faults, keys, strict=True) if keys.count(key) > 1]
+    errors = [f"--over {key}: given {keys.count(key)} times; give all its values in one --over" for key in keys]
+    errors = [fault for fault, key in zip(errors, keys, strict=True) if keys.count(key) > 1]
     if plot is not None and len(set(keys)) > 2:
-        faults.append(f"--plot {plot}: a picture shows 1 or 2 keys, not {len(set(keys))}; leave it out, or sweep fewer")
-    if faults:
-        raise ScenarioError(list(dict.fromkeys(faults)))
+        errors.append(f"--plot {plot}: a picture shows 1 or 2 keys, not {len(set(keys))}; leave it out, or sweep fewer")
+    if errors:
+        raise ScenarioError(list(dict.fromkeys(errors)))
 
 
 def parse_axis(text: str, option: str = "--over") -> tuple[str, list[Any]]:
-    """Key and values from KEY=a,b,c or KEY=low:high:count, as an option was given."""
+    """Parse KEY=a,b,c or KEY=low:high:count into key and values."""
     key, equals, values = text.partition("=")
     key = key.strip()
     parts = values.split(":")
     if equals and len(parts) == 3:
         try:
             low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
-        except ValueError as fault:
-            raise ScenarioError([f"{option} {text}: write low:high:count, for instance radio.delay=0:2:5"]) from fault
+        except ValueError as error:
+            raise ScenarioError([f"{option} {text}: write low:high:count, for instance radio.delay=0:2:5"]) from error
         if not 1 <= count <= MAX_GRID_POINTS:
             raise ScenarioError([f"{option} {text}: the count lies outside [1, {MAX_GRID_POINTS}]"])
         step = (high - low) / max(count - 1, 1)
@@ -441,7 +443,7 @@ def _print_sweep(tidy: Any, keys: list[str], show: str) -> None:
 
 
 class PictureKind(StrEnum):
-    """What to draw."""
+    """Kinds of picture."""
 
     TRAJECTORIES = "trajectories"
     SERIES = "series"
@@ -724,7 +726,7 @@ def watch(
 
 
 def _comparison(value: list[str]) -> str | dict[str, Any] | None:
-    """What flies beside the scenario: a name, or keys with values."""
+    """Return the comparison beside the scenario: a name, or keys with values."""
     if any("=" not in each for each in value) and len(value) > 1:
         raise StudioError(f"--against {' '.join(value)}: give one preset or file, or only KEY=VALUE")
     if value and "=" not in value[0]:

@@ -1,4 +1,4 @@
-"""Verbs presets, validate and doctor: what there is, whether it is right, and whether this machine can run it."""
+"""Verbs presets, validate, doctor, keys and types: list scenarios and their keys, check files and this machine."""
 
 import tomllib
 from pathlib import Path
@@ -94,7 +94,7 @@ def validate(
 
 
 def _checked(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> dict[str, Any]:
-    """Verdict, notes and faults of one file; each fault begins with its name."""
+    """Return verdict, notes and errors of one file; each error begins with its name."""
     from airflock.search import ValidationReport, validate
 
     found: list[str] = []

@@ -1,4 +1,4 @@
-"""The command `airflock`: its verbs, and one line for everything that goes wrong."""
+"""The command `airflock`: its verbs, and one line for every error."""
 
 import _thread
 import atexit
@@ -36,7 +36,7 @@ INTERRUPT_DELAY = 0.05  # s
 
 
 class VerbGroup(TyperGroup):
-    """The verbs; a wrong command line and Ctrl-C end like any other fault, with one line and status 2."""
+    """Group of the verbs; a wrong command line and Ctrl-C end like any other error, with one line and status 2."""
 
     def main(
         self,
@@ -53,13 +53,13 @@ class VerbGroup(TyperGroup):
             result = super().main(words, prog_name, complete_var, False, windows_expand_args, **extra)
         except typer.Abort as stop:
             raise AirflockError("interrupted") from stop
-        except Exception as fault:
-            if not hasattr(fault, "format_message"):
+        except Exception as error:
+            if not hasattr(error, "format_message"):
                 raise
-            if type(fault).__name__ == "NoArgsIsHelpError":
-                fault.show()  # type: ignore[attr-defined]
+            if type(error).__name__ == "NoArgsIsHelpError":
+                error.show()  # type: ignore[attr-defined]
                 sys.exit(2)
-            raise AirflockError(usage_error(fault, words)) from fault
+            raise AirflockError(usage_error(error, words)) from error
         return sys.exit(result if isinstance(result, int) else 0) if standalone_mode else result
 
     def invoke(self, ctx: Any) -> Any:
@@ -68,8 +68,8 @@ class VerbGroup(TyperGroup):
             return super().invoke(ctx)
         except KeyboardInterrupt as stop:
             raise AirflockError("interrupted; files that were not announced as saved were not written") from stop
-        except EOFError as fault:  # typer takes it for Ctrl-D
-            raise AirflockError(f"unexpected end of a file: {fault}; AIRFLOCK_DEBUG=1 shows where") from fault
+        except EOFError as error:  # typer takes it for Ctrl-D
+            raise AirflockError(f"unexpected end of a file: {error}; AIRFLOCK_DEBUG=1 shows where") from error
 
 
 app = typer.Typer(
@@ -123,7 +123,7 @@ def _root_callback(
 
 
 def main() -> None:
-    """Run the command; bad input ends with one line per fault and exit status 2, and so does SIGTERM."""
+    """Run the command; bad input ends with one line per error and exit status 2, and so does SIGTERM."""
     if threading.current_thread() is threading.main_thread():  # only there are signals heard
         signal.signal(signal.SIGTERM, _on_sigterm)
         sys.unraisablehook = _repeat_interrupt
@@ -133,40 +133,41 @@ def main() -> None:
         try:
             app(standalone_mode=True)
         finally:
-            sys.stdout.flush()  # a full disk behind stdout tells so here, and not after the last line of Python
-    except AirflockError as fault:
-        _end(str(fault), fault)
+            sys.stdout.flush()  # a full disk behind stdout is an error here, not after the last line of Python
+    except AirflockError as error:
+        _end(str(error), error)
     except BrokenPipeError:
+        # The reader of a pipe has gone (head, less): Python would complain once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except (KeyboardInterrupt, BdbQuit) as stop:  # while the verb is looked up, or after it; a debugger that is left
         _end("interrupted", stop)
-    except OSError as fault:
-        _end(f"{fault.filename or 'output'}: {os_error_message(fault)}", fault)
-    except MemoryError as fault:
-        _end(f"needs more memory than there is: {fault}; ask for fewer agents, flights or samples", fault)
-    except Exception as fault:  # the border: whatever else goes wrong is one line, too
+    except OSError as error:
+        _end(f"{error.filename or 'output'}: {os_error_message(error)}", error)
+    except MemoryError as error:
+        _end(f"needs more memory than there is: {error}; ask for fewer agents, flights or samples", error)
+    except Exception as error:  # the border: whatever else goes wrong is one line, too
         from airflock.scenarios import user_error_line
 
-        if told := user_error_line(fault):  # on the device python: compiled, a rule raises nothing
-            _end(told, fault)
-        _end(f"unexpected {type(fault).__name__}: {fault}; please report it; AIRFLOCK_DEBUG=1 shows where", fault)
+        if message := user_error_line(error):  # on the device python: compiled, a rule raises nothing
+            _end(message, error)
+        _end(f"unexpected {type(error).__name__}: {error}; please report it; AIRFLOCK_DEBUG=1 shows where", error)
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
-    """What Airflock warns of, as a line; what libraries say to programmers is not for who gives commands."""
+    """Print warnings of Airflock as a line; drop those that libraries address to programmers."""
     if category is UserWarning:
         sys.stderr.write(f"note: {shortened(printable(str(message)))}\n")
 
 
 def _on_sigterm(number: int, _: Any) -> NoReturn:
-    """SIGTERM, as batch systems send it, ends like Ctrl-C; a second one does not disturb what is being put away."""
+    """End like Ctrl-C on SIGTERM, which batch systems send; a second one does not disturb the cleaning up."""
     signal.signal(number, signal.SIG_IGN)
     raise KeyboardInterrupt
 
 
 def _repeat_interrupt(lost: Any) -> None:
-    """An interruption that fell into a finaliser, where Python can only tell of it, comes again a moment later.
+    """Repeat an interruption that fell into a finaliser, where Python can only print it, a moment later.
 
     Numba's compiler drops objects with finalisers at every turn: Ctrl-C and SIGTERM were lost in one of 200 tries.
     """

@@ -1,4 +1,4 @@
-"""Options that several verbs share, and what they turn into."""
+"""Options that several verbs share, and the functions that read them."""
 
 import math
 import re
@@ -59,36 +59,38 @@ SaveFile = Annotated[Path | None, typer.Option("--save", metavar="FILE.nc", help
 
 
 def collect_option_errors(context: typer.Context) -> ErrorCollector:
-    """What a verb is asked for, with the numbers of its command line that are none or lie outside their ranges."""
+    """Return an ErrorCollector with the errors of the command line's numbers: unreadable or out of range."""
     return ErrorCollector(context.meta.get(ERRORS_KEY, ()))
 
 
 def parse_settings(
     pairs: list[str] | None, agents: int | None = None, duration: str | None = None, option: str = "--set"
 ) -> dict[str, Any]:
-    """Keys and values from --set (or another option) and its short forms; values are read as TOML, or else as text."""
+    """Return keys and values of --set (or another option) and its short forms; values are read as TOML, or else as
+    text.
+    """
     values: dict[str, Any] = {}
-    faults = []
+    errors = []
     for pair in pairs or []:
         key, equals, text = pair.partition("=")
         if not equals or not key.strip():
-            faults.append(f"{option} {pair}: write KEY=VALUE, for instance {option} model.p_rep=0.14")
+            errors.append(f"{option} {pair}: write KEY=VALUE, for instance {option} model.p_rep=0.14")
             continue
-        with collect_errors(faults):
+        with collect_errors(errors):
             values[key.strip()] = parse_option_value(text, f"{option} {key.strip()}")
     short: dict[str, tuple[str, float]] = {}
     if agents is not None:
         short["agents"] = (str(agents), agents)
     if duration is not None:
-        with collect_errors(faults):
+        with collect_errors(errors):
             short["duration"] = (duration, parse_seconds(duration, "--duration"))
-    faults += _range_errors(short)
-    raise_errors(faults)
+    errors += _range_errors(short)
+    raise_errors(errors)
     return values | {key: number for key, (_, number) in short.items()}
 
 
 def _range_errors(short_options: Mapping[str, tuple[str, float]]) -> list[str]:
-    """What lies outside its range of --agents and --duration, each as it is written and as a number."""
+    """Return range errors of --agents and --duration, each as it is written and as a number."""
     if not short_options:
         return []
     from airflock.core import Quantity, declarations, quantity_error
@@ -103,7 +105,7 @@ def _range_errors(short_options: Mapping[str, tuple[str, float]]) -> list[str]:
 
 
 def parse_seconds(text: str, option: str = "--budget") -> float:
-    """Seconds of a time such as 90s, 10min or 2h; ScenarioError for anything else."""
+    """Return the seconds of a time such as 90s, 10min or 2h; ScenarioError for anything else."""
     match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
     if match is None or not 0.0 < float(match[1]) < math.inf:
         raise ScenarioError([f"{option} {text}: write a time above 0 such as 90s, 10min or 2h"])
@@ -111,42 +113,42 @@ def parse_seconds(text: str, option: str = "--budget") -> float:
 
 
 def parse_option_value(text: str, option: str) -> Any:
-    """A TOML value, or the text itself if it is none; `where` names the option in faults."""
+    """Return a TOML value, or the text itself if it is none; `where` names the option in errors."""
     with as_error(option):
         return parse_toml_value(text)
 
 
 def raise_errors(errors: list[str]) -> None:
-    """End with all faults that were gathered, if there are any."""
+    """Raise all collected errors, if there are any."""
     if errors:
         raise ScenarioError(errors)
 
 
 def check_writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequence[str | Path | None] = ()) -> None:
-    """Refuse files to be written, each with its possible endings, that cannot be; before any work is done.
+    """Refuse output files that cannot be written, each with its possible endings, before any work is done.
 
     reads : what the command reads, names of presets among it: none of these files is written over
     """
     import os
 
-    faults = []
+    errors = []
     for path, endings in outputs:
         if path is None:
             continue
-        folder, wrong = path.parent, suffix_error(path, endings)
-        if wrong:
-            faults.append(wrong)
+        folder, error = path.parent, suffix_error(path, endings)
+        if error:
+            errors.append(error)
         if not folder.is_dir():
-            faults.append(f"{path}: the folder {folder} does not exist")
+            errors.append(f"{path}: the folder {folder} does not exist")
         elif path.is_dir() or not os.access(folder, os.W_OK):
-            faults.append(f"{path}: cannot be written")
+            errors.append(f"{path}: cannot be written")
         elif path.exists() and any(is_file(read) and path.samefile(read) for read in reads if read is not None):
-            faults.append(f"{path}: is an input and would be overwritten; give another file to write")
-    raise_errors(faults)
+            errors.append(f"{path}: is an input and would be overwritten; give another file to write")
+    raise_errors(errors)
 
 
 def announce_run_time(scenarios: Sequence[Any], threads: int | None, device: str) -> None:
-    """Tell beforehand about how long flights on the processor will take, where that is more than a minute."""
+    """Print how long flights on the processor will take, if that is more than a minute."""
     from airflock.cli.terminal import print_message
     from airflock.scenarios import run_time_note
     from airflock.support import available_cores
@@ -157,7 +159,7 @@ def announce_run_time(scenarios: Sequence[Any], threads: int | None, device: str
 
 
 def compile_before_bar(scenario: Any, precision: int, device: str) -> None:
-    """Compile what flies a scenario on the processor before a bar on the terminal begins, whose rate is of flights."""
+    """Compile the driver of a scenario before a bar on the terminal begins, so that its rate is of flights."""
     import sys
 
     if device == "cpu" and sys.stderr.isatty():
@@ -169,28 +171,28 @@ def compile_before_bar(scenario: Any, precision: int, device: str) -> None:
 def collect_settings(
     errors: ErrorCollector, changes: list[str] | None, agents: int | None, duration: str | None
 ) -> dict[str, Any]:
-    """What `parse_settings` makes of these options, the others being judged where the number of agents is none."""
+    """Return the settings of these options; if the number of agents is invalid, still check the others."""
     return invalid_if(agents, errors.read(parse_settings, changes, value_or_default(agents, None), duration))
 
 
 def collect_scenario(
     errors: ErrorCollector, name: str, settings: Mapping[str, Any], law: str | None = None, *, trust: bool
 ) -> Any:
-    """The scenario of a name with what is changed; the name and its file are judged where a change is none."""
+    """Return the named scenario with its changes; if a change is invalid, still check the name and its file."""
     from airflock.scenarios import load
 
     return invalid_if(settings, errors.read(load, name, value_or_default(settings, {}), law, trust=trust))
 
 
 def seeds_from(first: int, count: int) -> list[int]:
-    """The seeds of --first-seed and --seeds."""
+    """Return the seeds of --first-seed and --seeds."""
     from airflock.scenarios import check_seeds
 
     return check_seeds(range(first, first + count))
 
 
 def check_flight_options(device: str, precision: int, scheduler: str | None = None) -> None:
-    """Refuse a device that nobody knows, a number of bits that is none, and workers with another device than a cpu."""
+    """Refuse an unknown device, a wrong number of bits, and workers on another device than a cpu."""
     from airflock.runs import check_worker_device
     from airflock.support import check_device, check_precision
 
@@ -202,11 +204,11 @@ def check_flight_options(device: str, precision: int, scheduler: str | None = No
 
 
 def parse_position(option: str, text: str) -> tuple[float, float, float]:
-    """Latitude and longitude (degrees) and altitude (m) from text."""
+    """Parse latitude and longitude (degrees) and altitude (m)."""
     try:
         latitude, longitude, altitude = (float(part) for part in text.split(","))
         if not math.isfinite(latitude + longitude + altitude):
             raise ValueError
-    except ValueError as fault:
-        raise ScenarioError([f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120"]) from fault
+    except ValueError as error:
+        raise ScenarioError([f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120"]) from error
     return latitude, longitude, altitude

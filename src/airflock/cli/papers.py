@@ -1,4 +1,4 @@
-"""The door to the papers, which are a distribution of their own: airflock-papers."""
+"""airflock.paper and its verb: recompute papers, which are a distribution of their own: airflock-papers."""
 
 from collections import Counter
 from importlib import import_module
@@ -12,7 +12,7 @@ from airflock.support import AirflockError
 
 # ---- airflock.paper
 
-PACKAGE = "airflock_papers"  # looked for when it is asked for: Airflock flies without it
+PACKAGE = "airflock_papers"  # imported when a paper is recomputed: Airflock flies without it
 
 
 def paper(
@@ -62,7 +62,7 @@ def paper(
 
 
 def find_paper(name: str) -> Any:
-    """The publication of this name.
+    """Return the publication of this name.
 
     Raises AirflockError if airflock-papers is not installed, or there is no such paper.
     """
@@ -74,8 +74,8 @@ def require_papers() -> None:
     """Raise AirflockError, with what to install, unless airflock-papers is there."""
     try:
         import_module(PACKAGE)
-    except ModuleNotFoundError as fault:
-        raise AirflockError("papers need airflock-papers: pip install -e ./papers in a clone of Airflock") from fault
+    except ModuleNotFoundError as error:
+        raise AirflockError("papers need airflock-papers: pip install -e ./papers in a clone of Airflock") from error
 
 
 # ---- airflock paper
@@ -126,7 +126,7 @@ def paper_verb(
 def _all(
     quick: bool, breaks: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]
 ) -> None:
-    """Every paper: in its small form, or every claim under its change, against what is committed."""
+    """Recompute every paper: in its small form, or every claim under its change, against the committed verdicts."""
     from airflock.cli.papers import require_papers
     from airflock.support import AirflockError, cache_folder
 
@@ -135,9 +135,9 @@ def _all(
 
     wrong = [option for option, given in others.items() if given]
     if wrong or quick == breaks:
-        told = "takes days; add --quick or --breaks, or name one paper"
-        told = "give --quick or --breaks, not both" if quick else told
-        raise AirflockError(f"all: {', '.join(wrong)} is of one paper; name it" if wrong else f"all: {told}")
+        message = "takes days; add --quick or --breaks, or name one paper"
+        message = "give --quick or --breaks, not both" if quick else message
+        raise AirflockError(f"all: {', '.join(wrong)} is of one paper; name it" if wrong else f"all: {message}")
     if breaks:
         _all_breaks(keep or cache_folder() / "papers" / "breaks", threads, as_json)
         return
@@ -148,9 +148,9 @@ def _all(
         terminal.print_json({"claims": [row._asdict() for row in rows], "changed": [row._asdict() for row in changed]})
     else:
         for row in changed:
-            told = f"{row.committed or 'not committed'} is now {row.found or 'not flown'}"
+            message = f"{row.committed or 'not committed'} is now {row.found or 'not flown'}"
             why = f" (not judged: committed as flown on {row.elsewhere})" if row.elsewhere else ""
-            typer.echo(f"{row.paper} {row.id}: {told}{why}")
+            typer.echo(f"{row.paper} {row.id}: {message}{why}")
         typer.echo(f"{len(rows)} claims in their small form, {len(changed)} of another verdict than the committed one")
         if any(row.elsewhere for row in changed):
             typer.echo("On another kind of processor the same seeds give other flights; a few verdicts may differ.")
@@ -159,7 +159,7 @@ def _all(
 
 
 def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
-    """Every claim of every paper under its change, against what is committed."""
+    """Check every claim of every paper under its change, against the committed verdicts."""
     from airflock_papers import breaks
 
     before = breaks.committed()
@@ -172,14 +172,14 @@ def _all_breaks(folder: Path, threads: int | None, as_json: bool) -> None:
         for row, elsewhere in worse:
             why = f" (not judged: turned red on {elsewhere})" if elsewhere else ""
             typer.echo(f"{row.paper} {row.id}: {row.result} with {row.change} ({row.ours}, then {row.changed}){why}")
-        told = ", ".join(f"{number} {result}" for result, number in Counter(row.result for row in rows).items())
-        typer.echo(f"{len(rows)} claims under their changes: {told}")
+        message = ", ".join(f"{number} {result}" for result, number in Counter(row.result for row in rows).items())
+        typer.echo(f"{len(rows)} claims under their changes: {message}")
     if not all(each.elsewhere for each in worse):
         raise typer.Exit(1)
 
 
 def _breaks(name: str, only: str | None, seeds: int | None, threads: int | None, as_json: bool) -> None:
-    """Each claim under the change that must break it."""
+    """Check each claim under the change that must break it."""
     from airflock.cli.papers import find_paper
 
     paper_verb = find_paper(name)

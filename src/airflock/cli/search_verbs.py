@@ -1,4 +1,4 @@
-"""Verb evolve: repeat or begin an optimisation."""
+"""Verbs evolve, harden, tune and certify: search for parameters, make them safer, and bound their risks."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -103,7 +103,7 @@ def evolve(
         study_executor,
     )
 
-    asked = options.collect_option_errors(ctx)
+    errors = options.collect_option_errors(ctx)
     given = {
         "algorithm": algorithm,
         "population": population,
@@ -116,20 +116,20 @@ def evolve(
         "start": start,
         "averages": averages,
     }
-    found = asked.read(
+    found = errors.read(
         evolve_request,
         scenario,
-        value_or_default(options.collect_settings(asked, changes, agents, duration), {}),
+        value_or_default(options.collect_settings(errors, changes, agents, duration), {}),
         search_keys={key: value for key, value in given.items() if value is not None and value is not INVALID},
         limit=limit or (),
         trust=trust,
         fast=fast,
         folder=out if resume else None,
     )
-    asked.read(check_sensitivity_method, sensitivity)
-    asked.read(check_timeout, timeout)
-    asked.read(check_study_device, device, scheduler)
-    asked.raise_errors()
+    errors.read(check_sensitivity_method, sensitivity)
+    errors.read(check_timeout, timeout)
+    errors.read(check_study_device, device, scheduler)
+    errors.raise_errors()
     study, taken = found
     study = resolve_device(study, device)
     open_folder(out, study, resume=resume)
@@ -220,13 +220,13 @@ def harden(
     from airflock.runs import write_toml_file
     from airflock.search import MAX_ROUNDS, harden, hardened_document, hardening_request
 
-    asked = options.collect_option_errors(ctx)
-    settings = asked.read(options.parse_settings, changes, None, duration)
-    optima = invalid_if(settings, asked.read(_optima, scenario, value_or_default(settings, {}), trust))
-    places = asked.read(_output_files, out, len(value_or_default(optima, [])), scenario)
-    asked.read(hardening_request, optima, value_or_default(cost, 0.0), limit or ())
-    numbers = asked.read(options.seeds_from, first_seed, seeds)
-    asked.raise_errors()
+    errors = options.collect_option_errors(ctx)
+    settings = errors.read(options.parse_settings, changes, None, duration)
+    optima = invalid_if(settings, errors.read(_optima, scenario, value_or_default(settings, {}), trust))
+    places = errors.read(_output_files, out, len(value_or_default(optima, [])), scenario)
+    errors.read(hardening_request, optima, value_or_default(cost, 0.0), limit or ())
+    numbers = errors.read(options.seeds_from, first_seed, seeds)
+    errors.raise_errors()
     terminal.print_notes(note for each in optima for note in each.notes)
     with counting_parts(f"{scenario}: flights", MAX_ROUNDS * seeds * len(optima), quiet=as_json) as done:
         steps = harden(optima, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
@@ -243,14 +243,14 @@ def harden(
 
 
 def _output_files(out: Path, optima: int, where: str) -> list[Path]:
-    """Files to write, one for each optimum."""
+    """Return the files to write, one for each optimum."""
     places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, optima + 1))]
     options.check_writable(*((place, SCENARIOS) for place in places), reads=[where])
     return places
 
 
 def _optima(source: str, settings: dict[str, Any], trust: bool) -> list[Any]:
-    """The optimum, or that of each scenario of a study's folder."""
+    """Return the optimum, or that of each scenario of a study's folder."""
     from airflock.scenarios import load
     from airflock.search import BEST_FILE, further_best_files
 
@@ -262,7 +262,7 @@ def _optima(source: str, settings: dict[str, Any], trust: bool) -> list[Any]:
 
 
 def _print_hardened(name: str, steps: list[Any], seeds: int) -> None:
-    """A table of what each step flies like, and below it a line for each: what it costs and gains, and its verdict."""
+    """Print a table of the scores of each step, and below it a line for each: costs, gains, and verdict."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -282,8 +282,8 @@ def _print_hardened(name: str, steps: list[Any], seeds: int) -> None:
     console.print(table)
     for step in steps[1:]:
         (cost, least, most), (gain, low, high) = step.cost, step.gain
-        told = f"cost {cost:.3g} ({least:.3g} to {most:.3g}), gain {gain:.3g} m ({low:.3g} to {high:.3g}), 95 %"
-        console.print(f"{step.name}: {step.verdict}; {told}", highlight=False, markup=False, soft_wrap=True)
+        costs = f"cost {cost:.3g} ({least:.3g} to {most:.3g}), gain {gain:.3g} m ({low:.3g} to {high:.3g}), 95 %"
+        console.print(f"{step.name}: {step.verdict}; {costs}", highlight=False, markup=False, soft_wrap=True)
 
 
 # ---- tune
@@ -346,16 +346,18 @@ def tune(
     from airflock.certificates import check_confidence
     from airflock.search import load_plan, make_request, tune
 
-    asked = options.collect_option_errors(ctx)
-    seconds = asked.read(options.parse_seconds, budget)
-    settings = options.collect_settings(asked, changes, agents, duration)
-    base = options.collect_scenario(asked, asked.read(_start_scenario, scenario, like, heard), settings, trust=trust)
-    start = asked.read(_tuned_scenario, base, like)
-    plan = asked.read(load_plan, out, start, resume) if like is None else None  # with logs, of what they will tell
+    errors = options.collect_option_errors(ctx)
+    seconds = errors.read(options.parse_seconds, budget)
+    settings = options.collect_settings(errors, changes, agents, duration)
+    base = options.collect_scenario(errors, errors.read(_start_scenario, scenario, like, heard), settings, trust=trust)
+    start = errors.read(_tuned_scenario, base, like)
+    plan = (
+        errors.read(load_plan, out, start, resume) if like is None else None
+    )  # with logs it depends on their contents
     if confidence is not None:
-        asked.read(check_confidence, confidence)
-    asked.read(make_request, start, limit or (), confidence, value_or_default(plan, None))
-    asked.raise_errors()
+        errors.read(check_confidence, confidence)
+    errors.read(make_request, start, limit or (), confidence, value_or_default(plan, None))
+    errors.raise_errors()
     terminal.print_notes(start.notes)
     options.compile_before_bar(base, 32, "cpu")
     what: Any = base if like is None else scenario
@@ -363,14 +365,14 @@ def tune(
     if like is not None:
         how |= {"like": base, "heard": heard}
     shown: list[str] = []
-    with progress_line(as_json) as told:
+    with progress_line(as_json) as line:
 
         def watch(p: Any) -> None:
-            told.update(p.stage + (f", {p.told}" if p.told else ""), p.done, p.total)
+            line.update(p.stage + (f", {p.told}" if p.told else ""), p.done, p.total)
 
         def note(text: str) -> None:
             shown.append(text)
-            told.say(text)
+            line.say(text)
 
         tuning = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
     if as_json:
@@ -382,7 +384,7 @@ def tune(
 
 
 def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -> str:
-    """The scenario that names law, field and speed: the one that is tuned or, with logs, what they are like."""
+    """Return the scenario that names law, field and speed: the tuned one or, with logs, that of --like."""
     if like is not None:
         return like
     if len(scenario) > 1 or heard is not None:
@@ -393,14 +395,14 @@ def _start_scenario(scenario: list[str], like: str | None, heard: Path | None) -
 
 
 def _tuned_scenario(base: Any, like: str | None) -> Any:
-    """The scenario from which tuning starts; with logs it is not known yet, but takes the same limits."""
+    """Return the scenario from which tuning starts; with logs it is not known yet, but takes the same limits."""
     from airflock.search import prepare_start
 
     return base if like is not None else prepare_start(base)[0]
 
 
 def _print_campaign(tuning: Any, shown: list[str]) -> None:
-    """What was found, and those notes that were not told while it was sought."""
+    """Print the result, and the notes that were not printed during the search."""
     from rich.console import Console
 
     from airflock.search import limit_report_line
@@ -427,7 +429,7 @@ def _print_campaign(tuning: Any, shown: list[str]) -> None:
 
 
 def print_certificate(certificate: Any) -> None:
-    """Print all that it says, and what it does not say."""
+    """Print everything that a certificate shows, and what it does not show."""
     from rich.console import Console
 
     console = Console()
@@ -452,7 +454,7 @@ def print_certificate(certificate: Any) -> None:
 
 
 def _verdicts(console: Any, certificate: Any) -> None:
-    """One row a limit."""
+    """Print one row a limit."""
     from rich import box
     from rich.table import Table
 
@@ -514,7 +516,7 @@ def _tolerances(console: Any, tolerance: Any) -> None:
 
 
 def _map(console: Any, bounds: Any) -> None:
-    """Upper bounds in percent of flights, first key downwards, second across."""
+    """Print upper bounds in percent of flights, first key downwards, second across."""
     if not bounds:
         return
     from rich import box
@@ -622,9 +624,9 @@ def certify(
 
     Example: airflock certify vasarhelyi_2018/real_6ms --limit "r_min<1 at 0.1/h" --budget 10min --out certificate.toml
     """
-    asked = options.collect_option_errors(ctx)
+    errors = options.collect_option_errors(ctx)
     if check:
-        asked.raise_errors()
+        errors.raise_errors()
         others = {
             "--limit": limit, "--flights": flights, "--out": out, "--resume": resume, "--tolerance": tolerance,
             "--tolerance-of": tolerance_of, "--split": split, "--map": over, "--uncertain": uncertain, "--plot": plot,
@@ -648,27 +650,27 @@ def certify(
     )
     from airflock.cli.flight_verbs import parse_axis
 
-    asked.read(options.check_writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
-    seconds = asked.read(options.parse_seconds, budget)
+    errors.read(options.check_writable, (out, SCENARIOS), (plot, PICTURES), reads=[scenario])
+    seconds = errors.read(options.parse_seconds, budget)
     loaded = options.collect_scenario(
-        asked, scenario, options.collect_settings(asked, changes, agents, duration), law, trust=trust
+        errors, scenario, options.collect_settings(errors, changes, agents, duration), law, trust=trust
     )
-    asked.read(check_confidence, confidence)
-    asked.read(check_flight_count, flights)
-    asked.read(check_flight_options, precision, device)
+    errors.read(check_confidence, confidence)
+    errors.read(check_flight_count, flights)
+    errors.read(check_flight_options, precision, device)
     how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-    campaign = asked.read(campaign_from_request, loaded, limit or [], confidence, flights, **how)
+    campaign = errors.read(campaign_from_request, loaded, limit or [], confidence, flights, **how)
     also: dict[str, Any] = {"split": split, "axes": {}}
-    also["keys"] = asked.read(tolerance_keys, loaded, tolerance_of or tolerance)
+    also["keys"] = errors.read(tolerance_keys, loaded, tolerance_of or tolerance)
     if split:
-        asked.read(check_split, campaign)
+        errors.read(check_split, campaign)
     if over:
-        axes = asked.collect_each(partial(parse_axis, option="--map"), over)
-        also["axes"] = asked.read(check_map_axes, loaded, asked.read(dict, axes))
-    asked.read(check_workers, timeout, scheduler, device)
+        axes = errors.collect_each(partial(parse_axis, option="--map"), over)
+        also["axes"] = errors.read(check_map_axes, loaded, errors.read(dict, axes))
+    errors.read(check_workers, timeout, scheduler, device)
     if resume and out is None:
-        asked.note("--resume: name the certificate whose flights are to be continued with --out")
-    asked.raise_errors()
+        errors.note("--resume: name the certificate whose flights are to be continued with --out")
+    errors.raise_errors()
     terminal.print_notes(campaign.scenario.notes)
     if scheduler is None:
         options.compile_before_bar(campaign.flown, precision, device)
@@ -680,9 +682,9 @@ def _flown(
     campaign: Any, seconds: float, out: Path | None, resume: bool, flying: dict[str, Any], extras: dict[str, Any], *,
     quiet: bool,
 ) -> Any:  # fmt: skip
-    """Fly a campaign, in the folder beside `out` or one that is gone afterwards; its certificate.
+    """Fly a campaign, in the folder beside `out` or a temporary one, and return its certificate.
 
-    flying : scheduler, threads and timeout; also: what is asked for besides counting
+    flying : scheduler, threads and timeout; also: estimates besides counting
     """
     from airflock.certificates import (
         CAMPAIGN_KIND,
@@ -708,7 +710,7 @@ def _flown(
 
 
 def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:
-    """Write, print, and leave with status 1 where something is not shown."""
+    """Write, print, and exit with status 1 where something is not shown."""
     if out is not None:
         result.save(out)
         terminal.print_message(f"saved {out}")
@@ -727,18 +729,18 @@ def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> Non
 
 @contextmanager
 def counting_progress(quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[str], None]]]:
-    """Progress of counting: flights up to the coming look, events so far, flights per second; then what else begins."""
-    with progress_line(quiet) as told:
+    """Show flights up to the next look, events so far, flights per second; then the later stages."""
+    with progress_line(quiet) as line:
 
         def watch(p: Any) -> None:
             events = ", ".join(str(count) for count in p.events)
-            told.update(f"counting, {events} events, {p.rate:.1f} flights/s", p.done, p.total)
+            line.update(f"counting, {events} events, {p.rate:.1f} flights/s", p.done, p.total)
 
-        yield watch, told.update
+        yield watch, line.update
 
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
-    """Check a certificate; status 1 where it does not hold."""
+    """Check a certificate; exit with status 1 where it does not hold."""
     from airflock.certificates import check_certificate
 
     with counting_parts(f"{path}: flights again", quiet=as_json) as done:

@@ -1,4 +1,4 @@
-"""Tables for a terminal, and JSON for machines."""
+"""Output of the commands: tables for a terminal, JSON for machines, and progress."""
 
 import itertools
 import json
@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 
 def column_statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Mean, standard deviation and median of each column; of a column of lists, those of each place.
+    """Return mean, standard deviation and median of each column; of a column of lists, those of each place.
 
     A value that is nan (a time of what never happened) is left out; where all are, the statistics are nan.
     """
@@ -41,7 +41,9 @@ def _moments(numbers: Sequence[Any]) -> tuple[float, float, float]:
 
 
 def format_number(x: Any, missing: str = "never") -> str:
-    """A number with four significant digits, `missing` where it is nan (a time's `never`); a list side by side."""
+    """Format a number with four significant digits, `missing` where it is nan (a time's `never`); a list side by
+    side.
+    """
     if isinstance(x, (list, tuple)):
         return ", ".join(f"{v:.3g}" if v == v else missing for v in x)
     return f"{x:.4g}" if x == x else missing
@@ -55,7 +57,7 @@ def print_score_table(
 ) -> None:
     """Print order parameters beside what a paper reports; about: unit and meaning by name.
 
-    What no flight has (a clearance where nothing stands) is named in one line below, not told as a number.
+    What no flight has (a clearance where nothing stands) is named in one line below instead of a number.
     """
     from rich import box
     from rich.console import Console
@@ -93,7 +95,7 @@ def print_score_table(
 
 
 def _is_unmeasured(key: str, mean: Any) -> bool:
-    """Whether no flight has such a number; an event that never happened is told as `never`."""
+    """Return True if no flight has such a number; an event that never happened is printed as `never`."""
     values = mean if isinstance(mean, (list, tuple)) else [mean]
     return not key.startswith("time_to_") and bool(values) and all(math.isnan(value) for value in values)
 
@@ -104,7 +106,7 @@ def print_json(value: Any) -> None:
 
 
 def to_json_value(value: Any) -> Any:
-    """Plain Python values with finite numbers."""
+    """Return plain Python values with finite numbers."""
     if isinstance(value, Mapping):
         return {str(key): to_json_value(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
@@ -115,13 +117,13 @@ def to_json_value(value: Any) -> Any:
 
 
 def print_notes(notes: Iterable[str]) -> None:
-    """What is read otherwise than it is written or hardly meant, once each; before anything is flown or written."""
+    """Print notes on unexpected or doubtful settings, once each; before anything is flown or written."""
     for text in dict.fromkeys(notes):
         print_message(f"note: {text}")
 
 
 def print_message(text: str) -> None:
-    """A line for a person, on the error stream so that it never mixes with output."""
+    """Print a line for a person, on the error stream so that it never mixes with output."""
     sys.stderr.write(f"{text}\n")
 
 
@@ -132,10 +134,10 @@ INTERVAL_SHARE = 0.1  # of the time so far that passes at least between two line
 
 
 class ProgressLine(Protocol):
-    """What is under way, told again whenever it changes."""
+    """Progress of the work, updated as it changes."""
 
     def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
-        """What is under way, how much of it is done, and how much there is (None: nobody knows)."""
+        """Show the work under way, the amount done, and the total (None: unknown)."""
 
     def say(self, text: str) -> None:
         """Print a line that stays."""
@@ -143,7 +145,7 @@ class ProgressLine(Protocol):
 
 @contextmanager
 def progress_line(quiet: bool = False) -> Iterator[ProgressLine]:
-    """The line for where standard error goes: none if quiet, a bar on a terminal, or lines for a log."""
+    """Return the progress for standard error: none if quiet, a bar on a terminal, or lines for a log."""
     if quiet:
         yield SilentProgress()
     elif sys.stderr.isatty():
@@ -154,17 +156,17 @@ def progress_line(quiet: bool = False) -> Iterator[ProgressLine]:
 
 
 class SilentProgress:
-    """Nothing is told of progress, nor what would stay above it."""
+    """Progress that prints nothing, nor the lines that would stay above it."""
 
     def update(self, text: str, done: float = 0.0, total: float | None = None) -> None:
-        """Tell nothing."""
+        """Print nothing."""
 
     def say(self, text: str) -> None:
         """Print nothing."""
 
 
 class LogProgress:
-    """Plain lines for a file or the log of a cluster, each with what is done, how fast, and how long it will take."""
+    """Plain lines for a file or the log of a cluster, each with amount done, rate, and time left."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
         self._clock, self._lock = clock, Lock()
@@ -179,6 +181,7 @@ class LogProgress:
             now = self._clock()
             if now < self._next_line_at:
                 return
+            # The interval grows with the run, so that a log of days stays short.
             self._next_line_at = now + max(LINE_INTERVAL, INTERVAL_SHARE * (now - self._began))
             amount = f": {done:,.0f}" if done else ""
             amount = f": {done:,.0f} of {total:,.0f} ({done / total:.0%})" if total else amount
@@ -192,7 +195,7 @@ class LogProgress:
 
 
 class TimeLeft:
-    """How fast work goes: `left` is the time (s) that it will still take, None where nobody knows.
+    """Rate of the work: `left` is the remaining time (s), None while unknown.
 
     What was done before it was first looked at, by a run that was cut off, took no time. Less done than before
     means that other work begins.
@@ -204,8 +207,9 @@ class TimeLeft:
         self.left: float | None = None
 
     def update(self, done: float, total: float | None) -> None:
-        """Take what is done, of how much."""
+        """Take the amount done, and the total."""
         now = self._clock()
+        # Less than before: other work has begun, and its rate is not that of the last.
         if done < self._last:
             self._first, self._since = done, now
         self._last = done
@@ -214,7 +218,7 @@ class TimeLeft:
 
 
 def format_duration(seconds: float) -> str:
-    """A time as one says it: 40 s, 12 min, 3.5 h."""
+    """Format a time: 40 s, 12 min, 3.5 h."""
     if seconds < 100.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
@@ -222,7 +226,7 @@ def format_duration(seconds: float) -> str:
 
 @contextmanager
 def _progress_bar() -> Iterator[ProgressLine]:
-    """A line that moves: what is under way, a bar, its share, and the time that is left."""
+    """Return a moving line: the work under way, a bar, its share, and the time left."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
@@ -251,29 +255,29 @@ def _progress_bar() -> Iterator[ProgressLine]:
 
 @contextmanager
 def counting_parts(label: str, total: int | None = None, quiet: bool = False) -> Iterator[Callable[[], None]]:
-    """Progress of so many equal parts (None: nobody knows); yields a function to call after each."""
-    with progress_line(quiet) as told:
+    """Show the progress of so many equal parts (None: unknown); yields a function to call after each."""
+    with progress_line(quiet) as line:
         lock, done = Lock(), 0
 
         def one() -> None:
             nonlocal done
             with lock:
                 done += 1
-                told.update(label, done, total)
+                line.update(label, done, total)
 
-        told.update(label, 0, total)
+        line.update(label, 0, total)
         yield one
 
 
 @contextmanager
 def search_progress(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], None], Callable[[bool], None]]]:
-    """Progress of a search: generation, best, mean, flights per second; then of the finalists."""
+    """Show the progress of a search: generation, best, mean, flights per second; then of the finalists."""
     from airflock.search import RACE_ROUNDS
 
     finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
     finals += round(sum(share * seeds for share, seeds in RACE_ROUNDS) * study.whole("pool"))
     began, flown = time.perf_counter(), itertools.count(1)
-    with progress_line(quiet) as told:
+    with progress_line(quiet) as line:
 
         def watch(p: Any) -> None:
             rate = p.fresh / max(time.perf_counter() - began, 1e-9)
@@ -281,9 +285,9 @@ def search_progress(study: Any, quiet: bool) -> Iterator[tuple[Callable[[Any], N
             found += "" if p.mean is None else f", mean {p.mean:.4f}"
             where = f"run {p.run + 1}, " if study.whole("restarts") else ""
             text = f"{where}generation {p.generation + 1}/{study.whole('generations')}{found}, {rate:.1f} flights/s"
-            told.update(text, p.done, p.total)
+            line.update(text, p.done, p.total)
 
         def note(_: bool) -> None:
-            told.update("finalists on fresh seeds", min(next(flown), finals), finals)
+            line.update("finalists on fresh seeds", min(next(flown), finals), finals)
 
         yield watch, note

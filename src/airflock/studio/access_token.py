@@ -1,4 +1,4 @@
-"""Door: who may open a page. A token in the address, then a cookie; everything else is turned away.
+"""Access to a page: a token in the address, then a cookie; every other request is refused.
 
 The web server of viser has no such check. It serves through `websockets`, whose one call is wrapped while the server
 starts; the same place gives the page a few lines of its own (keys on a slider do not turn the camera; sliders, fields
@@ -69,39 +69,42 @@ addEventListener("DOMContentLoaded", () => {
 def check_access(
     path: str, cookies: str, cookie_name: str, token: str, origin: str = "", host: str = ""
 ) -> tuple[bool, bool]:
-    """Whether a request may pass, and whether it came with the token in its address.
+    """Return two booleans: whether a request may pass, and whether it came with the token in its address.
 
     path   : with its query; cookies : the header; name : of the cookie that holds the token
-    origin : header that names the page that asks, if any; host : header that names the address that it asks
+    origin : header with the address of the requesting page, if any; host : header with the address of this page
 
     A browser sends the cookie also for pages of other ports of the same machine: they are turned away.
     """
     try:
         given = parse_qs(urlsplit(path).query).get("token", [""])[0]
+        # Constant time: the time of an answer must not reveal how much of a token was right.
         if hmac.compare_digest(given.encode(), token.encode()):
             return True, True
         kept = SimpleCookie(cookies)
-        asks = urlsplit(origin).netloc
+        origin_host = urlsplit(origin).netloc
     except (CookieError, ValueError):  # what a stranger sends may be no address at all
         return False, False
     value = kept[cookie_name].value if cookie_name in kept else ""
-    return hmac.compare_digest(value.encode(), token.encode()) and (not origin or asks == host), False
+    return hmac.compare_digest(value.encode(), token.encode()) and (not origin or origin_host == host), False
 
 
 @contextmanager
 def require_token(token: str, port: int) -> Iterator[None]:
-    """Servers of websockets started meanwhile ask for the token."""
+    """Let the servers of websockets that start inside require the token."""
+    # viser has no access control, so the server is wrapped while it starts; the web socket included.
     serve, name = websockets.asyncio.server.serve, f"airflock_{port}"
 
     def with_check(handler: Any, *where: Any, process_request: Callable[..., Any], **rest: Any) -> Any:
         def check(connection: Any, request: Any) -> Any:
             cookies, origin, host = ("; ".join(request.headers.get_all(n)) for n in ("Cookie", "Origin", "Host"))
-            passes, anew = check_access(request.path, cookies, name, token, origin, host)
+            passes, sets_cookie = check_access(request.path, cookies, name, token, origin, host)
             if not passes:
                 return Response(
                     HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Type": "text/plain"}), REFUSAL_PAGE
                 )
             page = urlsplit(request.path).path in ("", "/", "/index.html")
+            # The page must arrive uncompressed, because the script is inserted into its bytes.
             if page and "Accept-Encoding" in request.headers:
                 del request.headers["Accept-Encoding"]
             answer = process_request(connection, request)
@@ -109,7 +112,7 @@ def require_token(token: str, port: int) -> Iterator[None]:
                 answer.body = answer.body.replace(b"<head>", b"<head>" + PAGE_SCRIPT, 1)
                 del answer.headers["Content-Length"]
                 answer.headers["Content-Length"] = str(len(answer.body))
-            if anew and answer is not None:
+            if sets_cookie and answer is not None:
                 answer.headers["Set-Cookie"] = f"{name}={token}; HttpOnly; SameSite=Strict; Path=/"
             return answer
 

@@ -1,4 +1,4 @@
-"""View: the scene of a page, in the words of the studio: solids, lines, agents, cameras. It and `panel` know viser."""
+"""Browser view: everything that uses viser: charts, panel, and the scene with solids, lines, agents and cameras."""
 
 import secrets
 import socket
@@ -28,7 +28,9 @@ FLAT_SHARE = 1e-4  # of values, which are numbers of seven digits
 
 
 def round_ends(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Round ends of an axis that holds all values, which ascend: from the first to the last, and a little more."""
+    """Return round ends of an axis that holds all values, which ascend: from the first to the last, and a little
+    more.
+    """
     low, high = (float(values[0]), float(values[-1])) if len(values) else (0.0, 0.0)
     span = high - low
     if not span > MIN_RELATIVE_SPAN * max(abs(low), abs(high), 1.0):
@@ -39,7 +41,7 @@ def round_ends(values: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def axis_ranges(columns: tuple[NDArray[np.float64], ...]) -> dict[str, tuple[float, float]]:
-    """Ends of the axes that a page must be told: that of x always, that of y where the page finds none itself.
+    """Return the axis ranges that must be sent to a page: always x, and y where the page cannot find it itself.
 
     That is where a value is missing (nan), and where all are the same but for rounding, as the speeds of fish.
     """
@@ -54,7 +56,7 @@ def axis_ranges(columns: tuple[NDArray[np.float64], ...]) -> dict[str, tuple[flo
 
 
 class Chart:
-    """One chart of viser, whose axis is set.
+    """Chart of viser whose axis ranges are set.
 
     Left alone, the page scales the axis of new values by that of the last ones. A chart that was made while it was
     hidden, or drawn too slowly, has none yet, and then shows the first second for ever (viser 1.1). An axis that is
@@ -69,18 +71,18 @@ class Chart:
 
     @property
     def data(self) -> tuple[NDArray[np.float64], ...]:
-        """(time or what else is across, *values), one array a line, all of one length."""
+        """Set the data: (time or another axis, *values), one array a line, all of one length."""
         return tuple(self._handle.data)
 
     @data.setter
     def data(self, columns: tuple[NDArray[np.float64], ...]) -> None:
-        if (told := axis_ranges(columns)) != self._axis_ranges:
-            self._axis_ranges = told
-            self._handle.scales = {axis: uplot.Scale(time=False, range=given) for axis, given in told.items()}
+        if (ranges := axis_ranges(columns)) != self._axis_ranges:
+            self._axis_ranges = ranges
+            self._handle.scales = {axis: uplot.Scale(time=False, range=given) for axis, given in ranges.items()}
         self._handle.data = columns
 
     def remove(self) -> None:
-        """Take it from the page."""
+        """Remove the chart from the page."""
         self._handle.remove()
 
 
@@ -90,7 +92,7 @@ CHART_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000
 
 
 class Widgets:
-    """The panel of one page.
+    """Panel of one page.
 
     server : of viser
     """
@@ -99,34 +101,34 @@ class Widgets:
         self.server = server
 
     def add_tabs(self, *names: str) -> list[Any]:
-        """Tabs; each is a context in which controls are made."""
+        """Add tabs; each is a context in which controls are made."""
         group = self.server.gui.add_tab_group()
         return [group.add_tab(name) for name in names]
 
     def folder(self, name: str, is_open: bool = True) -> Any:
-        """A folder; a context in which controls are made."""
+        """Add a folder, a context in which controls are made."""
         return self.server.gui.add_folder(name, expand_by_default=is_open)
 
     def text(self, content: str = "") -> Any:
-        """HTML that can be rewritten: `.content`."""
+        """Add HTML that can be rewritten: `.content`."""
         return self.server.gui.add_html(content)
 
     def add_button(self, label: str, action: Callable[[], None], hint: str = "") -> Any:
-        """A button; `.label` can be rewritten."""
+        """Add a button; `.label` can be rewritten."""
         handle = self.server.gui.add_button(label, hint=hint or None)
         handle.on_click(lambda _: action())
         return handle
 
     def row(self, actions: dict[str, Callable[[], None]]) -> None:
-        """Small buttons side by side."""
+        """Add small buttons side by side."""
         self.server.gui.add_button_group("", tuple(actions)).on_click(lambda event: actions[event.target.value]())
 
     def command(self, label: str, key: Any, action: Callable[[], None]) -> None:
-        """A key that does something."""
+        """Bind a key to an action."""
         self.server.gui.add_command(label, hotkey=key).on_trigger(lambda _: action())
 
     def add_checkbox(self, label: str, value: bool, action: Callable[[bool], None], hint: str = "") -> Any:
-        """A switch; its state is `.value`."""
+        """Add a switch; its state is `.value`."""
         handle = self.server.gui.add_checkbox(label, value, hint=hint or None)
         handle.on_update(lambda event: action(bool(event.target.value)) if event.client is not None else None)
         return handle
@@ -134,13 +136,15 @@ class Widgets:
     def add_menu(
         self, label: str, options: Sequence[str], value: str, action: Callable[[str], None], hint: str = ""
     ) -> Any:
-        """A menu; what is chosen is `.value`."""
+        """Add a menu; the chosen entry is `.value`."""
         handle = self.server.gui.add_dropdown(label, tuple(options), initial_value=value, hint=hint or None)
         handle.on_update(lambda event: action(event.target.value) if event.client is not None else None)
         return handle
 
     def number(self, label: str, value: int, low: int, high: int, action: Callable[[int], None], hint: str = "") -> Any:
-        """A field for a whole number; beyond its ends it is ignored until the field is left, then set to the end."""
+        """Add a field for a whole number; beyond its ends it is ignored until the field is left, then set to the
+        end.
+        """
         handle = self.server.gui.add_number(label, value, min=low, max=high, step=1, hint=hint or None)
 
         @handle.on_update
@@ -151,11 +155,11 @@ class Widgets:
         return handle
 
     def field(self, label: str, hint: str = "") -> Any:
-        """A field for a line of text: `.value`."""
+        """Add a field for a line of text: `.value`."""
         return self.server.gui.add_text(label, "", hint=hint or None)
 
     def add_upload_button(self, label: str, ending: str, action: Callable[[str, bytes], None], hint: str = "") -> Any:
-        """A button that takes a file from the reader's machine; `action` is called with its name and content."""
+        """Add a button that takes a file from the reader's machine; `action` gets its name and content."""
         handle = self.server.gui.add_upload_button(label, mime_type=ending, hint=hint or None)
         handle.on_upload(lambda event: action(event.target.value.name, event.target.value.content))
         return handle
@@ -164,13 +168,13 @@ class Widgets:
         self, label: str, low: float, high: float, step: float, value: float, action: Callable[[float], None],
         hint: str = "",
     ) -> Any:  # fmt: skip
-        """A slider; `action` is called for a hand on it, not of a value that is set from here."""
+        """Add a slider; `action` is called when a reader moves it, not when the program sets its value."""
         handle = self.server.gui.add_slider(label, low, high, step, value, hint=hint or None)
         handle.on_update(lambda event: action(float(event.target.value)) if event.client is not None else None)
         return handle
 
     def add_control(self, control: ParameterControl, action: Callable[[str, Any], None]) -> Any:
-        """A slider or a menu for a parameter."""
+        """Add a slider or a menu for a parameter."""
         if control.is_choice:
             return self.add_menu(
                 control.label, control.options, control.value, lambda v: action(control.key, v), control.hint
@@ -186,7 +190,7 @@ class Widgets:
         )
 
     def add_chart(self, title: str, names: Sequence[str], band: bool = False, across: str = "t (s)") -> Chart:
-        """A chart: `.data` is (time or what is `across`, *values). With a band, the last two are its ends, shaded."""
+        """Add a chart: `.data` is (time or `across`, *values). With a band, the last two are its ends, shaded."""
         series: list[Any] = [uplot.Series(label=across)]
         for number, name in enumerate(names):
             edge = band and number >= len(names) - 2
@@ -202,7 +206,7 @@ class Widgets:
         ))  # fmt: skip
 
     def notify(self, title: str, body: str, is_error: bool = False) -> None:
-        """A notice on every open page."""
+        """Show a notice on every open page."""
         for client in self.server.get_clients().values():
             client.add_notification(title, body, color="red" if is_error else "blue", auto_close_seconds=8.0)
 
@@ -220,14 +224,14 @@ NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
 
 
 class BrowserView:
-    """A page at an address of its own.
+    """Page at an address of its own.
 
-    host : localhost, unless the page is to be seen from elsewhere; port : the one asked for, 0 for any free one
+    host : localhost, unless the page is to be seen from elsewhere; port : 0 for any free one
     Raises StudioError where the port is in use.
     """
 
     def __init__(self, host: str, port: int, title: str):
-        free = _free_port(host)  # also where a port is given: a host that is not this machine is told as such
+        free = _free_port(host)  # also where a port is given: a host that is not this machine is an error of its own
         port = port or free
         _check_port_free(host, port)
         token = secrets.token_urlsafe(12)
@@ -236,6 +240,7 @@ class BrowserView:
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection")  # to a page that has just gone
         with require_token(token, port):
             self.server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+        # viser silently takes the next port when another program was faster.
         if self.server.get_port() != port:
             self.server.stop()
             raise StudioError(f"port {port} is in use; give another one with --port, or --port 0 for any free one")
@@ -258,11 +263,11 @@ class BrowserView:
 
     @property
     def clients(self) -> int:
-        """Pages that are open."""
+        """Open pages."""
         return len(self.server.get_clients())
 
     def atomic(self) -> Any:
-        """All that is sent inside appears at once."""
+        """Let everything that is sent inside appear at once."""
         return self.server.atomic()
 
     def stop(self) -> None:
@@ -272,7 +277,7 @@ class BrowserView:
     # ------------------------------------------------------------------------------------------------ standing
 
     def clear(self, moving: bool = True) -> None:
-        """Take away what stands, and the agents with all that is drawn about them."""
+        """Remove the scene, and the agents with all that is drawn about them."""
         for node in [*self._standing, *(self._moving if moving else [])]:
             node.remove()
         self._standing = []
@@ -293,12 +298,12 @@ class BrowserView:
             self._welcome(client)
 
     def _meet(self, client: Any) -> None:
-        """Point the camera of a page that opens, and listen to what it tells of its size."""
+        """Point the camera of a page that opens, and listen for its size."""
         self._welcome(client)
         client.camera.on_update(lambda _: self._sized(client))
 
     def _sized(self, client: Any) -> None:
-        """Point the camera of a page anew that has become narrow, or no longer is: it tells its size as it looks."""
+        """Point the camera again when a page becomes narrow or wide: pages report their size with their camera."""
         narrow = min(client.camera.aspect, FULL_ASPECT)
         if abs(narrow - self._narrow.get(client.client_id, FULL_ASPECT)) > MIN_ASPECT_CHANGE:
             self._narrow[client.client_id] = narrow
@@ -309,12 +314,12 @@ class BrowserView:
             setattr(camera, name, value)
 
     def _welcome(self, client: Any) -> None:
-        """Point the camera of one page; until the page has answered, what it says of its camera is old."""
+        """Point the camera of one page; camera messages from before its answer are outdated."""
         self._met[client.client_id] = time.monotonic()
         self._point(client.camera, self._narrow.get(client.client_id, FULL_ASPECT))
 
     def ground(self, name: str, span: float, height: float, centre: NDArray[Any]) -> None:
-        """A grid of 20 by 20 squares."""
+        """Draw a grid of 20 by 20 squares."""
         cell = _round_length(span / 5.0)
         self._standing.append(
             self.server.scene.add_grid(
@@ -335,7 +340,7 @@ class BrowserView:
             camera.look_at = tuple(target)
 
     def solid(self, solid: SceneSolid, opacity: float | None = None) -> None:
-        """Something that stands."""
+        """Draw a solid."""
         self._standing.append(
             self.server.scene.add_mesh_simple(
                 f"/world/{solid.name}", solid.vertices.astype(np.float32), solid.faces, color=solid.colour,
@@ -344,17 +349,19 @@ class BrowserView:
         )  # fmt: skip
 
     def lines(self, lines: SceneLines, width: float = 2.0) -> None:
-        """Lines that stay."""
+        """Draw lines that stay."""
         self._standing.append(self._segments(f"/world/{lines.name}", lines.points, lines.colour, width))
 
     def label(self, text: str, position: NDArray[Any]) -> None:
-        """Words at a place, m."""
+        """Write words at a place, m."""
         self._standing.append(self.server.scene.add_label(f"/world/label_{text}", text, position=_to_tuple(position)))
 
     def handle(
         self, name: str, position: NDArray[Any], size: float, flat: bool, on_move: Callable[[NDArray[Any]], None]
     ) -> None:
-        """A handle of a size, m, by which something is dragged; `told` hears where it was let go."""
+        """Add a handle of a size, m, by which something is dragged; the callback gets the place where it was
+        dropped.
+        """
         made = self.server.scene.add_transform_controls(
             f"/world/{name}", scale=size, disable_rotations=True, active_axes=(True, True, not flat),
             position=_to_tuple(position), depth_test=False,
@@ -375,7 +382,7 @@ class BrowserView:
     # ------------------------------------------------------------------------------------------------- moving
 
     def agents(self, count: int, size: float, lines: Mapping[str, tuple[Any, float]]) -> None:
-        """So many darts of a size, m; their trails; and kinds of lines about them by name: colour and width."""
+        """Make so many darts of a size, m; their trails; and kinds of lines about them by name: colour and width."""
         vertices, faces = dart_mesh(size)
         at = np.zeros((count, 3), np.float32)
         self._agents = self.server.scene.add_batched_meshes_simple(
@@ -395,27 +402,28 @@ class BrowserView:
         self._moving += [self._agents, *self._trails, *self._extra.values()]
 
     def move(self, position: NDArray[Any], turn: NDArray[Any], colour: NDArray[Any]) -> None:
-        """Put all agents somewhere: positions (agent, 3) m, quaternions (agent, 4), colours (agent, 3)."""
+        """Move all agents: positions (agent, 3) m, quaternions (agent, 4), colours (agent, 3)."""
         self._agents.batched_positions = position
         self._agents.batched_wxyzs = turn
         self._agents.batched_colors = _linear_light(colour)
 
     def trail(self, begin: NDArray[Any], end: NDArray[Any], colour: NDArray[Any], is_complete: bool) -> None:
-        """The newest piece of every agent's trail, again; where it is done, the next one takes the oldest's place."""
+        """Rewrite the newest piece of every trail; once it is complete, the next call reuses the oldest piece."""
         node = self._trails[self._turn % TRAIL_PIECES]
         self._turn += is_complete
         node.points = np.stack([begin, end], 1)
+        # Trails are mixed with the background instead of being transparent: segments of viser have no opacity each.
         pale = _linear_light(0.45 * colour + 0.55 * 235)
         node.colors = np.repeat(pale[:, None], 2, axis=1)
 
     def no_trails(self) -> None:
-        """Forget all trails."""
+        """Remove all trails."""
         blank = np.zeros((self._trails[0].points.shape[0], 2, 3), np.float32)
         for node in self._trails:
             node.points = blank
 
     def extra(self, name: str, points: NDArray[Any], colour: NDArray[Any] | None = None) -> None:
-        """Lines of a kind: (segment, 2, 3) m, each in its own colour (segment, 3) if given; none clears them."""
+        """Draw lines of a kind: (segment, 2, 3) m, each in its own colour (segment, 3) if given; none clears them."""
         node = self._extra[name]
         if not len(points) and name in self._bare:
             return
@@ -431,7 +439,7 @@ class BrowserView:
         node.colors, node.points = tones, places
 
     def on_click(self, callback: Callable[[NDArray[Any], NDArray[Any]], None]) -> None:
-        """Tell of a click into the scene: origin and direction of its ray."""
+        """Call back with each click into the scene: origin and direction of its ray."""
 
         @self.server.scene.on_click()
         def _(event: Any) -> None:
@@ -444,7 +452,7 @@ def _to_tuple(position: NDArray[Any]) -> tuple[float, float, float]:
 
 
 def _linear_light(colour: NDArray[Any]) -> NDArray[np.uint8]:
-    """Colours of many meshes or segments, which viser takes as linear light: sRGB (IEC 61966-2-1) decoded."""
+    """Decode sRGB (IEC 61966-2-1) colours of many meshes or segments, which viser takes as linear light."""
     share = np.asarray(colour, float) / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.asarray(np.round(255.0 * light), np.uint8)
@@ -454,38 +462,40 @@ def _free_port(host: str) -> int:
     with socket.socket() as probe:
         try:
             probe.bind((host, 0))
-        except OSError as fault:
+        except OSError as error:
             raise StudioError(
-                f"host = {host}: {fault.strerror or fault}; give a name or IPv4 address of this machine, or 0.0.0.0"
-            ) from fault
+                f"host = {host}: {error.strerror or error}; give a name or IPv4 address of this machine, or 0.0.0.0"
+            ) from error
         return int(probe.getsockname()[1])
 
 
 def _check_port_free(host: str, port: int) -> None:
     """Raise StudioError where nothing can listen at a port; viser would take the next one without a word."""
     with socket.socket() as probe:
+        # A port that a page has just left may be used again at once, as viser does.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
-        except OSError as fault:
+        except OSError as error:
             raise StudioError(
-                f"{host}:{port}: {fault.strerror or fault}; give another port with --port, or --port 0 for any free one"
-            ) from fault
+                f"{host}:{port}: {error.strerror or error}; give another port with --port, or --port 0 for any free one"
+            ) from error
 
 
 def _round_length(length: float) -> float:
-    """1, 2 or 5 times a power of ten near a length, m."""
+    """Return 1, 2 or 5 times a power of ten near a length, m."""
     power = 10.0 ** np.floor(np.log10(max(length, 1e-9)))
     return float(min((1.0, 2.0, 5.0, 10.0), key=lambda digit: abs(digit * power - length)) * power)
 
 
 def camera_for_aspect(camera_aim: Mapping[str, Any], aspect: float) -> dict[str, Any]:
-    """An aim of a camera for a page of an aspect, width by height: a narrow one sees as far sideways as others do.
+    """Move a camera for a page of an aspect (width by height), so that a narrow page sees as far sideways.
 
     The field of view is that of the height, so the camera of a telephone draws back until the width shows as much.
     """
     if not camera_aim or not 0.0 < aspect < FULL_ASPECT:
         return dict(camera_aim)
+    # The field of view is that of the height: a narrow page would cut off the sides.
     closer = aspect / FULL_ASPECT
     target = np.asarray(camera_aim["look_at"])
     place = target + (np.asarray(camera_aim["position"]) - target) / closer
@@ -504,7 +514,7 @@ Positions = NDArray[Any]
 
 
 class Trails:
-    """The trails of a scene.
+    """Trails of a scene.
 
     shown : whether they are drawn; `show` changes it
     """
@@ -519,12 +529,12 @@ class Trails:
         self._frame_count = 0
 
     def forget(self) -> None:
-        """Take away what is drawn: agents are elsewhere."""
+        """Remove the trails: agents are elsewhere."""
         self._view.no_trails()
         self._piece_start = None
 
     def show(self, on: bool) -> None:
-        """Draw trails from here on, or take them away."""
+        """Draw trails from here on, or remove them."""
         self.shown = on
         self.forget()
 

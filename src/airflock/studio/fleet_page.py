@@ -1,4 +1,6 @@
-"""Page of a running fleet: drones where they are, their phases, links and faults, and what happened. It only looks."""
+"""Page of a running fleet: positions, phases, links and faults of its drones, and a list of events. It sends
+nothing.
+"""
 
 import html
 import time
@@ -32,7 +34,7 @@ REFUSAL_REASONS = {
     "mission": "from another mission",
     "stranger": "from systems that are not members",
 }
-FAULT_TEXTS = {  # what is said of faults whose amount the ether does not tell
+FAULT_TEXTS = {  # of faults whose amount the channel does not report
     "loss": "some packets to these drones are lost",
     "jitter": "packets to these drones are late",
     "duplicate": "some packets to these drones arrive twice",
@@ -46,7 +48,9 @@ TABLE_TAG = "<table style='width:100%;font-size:0.8em;border-collapse:collapse;t
 
 
 def members_html(observer: FleetObserver, now: float) -> str:
-    """A row for each drone: phase, height, speed, battery, whom it hears, age of its last packet."""
+    """Return a table with a row for each drone: phase, height, speed, battery, drones heard, age of its last
+    packet.
+    """
     heads = ("", "phase", "m", "m/s", "%", "hears", "s ago")
     rows = [f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"]
     members = observer.card.members
@@ -69,49 +73,49 @@ def _member_row(member: int, peer: Peer, now: float) -> str:
 
 
 def drone_html(observer: FleetObserver, member: int, now: float) -> str:
-    """All that one drone tells of itself."""
+    """Return everything that one drone reports about itself."""
     peer = observer.peers[member]
     if peer.status is None or peer.state is None:
         return small_print_html(f"<b>drone {member}</b>: not heard yet")
-    s, told = peer.state, peer.status
+    s, data = peer.state, peer.status
     hears = [b if a == member else a for a, b in observer.links(now) if member in (a, b)]
     linked = f"; packets between it and {', '.join(map(str, sorted(hears)))}" if hears else ""
     others, age = len(observer.card.members) - 1, now - peer.heard_at
     return small_print_html(
-        f"<b>drone {member}</b>: {peer.phase.name.lower()}, {'in the air' if told.is_airborne else 'on the ground'}<br>"
-        f"at east {s.x:.1f}, north {s.y:.1f}, {s.z:.1f} m above the site, known to {told.accuracy:.1f} m<br>"
-        f"flies {s.vx:.1f}, {s.vy:.1f}, {s.vz:.1f} m/s; battery {told.battery} %; clock off by {told.clock_error:.2f} s"
-        f"<br>hears {told.peers} of {others}{linked}; last packet {age:.1f} s ago"
+        f"<b>drone {member}</b>: {peer.phase.name.lower()}, {'in the air' if data.is_airborne else 'on the ground'}<br>"
+        f"at east {s.x:.1f}, north {s.y:.1f}, {s.z:.1f} m above the site, known to {data.accuracy:.1f} m<br>"
+        f"flies {s.vx:.1f}, {s.vy:.1f}, {s.vz:.1f} m/s; battery {data.battery} %; clock off by {data.clock_error:.2f} s"
+        f"<br>hears {data.peers} of {others}{linked}; last packet {age:.1f} s ago"
     )
 
 
 def faults_html(observer: FleetObserver) -> str:
-    """Faults that hold, with what they do."""
+    """Return the active faults and their effects."""
     said = (
         INJECTED_KINDS
         | FAULT_TEXTS
-        | {told: _first_sentence(OURS[kind].doc) for kind, told in SCENARIO_FAULT_NAMES.items()}
+        | {name: _first_sentence(OURS[kind].doc) for kind, name in SCENARIO_FAULT_NAMES.items()}
     )
     lines = [f"<b>{kind}</b>, {observer.named(who)}: {said[kind]}" for kind, who in observer.faults.items()]
     return small_print_html("<br>".join(lines)) if lines else ""
 
 
 def _first_sentence(doc: str) -> str:
-    """What a kind of fault does, by the first sentence of its own words."""
+    """Return the first sentence of a fault's description."""
     return doc.partition(": ")[2].partition(".")[0]
 
 
 def notes_html(observer: FleetObserver) -> str:
-    """What happened, newest first."""
+    """Return the events, newest first."""
     lines = []
-    for told in list(observer.notes)[: -MAX_NOTES - 1 : -1]:
-        who = f"drone {told.member}: " if told.member else ""
-        lines.append(f"{told.time - observer.begun:.1f} s · {who}{html.escape(told.text)}")
+    for note in list(observer.notes)[: -MAX_NOTES - 1 : -1]:
+        who = f"drone {note.member}: " if note.member else ""
+        lines.append(f"{note.time - observer.begun:.1f} s · {who}{html.escape(note.text)}")
     return small_print_html("<br>".join(lines))
 
 
 def fleet_warning(observer: FleetObserver, now: float) -> str:
-    """What is wrong with the whole: nothing arrives, or what arrives is not believed."""
+    """Return a warning for the whole fleet: no packets arrive, or their signatures are not valid."""
     refused = observer.refused
     most = max(refused, key=refused.__getitem__, default="")
     if not observer.accepted_count and sum(refused.values()) >= MIN_REFUSED:
@@ -154,7 +158,7 @@ ONE_WAY_GREY = 225  # grey of a link on which packets arrive one way only
 
 
 class FleetScene:
-    """The scene of a page that watches a fleet.
+    """Scene of a page that watches a fleet.
 
     way, links, follow : what its controls say; trails : behind the drones
     shown : the last shade, whose key stands on the page
@@ -188,10 +192,11 @@ class FleetScene:
         view.look_at(field.centre + field.span * PANEL_OFFSET, field.span, False)
 
     def frame(self, now: float, selected: int | None) -> None:
-        """Draw the fleet as it is known now; `chosen`: place of a drone among the members."""
+        """Draw the fleet as it is known now; `chosen`: index of a drone among the members."""
         position, velocity, known = self._motion(now)
         self.shown = self._agent_colours(now, velocity, position)
         tone = self.shown.colours
+        # Silent drones turn grey in every colouring, so that they cannot be overlooked.
         tone[self._silent(now)] = agent_colours.NO_VALUE_COLOUR
         trail = tone.copy()
         if selected is not None:
@@ -207,11 +212,11 @@ class FleetScene:
             self.view.follow(position[selected].astype(float))
 
     def positions(self, now: float) -> NDArray[np.float64]:
-        """Places of all members (drone, 3), m; far below who was never heard."""
+        """Return the positions of all members (drone, 3), m; drones never heard lie far below."""
         return self._motion(now)[0].astype(float)
 
     def _motion(self, now: float) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
-        """Positions and velocities (drone, 3), and who was ever heard."""
+        """Return positions and velocities (drone, 3), and a mask of the drones that were ever heard."""
         count = len(self.members)
         position, velocity, known = np.zeros((count, 3), np.float32), np.zeros((count, 3), np.float32), []
         for number, member in enumerate(self.members):
@@ -229,6 +234,7 @@ class FleetScene:
     def _lines(self, now: float, position: NDArray[np.float32], known: NDArray[np.bool_], selected: int | None) -> None:
         index = {member: number for number, member in enumerate(self.members)}
         links = {(index[a], index[b]): both for (a, b), both in self.observer.links(now).items()}
+        # A drone that was never heard has no place to draw a line to.
         links = {pair: both for pair, both in links.items() if known[list(pair)].all()}
         heard = np.zeros((0, 2, 3), np.float32)
         if selected is not None:
@@ -250,24 +256,26 @@ class FleetScene:
             values = [-1 if is_on_ground(peer.phase) else AIR_PHASES.index(peer.phase) for peer in peers]
             names = tuple(phase.name.lower() for phase in AIR_PHASES)
             return AgentColours(
-                way, agent_colours.CATEGORIES, np.array(values), names=names, told="on the ground, or silent"
+                way, agent_colours.CATEGORIES, np.array(values), names=names, note="on the ground, or silent"
             )
         if way == "fault":
             faults = self.observer.faults
             values = [next((k for k, who in enumerate(faults.values()) if m in who), -1) for m in self.members]
             return AgentColours(
-                way, agent_colours.CATEGORIES, np.array(values), names=tuple(faults), told="none, or silent"
+                way, agent_colours.CATEGORIES, np.array(values), names=tuple(faults), note="none, or silent"
             )
         if way == "drone":
             return agent_colours.individual_colours(len(peers))
         if way in agent_colours.MOTION_COLOURINGS:
             return agent_colours.motion_colours(way, position, velocity, card.safety.speed_max, (0.0, card.high))
-        told = [peer.status for peer in peers]
+        reports = [peer.status for peer in peers]
         if way == "battery":
-            return AgentColours(way, agent_colours.NUMBERS, _with_nan([s and s.battery for s in told]), 0.0, 100.0, "%")
+            return AgentColours(
+                way, agent_colours.NUMBERS, _with_nan([s and s.battery for s in reports]), 0.0, 100.0, "%"
+            )
         if way == "neighbours heard":
             most = max(len(peers) - 1.0, 1.0)
-            return AgentColours(way, agent_colours.NUMBERS, _with_nan([s and s.peers for s in told]), 0.0, most)
+            return AgentColours(way, agent_colours.NUMBERS, _with_nan([s and s.peers for s in reports]), 0.0, most)
         return AgentColours(
             way, agent_colours.NUMBERS, np.array([now - peer.at for peer in peers]), 0.0, HEARD_WITHIN, "s"
         )
@@ -314,7 +322,7 @@ class FleetPage:
                 "follow",
                 FLEET_FOLLOW_CHOICES,
                 FLEET_FOLLOW_CHOICES[0],
-                lambda whom: setattr(drawing, "follow_choice", whom),
+                lambda choice: setattr(drawing, "follow_choice", choice),
             )
             with panel.folder("Selected drone"):
                 self.about = panel.text()
@@ -340,7 +348,7 @@ class FleetPage:
         self.frame(True)
 
     def ask(self, action: Callable[[], None]) -> None:
-        """Do something before the next frame; from any thread."""
+        """Queue an action for the next frame; from any thread."""
         self._asked.put(action)
 
     def stop(self) -> None:
@@ -358,6 +366,7 @@ class FleetPage:
             refreshed = now if refresh else refreshed
             self.frame(refresh)
             drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
+            # At least a millisecond: the threads of the page server need the interpreter as well.
             self._asked.wait(max(drawn - self._clock(), 0.001))
             self._asked.answer(lambda action: action())
 
@@ -374,11 +383,11 @@ class FleetPage:
     # -------------------------------------------------------------------------------------------------- selecting
 
     def select(self, number: int | None) -> None:
-        """Select a drone by its place among the members, or none."""
+        """Select a drone by its index among the members, or none."""
         self.chosen = number
 
     def select_next(self, count: int) -> None:
-        """Select a drone some places on."""
+        """Select a drone some indices on."""
         now = -1 if self.chosen is None and count > 0 else self.chosen or 0
         self.select((now + count) % len(self.observer.card.members))
 
@@ -408,7 +417,7 @@ class FleetPage:
             self.about.content = drone_html(observer, card.members[self.chosen], now)
 
     def _measure(self, now: float) -> None:
-        """Add the present moment to the charts, once somebody was heard."""
+        """Add the present moment to the charts, once any drone was heard."""
         observer, flying = self.observer, self.observer.flying(now)
         if not observer.accepted_count:
             return

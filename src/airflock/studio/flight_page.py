@@ -1,4 +1,4 @@
-"""Page: the player's flights on a view, frame by frame. Its rooms hold the controls and say what is seen."""
+"""Flight page: the player's flights on a view, frame by frame. Its panels hold the controls and the measures."""
 
 import html
 import time
@@ -68,11 +68,12 @@ class FlightPage:
             if moved or acted or refresh:
                 self.frame(refresh)
             refreshed = now if refresh else refreshed
+            # A late frame is not caught up: after a pause of the machine the page goes on at its usual rate.
             drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
             acted = self._run_actions_until(drawn)
 
     def _run_actions_until(self, end: float) -> bool:
-        """Do at once what a hand asks for, until the next frame is due. Whether anything was done."""
+        """Run the actions of controls at once, until the next frame is due. Return True if any ran."""
         acted = self.player.run_actions_within(0.001)  # the threads of the page's server come first
         while self._is_running and (left := end - time.perf_counter()) > 0.0:
             acted = self.player.run_actions_within(left) or acted
@@ -88,6 +89,7 @@ class FlightPage:
     def on_time_changed(self) -> None:
         """Forget trails, charts, and collisions that lie ahead: the flights are at another time."""
         self.scene.forget()
+        # Going back before a fork closes a pane.
         if len(self.player.sides) != len(self.scene.flocks):
             self.rebuild()
         self.measurement.clear()
@@ -112,11 +114,11 @@ class FlightPage:
             self.selection.at(np.asarray(origin), np.asarray(direction))
 
     def _rescued(self) -> None:
-        """Go back to the last moment that was kept before the flight failed."""
+        """Go back to the last snapshot before the flight failed."""
         self.playback.go_back(self.player.time)
 
     def _show_status(self) -> None:
-        """Say where the flight is, what is wrong, and what has happened."""
+        """Show where the flight is, any error, and the last event."""
         player = self.player
         state = "paused" if player.is_paused else "stopped" if player.failure_message or player.over else "flying"
         counts = [side.flight.agents for side in player.sides]

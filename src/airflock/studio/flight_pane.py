@@ -1,4 +1,6 @@
-"""Side: one open flight that is tuned, and what was changed on it. A page shows one of them, or two side by side."""
+"""Flight pane: one open flight that is tuned, its source, its controls, its changes, and the files written from
+it.
+"""
 
 import math
 import os
@@ -44,7 +46,7 @@ MAX_DURATION = 1e6  # s; an open page has no end of its own
 
 @dataclass(frozen=True)
 class FlightSource:
-    """Where flights come from.
+    """Source of flights.
 
     where     : preset, scenario file or recording, which is flown again with its events
     settings  : keys changed from outside
@@ -62,7 +64,7 @@ class FlightSource:
     def of(
         cls, name: str, settings: Mapping[str, Any] | None, law: Any = None, *, trust: bool = False
     ) -> "FlightSource":
-        """An origin by its name; raises RecordingError for a recording that cannot be flown again."""
+        """Return the source of a name; raises RecordingError for a recording that cannot be flown again."""
         return cls(
             name,
             dict(settings or {}),
@@ -72,13 +74,13 @@ class FlightSource:
         )
 
     def scenario(self) -> Scenario:
-        """The scenario, with its own duration."""
+        """Load the scenario, with its own duration."""
         if self.recording is not None:
             return scenario_of_recording(self.recording, dict(self.settings))
         return load(self.where, dict(self.settings), self.law, trust=self.trust)
 
     def flight(self, seed: int, device: str = "cpu") -> tuple[Scenario, Flight]:
-        """The scenario without an end, and an open flight of it; that of a recording is a compiled one."""
+        """Open a flight; return its scenario without an end, and the flight. Of a recording it is a compiled one."""
         preset = without_end(self.scenario())
         if self.recording is None:
             return preset, Flight(preset, seed, device=device)
@@ -87,19 +89,19 @@ class FlightSource:
         return preset, Flight(preset, seed, precision=int(self.recording.attrs["airflock_precision"]), events=events)
 
     def beside(self, first: "FlightSource") -> str:
-        """What it is called beside another one: its name, or the keys that set it apart."""
+        """Return the label beside another source: its name, or the keys that differ."""
         if self.where != first.where:
             return self.where
         return ", ".join(f"{key} = {v}" for key, v in self.settings.items() if first.settings.get(key) != v)
 
     @property
     def document(self) -> dict[str, Any] | None:
-        """The scenario of a recording as a document; None of a preset or a file."""
+        """Return the scenario of a recording as a document; None for a preset or a file."""
         return None if self.recording is None else attributes.scenario_document(self.recording)
 
 
 def load_repeatable_recording(path: str) -> xr.Dataset:
-    """A recording that can be flown again. Raises RecordingError for any other, and says what shows it."""
+    """Load a recording that can be flown again. Raises RecordingError for any other, with the verb that shows it."""
     found = load_recording(path)
     if "airflock_scenario" not in found.attrs or not int(found.attrs.get("random_start", 1)):
         raise RecordingError(f"{path}: was not flown from a scenario and a seed; airflock replay {path} shows it")
@@ -107,7 +109,7 @@ def load_repeatable_recording(path: str) -> xr.Dataset:
 
 
 def without_end(scenario: Scenario) -> Scenario:
-    """The scenario with the longest duration that a flight can have."""
+    """Return the scenario with the longest duration that a flight can have."""
     longest = min(MAX_DURATION, 0.9 * 2**31 * scenario.flight.dt)
     document = {**scenario.document, "duration": longest}
     return replace(scenario, flight=replace(scenario.flight, duration=longest), document=document)
@@ -122,7 +124,7 @@ def tuned_toml(
     recorded_document: Mapping[str, Any] | None = None,
     full_document: Mapping[str, Any] | None = None,
 ) -> str:
-    """Text of a preset or scenario file with keys set anew; comments, units and sources of the others stay.
+    """Return a preset or scenario file with changed keys; comments, units and sources of the others stay.
 
     given : the scenario of a recording, instead of a file
     whole : what the scenario consists of with all that it extends, for groups and faults that the file does not write
@@ -146,7 +148,7 @@ def tuned_toml(
 
 
 def _table_and_name(document: Any, key: str, full_document: Mapping[str, Any]) -> tuple[Any, str]:
-    """The table of a document that holds a key, which is made if need be, and the key's name in it."""
+    """Return the table of a document that holds a key, made if missing, and the key's name in it."""
     section, _, name = key.partition(".")
     if not name:
         return document, section
@@ -163,7 +165,7 @@ def _table_and_name(document: Any, key: str, full_document: Mapping[str, Any]) -
 
 
 def free_path(path: Path) -> Path:
-    """A name that is not taken: flight.nc, flight-2.nc, ..."""
+    """Return an unused name: flight.nc, flight-2.nc, ..."""
     found, number = path, 2
     while found.exists():
         found, number = path.with_name(f"{path.stem}-{number}{path.suffix}"), number + 1
@@ -171,7 +173,7 @@ def free_path(path: Path) -> Path:
 
 
 def refly(flight: Flight) -> xr.Dataset:
-    """Recording of an open flight, flown again without a page from its scenario, seed and events.
+    """Fly an open flight again without a page, from its scenario, seed and events, and return its recording.
 
     Raises FlightError where the end of it has other bits than the flight at hand.
     """
@@ -196,7 +198,7 @@ SLIDER_STEPS = 400  # of a slider
 
 
 class ParameterControl(NamedTuple):
-    """One control: a number with a span, or a choice with options.
+    """Control of a parameter: a number with a span, or a choice with options.
 
     key   : as in a scenario file, such as model.p_rep
     label : name and unit
@@ -216,14 +218,14 @@ class ParameterControl(NamedTuple):
 
     @property
     def is_choice(self) -> bool:
-        """Whether this is a menu, not a slider."""
+        """True for a menu, False for a slider."""
         return bool(self.options)
 
 
 def scenario_controls(
     scenario: Scenario, default_spans: Mapping[str, tuple[float, float]] | None = None
 ) -> dict[str, list[ParameterControl]]:
-    """Controls by section, in the order in which the paper's parameters are declared; empty sections are left out.
+    """Return controls by section, in the order in which the parameters are declared; empty sections are left out.
 
     The law's section is sorted into the parts that the law names, "model: repulsion" and so on. Numbers that a group
     has of its own follow: those that the file names for it, and all of a law of its own.
@@ -255,7 +257,9 @@ def scenario_controls(
 
 
 def fault_controls(entries: Sequence[FaultEntry]) -> dict[str, list[ParameterControl]]:
-    """Controls of the numbers of each fault of a scenario, in the order of its entries; many kinds have none."""
+    """Return controls of the numbers of each fault of a scenario, in the order of its entries; many kinds have
+    none.
+    """
     found: dict[str, list[ParameterControl]] = {}
     for key, kind, declared, value in fault_declarations(entries):
         if isinstance(declared, Quantity):
@@ -266,7 +270,7 @@ def fault_controls(entries: Sequence[FaultEntry]) -> dict[str, list[ParameterCon
 def make_slider(
     key: str, declared: Quantity, value: float, study_span: tuple[float, float] | None = None
 ) -> ParameterControl:
-    """Slider of a number, over the span of a study or the usual one that is declared, widened to hold the value.
+    """Make the slider of a number, over a study's span or the declared usual one, widened to hold the value.
 
     Without either from 0 to 4 times the value, or as far on both sides of 0, within the declared range.
     """
@@ -281,14 +285,14 @@ def make_slider(
 
 
 def slider_span(low: float, high: float, value: float) -> tuple[float, float]:
-    """Ends of a slider: inside [low, high], around the value, and not so wide that it cannot be set by hand."""
+    """Return the ends of a slider: inside [low, high], around the value, and narrow enough to set it by hand."""
     reach = DEFAULT_SPAN_FACTOR * abs(value) if value else min(1.0, max(abs(low), abs(high)))
     begin, end = max(low, -reach if low < 0.0 else 0.0), min(high, reach)
     return min(begin, value), max(end, value)
 
 
 def set_options(settings: Mapping[str, Any]) -> str:
-    """Keys and values as options of the command: --set model.p_rep=0.2 ..."""
+    """Return keys and values as options of the command: --set model.p_rep=0.2 ..."""
     return " ".join(f"--set {shlex.quote(f'{key}={_toml_text(value)}')}" for key, value in settings.items())
 
 
@@ -299,7 +303,7 @@ def _toml_text(value: Any) -> str:
 
 
 def _round_step(step: float) -> float:
-    """A step of 1, 2 or 5 times a power of ten, at most as large."""
+    """Return a step of 1, 2 or 5 times a power of ten, at most as large."""
     if step <= 0.0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(step))
@@ -317,7 +321,7 @@ MAX_INTERPRETED_AGENTS = 400  # agents; of more, one interpreted step holds a pa
 
 
 class FlightPane:
-    """One flight of an origin, with a list of what was changed, so that it can be undone.
+    """One flight of a source, with a list of its changes, so that they can be undone.
 
     at_once : fly interpreted while the driver is compiled, until `switch_to_compiled` (a recording, a large flock:
               compiled)
@@ -347,22 +351,24 @@ class FlightPane:
 
     @property
     def is_compiling(self) -> bool:
-        """Whether an interpreted flight stands for one that is being compiled."""
+        """True while an interpreted flight stands for one that is being compiled."""
         return self._compiled_flight is not None
 
     @property
     def is_compiled(self) -> bool:
-        """Whether `switch_to_compiled` has nothing to wait for."""
+        """True if `switch_to_compiled` has nothing to wait for."""
         return self._compiled_flight is None or self._compiled_flight.done()
 
     def switch_to_compiled(self) -> Snapshot | None:
-        """Go on as the compiled flight, flown again to here with all that was done; waits for it. Returns its start.
+        """Replace the flight by the compiled one, flown again to here with all events. Return its start.
 
         From here on, and in what is saved of it, bits are those of the compiled flight. None where nothing is compiled.
         Raises RuleError.
         """
         if self._compiled_flight is None:
             return None
+        # The compiled flight flies from the start to the present step, so that saved bits are those of a compiled
+        # flight. Carrying the interpreted state over would save a flight that nobody can fly again.
         interpreted, (self.flight, self._compiled_flight) = self.flight, (self._compiled_flight.result(), None)
         start = self.flight.snapshot()
         self._replay(interpreted.events)
@@ -370,7 +376,8 @@ class FlightPane:
         return start
 
     def fork(self) -> "FlightPane":
-        """Another side that goes on from here, with the same noise."""
+        """Return another pane that goes on from here, with the same noise."""
+        # Not by __init__: a new pane would compile and start again; the flight alone is branched.
         twin = object.__new__(FlightPane)
         twin.__dict__.update(self.__dict__)
         twin.flight = self.flight.branch()
@@ -379,12 +386,12 @@ class FlightPane:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario in force."""
+        """Scenario in force."""
         return self.flight.scenario
 
     @property
     def motion(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Positions (agent, 3) in m and velocities (agent, 3) in m/s; the third axis of a plane is 0.
+        """Return positions (agent, 3) in m and velocities (agent, 3) in m/s; the third axis of a plane is 0.
 
         Agents that have left are far below, each in a place of its own, at rest.
         """
@@ -396,11 +403,11 @@ class FlightPane:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All keys that differ from the file; not those of faults that were set off by hand, which it does not have."""
+        """Keys that differ from the file, without those of faults begun by hand, which the file does not have."""
         return {**self.origin.settings, **{key: v for key, v in self.changed.items() if not self._is_manual_fault(key)}}
 
     def command(self, seed: int) -> str:
-        """The command that opens the present scenario again."""
+        """Command that opens the present scenario again."""
         origin = self.origin
         where = f"./{origin.where}" if origin.where.startswith("-") else origin.where  # not an option
         law = f"--law {shlex.quote(str(origin.law))}" if isinstance(origin.law, str | os.PathLike) else ""
@@ -416,6 +423,7 @@ class FlightPane:
         self._advance_to(time if self._gust_end is None else min(time, self._gust_end))
         if self._gust is None:
             return
+        # A change of wind may wait for its driver; the gust lasts from when it begins to blow.
         if self._gust_end is None and not self.flight.waiting:
             self._gust_end = before + self._gust[0]
         if self._gust_end is not None and self.flight.time >= self._gust_end - 1e-9:
@@ -429,10 +437,11 @@ class FlightPane:
             self.flight.advance(steps=steps)
 
     def again(self, moment: Snapshot, time: float) -> None:
-        """Go back to a moment, then fly to a time, s, with all that was done to the flight up to there."""
+        """Go back to a snapshot, then fly to a time, s, with all events up to there."""
         done = self.flight.events[len(moment.events) :]
         self.restore(moment)
         last = round(time / self.scenario.flight.dt)
+        # Events are part of the flight: without them the same seed would lead elsewhere.
         self._replay([event for event in done if event.step < last])
         self._advance_to(time)
         self.changed = self._current_changes()
@@ -443,7 +452,7 @@ class FlightPane:
             self.flight.event(event.kind, **event.data)
 
     def restore(self, moment: Snapshot) -> None:
-        """Go back to a moment of this flight, s; what came after it is given up."""
+        """Go back to a snapshot of this flight, s; its later part is dropped."""
         self.flight.restore(moment)
         self._gust = self._gust_end = None
         self.changed, self._undo_list = self._current_changes(), []
@@ -452,7 +461,7 @@ class FlightPane:
         }
 
     def _current_changes(self) -> dict[str, Any]:
-        """Keys that are changed at the present moment of the flight, with their values."""
+        """Return the keys that are changed at the present moment of the flight, with their values."""
         found: dict[str, Any] = {}
         for event in self.flight.events:
             if event.kind == "change":
@@ -460,17 +469,18 @@ class FlightPane:
         return {key: value for key, value in found.items() if value != self._start_value(key)}
 
     def _start_value(self, key: str) -> Any:
-        """Value of a key in the preset; of a fault that was set off by hand its value then."""
+        """Return the value of a key in the preset; for a fault begun by hand, its value at that time."""
         return self._manual_fault_values.get(key) if self._is_manual_fault(key) else scenario_value(self.preset, key)
 
     def _is_manual_fault(self, key: str) -> bool:
-        """Whether a key is of a fault that was set off by hand."""
+        """Return True if a key belongs to a fault that was begun by hand."""
         return is_fault_key(key) and not has_fault(self.preset, key)
 
     # ----------------------------------------------------------------------------------------------- tuning
 
     def change(self, settings: Mapping[str, Any]) -> None:
         """Set keys of the scenario from now on; what must be compiled comes into force when that is done."""
+        # Faults begun by hand are not in the file, so their first values must be remembered for undo.
         by_hand = {key: scenario_value(self.scenario, key) for key in settings if self._is_manual_fault(key)}
         self.flight.change(settings, wait=False)
         self._manual_fault_values = {**by_hand, **self._manual_fault_values}
@@ -527,14 +537,16 @@ class FlightPane:
 
 
 def positions_and_velocities(state: NDArray[Any], dimensions: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Positions and velocities (agent, 3) from a state (component, agent) of two or three dimensions."""
+    """Return positions and velocities (agent, 3) of a state (component, agent) of two or three dimensions."""
     found = np.zeros((2, state.shape[1], 3), np.float32)
     found[0, :, :dimensions], found[1, :, :dimensions] = state[:dimensions].T, state[dimensions : 2 * dimensions].T
     return found[0], found[1]
 
 
 def scenario_value(scenario: Scenario, key: str) -> Any:
-    """Value of a key such as model.p_rep, groups.heavy.body.tau or faults.0.share; None of a fault that it lacks."""
+    """Return the value of a key such as model.p_rep, groups.heavy.body.tau or faults.0.share; None for a missing
+    fault.
+    """
     if is_group_key(key):
         return group_key_value(scenario, key)
     if is_fault_key(key):

@@ -1,4 +1,4 @@
-"""Watch: a page in the browser that shows a flight and lets it be played, tuned and measured; or a fleet that flies."""
+"""airflock.watch: open a page in the browser that shows a live flight, or a fleet that flies."""
 
 import os
 import time
@@ -92,10 +92,10 @@ def watch(
 
 
 def _check_unused(subject: str, options: Mapping[str, Any], needed: str) -> None:
-    """Raise StudioError for what was given and would do nothing."""
-    given = [name for name, value in options.items() if value]
-    if given:
-        raise StudioError(f"{subject}; {' and '.join(given)} need{'s' * (len(given) == 1)} {needed}")
+    """Raise StudioError for options that would have no effect."""
+    useless = [name for name, value in options.items() if value]
+    if useless:
+        raise StudioError(f"{subject}; {' and '.join(useless)} need{'s' * (len(useless) == 1)} {needed}")
 
 
 # ---- Fleets
@@ -104,13 +104,13 @@ DEFAULT_RADIOS = (f"udp:{DEFAULT_WATCH_ADDRESS[0]}:{DEFAULT_WATCH_ADDRESS[1]}",)
 
 
 class ListeningRadios:
-    """Open radios that are only listened to: pieces of a serial line are put together to frames."""
+    """Open radios that only listen: pieces of a serial line are joined to frames."""
 
     def __init__(self, ports: Sequence[Port]):
         self._ports_and_streams = [(port, FrameStream() if isinstance(port, SerialPort) else None) for port in ports]
 
     def __call__(self) -> Iterator[bytes]:
-        """Datagrams that have arrived."""
+        """Yield the datagrams that have arrived."""
         for port, line in self._ports_and_streams:
             for data in port.read():
                 yield from [data] if line is None else line.whole_frames(data)
@@ -124,20 +124,20 @@ class ListeningRadios:
 def open_card_and_radios(
     card: Path, key: Path | None, radios: Sequence[str]
 ) -> tuple[FlightCard, bytes, ListeningRadios]:
-    """Card, key and open radios. Raises CardError with all faults at once, and leaves nothing open."""
-    faults: list[str] = []
-    found, secret, ports = None, b"", []
-    with collect_errors(faults):
-        found = read_card(card)
-    with collect_errors(faults):
+    """Return card, key and open radios. Raises CardError with all errors at once, and leaves nothing open."""
+    errors: list[str] = []
+    flight_card, secret, ports = None, b"", []
+    with collect_errors(errors):
+        flight_card = read_card(card)
+    with collect_errors(errors):
         secret = read_key(key or card.with_suffix(".key"))
     for text in radios or DEFAULT_RADIOS:
-        with collect_errors(faults):
+        with collect_errors(errors):
             ports.append(open_port(text))
-    if faults or found is None:
+    if errors or flight_card is None:
         ListeningRadios(ports).close()
-        raise CardError(faults)
-    return found, secret, ListeningRadios(ports)
+        raise CardError(errors)
+    return flight_card, secret, ListeningRadios(ports)
 
 
 def watch_fleet(
@@ -148,15 +148,15 @@ def watch_fleet(
 
     Raises CardError for card, key and radios, all faults at once, and StudioError for a port in use.
     """
-    found, secret, heard = open_card_and_radios(expand_path(card), expand_path(key) if key else None, radios)
+    flight_card, secret, heard = open_card_and_radios(expand_path(card), expand_path(key) if key else None, radios)
     try:
-        if time.time() >= found.expires:
+        if time.time() >= flight_card.expires:
             notify(f"note: {card} has expired; its drones no longer start")
         from airflock.studio.browser_view import BrowserView
         from airflock.studio.fleet_page import FleetPage
 
-        observer = FleetObserver(found, secret, now=time.monotonic(), utc=time.time_ns() // 1000)
-        view = BrowserView(host, port, found.name)
+        observer = FleetObserver(flight_card, secret, now=time.monotonic(), utc=time.time_ns() // 1000)
+        view = BrowserView(host, port, flight_card.name)
         try:
             page = FleetPage(observer, view, heard)
             notify(f"listening at {', '.join(radios or DEFAULT_RADIOS)}; watch at {view.address}  (Ctrl-C ends)")

@@ -1,4 +1,6 @@
-"""Measuring: charts of order parameters, speeds and distances, their histograms, and the table of scores."""
+"""Measurement panel: charts of order parameters, speeds and distances, histograms, scores, and comparison of two
+flights.
+"""
 
 import html
 import math
@@ -20,7 +22,7 @@ BAND_NAMES = ("paper +", "paper −")
 
 
 class MeasurementPanel(PagePanel):
-    """Charts of one side, or of two in one picture."""
+    """Charts of one pane, or of two in one picture."""
 
     def __init__(self, page: "FlightPage", tab: Any):
         super().__init__(page)
@@ -31,7 +33,7 @@ class MeasurementPanel(PagePanel):
         self.name = ""  # of the order parameter that is drawn
 
     def rebuild(self) -> None:
-        """Begin anew, for as many sides as there are."""
+        """Start again, for as many panes as there are."""
         player = self.player
         scores = player.sides[0].flight.scores()
         self._score_names = [name for name, value in scores.items() if isinstance(value, (int, float))]
@@ -47,7 +49,7 @@ class MeasurementPanel(PagePanel):
         self._make_charts()
 
     def _make_charts(self) -> None:
-        """Make menu, charts and table anew."""
+        """Make menu, charts and table."""
         panel, player = self.widgets, self.player
         for chart in self._charts:
             chart.remove()
@@ -84,7 +86,7 @@ class MeasurementPanel(PagePanel):
         ]
 
     def _choose(self, name: str) -> None:
-        """Draw another order parameter, from here on; with a band only where the paper tells its value."""
+        """Draw another order parameter from now on; with a band only where the paper reports its value."""
         self.name = name
         for side in self.sides:
             side.name = name
@@ -92,7 +94,7 @@ class MeasurementPanel(PagePanel):
         self._make_charts()
 
     def clear(self) -> None:
-        """Forget the charts: the flight went elsewhere."""
+        """Clear the charts: the flight is at another time."""
         for side in self.sides:
             side.clear()
 
@@ -141,7 +143,7 @@ class MeasurementPanel(PagePanel):
 
 
 def _joined_outlines(outlines: list[Any]) -> tuple[Any, ...]:
-    """Outlines of histograms over one axis: values and the share of each at them."""
+    """Return outlines of histograms over one axis: values and the share of each at them."""
     if len(outlines) == 1:
         return tuple(outlines[0])
     values = np.union1d(outlines[0][0], outlines[1][0])
@@ -164,7 +166,7 @@ NO_COMPARISON_TEXT = (
 
 
 class ComparisonPanel(PagePanel):
-    """Fork, choose which side the controls act on, and read the differences."""
+    """Controls to fork, to choose the active pane, and to read the differences."""
 
     def __init__(self, page: "FlightPage", tab: Any):
         super().__init__(page)
@@ -194,7 +196,7 @@ class ComparisonPanel(PagePanel):
         self.page.tuning.rebuild()
 
     def rebuild(self) -> None:
-        """A menu of which side is in hand, where there are two."""
+        """Show a menu of the active pane, if there are two."""
         if self._pane_menu is not None:
             self._pane_menu.remove()
             self._pane_menu = None
@@ -205,7 +207,7 @@ class ComparisonPanel(PagePanel):
                 )
 
     def refresh(self) -> None:
-        """One table of what differs: parameters and order parameters."""
+        """Show one table of the differences: parameters and order parameters."""
         sides = self.player.sides
         if len(sides) < 2:
             self.text.content = small_print_html(NO_COMPARISON_TEXT)

@@ -1,4 +1,4 @@
-"""Measures of a page: the scenario's order parameters in the window since the last change, and how near agents are."""
+"""Measures of a page: order parameters in the window since the last change, near pairs, and tables of scores."""
 
 import html
 import math
@@ -23,7 +23,7 @@ HISTOGRAM_BINS = 40  # of a histogram
 
 
 class FlockInstant(NamedTuple):
-    """One moment of a flock: s, m/s, m."""
+    """Measures of a flock at one instant: s, m/s, m."""
 
     time: float
     mean_speed: float
@@ -42,6 +42,7 @@ class AgentPairs:
         self.position = np.asarray(position, float)
         self.period = None
         if period is not None:
+            # cKDTree has no open axis beside periodic ones; a side of 1e9 m acts as one.
             box = np.array([side if side > 0.0 else 1e9 for side in period])
             self.period = box
             self._tree = cKDTree(np.mod(self.position + 0.5 * box, box), boxsize=box)
@@ -49,21 +50,21 @@ class AgentPairs:
             self._tree = cKDTree(self.position)
 
     def apart(self) -> NDArray[np.float64]:
-        """Distance of each agent to its nearest neighbour, m; none of one agent."""
+        """Return the distance of each agent to its nearest neighbour, m; empty for one agent."""
         if len(self.position) < 2:
             return np.zeros(0)
         return np.asarray(self._tree.query(self._tree.data, k=2)[0][:, 1])
 
     def nearest(self) -> float:
-        """Smallest distance of two agents, m; nan of one agent."""
+        """Return the smallest distance of two agents, m; nan for one agent."""
         return float(self.apart().min()) if len(self.position) > 1 else math.nan
 
     def within(self, distance: float) -> NDArray[np.intp]:
-        """Pairs (pair, 2) nearer than a distance, m."""
+        """Return pairs (pair, 2) nearer than a distance, m."""
         return np.asarray(self._tree.query_pairs(distance, output_type="ndarray"), np.intp)
 
     def nearest_pairs_within(self, distance: float) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Pairs (pair, 2) nearer than a distance, m, and how far apart; none through a periodic face.
+        """Return pairs (pair, 2) nearer than a distance, and their distances, m; none through a periodic face.
 
         Of more than can be drawn the nearest.
         """
@@ -71,15 +72,18 @@ class AgentPairs:
         far = distance
         if size * size > 2 * MAX_LINKS:  # a denser flock than can be drawn: as far as so many neighbours reach
             count = min(size - 1, max(1, 2 * MAX_LINKS // size))
+            # The 90 % quantile of the distance to the n-th neighbour bounds the pairs before they are listed:
+            # all pairs of 1,000 agents within radio range would be half a million.
             far = min(distance, float(np.quantile(self._tree.query(self._tree.data, k=count + 1)[0][:, -1], 0.9)))
         pairs = self.within(far)
         length = np.linalg.norm(self.position[pairs[:, 1]] - self.position[pairs[:, 0]], axis=1)
+        # Stable: among equal lengths the drawn lines do not flicker from frame to frame.
         order = np.argsort(length, kind="stable")[:MAX_LINKS]
         order = order[length[order] <= distance]  # others lie beyond a periodic face
         return pairs[order], length[order]
 
     def neighbours(self, count: int = 3) -> NDArray[Any]:
-        """Segments (segment, 2, 3) from each agent to its nearest others; none through a periodic face."""
+        """Return segments (segment, 2, 3) from each agent to its nearest others; none through a periodic face."""
         count = min(count, len(self.position) - 1, max(1, MAX_LINKS // max(len(self.position), 1)))
         if count < 1:
             return np.zeros((0, 2, 3))
@@ -90,13 +94,14 @@ class AgentPairs:
 
 
 def without_periodic_crossings(segments: NDArray[Any], period: NDArray[Any]) -> NDArray[Any]:
-    """Segments without those that cross a periodic face."""
+    """Drop the segments that cross a periodic face."""
+    # The nearest image is at most half a period away; a longer line leads the wrong way round.
     long = (np.abs(segments[:, 1] - segments[:, 0]) > 0.5 * period).any(axis=1)
     return np.asarray(segments[~long])
 
 
 def world_period(scenario: Any) -> tuple[float, float, float] | None:
-    """Sides of a periodic world, m; None of any other."""
+    """Return the sides of a periodic world, m; None for any other."""
     world = scenario.world
     if world.edges != "periodic":
         return None
@@ -104,7 +109,7 @@ def world_period(scenario: Any) -> tuple[float, float, float] | None:
 
 
 class PaneChartData:
-    """What the charts show of one side: instants, the course of one order parameter of the present window, and how
+    """Data of the charts of one pane: instants, the course of one order parameter of the present window, and how
     often which speed and which distance to the nearest neighbour was seen in it.
 
     top, far : ends of the histograms, m/s and m
@@ -118,12 +123,12 @@ class PaneChartData:
         self._window = -1
 
     def clear(self) -> None:
-        """Forget everything: another flight, or an earlier moment of this one."""
+        """Clear everything: another flight, or an earlier moment of this one."""
         self.instants.clear()
         self.fresh()
 
     def fresh(self) -> None:
-        """A new window begins."""
+        """Begin a new window."""
         self.score_course.clear()
         self.speed_histogram.clear()
         self.distance_histogram.clear()
@@ -134,6 +139,7 @@ class PaneChartData:
             self._window = len(flight.windows)
             self.fresh()
         scores = flight.scores()
+        # A paused page calls again with the same moment; counting it twice would bend the histograms.
         if self.instants and self.instants[-1].time == flight.time:
             return scores
         speed, apart = np.sqrt((velocity**2).sum(1)), pairs.apart()
@@ -150,14 +156,14 @@ class PaneChartData:
 
 
 class Histogram:
-    """How often values from 0 to `top` were seen, as shares of all; what is larger counts in the last bin."""
+    """Shares of values from 0 to `top`; larger values count in the last bin."""
 
     def __init__(self, max_value: float):
         self.edges = np.linspace(0.0, max_value, HISTOGRAM_BINS + 1)
         self.counts = np.zeros(HISTOGRAM_BINS)
 
     def clear(self) -> None:
-        """Forget all values."""
+        """Remove all values."""
         self.counts[:] = 0.0
 
     def add(self, values: NDArray[Any]) -> None:
@@ -169,13 +175,13 @@ class Histogram:
 
     @property
     def steps(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The outline of the bars: values and shares."""
+        """Return the outline of the bars: values and shares."""
         share = self.counts / max(self.counts.sum(), 1.0)
         return np.repeat(self.edges, 2)[1:-1], np.repeat(share, 2)
 
 
 def default_score(names: Mapping[str, Any], published: Mapping[str, Any]) -> str:
-    """The order parameter shown first: one that the paper reports, if there is any."""
+    """Return the order parameter shown first: one that the paper reports, if there is any."""
     for name in ("phi_corr", "fitness", "f_corr", "polarisation"):
         if name in names and (name in published or not published):
             return name
@@ -188,7 +194,9 @@ COLUMN_STYLE = "text-align:right;padding-left:0.8em"
 
 
 def score_table_html(flights: Sequence[Flight], scores: Sequence[Mapping[str, Any]]) -> str:
-    """Order parameters of this window, of the window before, and of the paper, as HTML; of two flights side by side."""
+    """Return order parameters of this window, the window before and the paper, as HTML; of two flights side by
+    side.
+    """
     flight, two = flights[0], len(flights) > 1
     about, published = reported_values(flight.scenario.measures), {} if two else flight.scenario.published
     before = flight.windows[-1].scores if flight.windows and not two else {}
@@ -214,7 +222,7 @@ def score_table_html(flights: Sequence[Flight], scores: Sequence[Mapping[str, An
 
 
 def difference_table_html(a: Scenario, b: Scenario) -> str:
-    """What two scenarios do not have in common, as HTML."""
+    """Return the differences of two scenarios, as HTML."""
     found = scenario_differences(a, b)
     if not found:
         return _table_html([], "no difference, only chance that has grown")
@@ -229,7 +237,7 @@ def difference_table_html(a: Scenario, b: Scenario) -> str:
 
 
 def scenario_differences(a: Scenario, b: Scenario) -> list[tuple[str, Any, Any]]:
-    """Keys whose values differ, with both values; None where a scenario has no such key."""
+    """Return the keys whose values differ, with both values; None where a scenario has no such key."""
     found: list[tuple[str, Any, Any]] = []
     if a.model.name != b.model.name:
         found.append(("model.kind", a.model.name, b.model.name))
@@ -244,7 +252,7 @@ def scenario_differences(a: Scenario, b: Scenario) -> list[tuple[str, Any, Any]]
 
 
 def _key_units(scenario: Scenario) -> dict[str, str]:
-    """Key of each number of a scenario that has a unit → the unit, in brackets."""
+    """Return the unit, in brackets, of each key that has one."""
     return {
         f"{section}.{name}".strip("."): f"({declared.unit})"
         for section, record in scenario.records.items()

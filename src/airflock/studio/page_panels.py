@@ -1,4 +1,4 @@
-"""Playing: pause, step, back, speed, seed and agents; how the flock is shown; collisions, with a way to their time."""
+"""Panels of a flight page: base class, playback, actions on the world, and opening of scenarios."""
 
 import html
 import math
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 class PagePanel:
-    """One part of a page.
+    """One panel of a page.
 
     page : which it belongs to
     """
@@ -54,17 +54,17 @@ class PagePanel:
         """Show the present moment; a few times a second."""
 
     def ask(self, action: Callable[[], Any]) -> Callable[[], None]:
-        """What a control calls to have something done before the next frame."""
+        """Queue an action for the next frame."""
         return lambda: self.player.ask(lambda: (action(), None)[1])
 
 
 def small_print_html(text: str) -> str:
-    """Small print of a panel, as HTML."""
+    """Return small print of a panel, as HTML."""
     return f"<div style='padding:0 0.75em;font-size:0.85em'>{text}</div>"
 
 
 def status_html(text: str, is_error: bool) -> str:
-    """What a page says above its tabs, as HTML, at a distance from them; red where it is bad."""
+    """Return the status above a page's tabs, as HTML, with a margin; red for an error."""
     look = f"padding:0 0.75em 0.6em;font-size:0.85em;color:{'#b00020' if is_error else '#555'}"
     return f"<div style='{look}'>{html.escape(text)}</div>" if text else ""
 
@@ -86,7 +86,7 @@ NO_JUMP_TEXT = "jump to …"
 
 
 class PlaybackPanel(PagePanel):
-    """Controls of time and of what is drawn."""
+    """Controls of time and of the drawing."""
 
     def __init__(self, page: "FlightPage"):
         super().__init__(page)
@@ -134,7 +134,7 @@ class PlaybackPanel(PagePanel):
             panel.command(label, key, self.ask(action))
 
     def rebuild(self) -> None:
-        """What may colour the agents of these flights; whom the camera follows in a scenario that is new here."""
+        """List the colourings of these flights; in a new scenario, set which agent the camera follows."""
         player = self.player
         self._show_seed_and_agents()
         if self._camera_scenario != player.side.origin.where:
@@ -148,14 +148,14 @@ class PlaybackPanel(PagePanel):
             self.colouring_menu.value = self.scene.colouring.name
 
     def _show_seed_and_agents(self) -> None:
-        """Show seed and number of agents of what flies."""
+        """Show seed and number of agents of the flight."""
         self.seed.value, self.agents.value = self.player.seed, self.player.flight.agents
 
     def _follow(self, choice: str) -> None:
         self.scene.follow_choice = choice
 
     def _go(self) -> None:
-        """Go to the moment that was typed."""
+        """Go to the typed time."""
         try:
             time = float(self.moment_field.value)
         except ValueError:
@@ -175,7 +175,7 @@ class PlaybackPanel(PagePanel):
         self.page.on_time_changed()
 
     def reset(self, seed: int | None = None, agents: int | None = None) -> None:
-        """Begin another flight; where that is refused, the fields show what flies."""
+        """Begin another flight; if it is refused, the fields show the present one."""
         try:
             self.player.reset(seed, {} if agents is None else {"agents": agents})
         except AirflockError:
@@ -194,7 +194,7 @@ class PlaybackPanel(PagePanel):
         return f"t = {c.time:.1f} s: {c.first} and {c.second}{side}"
 
     def refresh(self) -> None:
-        """The button's words, the key to the colours, and the list of collisions."""
+        """Update the button's label, the key to the colours, and the list of collisions."""
         label = "Fly" if self.player.is_paused else "Pause"
         if self.pause.label != label:
             self.pause.label = label
@@ -220,7 +220,7 @@ MAX_HANDLES = 20  # goals that are shown with handles
 
 
 class ActionPanel(PagePanel):
-    """Hands on the world; what they do reaches all sides alike."""
+    """Controls that act on the world, in all panes equally."""
 
     def __init__(self, page: "FlightPage"):
         super().__init__(page)
@@ -239,7 +239,7 @@ class ActionPanel(PagePanel):
         self._handles(self.scene)
 
     def rebuild(self) -> None:
-        """Goals can be dragged where there are any."""
+        """Enable dragging where there are goals."""
         self.drag_checkbox.visible = has_goals(self.player.sides)
         self.drag_checkbox.value = self.is_dragging = self.is_dragging and self.drag_checkbox.visible
 
@@ -272,7 +272,7 @@ class ActionPanel(PagePanel):
         self.scene.rebuild_if_changed()
 
     def _handles(self, drawing: PageScene) -> None:
-        """A handle on each goal of each side, while goals may be dragged."""
+        """Put a handle on each goal of each pane, while goals may be dragged."""
         if not self.is_dragging:
             return
         for flock in drawing.flocks:
@@ -293,7 +293,7 @@ class ActionPanel(PagePanel):
 
 
 def has_goals(panes: Sequence[FlightPane]) -> bool:
-    """Whether a side has goals that can be dragged."""
+    """Return True if a pane has goals that can be dragged."""
     return any(side.scenario.goals.kind in ("points", "scene") for side in panes)
 
 
@@ -303,7 +303,7 @@ NO_CHOICE_TEXT = "a preset …"
 
 
 class OpeningPanel(PagePanel):
-    """A menu of presets, and a button that takes a scenario file."""
+    """Menu of presets, and a button that takes a scenario file."""
 
     def __init__(self, page: "FlightPage"):
         super().__init__(page)
@@ -327,7 +327,7 @@ class OpeningPanel(PagePanel):
         self.player.ask(lambda: self.take(name, content))
 
     def take(self, name: str, content: bytes) -> None:
-        """Open a scenario file that was sent; code that it names does not run. Raises AirflockError, and keeps nothing.
+        """Open an uploaded scenario file; code that it names does not run. Raises AirflockError, and keeps nothing.
 
         name : of the file on the reader's machine; content : its bytes
         """
@@ -347,25 +347,25 @@ class OpeningPanel(PagePanel):
         self.message.content = small_print_html("")
 
     def rebuild(self) -> None:
-        """The menu names what flies, where that is a preset."""
+        """Set the menu to the preset that flies, if it is one."""
         where = self.player.side.origin.where
         self.preset_menu.value = where if where in presets() else NO_CHOICE_TEXT
 
 
 def read_scenario_text(name: str, content: bytes) -> str:
-    """Text of a scenario file that was sent. Raises StudioError where it is no TOML, and says why."""
+    """Decode an uploaded scenario file. Raises StudioError, with the reason, if it is not TOML."""
     try:
         if len(content) > MAX_BYTES:
             raise TextError(f"is larger than {MAX_BYTES / 1e6:g} MB, more than any file of this kind needs")
         text = content.decode("utf-8-sig")
         parse_toml(text)
-    except UnicodeDecodeError as fault:
-        wrong = f"is not text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}"
-        raise StudioError(f"{name}: is not a scenario file (TOML): {wrong}") from fault
-    except FormatError as fault:
-        raise StudioError(f"{name}: is not a scenario file (TOML): {fault}") from fault
-    except TextError as fault:
-        raise StudioError(f"{name}: {fault}") from fault
+    except UnicodeDecodeError as error:
+        wrong = f"is not text in UTF-8: byte {error.start} is 0x{content[error.start]:02x}"
+        raise StudioError(f"{name}: is not a scenario file (TOML): {wrong}") from error
+    except FormatError as error:
+        raise StudioError(f"{name}: is not a scenario file (TOML): {error}") from error
+    except TextError as error:
+        raise StudioError(f"{name}: {error}") from error
     if "\0" in name:
         raise StudioError(f"{printable(name)}: holds a character (NUL) that no file name may have")
     if not name.lower().endswith(".toml"):

@@ -1,4 +1,4 @@
-"""Drawing: what stands, and the flocks of all sides frame by frame: darts, trails, links, collisions."""
+"""Scene of a flight page: solids, and the flocks of all panes frame by frame: darts, trails, links, collisions."""
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
@@ -36,7 +36,7 @@ AgentPair = tuple[int, int]
 
 
 class Collision(NamedTuple):
-    """Two agents nearer than a collision: since when, s, on which side, and who."""
+    """Two agents nearer than a collision: begin, s, pane, and agents."""
 
     time: float
     side: int
@@ -57,23 +57,25 @@ class CollisionList:
 
     @property
     def listed(self) -> list[Collision]:
-        """The latest, newest first."""
+        """Return the latest collisions, newest first."""
         return sorted(self._last_seen, reverse=True)[:MAX_LISTED]
 
     def add_frame(self, time: float, pane: int, touching: Iterable[AgentPair]) -> None:
-        """Take the pairs of a side that are nearer than a collision at a time, s."""
+        """Add the pairs of a pane that are nearer than a collision at a time, s."""
         pairs = set(touching)
         for key in [key for key in self._ongoing if key[0] == pane and key[1] not in pairs]:
             del self._ongoing[key]
         for pair in sorted(pairs):
             found = self._ongoing.setdefault((pane, pair), Collision(time, pane, *pair))
             self._last_seen[found] = time
+        # A dict keeps the order of insertion, so the first entry is the oldest collision.
         while len(self._last_seen) > MAX_KEPT:
             del self._last_seen[next(iter(self._last_seen))]
 
     def go_back(self, time: float, pane_count: int) -> None:
-        """Forget what began after a time, s, and what belongs to a side that is gone; the rest may go on from there."""
+        """Drop collisions that began after a time, s, and those of closed panes; the rest may continue."""
         kept = {c: min(last, time) for c, last in self._last_seen.items() if c.time <= time and c.side < pane_count}
+        # Pairs that touched at that moment are still the same collision when the flight goes on from there.
         still = [c for c, last in self._last_seen.items() if c in kept and last >= time]
         self._last_seen = kept
         self._ongoing = {
@@ -81,11 +83,11 @@ class CollisionList:
         }
 
     def fork(self) -> None:
-        """A second side begins with the past of the first."""
+        """Give a second pane the collisions of the first."""
         self._renamed({0: BOTH_PANES, BOTH_PANES: BOTH_PANES})
 
     def join(self, pane: int) -> None:
-        """One side goes on alone."""
+        """Keep the collisions of one pane."""
         self._renamed({pane: 0, BOTH_PANES: 0})
 
     def _renamed(self, names: dict[int, int]) -> None:
@@ -100,7 +102,7 @@ class CollisionList:
                 self._ongoing |= {(side, pair): new for side in ((0, 1) if new.side == BOTH_PANES else (0,))}
 
     def clear(self) -> None:
-        """Forget all: other flights."""
+        """Drop all: other flights."""
         self._last_seen, self._ongoing = {}, {}
 
 
@@ -113,7 +115,7 @@ DRAG_ROWS = ("shared_power_drag", "shared_model_drag")  # where a driver keeps i
 
 
 class AgentColouring:
-    """The way in which agents are coloured.
+    """Colouring of the agents.
 
     way : its name, one of `available_colourings`; shown : the last shade, whose key stands on the page
     """
@@ -125,7 +127,9 @@ class AgentColouring:
     def of(
         self, flocks: Sequence["DrawnFlock"], velocity: NDArray[Any], max_speed: float, height: tuple[float, float]
     ) -> AgentColours:
-        """The shade of the agents of all flocks; velocity (agent, 3), m/s; top : of the scale of speeds, m/s."""
+        """Return the colours of the agents of all flocks; velocity (agent, 3), m/s; top: of the scale of speeds,
+        m/s.
+        """
         way = self.name
         own = np.vstack([flock.position for flock in flocks])
         if way in MOTION_COLOURINGS:
@@ -142,7 +146,7 @@ class AgentColouring:
         return self.shown
 
     def _flock_colours(self, name: str, flock: "DrawnFlock") -> AgentColours | None:
-        """The shade of one flock; None where it has no such value."""
+        """Return the colours of one flock; None where it has no such value."""
         side, count = flock.side, len(flock.position)
         flight, scenario = side.flight, side.scenario
         if name == "agent":
@@ -169,7 +173,7 @@ class AgentColouring:
 
 
 def available_colourings(flocks: Sequence["DrawnFlock"]) -> tuple[str, ...]:
-    """Names of what may colour the agents of flocks."""
+    """Return the names of the colourings of flocks."""
     found = [
         *MOTION_COLOURINGS,
         "agent",
@@ -185,7 +189,7 @@ def available_colourings(flocks: Sequence["DrawnFlock"]) -> tuple[str, ...]:
 
 
 def joined_colours(parts: Sequence[AgentColours]) -> AgentColours:
-    """The same shade of several flocks as one: on one scale, with one list of names."""
+    """Join the colours of several flocks: on one scale, with one list of names."""
     first = parts[0]
     if len(parts) == 1:
         return first
@@ -195,7 +199,7 @@ def joined_colours(parts: Sequence[AgentColours]) -> AgentColours:
         values = [np.array([names.index(part.names[v]) if v >= 0 else -1 for v in part.values]) for part in parts]
     return first._replace(
         values=np.concatenate(values), names=names, low=min(part.low for part in parts),
-        high=max(part.high for part in parts), told=" and ".join(dict.fromkeys(part.told for part in parts)),
+        high=max(part.high for part in parts), note=" and ".join(dict.fromkeys(part.note for part in parts)),
     )  # fmt: skip
 
 
@@ -213,7 +217,7 @@ LOST_LINK_GREY = 240.0  # of a link on which no packet arrives
 
 
 class DrawnFlock:
-    """One side as it is drawn: where its scene lies, and who collides."""
+    """Flock of one pane as it is drawn: position of its scene, and agents that collide."""
 
     def __init__(self, side: FlightPane, offset: NDArray[Any]):
         self.side, self.offset = side, offset
@@ -225,15 +229,16 @@ class DrawnFlock:
         self.pairs = measures.AgentPairs(self.position, self.period)
 
     def look(self) -> None:
-        """Take the present moment; of a flight that stopped flying the last one that can be drawn stays."""
+        """Take the present moment; for a flight that stopped, keep the last one that can be drawn."""
         position, velocity = self.side.motion
+        # A diverged flight keeps its last finite picture: nan would spread through the meshes of the page.
         if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
             return
         self.position, self.velocity = position, velocity
         self.pairs = measures.AgentPairs(self.position, self.period)
 
     def links(self, kind: str) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-        """Lines between agents, and their colours: paler where a packet is more likely lost."""
+        """Return lines between agents, and their colours: paler where a packet is more likely lost."""
         tone = np.array(agent_colours.LINE_STYLES["links"][0])
         if kind == "radio":
             k = self.side.scenario.radio
@@ -244,32 +249,33 @@ class DrawnFlock:
         else:
             points = self.pairs.neighbours() if kind == LINK_CHOICES[1] else np.zeros((0, 2, 3))
             tones = np.tile(tone, (len(points), 1))
+        # Agents that left are parked far below; no line may lead to them.
         seen = (points[..., 2] > 0.5 * ABSENT_HEIGHT).all(axis=1)
         return points[seen] + self.offset, np.asarray(tones, np.uint8).reshape(-1, 3)[seen]
 
 
 @lru_cache(maxsize=16)
 def arrival_curve(radio: Radio, k: Any) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Distances, m, and the probability that one packet of each rate arrives over them where nobody else sends."""
+    """Return distances, m, and the probability that a packet of each rate arrives if no other agent sends."""
     far = np.linspace(0.0, min(k.range, 4.0 * max(k.loss_at, getattr(k, "far", 0.0))), 129)
     return far, np.array([arrival_probability(radio, k, r) for r in far.tolist()])
 
 
 class PageScene:
-    """The scene of a page."""
+    """Scene of a page."""
 
     def __init__(self, player: Player, view: BrowserView):
         self.player, self.view = player, view
         self.colouring, self.links, self.follow_choice = AgentColouring(), LINK_CHOICES[0], FOLLOW_CHOICES[0]
         self.trails = Trails(view)
         self.collisions = CollisionList()
-        self.draw_handles: Any = None  # is asked for goals that can be dragged: (player, drawing) → None
+        self.draw_handles: Any = None  # draws handles on goals that can be dragged: (player, drawing) → None
         self.rebuild()
 
     # ----------------------------------------------------------------------------------------------- what stands
 
     def rebuild(self) -> None:
-        """Draw the worlds of all sides anew, with their agents as they are."""
+        """Draw the worlds of all panes again, with their agents as they are."""
         view, sides = self.view, self.player.sides
         self.stages = [self._scene_of_pane(side) for side in sides]
         self.span = max(stage.span for stage in self.stages)
@@ -302,7 +308,7 @@ class PageScene:
         return stage
 
     def _build(self) -> None:
-        """Everything that stands, each side at its place."""
+        """Draw all solids, each pane at its place."""
         view = self.view
         self._worlds = [_world_state(side) for side in self.player.sides]
         middle = np.mean([s.centre + f.offset for s, f in zip(self.stages, self.flocks, strict=True)], axis=0)
@@ -319,12 +325,12 @@ class PageScene:
             self.draw_handles(self)
 
     def rebuild_if_changed(self) -> None:
-        """Draw what stands anew where it has changed: an obstacle was thrown in, a goal moved, a fork begun."""
+        """Draw the solids again if they changed: an obstacle was thrown in, a goal moved, a fork begun."""
         if self._panes_changed() or [_world_state(side) for side in self.player.sides] != self._worlds:
             self.rebuild_worlds()
 
     def rebuild_worlds(self) -> None:
-        """Draw what stands anew, with the camera and the flocks as they are; of other sides than before, everything."""
+        """Draw the solids again, keeping camera and flocks; for other panes than before, draw everything."""
         if self._panes_changed():
             self.rebuild()
             return
@@ -339,7 +345,7 @@ class PageScene:
         return len(sides) != len(drawn) or any(a is not b for a, b in zip(sides, drawn, strict=True))
 
     def forget(self) -> None:
-        """Forget trails, and collisions that lie ahead: the flight went elsewhere."""
+        """Drop trails, and collisions that lie ahead: the flight is at another time."""
         self.trails.forget()
         self.collisions.go_back(self.player.time, len(self.player.sides))
 
@@ -370,7 +376,7 @@ class PageScene:
         self.view.extra("links", np.vstack([points for points, _ in links]), np.vstack([tones for _, tones in links]))
 
     def _trail_starts(self, before: NDArray[Any], position: NDArray[Any]) -> NDArray[Any]:
-        """Where a piece of trail begins: where the agent was, or here if it went through a periodic face."""
+        """Return the begin of a trail piece: the last position, or this one after a periodic face."""
         begin, first = before.copy(), 0
         for flock in self.flocks:
             part = slice(first, first + len(flock.position))
@@ -384,7 +390,7 @@ class PageScene:
         return begin
 
     def _flash(self, tone: NDArray[np.uint8]) -> None:
-        """Colour who collides, for half a second at least, and list new collisions."""
+        """Colour colliding agents, for half a second at least, and list new collisions."""
         first = 0
         self._flash_frames_left = np.maximum(self._flash_frames_left - 1, 0)
         for number, flock in enumerate(self.flocks):
@@ -395,7 +401,7 @@ class PageScene:
         tone[self._flash_frames_left > 0] = agent_colours.COLLISION_COLOUR
 
     def pane_and_agent(self, selected: int) -> tuple[int, int]:
-        """Side and number of an agent counted through all sides."""
+        """Return pane and number of an agent counted through all panes."""
         for number, flock in enumerate(self.flocks):
             if selected < len(flock.position):
                 return number, selected
@@ -404,12 +410,12 @@ class PageScene:
 
     @property
     def positions(self) -> NDArray[Any]:
-        """Places in the scene of the agents of all sides, (agent, 3) m."""
+        """Return positions in the scene of the agents of all panes, (agent, 3) m."""
         return np.vstack([flock.position + flock.offset for flock in self.flocks])
 
 
 def expected_speed(pane: FlightPane) -> float:
-    """Speed at which a flock may be expected to fly, m/s: what its law prefers, or at least what it flies at now."""
+    """Return the expected speed of a flock, m/s: the one its law prefers, at least the present one."""
     scenario = pane.scenario
     known = scenario.model.preferred_speed or (lambda _: scenario.metrics.v_flock or 0.0)
     now = float(np.sqrt((pane.motion[1] ** 2).sum(1)).max()) / 1.3
@@ -417,6 +423,6 @@ def expected_speed(pane: FlightPane) -> float:
 
 
 def _world_state(side: FlightPane) -> Any:
-    """What tells whether a side's world looks as it was drawn."""
+    """Return values that change when a pane's world must be drawn again."""
     scenario = side.scenario
     return scenario.world, scenario.scene, scenario.goals

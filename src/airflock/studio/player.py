@@ -1,4 +1,4 @@
-"""Player: flights on one clock, played, stopped and taken back; it knows no page."""
+"""Player: flights on one clock, played, stopped and taken back; independent of any page."""
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +35,7 @@ class PageClock:
         self.dt, self.speed, self._owed_steps = dt, speed, 0.0
 
     def due(self, elapsed: float) -> int:
-        """Whole steps due after `elapsed` s of real time; the rest is owed to the next call.
+        """Return the whole steps due after `elapsed` s of real time; the rest is added to the next call.
 
         Of a page that was held up for longer than a quarter of a second only so much is caught up.
         """
@@ -49,26 +49,26 @@ QueuedAction = Callable[[], None]
 
 
 class ActionQueue:
-    """A queue with a bell: the thread that flies waits for the next frame or the next wish, whichever comes first."""
+    """Queue with a bell: the flying thread waits for the next frame or the next action, whichever comes first."""
 
     def __init__(self) -> None:
         self._actions: SimpleQueue[QueuedAction] = SimpleQueue()
         self._event = Event()
 
     def put(self, action: QueuedAction) -> None:
-        """Ask for something; from any thread."""
+        """Queue an action; from any thread."""
         self._actions.put(action)
         self._event.set()
 
     def wait(self, seconds: float) -> bool:
-        """Wait for some seconds of real time at most. Whether something was asked for."""
+        """Wait for at most some seconds of real time. Return True if an action is queued."""
         if not self._event.wait(max(seconds, 0.0)):
             return False
         self._event.clear()
         return True
 
     def answer(self, run: Callable[[QueuedAction], None]) -> bool:
-        """Hand everything that was asked for to `do`. Whether there was anything."""
+        """Hand every queued action to `do`. Return True if there was any."""
         done = False
         while True:
             try:
@@ -84,7 +84,7 @@ MAX_SNAPSHOTS = 400  # moments at most
 
 
 class KeptSnapshots:
-    """Snapshots in the order of their time; where there are too many, every second moment is dropped.
+    """Snapshots in the order of their time; when there are too many, every second one is dropped.
 
     every : flight seconds between two of them; doubles whenever they are thinned
     """
@@ -98,11 +98,11 @@ class KeptSnapshots:
         return len(self._kept)
 
     def due(self, time: float) -> bool:
-        """Whether the next moment should be kept at this time, s."""
+        """Return True if a snapshot should be kept at this time, s."""
         return not self._times or time >= self._times[-1] + self.interval - 1e-9
 
     def keep(self, time: float, snapshots: tuple[Snapshot, ...]) -> None:
-        """Keep a moment, s, one snapshot a flight; those after it belong to a past that is given up."""
+        """Keep the snapshots of a time, s, one a flight, and drop later ones: their past no longer exists."""
         self.forget_after(time)
         self._kept.append(snapshots)
         self._times.append(time)
@@ -116,7 +116,7 @@ class KeptSnapshots:
         del self._kept[count:], self._times[count:]
 
     def at(self, time: float) -> tuple[Snapshot, ...] | None:
-        """The last moment up to a time, s; the first of all if there is none before."""
+        """Return the last snapshots up to a time, s; the first of all if there are none before."""
         if not self._kept:
             return None
         return self._kept[max(bisect_right(self._times, time + 1e-9) - 1, 0)]
@@ -127,7 +127,7 @@ class KeptSnapshots:
 
 @dataclass(frozen=True)
 class FlightRequest:
-    """What a page is to fly.
+    """Request of a page: which flights it shows.
 
     where    : preset, scenario file or recording, which is flown again with its events
     settings : keys changed from outside
@@ -146,7 +146,9 @@ class FlightRequest:
     interpret_first: bool = False
 
     def sources(self) -> list[FlightSource]:
-        """Where the flights come from, one or two; raises RecordingError for a recording that cannot be flown again."""
+        """Return the sources of one or two flights; raises RecordingError for a recording that cannot be flown
+        again.
+        """
         first = FlightSource.of(self.where, self.settings, self.law, trust=self.trust)
         if isinstance(self.compared_with, str):
             return [first, FlightSource.of(self.compared_with, self.settings, trust=self.trust)]
@@ -158,7 +160,7 @@ class FlightRequest:
 
 
 class ComparedFlights:
-    """One flight of a scenario, or two side by side. They know no clock: `Player` flies them.
+    """One flight of a scenario, or two side by side. They have no clock: `Player` flies them.
 
     Attributes: origins, where they come from; sides, as they fly; hand, which of them the controls act on; note, what
     was done last, for the page; fault, called with everything that was refused.
@@ -174,7 +176,7 @@ class ComparedFlights:
         self._open()
 
     def _open(self, place_agents: bool = False) -> None:
-        """Begin the flights of all origins, agents placed if `start`. Raises AirflockError, and changes nothing."""
+        """Begin the flights of all origins, agents placed if `place_agents`. Raises AirflockError, and changes nothing."""
         sides = [FlightPane(origin, self.seed, self._interpret_first) for origin in self.sources]
         if len(sides) == 2 and sides[0].scenario.dimensions != sides[1].scenario.dimensions:
             flown = [f"{side.origin.where} in {side.scenario.dimensions}" for side in sides]
@@ -190,36 +192,36 @@ class ComparedFlights:
 
     @property
     def is_compiling(self) -> bool:
-        """Whether interpreted flights stand for those that are being compiled."""
+        """True while interpreted flights stand for those that are being compiled."""
         return any(side.is_compiling for side in self.sides)
 
     def switch_to_compiled(self) -> list[Snapshot | None]:
-        """Go on as compiled flights, once they are compiled: their starts; None for those that are compiled already."""
+        """Replace flights by compiled ones, once ready. Return their starts; None for those compiled already."""
         return [side.switch_to_compiled() for side in self.sides]
 
     @property
     def time(self) -> float:
-        """The one clock, s."""
+        """Time of all flights, s."""
         return self.sides[0].flight.time
 
     @property
     def side(self) -> FlightPane:
-        """The side that the controls act on."""
+        """Active pane: the one that the controls act on."""
         return self.sides[self.hand]
 
     @property
     def flight(self) -> Flight:
-        """The flight of that side."""
+        """Flight of the active pane."""
         return self.side.flight
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario in force on that side."""
+        """Scenario in force on the active pane."""
         return self.side.scenario
 
     @property
     def preset(self) -> Scenario:
-        """The scenario that it started from."""
+        """Scenario from which the active pane started."""
         return self.side.preset
 
     @property
@@ -229,21 +231,21 @@ class ComparedFlights:
 
     @property
     def where(self) -> str:
-        """What is flown, in words."""
+        """Name of what flies."""
         first, *others = self.sources
         return " | ".join([first.where, *(other.beside(first) for other in others)])
 
     @property
     def motion(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Positions (agent, 3) in m and velocities (agent, 3) in m/s of that side."""
+        """Return positions (agent, 3) in m and velocities (agent, 3) in m/s of the active pane."""
         return self.side.motion
 
     # ---------------------------------------------------------------------------------------------- beginning
 
     def reset(self, seed: int | None = None, settings: Mapping[str, Any] | None = None) -> None:
-        """Another flight: of the same or another seed, or with other keys, such as the number of agents.
+        """Begin another flight: of the same or another seed, or with other keys, such as the number of agents.
 
-        A fork ends with its flight; two that were opened side by side begin anew.
+        A fork ends with its flight; two that were opened side by side begin again.
         """
         known = self.seed, self.sources
         self.seed = self.seed if seed is None else seed
@@ -256,7 +258,7 @@ class ComparedFlights:
         self.note = ""
 
     def open(self, name: str) -> None:
-        """Another scenario, of the same seed: a preset, or a file whose code may not run. A comparison ends.
+        """Open another scenario with the same seed: a preset, or a file whose code may not run. A comparison ends.
 
         Raises AirflockError, and flies on as before.
         """
@@ -324,7 +326,7 @@ class ComparedFlights:
 
     @property
     def command(self) -> str:
-        """The command that opens the present scenario again."""
+        """Command that opens the present scenario again."""
         return self.side.command(self.seed)
 
     def save_toml(self, path: Path) -> Path:
@@ -352,7 +354,7 @@ MAX_BUSY_SECONDS = 0.05  # s of real time flown at most before the page is answe
 
 
 class Player(ComparedFlights):
-    """Flights, played: what a page shows and what its controls do.
+    """Flights that are played: the model behind a page and its controls.
 
     `ask` may be called from any thread; everything else belongs to the thread that calls `tick`.
 
@@ -365,13 +367,13 @@ class Player(ComparedFlights):
         self._asked = ActionQueue()
         super().__init__(request)
 
-    def _open(self, start: bool = False) -> None:
-        super()._open(start)
+    def _open(self, place_agents: bool = False) -> None:
+        super()._open(place_agents)
         self.clock = PageClock(self.preset.flight.dt, self.clock.speed)
         self.snapshots, self.failure_message = KeptSnapshots(), ""
 
     def switch_to_compiled(self) -> list[Snapshot | None]:
-        """Go on as compiled flights, once they are compiled; of the moments to go back to the start is left."""
+        """Replace flights by compiled ones, once ready; of the snapshots only the start is kept."""
         if not self.is_compiling:
             return []
         starts = super().switch_to_compiled()
@@ -382,7 +384,7 @@ class Player(ComparedFlights):
 
     @property
     def status(self) -> str:
-        """What a page says while it waits, or why it stopped; empty while all is well."""
+        """Message while the page waits, or the reason why it stopped; empty otherwise."""
         if self.failure_message:
             return self.failure_message
         if self.is_compiling:
@@ -393,58 +395,62 @@ class Player(ComparedFlights):
 
     @property
     def over(self) -> bool:
-        """Whether the longest time that a page flies has been reached."""
+        """True once the longest time that a page flies has been reached."""
         return any(side.flight.over for side in self.sides)
 
     # ------------------------------------------------------------------------------------------------ playing
 
     def ask(self, action: Callable[[], None]) -> None:
-        """Do something before the next frame; from any thread."""
+        """Queue an action for the next frame; from any thread."""
+        # Actions wait for the next frame: no callback of the page touches the flight from its own thread.
         self._asked.put(action)
 
     def run_actions_within(self, seconds: float) -> bool:
-        """Wait for some seconds of real time, or until something was asked for and done. Whether it was."""
+        """Wait some seconds of real time, or until an action ran. Return True if one ran."""
         return self._asked.wait(seconds) and self._asked.answer(self._safely)
 
     def tick(self, elapsed: float) -> bool:
-        """Do what was asked for, then fly what is due after `elapsed` s of real time. Whether anything moved."""
-        asked = self._asked.answer(self._safely)
+        """Run queued actions, then fly the steps due after `elapsed` s of real time. Return True if anything
+        moved.
+        """
+        acted = self._asked.answer(self._safely)
         if self.is_compiling and all(side.is_compiled for side in self.sides):
-            asked = self._settled() or asked
+            acted = self._settled() or acted
         if self.is_paused or self.failure_message or self.over:
-            return asked
+            return acted
+        # A slow flight must not freeze the page: at most the steps that fit into one busy interval, as measured.
         steps = min(self.clock.due(elapsed), max(1, int(self._steps_per_second * MAX_BUSY_SECONDS)))
         if not steps:
-            return asked
+            return acted
         began, moved = perf_counter(), self.fly(steps)
         self._steps_per_second = steps / max(perf_counter() - began, 1e-6)
-        return moved or asked
+        return moved or acted
 
     def _settled(self) -> bool:
         try:
             self.switch_to_compiled()
-        except AirflockError as fault:
-            self.failure_message = f"stopped: {fault}"
+        except AirflockError as error:
+            self.failure_message = f"stopped: {error}"
             self.fault(self.failure_message)
         return True
 
     def _safely(self, action: Callable[[], None]) -> None:
-        """Do something; what goes wrong is a note on the page and a line in the terminal, and the flight goes on."""
+        """Run an action; an error becomes a note on the page and a line in the terminal, and the flight goes on."""
         try:
             action()
-        except AirflockError as fault:
-            self._report_error(str(fault))
-        except OSError as fault:  # a full disk, a folder that is gone
-            self._report_error(": ".join(part for part in (fault.filename, os_error_message(fault)) if part))
-        except Exception as fault:  # the last resort: somebody's flight must not be lost to one press of a button
-            self._report_error(f"unexpected {describe_error(fault)}; please report it")
+        except AirflockError as error:
+            self._report_error(str(error))
+        except OSError as error:  # a full disk, a folder that is gone
+            self._report_error(": ".join(part for part in (error.filename, os_error_message(error)) if part))
+        except Exception as error:  # the last resort: somebody's flight must not be lost to one press of a button
+            self._report_error(f"unexpected {describe_error(error)}; please report it")
 
     def _report_error(self, line: str) -> None:
         self.note = line
         self.fault(line)
 
     def fly(self, steps: int) -> bool:
-        """Fly so many steps, and keep a moment where one is due; a flight that fails stops and says why."""
+        """Fly so many steps, and keep a snapshot where one is due; a flight that fails stops with its reason."""
         if self.snapshots.due(self.time):
             self.snapshots.keep(self.time, tuple(side.flight.snapshot() for side in self.sides))
         clock = self.sides[0]
@@ -452,11 +458,11 @@ class Player(ComparedFlights):
         try:
             for side in self.sides:
                 side.fly_to(end)
-        except Exception as fault:  # a rule of the user's own may raise anything, until it is compiled
-            told = str(fault) if isinstance(fault, AirflockError) else user_error_line(fault)
-            if not told:
+        except Exception as error:  # a rule of the user's own may raise anything, until it is compiled
+            message = str(error) if isinstance(error, AirflockError) else user_error_line(error)
+            if not message:
                 raise
-            self.failure_message = f"stopped: {told}"
+            self.failure_message = f"stopped: {message}"
             self.fault(self.failure_message)
             return False
         return True
@@ -465,6 +471,7 @@ class Player(ComparedFlights):
         """Pause, and fly to the next decision: one step of the flock."""
         self.is_paused = True
         scenario, flight = self.sides[0].scenario, self.sides[0].flight
+        # A decision takes several motion steps; up to the next one is what a reader calls one step.
         every = max(1, round(scenario.sensors.period / scenario.flight.dt))
         self.fly(every - flight.step % every)
 
@@ -482,6 +489,7 @@ class Player(ComparedFlights):
         if moment is None:
             self.note = "no earlier moment is kept"
             return
+        # A snapshot from before a fork holds one flight; the second one did not exist then.
         del self.sides[len(moment) :]
         self.hand = min(self.hand, len(self.sides) - 1)
         failed = self.failure_message

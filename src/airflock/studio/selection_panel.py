@@ -1,4 +1,4 @@
-"""Selecting: the agent that was clicked, what it perceives, and a push."""
+"""Selection panel: the clicked agent, its percepts, and a push."""
 
 import html
 import math
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 NO_LINES = np.zeros((0, 2, 3))
 WAKE_SPANS = 6.0  # spans of a wake that are drawn
 LONGEST_ARROW = 5.0  # darts; length of the longest arrow
-VELOCITY_ARGUMENTS = {"dvx", "dvy", "dvz", "dv"}  # what a rule asks for to make velocities alike
+VELOCITY_ARGUMENTS = {"dvx", "dvy", "dvz", "dv"}  # arguments of a rule that aligns velocities
 FREE_RAY_COLOUR, HIT_RAY_COLOUR = agent_colours.GREEN, agent_colours.RED
 
 
 class PerceptDrawing(NamedTuple):
-    """Lines about one agent by kind (`view.stage.colours.LINES`): segments (segment, 2, 3) m, their colours, and words.
+    """Lines about one agent by kind (`LINE_STYLES`): segments (segment, 2, 3) m, their colours, and words.
 
     Kinds that are not named show nothing.
     """
@@ -39,14 +39,14 @@ class PerceptDrawing(NamedTuple):
 
 
 class PerceptLines:
-    """Eyes of the selected agent; remembers the world that it looked at, and how strong each term has been."""
+    """Percepts of the selected agent as lines; keeps the world last seen, and the strongest value of each term."""
 
     def __init__(self) -> None:
         self._world: tuple[Scenario, FlightWorld] | None = None
         self._strongest: dict[str, float] = {}
 
     def of(self, pane: FlightPane, agent: int, dart_length: float, max_speed: float) -> PerceptDrawing:
-        """What an agent perceives.
+        """Return the percepts of an agent.
 
         size : of a dart, m; top : speed that gives the longest arrow, m/s
         """
@@ -72,7 +72,7 @@ class PerceptLines:
     def _term_arrows(
         self, seen: Seen, own: NDArray[Any], size: float, model: Model
     ) -> tuple[NDArray[Any], NDArray[Any], list[str]]:
-        """Arrows of what the law was given: of all neighbours, of each, and of all surfaces.
+        """Return arrows of the law's terms: of all neighbours, of each, and of all surfaces.
 
         Terms of a law have units of their own, so each is as long as it is beside the strongest of its kind so far.
         """
@@ -80,6 +80,7 @@ class PerceptLines:
         for number, (name, vector, parts) in enumerate(_named_vectors(seen, model)):
             strength = float(np.linalg.norm(vector))
             longest = max([strength, *(float(np.linalg.norm(part)) for part in parts)])
+            # Terms have units of their own: each is scaled by the strongest of its kind so far.
             most = self._strongest[name] = max(self._strongest.get(name, 0.0), longest)
             tone, scale = (
                 agent_colours.TERM_COLOURS[number % len(agent_colours.TERM_COLOURS)],
@@ -98,11 +99,12 @@ class PerceptLines:
     def _ray_lines(
         self, scenario: Scenario, memory: Memory, seen: Seen
     ) -> tuple[tuple[NDArray[Any], NDArray[Any]], str]:
-        """The fan of rays that the agent casts: green where free, red up to what it met."""
+        """Return the fan of rays that the agent casts: green where free, red up to the hit."""
         if self._world is None or self._world[0] is not scenario:
             self._world = scenario, FlightWorld(scenario)
         place, course = self._world[1], GoalCourse(scenario)
         if len(memory.arrays["later"]):
+            # Obstacles that appear in flight are hidden in the driver's own copy until they appear.
             place.shapes[:] = memory.arrays["shapes"].astype(float).tolist()
         if course.points and scenario.goals.kind != "own":
             x, y, z = memory.arrays["aim"][:3].astype(float).tolist()
@@ -119,9 +121,9 @@ class PerceptLines:
 
 
 def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], list[NDArray[Any]]]]:
-    """What the law was given, by its own words: each vector, and what each neighbour adds to it; then the surfaces.
+    """Return the law's vectors by its own words: each with the part of each neighbour; then the surfaces.
 
-    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour that flies alike
+    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour of equal velocity
     would cause, too, and alignment, which is the rest.
     """
     found: list[tuple[str, NDArray[Any], list[NDArray[Any]]]] = []
@@ -135,10 +137,11 @@ def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], li
         ):
             found.append((term_name_and_unit(model, name)[0], vector, parts))
             continue
-        alike = [vector_values(term)[name] for term in view.alike]
-        apart = [part - same for part, same in zip(parts, alike, strict=True)]
+        # The rule evaluated with equal velocities is the repulsion; the remainder is the alignment.
+        resting = [vector_values(term)[name] for term in view.alike]
+        moving = [part - same for part, same in zip(parts, resting, strict=True)]
         found += [
-            (word, sum(terms, np.zeros(3)), terms) for word, terms in (("repulsion", alike), ("alignment", apart))
+            (word, sum(terms, np.zeros(3)), terms) for word, terms in (("repulsion", resting), ("alignment", moving))
         ]
     if view.walls:
         found += [(f"walls {name}".strip(), vector, []) for name, vector in vector_values(view.walls).items()]
@@ -146,7 +149,7 @@ def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], li
 
 
 def _neighbour_lines(view: Seen, own: NDArray[Any], size: float, measured: NDArray[Any]) -> dict[str, Any]:
-    """Lines to those whom its law takes notice of; crosses where it heard them, and where each now believes to be.
+    """Return lines to the neighbours that the law uses; crosses at their measured and believed positions.
 
     measured : (component, agent), what each believes of itself, m and m/s
     """
@@ -158,6 +161,7 @@ def _neighbour_lines(view: Seen, own: NDArray[Any], size: float, measured: NDArr
     believed[:, :axes] = measured[:axes, who].T
     believed[0] = view.own[:3]
     ghosts = np.vstack([cross_segments(believed[:1], 0.7 * size), cross_segments(believed[1:], 0.25 * size)])
+    # Without sensor errors belief and truth are the same, and the crosses would only hide the agents.
     off = float(np.linalg.norm(believed[0] - own)) > 0.0
     return {
         "heard": (np.stack([np.broadcast_to(own, noticed.shape), noticed], 1), None),
@@ -167,18 +171,18 @@ def _neighbour_lines(view: Seen, own: NDArray[Any], size: float, measured: NDArr
 
 
 def _noticed_neighbours(view: Seen) -> list[bool]:
-    """Of each that is heard, whether the law made anything of it; all where the law has no rule of one neighbour."""
+    """Return a mask of the heard neighbours that change the law's result; all if it has no rule of one neighbour."""
     return [any(term) for term in view.terms] if view.terms else [True] * len(view.heard)
 
 
 def cross_segments(places: NDArray[Any], half: float) -> NDArray[Any]:
-    """Two strokes at each place (place, 3), m."""
+    """Return two strokes at each place (place, 3), m."""
     cross = half * np.array([[[-1, -1, 0], [1, 1, 0]], [[-1, 1, 0], [1, -1, 0]]], float)
     return np.asarray((places[:, None, None] + cross).reshape(-1, 2, 3))
 
 
 def _agent_words(view: Seen, scenario: Scenario) -> list[str]:
-    """What is said of any agent."""
+    """Return the text about an agent."""
     oldest = max((other.age for other in view.heard), default=0.0)
     off = math.dist(view.true[:3], view.own[:3])
     wish = ", ".join(f"{part:.2f}" for part in view.command)
@@ -206,7 +210,7 @@ def _colour_mark_html(tone: tuple[int, int, int], mark: str = "━") -> str:
 
 
 def _wake_segments(scenario: Scenario, motion: tuple[NDArray[Any], NDArray[Any]]) -> NDArray[Any]:
-    """The two outermost trailing legs of every wing, straight back."""
+    """Return the two outermost trailing legs of every wing, straight back."""
     position, velocity = (part.astype(float) for part in motion)
     span, ahead = float(scenario.wing.span), np.array([1.0, 0.0, 0.0])
     if scenario.wing.frame == "ground":
@@ -218,7 +222,7 @@ def _wake_segments(scenario: Scenario, motion: tuple[NDArray[Any], NDArray[Any]]
 
 
 def _drag_text(memory: Memory, agent: int) -> str:
-    """Drag of a bird, and what the wash of the others makes of it."""
+    """Return the drag of a bird, and the effect of the others' wash on it."""
     which = "power" if "shared_power_drag" in memory.driver.ROWS else "model"
     drag = float(memory.rows([f"shared_{which}_drag"])[0, agent])
     said = f"{_colour_mark_html(agent_colours.SKY)} wakes; induced drag {drag:.3g} N"
@@ -235,7 +239,7 @@ NOTHING_SELECTED_TEXT = small_print_html("click an agent, or press S")
 
 
 class SelectionPanel(PagePanel):
-    """Whoever is selected, counted through the agents of all sides."""
+    """Panel of the selected agent, counted through the agents of all panes."""
 
     def __init__(self, page: "FlightPage"):
         super().__init__(page)
@@ -258,11 +262,11 @@ class SelectionPanel(PagePanel):
         self.widgets.command("Next agent", "S", self.ask(lambda: self.select_next(1)))
 
     def rebuild(self) -> None:
-        """Nobody is selected in another flight."""
+        """Clear the selection for another flight."""
         self.chosen, self.percept_lines = None, PerceptLines()
 
     def select(self, agent: int | None) -> None:
-        """Select an agent, or nobody."""
+        """Select an agent, or none."""
         self.chosen = agent
         self.page.frame(True)
 
@@ -286,7 +290,7 @@ class SelectionPanel(PagePanel):
             self.player.push(agent, 2.0 * self.scene.top / 1.5, side)
 
     def refresh(self) -> None:
-        """What the selected agent perceives and commands."""
+        """Show percepts and command of the selected agent."""
         if self.chosen is None:
             self.about.content = NOTHING_SELECTED_TEXT
             for kind in AGENT_LINE_KINDS:
@@ -310,7 +314,7 @@ class SelectionPanel(PagePanel):
         self.about.content = small_print_html(drawn.html.replace("</b>", f"{where}</b>", 1))
 
     def begin_fault(self) -> None:
-        """Let the fault that the menu names begin in the selected agent."""
+        """Begin the fault that the menu names in the selected agent."""
         if self.chosen is not None:
             side, agent = self.scene.pane_and_agent(self.chosen)
             self.player.sides[side].flight.fault(self.fault.value, agent, wait=False)

@@ -1,4 +1,4 @@
-"""Tuning: sliders and menus of every parameter of the side in hand, undo, and what can be saved of it."""
+"""Tuning panel: sliders and menus of every parameter of the active pane, undo, and files to save."""
 
 import html
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ RESTART_HINTS = {"agents": "“agents” under Play starts another flight", "dt"
 
 
 class TuningPanel(PagePanel):
-    """Sliders of one side."""
+    """Sliders of one pane."""
 
     def __init__(self, page: "FlightPage", tab: Any):
         super().__init__(page)
@@ -50,7 +50,7 @@ class TuningPanel(PagePanel):
         panel.row({"Set": self.ask(self._set)})
 
     def rebuild(self) -> None:
-        """Make the controls of the side in hand; again only where another law or side is in hand."""
+        """Make the controls of the active pane; again only for another law or pane."""
         preset, two = self.player.preset, len(self.player.sides) > 1
         made_for = preset.model, preset.records.keys(), self.player.side.origin.where, self.player.hand if two else None
         if made_for != self._controls_for:
@@ -62,7 +62,7 @@ class TuningPanel(PagePanel):
         self.show_values()
 
     def _rebuild_faults(self) -> None:
-        """Make the controls of faults again where others are in force: some may have been set off by hand."""
+        """Make the controls of faults again when other faults are in force: some may be begun by hand."""
         entries = self.player.scenario.faults
         faults = [entry.fault.name for entry in entries]
         if faults != self._fault_names:
@@ -72,7 +72,7 @@ class TuningPanel(PagePanel):
             self._fault_folders, self._fault_names = self._made(fault_controls(entries)), faults
 
     def _made(self, controls: Mapping[str, list[ParameterControl]]) -> list[Any]:
-        """Folders of controls, by section."""
+        """Make folders of controls, by section."""
         folders = []
         with self.tab:
             for section, own in controls.items():
@@ -106,7 +106,7 @@ class TuningPanel(PagePanel):
             raise
 
     def _set(self) -> None:
-        """Set a key by its name, as --set does; also one that has no slider, or beyond the ends of its slider."""
+        """Set a key by its name, as --set does; also one without a slider, or beyond the ends of its slider."""
         key, value = parse_setting(self.setting_field.value, self.player.scenario)
         self.player.change(key, value)
         self.setting_field.value = ""
@@ -127,20 +127,22 @@ class TuningPanel(PagePanel):
         self.widgets.notify("Saved", str(path.absolute()))
 
     def refresh(self) -> None:
-        """The command that opens this scenario again, with a button that copies it; controls of faults that are new."""
+        """Show the command that opens this scenario again, with a button that copies it, and controls of new
+        faults.
+        """
         self._rebuild_faults()
         command = html.escape(self.player.command, quote=True)
         self.command.content = small_print_html(f"<code>{command}</code><br>{copy_button_html(command)}")
 
 
 def copy_button_html(command: str) -> str:
-    """A button that copies a command, which is escaped, to the clipboard; the page's own script (`door`) does it."""
+    """Return a button that copies a command, escaped here; the page's script (`access_token`) copies it."""
     look = "border:1px solid #0072B2;border-radius:4px;background:none;color:#0072B2;cursor:pointer;margin-top:0.3em"
     return f"<button type='button' style='{look}' data-copy=\"{command}\">Copy command</button>"
 
 
 def parse_setting(text: str, scenario: Scenario) -> tuple[str, Any]:
-    """Key and value of a line such as `radio.delay = 400 ms`; raises ScenarioError where there is no such key."""
+    """Return key and value of a line such as `radio.delay = 400 ms`; raises ScenarioError for an unknown key."""
     key, equals, value = (part.strip() for part in text.partition("="))
     if not (key and equals and value):
         raise ScenarioError([f"{text.strip() or 'any key'}: write KEY = VALUE, for instance model.p_rep = 0.14"])
@@ -160,5 +162,5 @@ def parse_setting(text: str, scenario: Scenario) -> tuple[str, Any]:
 
 
 def file_stem(player: Player) -> str:
-    """What files of the side in hand are called."""
+    """Return the stem of file names of the active pane."""
     return Path(player.side.origin.where).with_suffix("").name

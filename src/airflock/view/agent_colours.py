@@ -1,4 +1,6 @@
-"""Shades: one value of every agent at one moment, the colours that stand for it, and the key that says so."""
+"""Colours of agents: one value of every agent at one moment, the colours that stand for it, and the key that
+explains them.
+"""
 
 import html
 import math
@@ -45,12 +47,12 @@ LINE_STYLES = {
 
 
 def ramp_colours(share: NDArray[Any]) -> NDArray[np.uint8]:
-    """Colours (n, 3) of shares from 0 to 1."""
+    """Return the colours (n, 3) of values from 0 to 1."""
     return _interpolated(RAMP_STOPS, np.clip(share, 0.0, 1.0) * (len(RAMP_STOPS) - 1))
 
 
 def wheel_colours(share: NDArray[Any]) -> NDArray[np.uint8]:
-    """Colours (n, 3) of shares of a full turn."""
+    """Return the colours (n, 3) of fractions of a full turn."""
     closed = np.vstack([WHEEL_STOPS, WHEEL_STOPS[:1]])
     return _interpolated(closed, np.mod(share, 1.0) * len(WHEEL_STOPS))
 
@@ -67,7 +69,7 @@ FIRST_LINKS = 9  # nearest agents that are linked first: in a dense flock they j
 
 
 def cluster_labels(position: NDArray[Any], distance: float, period: NDArray[Any] | None = None) -> NDArray[np.intp]:
-    """Of each agent the smallest number of an agent in its cluster, or -1 if it is alone: (agent,).
+    """Return the smallest agent number in the cluster of each agent, or -1 for a lone agent: (agent,).
 
     position : (agent, axis), m; distance : m, links are shorter; box : sides of a periodic world, m
     """
@@ -76,35 +78,41 @@ def cluster_labels(position: NDArray[Any], distance: float, period: NDArray[Any]
     if count < 2 or not distance > 0.0:
         return np.full(count, -1, np.intp)
     tree = cKDTree(points if period is None else np.mod(points + 0.5 * period, period), boxsize=period)
+    # A few nearest links join almost the whole flock at the cost of one query; all pairs within the distance
+    # would grow with the square of a dense flock.
     apart, other = tree.query(tree.data, k=min(FIRST_LINKS, count), distance_upper_bound=distance)
     near = np.isfinite(apart) & (np.arange(count)[:, None] != other)
     label = _component_labels(np.nonzero(near)[0], other[near], count)
     rest = np.flatnonzero(label != np.bincount(label).argmax())
     if len(rest):  # whatever joins two clusters has an end outside the largest
+        # cKDTree includes pairs at exactly this distance; the metric of clusters excludes them.
         far = np.nextafter(distance, 0.0)
         links = cKDTree(tree.data[rest], boxsize=period).sparse_distance_matrix(tree, far, output_type="coo_matrix")
         first = np.concatenate([np.nonzero(near)[0], rest[links.row]])
         label = _component_labels(first, np.concatenate([other[near], links.col]), count)
     least = np.full(label.max() + 1, count, np.intp)
+    # Labels are renamed to the smallest agent number, so that a cluster keeps its colour from frame to frame.
     np.minimum.at(least, label, np.arange(count))
     return np.where(np.bincount(label)[label] > 1, least[label], -1)
 
 
 def _component_labels(first: NDArray[Any], second: NDArray[Any], count: int) -> NDArray[np.intp]:
-    """Labels (agent,) of what links between agents join."""
+    """Return the labels (agent,) of the components that links between agents join."""
     links = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.intp)
 
 
 def cluster_distance(scenario: Any) -> float:
-    """Distance within which two agents of a scenario belong to one cluster, m; nan where that is not said."""
+    """Return the distance within which two agents belong to one cluster, m; nan where no rule of the scenario
+    gives one.
+    """
     return float(scenario.resolved_metrics().r_cluster or math.nan)
 
 
 # ---- Colourings of agents
 
 NUMBERS, HEADING, CATEGORIES, IDENTITIES = "scale", "turn", "names", "marks"
-MOTION_COLOURINGS = ("speed", "heading", "height")  # what the motion alone tells
+MOTION_COLOURINGS = ("speed", "heading", "height")  # from the motion alone
 GOLDEN_TURN = 0.6180339887  # of a turn between two marks: neighbouring numbers look unlike
 NO_VALUE_COLOUR = (150, 150, 150)  # of -1: none of the names, alone
 COLOURING_NOTES = {"agent": "each agent has a colour of its own", "cluster": "a colour for each cluster"}
@@ -115,9 +123,9 @@ class AgentColours(NamedTuple):
 
     name   : what it is
     kind   : scale, from `low` to `high` in `unit`; turn, shares of a full turn; names, numbers of `names`;
-             marks, whole numbers that only tell agents apart. Names and marks: -1 for none
+             marks, whole numbers without an order. Names and marks: -1 for none
     values : (agent,)
-    told   : what the key says beside it
+    note   : text beside the key
     """
 
     name: str
@@ -127,12 +135,13 @@ class AgentColours(NamedTuple):
     high: float = 1.0
     unit: str = ""
     names: tuple[str, ...] = ()
-    told: str = ""
+    note: str = ""
 
     @property
     def colours(self) -> NDArray[np.uint8]:
-        """Colours (agent, 3); grey where there is no value."""
+        """Return the colours (agent, 3); grey where there is no value."""
         values = np.asarray(self.values, float)
+        # Only numbers and headings may be negative; elsewhere -1 stands for no value.
         known = np.isfinite(values) & ((values >= 0.0) | (self.kind in (NUMBERS, HEADING)))
         whole = np.where(known, values, 0.0)
         if self.kind == NUMBERS:
@@ -146,10 +155,10 @@ class AgentColours(NamedTuple):
 
     @property
     def key(self) -> str:
-        """The key to the colours, as HTML."""
+        """Return the key to the colours, as HTML."""
         if self.kind == IDENTITIES:
             words = COLOURING_NOTES.get(self.name, self.name)
-            return _small_print_html(", ".join(part for part in (words, self.told) if part))
+            return _small_print_html(", ".join(part for part in (words, self.note) if part))
         if self.kind == CATEGORIES:
             chips = [
                 _colour_chip_html(tone, name)
@@ -157,7 +166,7 @@ class AgentColours(NamedTuple):
             ]
             return _small_print_html(
                 " ".join(
-                    [f"{html.escape(self.name)}:", *chips, _colour_chip_html(NO_VALUE_COLOUR, self.told or "none")]
+                    [f"{html.escape(self.name)}:", *chips, _colour_chip_html(NO_VALUE_COLOUR, self.note or "none")]
                 )
             )
         if self.kind == HEADING:
@@ -177,7 +186,7 @@ class AgentColours(NamedTuple):
 def motion_colours(
     name: str, position: NDArray[Any], velocity: NDArray[Any], max_speed: float, height_range: tuple[float, float]
 ) -> AgentColours:
-    """Speed (0 to `top` m/s), heading, or height (between two, m) of agents: (agent, 3), m and m/s."""
+    """Colour by speed (0 to `top` m/s), heading, or height (between two, m): (agent, 3), m and m/s."""
     if name == "heading":
         return AgentColours(name, HEADING, np.arctan2(velocity[:, 1], velocity[:, 0]) / (2.0 * np.pi))
     if name == "height":
@@ -186,19 +195,19 @@ def motion_colours(
 
 
 def number_colours(name: str, values: NDArray[Any], unit: str = "") -> AgentColours:
-    """Any number of agents, on a scale over all values at hand."""
+    """Colour by a number, on a scale over all its values."""
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
     return AgentColours(name, NUMBERS, values, low, high, unit)
 
 
 def individual_colours(count: int) -> AgentColours:
-    """A colour for each agent."""
+    """Give each agent its own colour."""
     return AgentColours("agent", IDENTITIES, np.arange(count))
 
 
 def group_colours(groups: Sequence[Any], count: int) -> AgentColours:
-    """To which group of a scenario each of `count` agents belongs."""
+    """Colour `count` agents by their group of a scenario."""
     values = np.full(count, -1)
     for number, group in enumerate(groups):
         values[list(group.agents)] = number
@@ -208,7 +217,7 @@ def group_colours(groups: Sequence[Any], count: int) -> AgentColours:
 def fault_colours(
     faults: Sequence[Mapping[str, Any]], time: float, count: int, kinds: Sequence[str] = ()
 ) -> AgentColours:
-    """Which kind of fault is at work in each of `count` agents at a time, s; of several, that which began last.
+    """Colour `count` agents by the fault that is active at a time, s; of several, by the one that began last.
 
     faults : kind, agent, begin and end, s (None: never); kinds : names in the order of the key, if they are known
     """
@@ -218,22 +227,22 @@ def fault_colours(
         over = fault["end"] is not None and time >= float(fault["end"])
         if float(fault["begin"]) <= time and not over and 0 <= int(fault["agent"]) < count:
             values[int(fault["agent"])] = names.index(str(fault["kind"]))
-    return AgentColours("fault", CATEGORIES, values, names=names, told="sound")
+    return AgentColours("fault", CATEGORIES, values, names=names, note="sound")
 
 
 def varied_number_units(scenario: Scenario) -> dict[str, str]:
-    """Numbers of law and body that differ among agents, such as model.v_flock, with their units."""
-    found = {}
+    """Return the units of the numbers of law and body that differ among agents, such as model.v_flock."""
+    units = {}
     records = {"model": scenario.parameters, "body": scenario.body, "sensors": scenario.sensors}
     for section, record in records.items():
         for name, declared, _ in declarations(record):
             if (LETTERS[section], name) in scenario.varied and isinstance(declared, Quantity):
-                found[f"{section}.{name}"] = "" if declared.unit == "1" else declared.unit
-    return found
+                units[f"{section}.{name}"] = "" if declared.unit == "1" else declared.unit
+    return units
 
 
 def varied_colours(scenario: Scenario, key: str, seed: int) -> AgentColours:
-    """A number that differs among agents, such as model.v_flock, as it is drawn with a seed."""
+    """Colour by a number that differs among agents, such as model.v_flock, drawn with a seed."""
     section, _, name = key.partition(".")
     return number_colours(
         key, np.array(scenario.agent_values(LETTERS[section], name, seed)), varied_number_units(scenario)[key]
@@ -241,14 +250,14 @@ def varied_colours(scenario: Scenario, key: str, seed: int) -> AgentColours:
 
 
 def cluster_colours(least: NDArray[Any]) -> AgentColours:
-    """Clusters as `view.stage.clusters` names them."""
+    """Colour by the clusters that `cluster_labels` returns."""
     known, sizes = np.unique(least[least >= 0], return_counts=True)
     most = f", the largest of {sizes.max()}" if len(known) else ""
-    return AgentColours("cluster", IDENTITIES, least, told=f"{len(known)} of two and more{most}, grey: alone")
+    return AgentColours("cluster", IDENTITIES, least, note=f"{len(known)} of two and more{most}, grey: alone")
 
 
 def category_colours(count: int) -> NDArray[np.uint8]:
-    """Colours (count, 3) of names: those that colour-blind readers tell apart, then others."""
+    """Return colours (count, 3) for names: first those that colour-blind readers can separate, then others."""
     own = np.array(CATEGORY_COLOURS, np.uint8)[:count]
     return np.vstack([own, wheel_colours(np.arange(len(own), count) * GOLDEN_TURN)]).astype(np.uint8)
 

@@ -1,4 +1,4 @@
-"""What every picture of a flight needs: paths in a window of time, the world's outlines, a view onto a plane."""
+"""Paths in a window of time, outlines of the world, and the projection of both onto a picture."""
 
 import math
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ class FlightPaths(NamedTuple):
 
     @property
     def speed(self) -> Array:
-        """(time, agent) m/s."""
+        """Speed (time, agent), m/s."""
         return np.asarray(np.sqrt((self.velocity**2).sum(1)))
 
     @property
@@ -43,7 +43,7 @@ class FlightPaths(NamedTuple):
 def paths_in_window(
     recording: xr.Dataset, start: float | None = None, stop: float | None = None, *, last: float | None = None
 ) -> FlightPaths:
-    """Trajectories from start to stop, s; without a start, the `last` seconds, or all of them.
+    """Return the trajectories from start to stop, s; without a start, the `last` seconds, or all of them.
 
     Raises a RecordingError when the window holds no frame.
     """
@@ -70,7 +70,7 @@ def paths_in_window(
 def time_window(
     times: Array, start: float | None, stop: float | None, last: float | None = None
 ) -> tuple[float, float]:
-    """First and last instant shown, s."""
+    """Return the first and the last instant shown, s."""
     end = float(times[-1]) if stop is None else float(stop)
     if start is not None:
         begin = float(start)
@@ -82,25 +82,25 @@ def time_window(
 
 
 def scenario_or_none(recording: xr.Dataset) -> Scenario | None:
-    """Scenario that a recording was flown with; None for tracks."""
+    """Return the scenario that a recording was flown with; None for tracks."""
     check_recording(recording)
     return scenario_of_recording(recording) if recording.attrs.get("airflock_scenario") else None
 
 
 def world_or_open(recording: xr.Dataset) -> arena.Parameters:
-    """World of a recording; open for tracks."""
+    """Return the world of a recording; an open one for tracks."""
     scenario = scenario_or_none(recording)
     return scenario.world if scenario else arena.Parameters(arena="none")
 
 
 def short_name(source: xr.Dataset | Scenario) -> str:
-    """Short name of a scenario or recording: that of the preset or file, or of the file of its tracks."""
+    """Return the short name of a scenario or recording: of its preset or file, or of the file of its tracks."""
     name = source.name if isinstance(source, Scenario) else attributes.recording_name(source)
     return Path(name).stem if name.endswith((".toml", ".nc")) else name
 
 
 def title_details(recording: xr.Dataset, paths: FlightPaths | None = None) -> str:
-    """What else a title says: number of agents, seed, and the window of time that is shown."""
+    """Return the details of a title: number of agents, seed, and the window of time that is shown."""
     agents = recording.sizes["individual"]
     parts = [f"{agents} agent{'s' if agents > 1 else ''}"]
     if "airflock_seed" in recording.attrs:
@@ -111,38 +111,38 @@ def title_details(recording: xr.Dataset, paths: FlightPaths | None = None) -> st
 
 
 class WorldOutline(NamedTuple):
-    """Corners (corner, axis) in m of a closed polygon, and whether it is an obstacle."""
+    """Corners (corner, axis) in m of a closed polygon; `obstacle` is false for the arena."""
 
     corners: Array
     obstacle: bool
 
 
 def _outline_heights(world: arena.Parameters) -> list[tuple[float, float]]:
-    """Lowest and highest height of each outline of a 3-D arena, m."""
+    """Return the lowest and the highest height of each outline of a 3-D arena, m."""
     whole = arena.heights_of(world)
-    found = [] if world.arena == "none" else [whole]
-    return found + [(h[0], h[1]) for h in world.heights or [whole] * len(world.obstacles)]
+    heights = [] if world.arena == "none" else [whole]
+    return heights + [(h[0], h[1]) for h in world.heights or [whole] * len(world.obstacles)]
 
 
 def world_outlines(world: arena.Parameters) -> list[WorldOutline]:
-    """Ground plans of the arena (first, if there is one) and of the obstacles, as closed polygons in the plane."""
+    """Return the ground plans of the arena (first, if there is one) and of the obstacles, as closed polygons."""
     plan = ground_plan(world)
-    found = [] if plan is None else [WorldOutline(np.array(plan.exterior.coords), False)]
+    outlines = [] if plan is None else [WorldOutline(np.array(plan.exterior.coords), False)]
     for corners in world.obstacles:
-        found.append(WorldOutline(np.array([*corners, corners[0]]), True))
-    return found
+        outlines.append(WorldOutline(np.array([*corners, corners[0]]), True))
+    return outlines
 
 
 def wall_lines(world: arena.Parameters) -> list[WorldOutline]:
-    """Faces and edges to draw: in the plane the outlines, in space floor, ceiling and uprights of each."""
+    """Return faces and edges to draw: in the plane the outlines, in space floor, ceiling and uprights of each."""
     if world.dimensions == "2":
         return world_outlines(world)
-    found = []
+    outlines = []
     for (corners, obstacle), (low, high) in zip(world_outlines(world), _outline_heights(world), strict=True):
-        found += [WorldOutline(_at_height(corners, z), obstacle) for z in (low, high)]
+        outlines += [WorldOutline(_at_height(corners, z), obstacle) for z in (low, high)]
         step = max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1  # a circle gets eight uprights
-        found += [WorldOutline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
-    return found
+        outlines += [WorldOutline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
+    return outlines
 
 
 def _at_height(corners: Array, z: float) -> Array:
@@ -150,9 +150,10 @@ def _at_height(corners: Array, z: float) -> Array:
 
 
 def crosses_periodic_face(segments: Array, world: arena.Parameters) -> Array:
-    """Which segments (segment, end, axis), m, lead through a face of a periodic world to the opposite one."""
+    """Return a mask of the segments (segment, end, axis), m, that lead through a periodic face."""
     if world.edges != "periodic":
         return np.zeros(len(segments), bool)
+    # A step of more than half the world is a jump to the opposite face.
     halves = np.array(half_sizes(world)[: segments.shape[2]])
     return np.asarray((np.abs(segments[:, 1] - segments[:, 0]) > halves).any(axis=1))
 
@@ -164,7 +165,9 @@ class Projection(NamedTuple):
     up: Array
 
     def __call__(self, points: Array, axis: int = 1) -> tuple[Array, Array]:
-        """Picture coordinates of points whose given axis holds their components; both m. A plane lies at height 0."""
+        """Return picture coordinates of points, m; `axis` is the axis that holds their components. A plane lies at
+        height 0.
+        """
         moved = np.moveaxis(points, axis, -1)
         known = min(moved.shape[-1], len(self.right))
         moved = moved[..., :known]
@@ -172,10 +175,11 @@ class Projection(NamedTuple):
 
 
 def projection(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.0) -> Projection:
-    """From above in the plane; in space from the given direction."""
+    """Return the view from above in the plane; in space, the view from a direction."""
     if axes == 2:
         return Projection(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
     a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
+    # Oblique parallel projection: lengths compare anywhere in the picture, which perspective would spoil.
     right = np.array([-math.sin(a), math.cos(a), 0.0])
     up = np.array([-math.cos(a) * math.sin(e), -math.sin(a) * math.sin(e), math.cos(e)])
     return Projection(right, up)
@@ -184,7 +188,7 @@ def projection(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.
 def picture_extent(
     paths: FlightPaths, world: arena.Parameters, view: Projection, margin: float = 0.04, around: Sequence[Array] = ()
 ) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top of a picture that holds the arena, every path and the lines `around` it, m."""
+    """Return left, right, bottom and top of a picture that holds the arena, all paths and the lines `around`, m."""
     xs, ys = view(paths.position)
     points = [(xs.ravel(), ys.ravel())] + [
         view(line) for line in (*(wall.corners for wall in wall_lines(world)), *around)
@@ -198,10 +202,11 @@ def picture_extent(
 
 
 def speed_range(paths: FlightPaths) -> tuple[float, float]:
-    """Ends of a colour bar, m/s: what all but a few percent lie between, rounded outwards."""
+    """Return the ends of a colour bar, m/s: all but a few percent of the speeds lie between, rounded outwards."""
     speed = paths.speed[np.isfinite(paths.speed)]
     if not speed.size:
         return 0.0, 1.0
+    # A single fast agent would leave all others in one colour.
     slow, fast = (max(float(v), 1e-3) for v in np.quantile(speed, (0.01, 0.999)))
     step = 10.0 ** math.floor(math.log10(fast)) / 2.0
     return step * math.floor(slow / step), step * math.ceil(fast / step)

@@ -1,4 +1,4 @@
-"""Arrows for what a law makes of its neighbours: the vectors among the fields of its sums."""
+"""Vectors that a law makes of its neighbours, and the rays that it casts."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -13,26 +13,26 @@ from airflock.scenarios import FlightWorld, GoalCourse, Scenario, step_counts
 
 
 def vector_fields(record: Any) -> dict[str, tuple[str, str]]:
-    """Vectors among the fields of a NamedTuple: name → fields of its x and y component.
+    """Find the vectors among the fields of a NamedTuple: name → fields of its x and y component.
 
     Sums(x, y, z) is one vector without a name; Sums(away_x, away_y, away_z, n) one called away.
     """
     fields = record._fields
-    found = {}
+    vectors = {}
     for field in fields:
         stem = field[:-1]
         if field.endswith("x") and f"{stem}y" in fields:
-            found[stem.strip("_")] = (field, f"{stem}y")
-    return found
+            vectors[stem.strip("_")] = (field, f"{stem}y")
+    return vectors
 
 
 def term_name_and_unit(model: Model, stem: str) -> tuple[str, str]:
-    """What a law calls a vector among its Sums, and its unit; by default the field's stem."""
+    """Return the law's name for a vector among its Sums, and its unit; by default the field's stem."""
     return model.terms.get(stem, (stem or "neighbours", ""))
 
 
 def vector_values(record: Any) -> dict[str, NDArray[np.float64]]:
-    """The vectors that a NamedTuple holds, by name: (3,), without a z component 0."""
+    """Return the vectors that a NamedTuple holds, by name: (3,), 0 for a missing z component."""
     return {
         name: np.array([getattr(record, x), getattr(record, y), getattr(record, f"{x[:-1]}z", 0.0)], float)
         for name, (x, y) in vector_fields(type(record)).items()
@@ -40,7 +40,7 @@ def vector_values(record: Any) -> dict[str, NDArray[np.float64]]:
 
 
 def arrow_lines(begin: NDArray[Any], end: NDArray[Any]) -> NDArray[np.float64]:
-    """A shaft and two barbs, (3, 2, 3), in the plane or as seen from above; nothing for an arrow of no length."""
+    """Return a shaft and two barbs, (3, 2, 3), in the plane or as seen from above; nothing for a zero arrow."""
     along = np.asarray(end, float) - begin
     length = float(np.linalg.norm(along))
     if length < 1e-9:
@@ -65,12 +65,12 @@ class CastRay(NamedTuple):
 
 
 class RecordingPercept(BoundPercept):
-    """Senses that keep every cast."""
+    """Percept that keeps every ray that a law casts."""
 
     cast_rays: list[CastRay]
 
     def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
-        """Free distance along the unit vector u, m."""
+        """Return the free distance along the unit vector u, m, and keep the ray."""
         free = super().cast(ux, uy, uz, length, radius)
         self.cast_rays.append(CastRay(ux, uy, uz, free, length))
         return free
@@ -85,15 +85,15 @@ def rays_and_command(
     time: float,
     agent: int,
 ) -> tuple[list[CastRay], Any]:
-    """Rays that an agent casts, and the command that it decides on, by its law's own rules.
+    """Return the rays that an agent casts and the command that it decides on, by its law's own rules.
 
     place, course : the world and its goals as they are at this time, s; own, heard : states of the agent and of others
     """
     senses = RecordingPercept.of(world, own, time, course.of(agent), (0, 0, agent))
     senses.cast_rays = []
     period = step_counts(scenario)["decide_every"] * scenario.flight.dt
-    made = decide(
+    decision = decide(
         scenario.model, scenario.parameters, own, list(heard), (), None,
         time=time, period=period, index=agent, percept=senses,
     )  # fmt: skip
-    return senses.cast_rays, made.command
+    return senses.cast_rays, decision.command

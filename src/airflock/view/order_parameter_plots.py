@@ -1,4 +1,6 @@
-"""Order parameters over time (Vásárhelyi et al. 2018, Figs 3 and 4 D)."""
+"""Plots of order parameters: over time, over goals, over swept keys, and as transfer functions (Vásárhelyi et al.
+2018).
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -41,11 +43,11 @@ def series(
     settings: Mapping[str, Any] | None = None,
     ax: Axes | None = None,
 ) -> Figure:
-    """Correlation, speed in units of v_flock, nearest neighbours (m) and rotation at every instant.
+    """Plot correlation, speed in units of v_flock, nearest neighbours (m) and rotation at every instant.
 
     recording   : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; by default the whole flight
-    smooth      : means over so many seconds, s (of the nearest pair the least value), told in the title; 0 draws
+    smooth      : means over so many seconds, s (of the nearest pair the least value), named in the title; 0 draws
                   instants alone, by default a two-hundredth of what is shown
     settings    : keys such as {"metrics.r_cluster": 60.0} that replace those the recording was flown with
     ax          : axes of a grid, whose place the panels take, instead of a new figure
@@ -85,25 +87,25 @@ def series(
     _rotation(lower, course, style.PURPLE, ROTATION_LABEL, pen)
     _mark_faults(recording, course, upper, lower)
     lower.set_xlim(float(course.index[0]), float(course.index[-1]) if len(course) > 1 else None)
-    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.told}")
+    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
     return style.root_figure(figure)
 
 
 def _mark_faults(recording: xr.Dataset, course: pd.DataFrame, upper: Axes, lower: Axes) -> None:
-    """A line where each fault begins, with its kind and agent where there are few."""
-    shown = [told for told in recorded_faults(recording) if course.index[0] <= told["begin"] <= course.index[-1]]
-    for told in shown:
+    """Draw a line where each fault begins, with its kind and agent where there are few."""
+    shown = [fault for fault in recorded_faults(recording) if course.index[0] <= fault["begin"] <= course.index[-1]]
+    for fault in shown:
         for axes in (upper, lower):
-            axes.axvline(told["begin"], color="0.55", linewidth=0.7, linestyle=":", zorder=0)
+            axes.axvline(fault["begin"], color="0.55", linewidth=0.7, linestyle=":", zorder=0)
         if len(shown) <= MAX_NAMED_FAULTS:
-            label = f" {told['kind']} ({told['agent']})"
+            label = f" {fault['kind']} ({fault['agent']})"
             lower.text(
-                told["begin"], 0.98, label, transform=lower.get_xaxis_transform(), rotation=90, va="top", fontsize=6
+                fault["begin"], 0.98, label, transform=lower.get_xaxis_transform(), rotation=90, va="top", fontsize=6
             )
 
 
 class SmoothedLines:
-    """Draws courses smoothed, with every instant faint behind.
+    """Lines that are smoothed, with every instant faint behind.
 
     course : order parameters over time, s; smooth : window, s; None for a two-hundredth of the course, 0 for none
     """
@@ -114,13 +116,13 @@ class SmoothedLines:
         span = float(times[-1] - times[0]) if len(times) else 0.0
         if smooth is not None and smooth < 0.0:
             raise AirflockError(f"smooth = {smooth:g} s must not be below 0")
-        wanted = float(f"{span / WINDOW_SHARE:.1g}") if smooth is None else smooth
-        self.count = round(wanted / period) if period > 0.0 else 0
+        seconds = float(f"{span / WINDOW_SHARE:.1g}") if smooth is None else smooth
+        self.count = round(seconds / period) if period > 0.0 else 0
         self.window_seconds = self.count * period
 
     @property
-    def told(self) -> str:
-        """What a title says of the window."""
+    def window_text(self) -> str:
+        """Words of the title that describe the window."""
         return f" · means over {self.window_seconds:.3g} s" if self.count > 1 else ""
 
     def draw(self, axes: Axes, values: pd.Series, color: str, label: str, *, least: bool = False) -> list[Any]:
@@ -128,6 +130,7 @@ class SmoothedLines:
         if self.count <= 1:
             return axes.plot(values.index, values, color=color, linewidth=0.9, label=label)
         axes.plot(values.index, values, color=color, linewidth=0.6, alpha=0.25)
+        # Centred, so that smoothed features stay at their time; the ends use what there is.
         around = values.rolling(self.count, center=True, min_periods=1)
         return axes.plot(
             values.index, around.min() if least else around.mean(), color=color, linewidth=1.1, label=label
@@ -135,7 +138,7 @@ class SmoothedLines:
 
 
 def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax: Axes | None) -> Figure:
-    """Every value of a metric set that has no picture of its own, one below the other; none of what is not there."""
+    """Plot every value of a metric set without a picture of its own, one below the other; skip missing values."""
     walled = scenario_or_none(recording) is not None
     names = [name for name in course.columns if course[name].notna().any() and (walled or name not in WALL_METRICS)]
     units = course.attrs.get("units", {})
@@ -155,14 +158,14 @@ def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax:
         if spread < MIN_RELATIVE_SPREAD * abs(middle):  # rounding is no course
             axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
     figure.align_ylabels(list(panels))
-    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.told}")
+    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
     return style.root_figure(figure)
 
 
 def rotations(
     flights: Mapping[str, xr.Dataset], *, start: float | None = None, stop: float | None = None, ax: Axes | None = None
 ) -> Figure:
-    """phi_LAP of several flights on one axis (Vásárhelyi et al. 2018, Fig. 4 D): near ±1 where they circle.
+    """Plot phi_LAP of several flights on one axis (Vásárhelyi et al. 2018, Fig. 4 D): near ±1 where they circle.
 
     flights     : label → recording, (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; ax : axes to draw into, instead of a new figure
@@ -216,7 +219,7 @@ def flocked(
     settings: Mapping[str, Any] | None = None,
     ax: Axes | None = None,
 ) -> Figure:
-    """Share of agents flocked and their polarisation, sub-swarms and collisions at every instant; lines mark goals.
+    """Plot the share of flocked agents, polarisation, sub-swarms and collisions over time; lines mark goals.
 
     recording   : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     start, stop : window of time, s; settings : keys that replace those the recording was flown with
@@ -259,7 +262,7 @@ def flocked(
     lower.set_ylim(bottom=0.0)
     style.style_axes(lower, "time (s)", "number")
     style.add_legend(lower, lower.get_lines(), columns=2)
-    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.told}")
+    style.set_figure_title(figure, short_name(recording), f"{title_details(recording)}{pen.window_text}")
     return style.root_figure(figure)
 
 
@@ -277,7 +280,7 @@ def heatmap(
     scenario: Scenario | None = None,
     ax: Axes | None = None,
 ) -> Figure:
-    """One order parameter over one or two swept keys.
+    """Plot one order parameter over one or two swept keys.
 
     table    : tidy, one row per flight: a column for each key, one for `value`, usually `seed`
     keys     : one or two swept keys; the first is the horizontal axis
@@ -335,7 +338,8 @@ def _are_numbers(levels: list[Any]) -> bool:
 
 
 def _named_ticks(axes: Axes, axis: str, levels: list[Any]) -> None:
-    """Levels as names at 0, 1, 2, ...; every so many of them when there are many."""
+    """Label levels as names at 0, 1, 2, ...; only every n-th of them when there are many."""
+    # Twelve names fit below one panel without touching.
     every = max(1, -(-len(levels) // 12))
     names = [f"{v:g}" if isinstance(v, (int, float, np.number)) else str(v) for v in levels]
     getattr(axes, f"set_{axis}ticks")(range(0, len(levels), every), names[::every])
@@ -362,6 +366,7 @@ def _map(figure: Figure, axes: Axes, table: pd.DataFrame, keys: Sequence[str], v
     edges = [_cell_edges(axes, which, v) for which, v in zip("xy", levels, strict=True)]
     cells = np.ma.masked_invalid(grid.to_numpy(dtype=float))
     low, high = (float(cells.min()), float(cells.max())) if cells.count() else (0.0, 1.0)
+    # Values of both signs get a diverging map whose white is zero.
     signed = low < 0.0 < high
     most = max(-low, high)
     axes.set_facecolor(style.PALE_GREY)  # a point that was not flown
@@ -375,19 +380,20 @@ def _map(figure: Figure, axes: Axes, table: pd.DataFrame, keys: Sequence[str], v
 
 
 def _write(axes: Axes, mesh: Any, edges: list[Any], cells: Any) -> None:
-    """The number in each cell, dark or light, whichever reads better on its colour."""
+    """Write the number into each cell, dark or light, whichever reads better on its colour."""
     size = style.SMALL_SIZE - 1.0 if max(cells.shape) <= 8 else style.SMALL_SIZE - 2.5
     for (row, column), number in np.ndenumerate(cells):
         if np.ma.is_masked(cells[row, column]):
             continue
         red, green, blue = to_rgb(mesh.cmap(mesh.norm(number)))
+        # Luma of ITU-R BT.601: dark text on light cells and the other way round.
         color = style.INK if 0.299 * red + 0.587 * green + 0.114 * blue > 0.5 else "white"
         x, y = (0.5 * (e[i] + e[i + 1]) for e, i in ((edges[0], column), (edges[1], row)))
         axes.text(x, y, f"{number:.3g}", ha="center", va="center", fontsize=size, color=color)
 
 
 def _cell_edges(axes: Axes, axis: str, levels: list[Any]) -> Any:
-    """Borders of cells: to scale where levels are evenly spaced numbers, else of equal size and named one by one."""
+    """Return the borders of cells: to scale for evenly spaced numbers, else cells of equal size with a name each."""
     steps = np.diff(np.array(levels, dtype=float)) if _are_numbers(levels) else np.zeros(0)
     if len(levels) > 12 and steps.size and steps.max() < 1.01 * steps.min():
         places: Any = np.array(levels, dtype=float)
@@ -404,7 +410,7 @@ def _cell_edges(axes: Axes, axis: str, levels: list[Any]) -> Any:
 
 
 def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Figure:
-    """F1, F2 and F3 (Vásárhelyi et al. 2018, Eqs 17-20 and Fig. 7), each over the order parameter that it judges.
+    """Plot F1, F2 and F3 (Vásárhelyi et al. 2018, Eqs 17-20 and Fig. 7), each over its order parameter.
 
     scenario : draws them with its v_flock, tolerances and units; without it, in units of their own parameters
     ax       : axes of a grid, whose place the panels take, instead of a new figure

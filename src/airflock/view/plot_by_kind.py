@@ -1,4 +1,4 @@
-"""One door to the pictures of a scenario or a recording, by the name of the kind."""
+"""`airflock.plot`: draw a scenario or a recording, by the name of the kind of picture."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ PlotSource = Scenario | xr.Dataset | str | os.PathLike[str]
 
 
 def plot(
-    what: PlotSource,
+    source: PlotSource,
     kind: str = "trajectories",
     *,
     seed: int = 0,
@@ -42,7 +42,7 @@ def plot(
 
     Parameters
     ----------
-    what : Scenario, xarray.Dataset, str or path
+    source : Scenario, xarray.Dataset, str or path
         A scenario or the name of one, which is flown; or a recording (time, space, keypoint, individual), or a
         file (.nc) of one.
     kind : str
@@ -83,12 +83,12 @@ def plot(
     if kind not in KINDS:
         raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}{suggest(kind, KINDS, lead='; ')}")
     if kind in SCENARIO_KINDS:
-        _refuse_tracks(what, kind)
-        scenario = _scenario(what, settings, law, trust)
+        _refuse_tracks(source, kind)
+        scenario = _scenario(source, settings, law, trust)
         return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)
     keep = ("heard",) if kind == "reception" else ()
-    recording = recording_or_flight(what, seed, settings, law, trust=trust, keep=keep)
-    with naming_file(what):
+    recording = recording_or_flight(source, seed, settings, law, trust=trust, keep=keep)
+    with naming_file(source):
         return _of_recording(recording, kind, start, stop, ax)
 
 
@@ -129,7 +129,7 @@ def recording_or_flight(
     source: PlotSource, seed: int, settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False,
     keep: Sequence[str] = (),
 ) -> xr.Dataset:  # fmt: skip
-    """The recording that is given or named, or a flight of the scenario that is."""
+    """Return the recording, open the named recording, or fly the scenario."""
     if isinstance(source, xr.Dataset) or _is_recording_file(source):
         if settings or law is not None:
             raise AirflockError(
@@ -141,14 +141,14 @@ def recording_or_flight(
 
 @contextmanager
 def naming_file(source: Any) -> Iterator[None]:
-    """Faults of a recording that are told inside begin with the name of its file, where it is one."""
+    """Put the name of the recording's file in front of the RecordingErrors raised inside."""
     try:
         yield
-    except RecordingError as fault:
-        before, colon, said = str(fault).partition(": ")
+    except RecordingError as error:
+        before, colon, rest = str(error).partition(": ")
         if before != "recording" or not colon or not _is_recording_file(source):
             raise
-        raise RecordingError(f"{source}: {said}") from fault
+        raise RecordingError(f"{source}: {rest}") from error
 
 
 def _source_name(source: Any) -> str:

@@ -67,21 +67,24 @@ class PackedPositions(NamedTuple):
 
 def pack_positions(position: NDArray[Any], rows: Sequence[NDArray[np.uint8]] = ()) -> PackedPositions:
     """Pack positions (time, axis, agent), m, all finite, and rows of bytes (time, agent) beside them."""
-    given = np.asarray(position, float)
-    low, high = given.min(axis=(0, 2)), given.max(axis=(0, 2))
+    positions = np.asarray(position, float)
+    low, high = positions.min(axis=(0, 2)), positions.max(axis=(0, 2))
     quantum = np.maximum((high - low) / MAX_QUANTA, 1e-12)
-    whole = np.round((given - low[:, None]) / quantum[:, None]).astype(np.uint16)
+    # Differences modulo 2^16 never clip and add up without loss: a minute of 1,000 drones takes 5 MB,
+    # the export of viser 15.
+    whole = np.round((positions - low[:, None]) / quantum[:, None]).astype(np.uint16)
     steps = whole.copy()
     steps[1:] -= whole[:-1]  # modulo 2^16, which adding up undoes
+    # Low and high bytes apart: slow agents leave the high ones at 0 or 255, which zlib packs to almost nothing.
     series = np.ascontiguousarray(steps.transpose(1, 2, 0)).ravel()
     data = (series & 0xFF).astype(np.uint8).tobytes() + (series >> 8).astype(np.uint8).tobytes()
     data += b"".join(np.diff(row, axis=0, prepend=row[:1] * 0).T.tobytes() for row in rows)  # modulo 2^8
-    frames, axes, agents = given.shape
+    frames, axes, agents = positions.shape
     return PackedPositions(low.tolist(), quantum.tolist(), (frames, axes, agents), zlib.compress(data, 9))
 
 
 def unpack_positions(packed: PackedPositions) -> tuple[NDArray[np.float64], list[NDArray[np.uint8]]]:
-    """Positions (time, axis, agent), m, within half a quantum of those packed, and the rows of bytes."""
+    """Return positions (time, axis, agent), m, within half a quantum of those packed, and the rows of bytes."""
     frames, axes, agents = packed.shape
     data = np.frombuffer(zlib.decompress(packed.data), np.uint8)
     halves = data[: 2 * frames * axes * agents].reshape(2, -1).astype(np.uint16)
@@ -114,29 +117,30 @@ class ColourLayer(NamedTuple):
 def colour_layers(
     recording: xr.Dataset, scenario: Scenario | None, position: NDArray[Any], present: NDArray[np.bool_], stride: int
 ) -> list[ColourLayer]:
-    """Layers of a recording: clusters, groups, faults, numbers that differ among agents, and its own variables.
+    """Return the layers of a recording: clusters, groups, faults, numbers that differ among agents, its own
+    variables.
 
     position : (frame, axis, agent), m, and present : (frame, agent), of every `stride`-th instant
     """
     frames, agents = present.shape
-    found = [] if scenario is None else list(_cluster_layer(scenario, position, present))
+    layers = [] if scenario is None else list(_cluster_layer(scenario, position, present))
     if scenario is not None and scenario.agents == agents:
         fixed = [group_colours(scenario.groups, agents)] if scenario.groups else []
         seed = attributes.read_integer(recording, "airflock_seed", 0)
         fixed += [varied_colours(scenario, key, seed) for key in varied_number_units(scenario)]
-        found += [_to_layer(shade, np.tile(shade.values, (frames, 1))) for shade in fixed]
+        layers += [_to_layer(shade, np.tile(shade.values, (frames, 1))) for shade in fixed]
     faults = attributes.recorded_faults(recording)
     armed = [] if scenario is None else [entry.fault.name for entry in scenario.faults]
     if faults or armed:
         times = recording["time"].values[::stride]
         kinds = tuple(dict.fromkeys([*armed, *(str(fault["kind"]) for fault in faults)]))
         shade = fault_colours(faults, 0.0, agents, kinds)
-        found.append(_to_layer(shade, np.array([fault_colours(faults, t, agents, kinds).values for t in times])))
-    return [*found, *_variable_layers(recording, stride)]
+        layers.append(_to_layer(shade, np.array([fault_colours(faults, t, agents, kinds).values for t in times])))
+    return [*layers, *_variable_layers(recording, stride)]
 
 
 def scenario_layer_names(scenario: Scenario) -> list[str]:
-    """Names of the layers of a flight of a scenario, before it is flown."""
+    """Return the names of the layers of a flight of a scenario, before it is flown."""
     clustered = math.isfinite(cluster_distance(scenario))
     return [
         *(["cluster"] if clustered else []),
@@ -148,13 +152,14 @@ def scenario_layer_names(scenario: Scenario) -> list[str]:
 
 
 def _cluster_layer(scenario: Scenario, position: NDArray[Any], present: NDArray[np.bool_]) -> Iterator[ColourLayer]:
-    """Clusters at each frame, of a scenario whose order parameters or law say how near a neighbour is."""
+    """Return the clusters at each frame, if an order parameter or the law defines how near a neighbour is."""
     reach = cluster_distance(scenario)
     if not math.isfinite(reach):
         return
     frames, axes, agents = position.shape
     world = scenario.world
     box = 2.0 * np.array(half_sizes(world)[:axes]) if world.edges == "periodic" else None
+    # Clusters change slowly; on long recordings every n-th frame is clustered and its labels are repeated.
     every = max(1, math.ceil(frames * agents / MAX_CLUSTERED_POSITIONS))
     least = np.full((frames, agents), -1)
     for first in range(0, frames, every):
@@ -162,13 +167,13 @@ def _cluster_layer(scenario: Scenario, position: NDArray[Any], present: NDArray[
         of = cluster_labels(position[first][:, there].T, reach, box)
         least[first : first + every, there] = np.where(of >= 0, there[of], -1)
     yield _to_layer(
-        AgentColours("cluster", IDENTITIES, np.zeros(0), told=f"linked over less than {reach:.3g} m; grey: alone"),
+        AgentColours("cluster", IDENTITIES, np.zeros(0), note=f"linked over less than {reach:.3g} m; grey: alone"),
         least,
     )
 
 
 def _variable_layers(recording: xr.Dataset, stride: int) -> Iterator[ColourLayer]:
-    """Every variable of the recording that holds one number for each individual, at each time or for good."""
+    """Return every variable that holds one number for each individual, at each time or for the whole flight."""
     for name, variable in recording.data_vars.items():
         sizes = dict(variable.sizes)
         if str(name) in NO_LAYER_VARIABLES or "individual" not in sizes or variable.dtype.kind not in "fiub":
@@ -188,13 +193,14 @@ def _variable_layers(recording: xr.Dataset, stride: int) -> Iterator[ColourLayer
 
 
 def _to_layer(shade: AgentColours, values: NDArray[Any]) -> ColourLayer:
-    """Values (time, agent) as bytes."""
+    """Encode values (time, agent) as bytes."""
     whole = np.asarray(values, float)
     known = np.isfinite(whole) & ((whole >= 0.0) | (shade.kind == NUMBERS))
     part = np.where(known, whole, 0.0)
     if shade.kind == NUMBERS:
         part = (NO_VALUE - 1) * np.clip((part - shade.low) / max(shade.high - shade.low, 1e-300), 0.0, 1.0)
     elif shade.kind == IDENTITIES:
+        # Marks are stored as hues: the page then needs no list of identities.
         part = np.round(part * GOLDEN_TURN % 1.0 * NO_VALUE) % NO_VALUE
     bytes_ = np.where(known & ((part < NO_VALUE) | (shade.kind != CATEGORIES)), np.round(part), NO_VALUE)
     return ColourLayer(shade._replace(values=np.zeros(0)), bytes_.astype(np.uint8))
@@ -218,9 +224,9 @@ class Replay:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the page as .html."""
         target = expand_path(path)
-        wrong = suffix_error(target, PAGES)
-        if wrong:
-            raise RecordingError(wrong)
+        error = suffix_error(target, PAGES)
+        if error:
+            raise RecordingError(error)
         atomic.write_file(target, self.text)
         return target
 
@@ -232,7 +238,7 @@ class Replay:
 
 
 def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "speed") -> Replay:
-    """Page that plays a recording; it opens from disk without network and displays itself in a notebook.
+    """Build a page that plays a recording; it opens from disk without network and displays itself in a notebook.
 
     recording : (time, space, keypoint, individual), simulated or flown: position m, velocity m/s
     rate      : frames per second that are kept at most
@@ -272,7 +278,7 @@ def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "spee
     packed = pack_positions(
         kept[:, :axes], [layer.bytes for layer in rows] + ([] if whole else [there.astype(np.uint8)])
     )
-    if scenario is None:  # tracks may lie at 5,000 km north, where a graphics card tells places half a metre apart
+    if scenario is None:  # tracks may lie at 5,000 km north, where single precision resolves half a metre
         packed = packed._replace(low=[*np.subtract(packed.low[:2], stage["centre"][:2]).tolist(), *packed.low[2:]])
         stage["centre"][:2] = 0.0, 0.0
     own = [layer.colours.name for layer in rows]
@@ -297,7 +303,7 @@ def replay(recording: xr.Dataset, *, rate: float = MAX_RATE, colour: str = "spee
 
 
 def check_colour(scenario: Scenario, colour: str) -> None:
-    """Raise RecordingError for a colour that a replay of a flight of a scenario would refuse: before it is flown."""
+    """Raise RecordingError for a colour that the replay of a scenario would refuse, before the flight."""
     _check_colour(colour, [*_motion_colourings(scenario.dimensions), *scenario_layer_names(scenario)], scenario.name)
 
 
@@ -312,7 +318,7 @@ def _check_colour(colour: str, colourings: Sequence[str], owner: str) -> None:
 
 
 def _page_html(name: str, about: dict[str, Any], data: bytes) -> str:
-    """The template with everything in its place."""
+    """Fill the template."""
     root = resources.files("airflock.view") / "replays"
     text = (root / "replay.html").read_text(encoding="utf-8")
     parts = {
@@ -326,33 +332,34 @@ def _page_html(name: str, about: dict[str, Any], data: bytes) -> str:
 
 
 def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
-    """Frames in which an absent agent stays where it was last, or where it will be first."""
+    """Keep an absent agent at its last position, or at its first one before it appears."""
     if present.all():
         return frames
     times = np.arange(len(frames))[:, None]
     last = np.maximum.accumulate(np.where(present, times, -1), axis=0)
+    # Index of the last frame with the agent, found by a running maximum instead of a loop over agents.
     source = np.where(last >= 0, last, present.argmax(axis=0))
-    found = np.take_along_axis(frames, source[:, None, :], axis=0)
+    kept = np.take_along_axis(frames, source[:, None, :], axis=0)
     ever = present.any(axis=0)
-    found[:, :, ~ever] = found[:, :, [int(ever.argmax())]]
-    return found
+    kept[:, :, ~ever] = kept[:, :, [int(ever.argmax())]]
+    return kept
 
 
 def _charts(courses: Mapping[str, NDArray[Any]]) -> list[list[Any]]:
-    """Charts, as titles and values, of what is known at some time: a lone agent has no nearest pair."""
+    """Return charts, as titles and values, of what is known at some time: a lone agent has no nearest pair."""
     return [[title, _rounded(values)] for title, values in courses.items() if np.isfinite(values).any()]
 
 
 def _mean_over_present(speed: NDArray[Any]) -> NDArray[Any]:
-    """Mean (time,) over those present; nan where nobody is."""
+    """Return the mean (time,) over present agents; nan where there is none."""
     known = np.isfinite(speed)
     total = np.where(known, speed, 0.0).sum(axis=1)
     return np.asarray(np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan))
 
 
 def _layer_json(shade: AgentColours) -> dict[str, Any]:
-    """What the page needs to know of a layer."""
-    words = f"{COLOURING_NOTES.get(shade.name, shade.name)}; {shade.told}" if shade.kind == IDENTITIES else shade.told
+    """Return the entries of the page for one layer."""
+    words = f"{COLOURING_NOTES.get(shade.name, shade.name)}; {shade.note}" if shade.kind == IDENTITIES else shade.note
     return {
         "name": shade.name, "kind": shade.kind, "ends": [f"{shade.low:.3g}", f"{shade.high:.3g} {shade.unit}".strip()],
         "names": list(shade.names), "tones": category_colours(len(shade.names)).tolist(),
@@ -363,14 +370,15 @@ def _layer_json(shade: AgentColours) -> dict[str, Any]:
 def _nearest_and_collisions(
     position: NDArray[Any], present: NDArray[np.bool_], period: float, scenario: Any
 ) -> tuple[NDArray[Any], list[tuple[float, int, int]]]:
-    """Smallest distance at each frame (m; nan of one agent), and when which pair came nearer than a collision."""
+    """Return the smallest distance at each frame (m; nan of one agent), and the collisions: time and pair."""
     measured = scenario.resolved_metrics() if scenario else None
     limit = (
         float(measured.r_coll)
         if measured and COLLISION_METRICS & set(scalar_names(scenario.measures, measured))
         else 0.0
     )
-    nearest, found = np.full(len(position), np.nan), []
+    nearest, collisions = np.full(len(position), np.nan), []
+    # A collision is listed at the frame where a pair comes near, not again while it stays near.
     touching: set[tuple[int, int]] = set()
     for number, frame in enumerate(position):
         who = np.flatnonzero(present[number])
@@ -381,20 +389,22 @@ def _nearest_and_collisions(
         if scenario and scenario.world.edges == "periodic":
             world = scenario.world
             box = np.array([world.side, world.side, world.height][: points.shape[1]])
+            # cKDTree wants coordinates in [0, box); the world has its origin in the middle.
             points = np.mod(points + 0.5 * box, box)
         tree = cKDTree(points, boxsize=box)
         nearest[number] = tree.query(points, k=2)[0][:, 1].min()
+        # The nearest pair is known already: most frames need no search for all pairs.
         near = tree.query_pairs(limit) if limit > 0.0 and nearest[number] < limit else set()
         now = {(int(who[i]), int(who[j])) for i, j in near}
-        found += [(number * period, i, j) for i, j in sorted(now - touching)]
+        collisions += [(number * period, i, j) for i, j in sorted(now - touching)]
         touching = now
-    return nearest, found[:MAX_EVENTS]
+    return nearest, collisions[:MAX_EVENTS]
 
 
 def _event_rows(recording: xr.Dataset, scenario: Any) -> list[list[Any]]:
-    """What was done to the flight: when, s, and what."""
-    found = [] if scenario is None else to_events(attributes.recorded_events(recording))[:MAX_EVENTS]
-    return [[event.step * scenario.flight.dt, _event_text(event)] for event in found]
+    """Return the events of a flight: time, s, and text."""
+    events = [] if scenario is None else to_events(attributes.recorded_events(recording))[:MAX_EVENTS]
+    return [[event.step * scenario.flight.dt, _event_text(event)] for event in events]
 
 
 def _event_text(event: Event) -> str:
@@ -402,7 +412,7 @@ def _event_text(event: Event) -> str:
 
 
 def _scene_json(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> dict[str, Any]:
-    """What stands in the world, as plain lists."""
+    """Return the scene as plain lists."""
     axes = position.shape[1]
     low, high = position.min(axis=(0, 2)), position.max(axis=(0, 2))
     centre, span = [*(0.5 * (low + high)), *[0.0] * (3 - axes)], 0.55 * float(max(np.ptp([low, high], axis=0)))
@@ -419,15 +429,15 @@ def _scene_json(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> d
 
 
 def _longest_step(scenario: Any) -> float | None:
-    """Longest way between two frames that is flown, not a way through a periodic face, m; None without one."""
+    """Return the longest step between two frames that is not a jump through a periodic face, m; None if unbounded."""
     return 0.5 * float(scenario.world.side) if scenario and scenario.world.edges == "periodic" else None
 
 
 def _rounded(values: NDArray[Any]) -> list[float | None]:
-    """Numbers of five digits, for JSON; null for what is not finite."""
+    """Round numbers to five digits, for JSON; null for numbers that are not finite."""
     return [float(f"{v:.5g}") if np.isfinite(v) else None for v in np.asarray(values, float).tolist()]
 
 
 def _rounded_up(value: float) -> float:
-    """A little more than a value, of two digits."""
+    """Round a value up to two digits."""
     return float(f"{max(value, 1e-6) * 1.1:.2g}")

@@ -1,4 +1,4 @@
-"""A certificate in panels: how the bound fell, how near agents came, how far numbers may move, bounds over two."""
+"""Plots of results: certificates, identified bodies, inferred laws, reception of the radio, and displays."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> Figure:
-    """Upper bounds by flights, smallest distances, tolerances of the environment, and a map of two of its numbers.
+    """Plot upper bounds by flights, smallest distances, tolerances of the environment, and a map of two numbers.
 
     Panels without data are left out.
     """
@@ -41,14 +41,14 @@ def plot_certificate(certificate: "Certificate", *, ax: Axes | None = None) -> F
     for axes, draw, name in zip(panels[0], draws, "ABCD", strict=False):
         draw(axes, certificate)
         style.set_panel_letter(axes, name)
-    said = "shown" if certificate.shown else "not shown"
-    details = f"{said}, {100.0 * certificate.campaign.confidence:g} % confidence"
+    verdict = "shown" if certificate.shown else "not shown"
+    details = f"{verdict}, {100.0 * certificate.campaign.confidence:g} % confidence"
     style.set_figure_title(figure, certificate.campaign.scenario.name, details)
     return style.root_figure(figure)
 
 
 def _bounds(axes: Axes, certificate: "Certificate") -> None:
-    """Upper and lower bound of every limit at every look, and the limit itself."""
+    """Draw the upper and lower bound of every limit at every look, and the limit itself."""
     for verdict, color in zip(certificate.verdicts, style.LINE_COLOURS, strict=False):
         if verdict.looks:
             n = [look.flights for look in verdict.looks]
@@ -70,7 +70,7 @@ def _bounds(axes: Axes, certificate: "Certificate") -> None:
 
 
 def _distances(axes: Axes, certificate: "Certificate") -> None:
-    """Share of flights whose smallest distance was below a value; dashed: limits on it.
+    """Draw the share of flights whose smallest distance was below a value; dashed: limits on it.
 
     Dotted: the tail as extreme value theory extrapolates it (`extrapolated_tail`), to look at; no bound comes from it.
     """
@@ -93,7 +93,7 @@ def _distances(axes: Axes, certificate: "Certificate") -> None:
 
 
 def extrapolated_tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Distances (point,), m, and the share of flights below them (point,), extrapolated from the nearest flights.
+    """Extrapolate the share of flights (point,) below distances (point,), m, from the nearest flights.
 
     distances : smallest one of each flight, growing
 
@@ -104,10 +104,12 @@ def extrapolated_tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float6
     if few < 20:
         return None
     end = float(distances[few])
+    # Excesses below the 20 % quantile: enough data to fit, few enough to follow the tail alone.
     below = end - distances[:few]
     mean, variance = float(below.mean()), float(below.var(ddof=1))
     if not (mean > 0.0 and variance > 0.0):
         return None
+    # Moments instead of likelihood: they always exist here, and the curve is only looked at.
     ratio = mean * mean / variance
     shape, scale = 0.5 * (1.0 - ratio), 0.5 * mean * (1.0 + ratio)
     at = np.linspace(0.0, end, 200)
@@ -120,7 +122,7 @@ def extrapolated_tail(distances: NDArray[np.float64]) -> tuple[NDArray[np.float6
 
 
 def _tolerances(axes: Axes, certificate: "Certificate") -> None:
-    """Tornado: factor by which each number may move, from its nominal value; those from zero without a bar.
+    """Draw a tornado plot: the factor by which each number may move; numbers with nominal value zero get no bar.
 
     Black: the interval that the scenario's file gives, as identified.
     """
@@ -151,18 +153,18 @@ def _tolerances(axes: Axes, certificate: "Certificate") -> None:
 
 
 def _bound_map(axes: Axes, certificate: "Certificate") -> None:
-    """Upper bound over two numbers; the line is the level below which a cell is safe."""
-    told = certificate.over
-    rows, columns = (np.array(values) for values in told["axes"])
-    high = np.array([cell["high"] for cell in told["cell"]]).reshape(len(rows), len(columns))
+    """Draw the upper bound over two numbers; the line is the level below which a cell is safe."""
+    table = certificate.over
+    rows, columns = (np.array(values) for values in table["axes"])
+    high = np.array([cell["high"] for cell in table["cell"]]).reshape(len(rows), len(columns))
     shown = axes.pcolormesh(
-        columns, rows, high, norm=LogNorm(told["level"] / 10.0, 1.0), cmap="viridis_r", shading="nearest"
+        columns, rows, high, norm=LogNorm(table["level"] / 10.0, 1.0), cmap="viridis_r", shading="nearest"
     )
-    if high.min() < told["level"] < high.max():
-        axes.contour(columns, rows, high, levels=[told["level"]], colors=style.RED, linewidths=1.2)
-    axes.plot([], [], color=style.RED, label=f"{100.0 * told['level']:g} % of flights")
+    if high.min() < table["level"] < high.max():
+        axes.contour(columns, rows, high, levels=[table["level"]], colors=style.RED, linewidths=1.2)
+    axes.plot([], [], color=style.RED, label=f"{100.0 * table['level']:g} % of flights")
     across, down = (
-        key if unit == "1" else f"{key} ({unit})" for key, unit in zip(told["keys"], told["units"], strict=True)
+        key if unit == "1" else f"{key} ({unit})" for key, unit in zip(table["keys"], table["units"], strict=True)
     )
     style.style_axes(axes, down, across, grid=False)
     style.add_legend(axes, above=True)
@@ -178,7 +180,9 @@ MAX_POINTS = 4000  # points in the second
 
 
 def plot_identified(result: IdentifyResult, check: LogCheck | None = None, *, ax: Axes | None = None) -> Figure:
-    """Commanded, flown and computed velocity; limit of acceleration; noise by lag; standing error; reception; order."""
+    """Plot commanded, flown and computed velocity; acceleration limit; noise by lag; ground error; reception;
+    order.
+    """
     figure, panels = style.figure_and_panels(ax, 2, 3, 10.0, 5.6)
     axes = panels.reshape(-1)
     flying = result.logs.flying()
@@ -206,7 +210,7 @@ def _empty(panel: Axes, text: str) -> None:
 
 
 def _draw_step_response(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
-    """Velocity east: commanded, logged, and computed from its first row on by the fitted body."""
+    """Draw velocity east: commanded, logged, and computed from its first row on by the fitted body."""
     rows = logs.of(int(logs.who[0]))
     run = np.cumsum(logs.is_new[rows])
     rows = rows[run == np.bincount(run).argmax()]
@@ -231,7 +235,7 @@ def _draw_step_response(panel: Axes, logs: FlightLogs, result: IdentifyResult) -
 
 
 def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
-    """Acceleration along the gap against gap / tau, with the limit."""
+    """Draw acceleration along the gap against gap / tau, with the limit."""
     run = np.cumsum(logs.is_new)
     k = np.arange(len(run) - 3)
     k = k[(run[k] == run[k + 3]) & (np.abs(logs.command[k + 2] - logs.command[k]).max(axis=1) < 1e-9)]
@@ -242,11 +246,11 @@ def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> N
     step = (logs.time[k + 2] - logs.time[k + 1])[:, None]
     pull = ((logs.velocity[k + 2] - logs.velocity[k + 1]) / step * gap).sum(axis=1) / size
     value = result.body.value
-    asked = size / value["tau"]
-    panel.plot(asked, pull, ".", color=style.SKY, markersize=1.5, alpha=0.4, rasterized=True)
-    edges = np.linspace(0.0, float(np.quantile(asked, 0.998)), 15)
+    demanded = size / value["tau"]
+    panel.plot(demanded, pull, ".", color=style.SKY, markersize=1.5, alpha=0.4, rasterized=True)
+    edges = np.linspace(0.0, float(np.quantile(demanded, 0.998)), 15)
     for low, high in zip(edges[:-1], edges[1:], strict=True):
-        inside = (asked >= low) & (asked < high)
+        inside = (demanded >= low) & (demanded < high)
         if inside.sum() >= 20 and 0.5 * (low + high) > 3.0 * value["white"] / value["tau"]:  # else noise hides the gap
             panel.plot(0.5 * (low + high), np.median(pull[inside]), "o", color=style.BLUE, markersize=3.5)
     panel.plot([], [], "o", color=style.BLUE, markersize=3.5, label="median of the log")
@@ -258,7 +262,7 @@ def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> N
 
 
 def _noise(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
-    """Mean square of what one row predicts wrongly, by lag, below saturation: the log's floor and the outer noise."""
+    """Draw the mean squared error of one-row predictions by lag, below saturation: log noise and outer noise."""
     value, step = result.body.value, logs.step
     run = np.cumsum(logs.is_new)
     rate = held.decay_rate(value["tau"], result.like.flight.dt)
@@ -266,6 +270,7 @@ def _noise(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
     for lag in range(1, 5):
         k = np.arange(len(logs.time) - lag)
         k = k[run[k] == run[k + lag]]
+        # The command must have stood still in between, or the prediction from one row does not hold.
         for between in range(1, lag):
             k = k[np.abs(logs.command[k + between] - logs.command[k]).max(axis=1) < 1e-9]
         gap = logs.command[k] - logs.velocity[k]
@@ -294,7 +299,7 @@ def _noise(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
 
 
 def _draw_ground_error(panel: Axes, result: IdentifyResult) -> None:
-    """Variogram of the velocity on the ground, with that of the fitted error."""
+    """Draw the variogram of the velocity on the ground, with that of the fitted error."""
     ground, value = result.logs.grounded_rows(), result.sensors.value
     if len(ground.time) < 50 or not np.isfinite(value["noise"]):
         _empty(panel, "no drone stood on the ground")
@@ -304,6 +309,7 @@ def _draw_ground_error(panel: Axes, result: IdentifyResult) -> None:
     for lag in np.unique(np.geomspace(1, max(2, len(ground.time) // (4 * result.logs.drones)), 18).astype(int)):
         k = np.arange(len(ground.time) - lag)
         k = k[run[k] == run[k + lag]]
+        # Fewer pairs make a variogram that jumps more than it shows.
         if len(k) > 30:
             lags.append(lag * step)
             seen.append(0.5 * float(((ground.velocity[k + lag] - ground.velocity[k]) ** 2).mean()))
@@ -326,7 +332,7 @@ def _draw_ground_error(panel: Axes, result: IdentifyResult) -> None:
 
 
 def _reception(panel: Axes, result: IdentifyResult) -> None:
-    """Share of decisions with a packet, by distance (Vásárhelyi et al. 2018, Fig. 8 in this form)."""
+    """Draw the share of decisions with a packet, by distance (Vásárhelyi et al. 2018, Fig. 8 in this form)."""
     if result.radio is None or not len(result.radio.picture_bins):
         _empty(panel, "no table of packets")
         return
@@ -339,7 +345,7 @@ def _reception(panel: Axes, result: IdentifyResult) -> None:
 
 
 def _order(panel: Axes, check: LogCheck | None) -> None:
-    """Polarisation of the log inside the band of the flights."""
+    """Draw the polarisation of the log inside the band of the flights."""
     if check is None or not check.band.size or not np.isfinite(check.polarisation).any():
         _empty(panel, "no flights to compare with")
         return
@@ -360,7 +366,7 @@ MAX_LAWS = 5  # laws that are drawn
 
 
 def plot_inferred(result: InferResult, *, ax: Axes | None = None) -> Figure:
-    """Force maps, the tracks' first and then each law's, best first: along the heading above, to the left below.
+    """Plot force maps, the tracks' first and then each law's, best first: along the heading above, to the left below.
 
     Katz et al., PNAS 108, 18720 (2011). A law that acts by velocities alone, such as alignment, shows no map.
     """
@@ -398,7 +404,7 @@ MIN_PAIRS = 10  # pairs of a bin below which it is not drawn
 
 
 def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | None = None) -> Figure:
-    """Ages of what agents have of each other: median, half of all, nine tenths of all; and the share heard so far.
+    """Plot how old the agents' data of each other are: median, 50 % and 90 % bands; and the share heard so far.
 
     heard : a recording with `age` (time, receiver, sender), s, or a table of packets (`recordings.reception`)
     bins  : of distance; ax : axes of a grid, whose place the panels take, instead of a new figure
@@ -447,7 +453,7 @@ def received(heard: xr.Dataset | pd.DataFrame, *, bins: int = BINS, ax: Axes | N
 
 
 def stood(show: Show, titles: list[str], *, ax: Axes | None = None) -> Figure:
-    """Every shape from the south, at the end of its leg; drones that failed are not shown.
+    """Plot every shape from the south, at the end of its leg; failed drones are not shown.
 
     titles : one for each shape; ax : axes of a grid, whose place the panels take, instead of a new figure
 

@@ -1,4 +1,4 @@
-"""A model's own rules drawn against distance (Vásárhelyi et al. 2018, Fig. 6), in the words of the law.
+"""Plot of a model's own rules against distance (Vásárhelyi et al. 2018, Fig. 6), named as the law names them.
 
 A law whose neighbours act through several terms (TERMS, or several vectors among its Sums) gets a panel for each.
 """
@@ -27,16 +27,18 @@ MAX_DIFFERENCE = 1e3  # m/s; a larger allowed difference is drawn as none
 
 
 class RuleResponse(NamedTuple):
-    """Answer of a pair rule along one axis: to each vector among its sums."""
+    """Response of a pair rule along one axis, for each vector among its sums."""
 
     name: str
     values: Array
 
 
 def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
-    """What `neighbour` returns for a neighbour r (m) ahead of an agent at rest that moves sideways at dv (m/s)."""
+    """Return the sums of `neighbour` for a neighbour r (m) ahead of an agent at rest that moves sideways at dv
+    (m/s).
+    """
     side = 1.0 if dv > 0.0 else 0.0
-    given = {
+    arguments = {
         "dx": r, "dy": 0.0, "dz": 0.0, "r": r, "r2": r * r, "dvx": 0.0, "dvy": dv, "dvz": 0.0, "dv": dv,
         "vx": 0.0, "vy": 0.0, "vz": 0.0, "hx": 0.0, "hy": 0.0, "hz": 0.0,
         "nhx": 0.0, "nhy": side, "nhz": 0.0, "age": 0.0, "lower": 0.0, "kin": 1.0, "group": -1.0, "p": p,
@@ -45,12 +47,14 @@ def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
         raise RuleError(f"model {model.name} has no rule neighbour")
     names = argument_names(model.neighbour, "neighbour", model.name)
     if "dv" in names and dv == 0.0:
-        given["dv"] = 1e-6  # as a driver guards it: the length of nothing divides safely
-    return model.neighbour(*(given[name] for name in names))
+        arguments["dv"] = 1e-6  # as a driver guards it: the length of nothing divides safely
+    return model.neighbour(*(arguments[name] for name in names))
 
 
 def repulsion_curve(model: Model, p: Any, r: Array) -> list[RuleResponse]:
-    """Push away from a neighbour at rest at distances r (m), positive outwards; one Response per vector."""
+    """Return the push away from a resting neighbour at distances r (m), positive outwards; one response per
+    vector.
+    """
     sums = [pair_sums(model, p, float(d)) for d in r]
     return [
         RuleResponse(name, np.array([-getattr(s, x) for s in sums], dtype=float))
@@ -59,7 +63,9 @@ def repulsion_curve(model: Model, p: Any, r: Array) -> list[RuleResponse]:
 
 
 def alignment_curve(model: Model, p: Any, r: Array, dv: float) -> list[RuleResponse]:
-    """Response along a velocity difference dv (m/s) at distances r (m), beyond what a neighbour at rest causes."""
+    """Return the response to a velocity difference dv (m/s) at distances r (m), beyond that to a resting
+    neighbour.
+    """
     rest = [pair_sums(model, p, float(d)) for d in r]
     moved = [pair_sums(model, p, float(d), dv) for d in r]
     return [
@@ -71,7 +77,7 @@ def alignment_curve(model: Model, p: Any, r: Array, dv: float) -> list[RuleRespo
 
 
 def allowed_difference_curve(model: Model, p: Any, r: Array) -> Array:
-    """Largest velocity difference (m/s) at distances r (m) that causes no alignment; nan where none does.
+    """Return the largest velocity difference (m/s) at distances r (m) that causes no alignment, or nan.
 
     Found by halving an interval, from the rule alone: any difference above it must cause some.
     """
@@ -89,8 +95,10 @@ def _largest_allowed_difference(model: Model, p: Any, r: float) -> float:
     low, high = 0.0, MAX_DIFFERENCE
     if not aligns(high):
         return float("nan")
+    # Any difference aligns: the curve is zero, not a rounding error of the search.
     if aligns(1e-6):
         return 0.0
+    # 60 halvings narrow the interval to the rounding of a double.
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if aligns(middle) else (middle, high)
@@ -98,12 +106,12 @@ def _largest_allowed_difference(model: Model, p: Any, r: float) -> float:
 
 
 def wall_curve(model: Model, p: Any, distance: Array, v: float) -> list[RuleResponse]:
-    """What one wall adds to the command of an agent that flies straight at it at v (m/s), positive inwards."""
+    """Return what one wall adds to the command of an agent that flies straight at it at v (m/s), positive inwards."""
     if model.boundary is None:
         raise RuleError(f"model {model.name} has no rule boundary")
     names = argument_names(model.boundary, "boundary", model.name)
-    given = {"nx": 1.0, "ny": 0.0, "nz": 0.0, "vx": -v, "vy": 0.0, "vz": 0.0, "p": p}
-    answers = [model.boundary(*({**given, "distance": float(d)}[name] for name in names)) for d in distance]
+    arguments = {"nx": 1.0, "ny": 0.0, "nz": 0.0, "vx": -v, "vy": 0.0, "vz": 0.0, "p": p}
+    answers = [model.boundary(*({**arguments, "distance": float(d)}[name] for name in names)) for d in distance]
     return [
         RuleResponse(name, np.array([getattr(a, x) for a in answers], dtype=float))
         for name, (x, _) in vector_fields(model.Walls).items()
@@ -120,7 +128,8 @@ def rules(
     scenario: Scenario, *, difference: float | None = None, speed: float | None = None, farthest: float | None = None,
     ax: Axes | None = None,
 ) -> Figure:  # fmt: skip
-    """Repulsion, largest allowed velocity difference and alignment, or each term of the law by its own word; walls.
+    """Plot repulsion, largest allowed velocity difference and alignment, or each term of the law by its own word;
+    walls.
 
     scenario   : whose law is drawn, with its numbers
     difference : velocity difference of the pair, m/s; by default the model's preferred speed
@@ -173,7 +182,7 @@ def _largest_distance(scenario: Scenario) -> float:
 
 
 def _term_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, stem: str) -> None:
-    """One term of a law: what a neighbour at rest adds to it, and what its motion adds, up to the law's own reach."""
+    """Draw one term of a law: the part of a resting neighbour and the part of its motion, up to the law's reach."""
     word, unit = term_name_and_unit(model, stem)
     assert model.neighbour is not None
     by_velocity = bool({"dvx", "dvy", "dv"} & set(argument_names(model.neighbour, "neighbour", model.name)))
@@ -198,7 +207,7 @@ def _term_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, stem: 
 
 
 def _pair_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
-    """Fig. 6 itself: repulsion, largest allowed difference, and the difference at hand."""
+    """Draw Fig. 6 itself: repulsion, largest allowed difference, and the difference at hand."""
     pushes = repulsion_curve(model, p, r)
     allowed = allowed_difference_curve(model, p, r)
     shared = unit == "m/s"  # one axis serves both

@@ -1,4 +1,4 @@
-"""What stands in a world, as triangles and lines for any renderer."""
+"""Scene of a world as triangles and lines for any renderer."""
 
 from typing import Any, NamedTuple
 
@@ -40,7 +40,7 @@ class SceneLines(NamedTuple):
 
 
 class SceneGeometry(NamedTuple):
-    """Everything that stands still.
+    """Solids and lines that stand still.
 
     span   : half the width of what should be seen, m
     centre : of it (3,), m
@@ -55,7 +55,7 @@ class SceneGeometry(NamedTuple):
 
 
 def scenario_geometry(scenario: Scenario, position: NDArray[Any]) -> SceneGeometry:
-    """What stands in the world of a scenario; position (agent, 3) in m says where the flock is, for an open world."""
+    """Return the scene of a scenario; position (agent, 3) in m places the view of an open world."""
     world, flat = scenario.world, scenario.dimensions == 2
     bottom, top = heights_of(world)
     solids, lines = [], []
@@ -92,19 +92,19 @@ def scenario_geometry(scenario: Scenario, position: NDArray[Any]) -> SceneGeomet
 
 
 def _drawn_shapes(scenario: Scenario) -> dict[float, NDArray[Any]]:
-    """Rows of the drawn shapes of a scene by their kind."""
+    """Return the rows of the drawn shapes of a scene by their kind."""
     return shapes_by_kind(scenario.stands().shapes)
 
 
 def shapes_by_kind(rows: NDArray[Any]) -> dict[float, NDArray[Any]]:
-    """Rows of shapes by their kind; without those that have no end."""
+    """Return rows of shapes by their kind; without infinite ones."""
     small = np.abs(rows[:, [0, 1, 3, 4]]).max(axis=1, initial=0.0) < MAX_DRAWN_SIZE if len(rows) else np.zeros(0, bool)
     return {kind: rows[small & (rows[:, 6] == kind)] for kind in (BOX, CYLINDER, TRIANGLE, SEGMENT)}
 
 
 def scenery_solids(shapes: dict[float, NDArray[Any]], plane_height: float | None) -> list[SceneSolid]:
-    """Boxes, trees, triangles and walls; in a plane everything is `tall` m high."""
-    found = []
+    """Return boxes, trees, triangles and walls; in a plane everything is `tall` m high."""
+    solids = []
     boxes = [_box_mesh(*_with_height(row, plane_height)) for row in shapes[BOX]]
     trunks = []
     for row in shapes[CYLINDER]:
@@ -122,11 +122,11 @@ def scenery_solids(shapes: dict[float, NDArray[Any]], plane_height: float | None
         ("walls", walls, OBSTACLE_COLOUR),
     ):
         if parts:
-            found.append(SceneSolid(name, *_joined_meshes(parts), colour))
+            solids.append(SceneSolid(name, *_joined_meshes(parts), colour))
     triangles = shapes[TRIANGLE][:, 7:16].reshape(-1, 3)
     if len(triangles):
-        found.append(SceneSolid("mesh", triangles, np.arange(len(triangles)).reshape(-1, 3), BLOCK_COLOUR))
-    return found
+        solids.append(SceneSolid("mesh", triangles, np.arange(len(triangles)).reshape(-1, 3), BLOCK_COLOUR))
+    return solids
 
 
 def _with_height(row: NDArray[Any], plane_height: float | None) -> NDArray[Any]:
@@ -141,12 +141,12 @@ def _box_mesh(x0: float, y0: float, z0: float, x1: float, y1: float, z1: float) 
 
 
 def prism_solid(name: str, corners: NDArray[Any], low: float, high: float, colour: tuple[int, int, int]) -> SceneSolid:
-    """Upright prism over a ground plan (corner, 2), m."""
+    """Return an upright prism over a ground plan (corner, 2), m."""
     return SceneSolid(name, *_prism_mesh(corners, low, high), colour)
 
 
 def _prism_mesh(corners: NDArray[Any], low: float, high: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Sides and roof of a ground plan."""
+    """Return the sides and the roof over a ground plan."""
     n = len(corners)
     vertices = np.array([[x, y, z] for z in (low, high) for x, y in corners], np.float32)
     faces = [t for i in range(n) for t in ((i, (i + 1) % n, n + i), ((i + 1) % n, n + (i + 1) % n, n + i))]
@@ -155,33 +155,34 @@ def _prism_mesh(corners: NDArray[Any], low: float, high: float) -> tuple[NDArray
 
 
 def _roof_triangles(corners: NDArray[Any]) -> list[tuple[int, int, int]]:
-    """Triangles that fill a simple polygon, by the numbers of its corners."""
+    """Return triangles that fill a simple polygon, by the numbers of its corners."""
     place = {(float(x), float(y)): number for number, (x, y) in enumerate(corners)}
-    found = constrained_delaunay_triangles(Polygon(corners)).geoms
-    return [tuple(place[corner] for corner in triangle.exterior.coords[:3]) for triangle in found]  # type: ignore[misc]
+    triangles = constrained_delaunay_triangles(Polygon(corners)).geoms
+    return [tuple(place[corner] for corner in triangle.exterior.coords[:3]) for triangle in triangles]  # type: ignore[misc]
 
 
 def _joined_meshes(parts: list[tuple[NDArray[Any], NDArray[Any]]]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Many solids as one."""
+    """Join many solids to one."""
     offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
     faces = np.vstack([part[1] + offset for part, offset in zip(parts, offsets, strict=True)])
     return np.vstack([part[0] for part in parts]), faces.astype(np.uint32)
 
 
 def prism_edges(corners: NDArray[Any], low: float, high: float) -> NDArray[Any]:
-    """Edges of an upright prism over a closed outline (corner, 2), as segments."""
-    found = []
+    """Return the edges of an upright prism over a closed outline (corner, 2), as segments."""
+    edges = []
     for z in {low, high}:
         ring = np.column_stack([corners, np.full(len(corners), z)])
-        found.append(np.stack([ring[:-1], ring[1:]], 1))
+        edges.append(np.stack([ring[:-1], ring[1:]], 1))
     if low < high:
+        # Round plans have many corners; eight uprights are enough to see their height.
         some = corners[: -1 : max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1]
-        found.append(np.array([[[x, y, low], [x, y, high]] for x, y in some]))
-    return np.vstack(found)
+        edges.append(np.array([[[x, y, low], [x, y, high]] for x, y in some]))
+    return np.vstack(edges)
 
 
 def dart_mesh(size: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    """A dart along +x, `size` m long: nose, ring of the tail, notch."""
+    """Return a dart along +x, `size` m long: nose, ring of the tail, notch."""
     turn = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
     ring = np.stack([np.full(8, -0.4), 0.3 * np.cos(turn), 0.18 * np.sin(turn)], 1)
     vertices = np.vstack([[[0.6, 0.0, 0.0]], ring, [[-0.2, 0.0, 0.0]]]) * size
@@ -190,8 +191,9 @@ def dart_mesh(size: float) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def velocity_quaternions(velocity: NDArray[Any]) -> NDArray[Any]:
-    """Quaternions (agent, 4), w first, that turn +x along velocities (agent, 3): yaw, then pitch."""
+    """Return quaternions (agent, 4), w first, that turn +x along velocities (agent, 3): yaw, then pitch."""
     yaw = np.arctan2(velocity[:, 1], velocity[:, 0])
+    # No roll: darts show where agents fly, the state holds no attitude.
     pitch = -np.arctan2(velocity[:, 2], np.hypot(velocity[:, 0], velocity[:, 1]))
     cy, sy, cp, sp = np.cos(yaw / 2), np.sin(yaw / 2), np.cos(pitch / 2), np.sin(pitch / 2)
     return np.stack([cy * cp, -sy * sp, cy * sp, sy * cp], 1).astype(np.float32)
@@ -203,7 +205,7 @@ FENCE_COLOUR = (204, 121, 167)
 
 
 def card_scene(card: FlightCard) -> SceneGeometry:
-    """What stands in the world of a card, m from its site."""
+    """Return the scene of a flight card, m from its site."""
     world = arena.Parameters(**to_tuples(card.document["world"]))
     rows = np.array(card.document["shapes"].get("shapes", []), float).reshape(-1, 18)
     lift = 0.0 if len(rows) else card.height

@@ -1,4 +1,4 @@
-"""Fitness against each parameter: every candidate of a study a dot, so that working ranges can be seen."""
+"""Plots of a search: fitness by generation, against each parameter, over pairs of parameters, and Pareto fronts."""
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
@@ -17,7 +17,7 @@ from airflock.view import style
 def convergence(
     table: pd.DataFrame, objective: str, *, maximise: bool = True, what: str = "", ax: Axes | None = None
 ) -> Figure:
-    """Fitness over generations.
+    """Plot fitness over generations.
 
     table     : one row a candidate: run, generation, and the column `objective` (nan: failed)
     objective : what is drawn; maximise: whether more of it is better
@@ -62,7 +62,7 @@ def fitness_scatter(
     what: str = "",
     ax: Axes | None = None,
 ) -> Figure:
-    """One panel a parameter.
+    """Plot fitness against each parameter: every candidate of a study is a dot.
 
     table     : one row a candidate: generation, a column for each key of `units`, and `objective`
     units     : key of a parameter → its unit
@@ -116,7 +116,7 @@ def slices(
     what: str = "",
     ax: Axes | None = None,
 ) -> Figure:
-    """A triangle of maps, one for each pair of parameters.
+    """Plot a triangle of maps, one for each pair of parameters.
 
     table  : one row a candidate: a column for each key of `bounds`, and `objective`
     bounds : key of a parameter → range that is drawn
@@ -169,7 +169,7 @@ def slices(
 def _best_in_cells(
     points: np.ndarray, values: np.ndarray, x: tuple[float, float], y: tuple[float, float], maximise: bool
 ) -> np.ma.MaskedArray:
-    """Best value (row, column) in each cell of two ranges, masked where there is none."""
+    """Return the best value (row, column) in each cell of two ranges, masked where there is none."""
     sign = 1.0 if maximise else -1.0
     index = [
         np.clip(((points[:, i] - low) / (high - low) * CELLS_PER_AXIS).astype(int), 0, CELLS_PER_AXIS - 1)
@@ -186,7 +186,7 @@ def _best_in_cells(
 def pareto(
     table: pd.DataFrame, front: Sequence[int], objectives: Sequence[str], *, what: str = "", ax: Axes | None = None
 ) -> Figure:
-    """One panel for each pair of objectives.
+    """Plot one panel for each pair of objectives.
 
     table : one row a candidate, a column for each objective; front : rows of the front, by position
     what  : title; objectives: columns that are drawn

@@ -1,4 +1,5 @@
-"""One look for all pictures: colours that colour-blind readers tell apart, quiet axes, titles that say what is shown.
+"""Look of all figures: colours that colour-blind readers can separate, quiet axes, informative titles; and their
+files.
 
 Everything is set on the figure at hand; global settings of Matplotlib are neither read on purpose nor changed, but for
 the two of files while one is written (`save`).
@@ -42,10 +43,10 @@ PIXEL_RESOLUTION = 200  # dots per inch of pixel formats
 
 
 class NotebookFigure(Figure):
-    """A figure with a canvas of its own, which notebooks show without pyplot."""
+    """Figure with a canvas of its own, which notebooks show without pyplot."""
 
     def __init__(self, width: float, height: float, background: str = "white"):
-        """Size in inches."""
+        """Make a figure of a size in inches."""
         super().__init__(figsize=(width, height), facecolor=background, layout="compressed", dpi=PIXEL_RESOLUTION)
         FigureCanvasAgg(self)
 
@@ -56,7 +57,7 @@ class NotebookFigure(Figure):
 
 
 def figure_and_axes(ax: Axes | None, width: float, height: float, layout: str = "") -> tuple[Figure, Any]:
-    """The axes that are given, in their figure; or a new figure of a size in inches with axes of its own."""
+    """Return the axes and their figure; without axes, make a new figure of a size in inches."""
     if ax is not None:
         return ax.get_figure(root=True), ax  # type: ignore[return-value]
     figure = NotebookFigure(width, height)
@@ -69,7 +70,7 @@ def figure_and_panels(
     ax: Axes | None, rows: int, columns: int, width: float, height: float, *, background: str = "white",
     layout: str = "constrained", **shared: Any,
 ) -> tuple[Figure, Any]:  # fmt: skip
-    """A figure of several panels and its axes (row, column): a new one of a size in inches, or one in the place of ax.
+    """Return a figure of several panels and its axes (row, column): new, of a size in inches, or in the place of ax.
 
     The latter is a SubFigure, which draws like any; `root_figure` gives the figure that it is a part of.
     shared : sharex, sharey, height_ratios, as `Figure.subplots` takes them
@@ -90,12 +91,12 @@ def figure_and_panels(
 
 
 def root_figure(figure: Figure) -> Figure:
-    """The whole figure that a picture is drawn in."""
+    """Return the whole figure that a picture is drawn in."""
     return figure.get_figure(root=True)
 
 
 def style_axes(axes: Axes, x: str = "", y: str = "", *, grid: bool = True) -> None:
-    """Labels with units, thin grey spines, a faint grid behind the data."""
+    """Set labels with units, thin grey spines, and a faint grid behind the data."""
     axes.set_xlabel(x, fontsize=TEXT_SIZE, color=INK)
     axes.set_ylabel(y, fontsize=TEXT_SIZE, color=INK)
     axes.tick_params(labelsize=SMALL_SIZE, color=GREY, labelcolor=INK, length=3, width=0.6)
@@ -109,7 +110,7 @@ def style_axes(axes: Axes, x: str = "", y: str = "", *, grid: bool = True) -> No
 
 
 def add_right_axis(axes: Axes, label: str, color: str) -> Axes:
-    """A second vertical axis on the right, in the colour of what it measures."""
+    """Add a second vertical axis on the right, in the colour of its data."""
     other = axes.twinx()
     style_axes(other, y=label, grid=False)
     other.yaxis.label.set_color(color)
@@ -121,7 +122,7 @@ def add_right_axis(axes: Axes, label: str, color: str) -> Axes:
 
 
 def set_title(axes: Axes, title: str, details: str = "", *, color: str = INK) -> None:
-    """Title at the upper left: what in bold, details in grey below it."""
+    """Set the title at the upper left: the subject in bold, details in grey below it."""
     lift = 18.0 if details else 6.0
     axes.set_title(title, loc="left", fontsize=TITLE_SIZE, fontweight="bold", color=color, pad=lift, parse_math=False)
     if details:
@@ -138,12 +139,12 @@ def set_title(axes: Axes, title: str, details: str = "", *, color: str = INK) ->
 
 
 def set_panel_letter(axes: Axes, name: str) -> None:
-    """Name of a panel at its upper left, as journals print it."""
+    """Write the letter of a panel at its upper left, as journals print it."""
     axes.set_title(name, loc="left", fontsize=TEXT_SIZE, fontweight="bold", color=INK, pad=6.0)
 
 
 def set_figure_title(figure: Figure, heading: str, details: str = "") -> None:
-    """Title of a picture of several panels: what in bold, details behind it; both may hold any sign."""
+    """Set the title of several panels: the subject in bold, details behind it; both may hold any character."""
     look: dict[str, Any] = {"fontsize": TEXT_SIZE + 0.5, "color": INK, "parse_math": False}
     title = figure.suptitle(heading, x=0.01, ha="left", fontweight="bold", **look)
     if details:
@@ -152,13 +153,13 @@ def set_figure_title(figure: Figure, heading: str, details: str = "") -> None:
 
 
 def add_legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 4, *, above: bool = False) -> None:
-    """Legend without a frame; above the axes, or where it hides least."""
-    found = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
-    if not found:
+    """Add a legend without a frame; above the axes, or where it hides least."""
+    entries = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
+    if not entries:
         return
     if above:
         axes.legend(
-            handles=found,
+            handles=entries,
             loc="lower right",
             bbox_to_anchor=(1.0, 1.0),
             ncols=columns,
@@ -169,7 +170,7 @@ def add_legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 
             borderaxespad=0.2,
         )
     else:
-        axes.legend(handles=found, loc="best", frameon=False, fontsize=SMALL_SIZE, handlelength=1.6)
+        axes.legend(handles=entries, loc="best", frameon=False, fontsize=SMALL_SIZE, handlelength=1.6)
 
 
 def add_colour_bar(
@@ -182,7 +183,7 @@ def add_colour_bar(
     shrink: float = 0.8,
     pad: float = 0.02,
 ) -> Colorbar:
-    """Colour bar beside axes, without a frame."""
+    """Add a colour bar beside axes, without a frame."""
     bar = figure.colorbar(shown, ax=axes, shrink=shrink, aspect=32, pad=pad)
     bar.set_label(label, fontsize=TEXT_SIZE, color=color)
     bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=color, color=color, length=2.5, width=0.6)
@@ -232,7 +233,7 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
 
 @contextmanager
 def print_settings() -> Iterator[None]:
-    """Files that are written inside embed their fonts as publishers take them, and are the same each time.
+    """Set Matplotlib so that files embed their fonts, as publishers want, and are identical at each run.
 
     One thread at a time: the settings are those of all of Matplotlib, and are put back as they were.
     """
@@ -242,17 +243,18 @@ def print_settings() -> Iterator[None]:
 
 @contextmanager
 def atomic_picture(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Iterator[Path]:
-    """Yield a temporary path to write to, renamed at the end; every fault on the way is one line."""
+    """Yield a temporary path to write to, renamed at the end; report every error in one line."""
     target = expand_path(path)
-    fault = suffix_error(target, suffixes)
-    if fault:
-        raise PictureError(fault)
+    error = suffix_error(target, suffixes)
+    if error:
+        raise PictureError(error)
     if target.is_dir():
         raise PictureError(f"{target}: is a folder; give a file name")
     try:
         with atomic_path(target) as temporary:
             yield temporary
     except (OSError, RuntimeError) as wrong:
+        # Matplotlib and ffmpeg raise with several lines; the first one names the cause.
         reason = getattr(wrong, "strerror", None) or (str(wrong).splitlines() or [type(wrong).__name__])[0]
         raise PictureError(f"{target}: cannot be written: {reason}; nothing was saved") from wrong
 

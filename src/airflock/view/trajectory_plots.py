@@ -1,4 +1,6 @@
-"""Trajectories of a flock, coloured by speed (Vásárhelyi et al. 2018, Fig. 4)."""
+"""Plots of paths: in the plane, in space, among buildings, and the rays of one agent (Vásárhelyi et al. 2018, Fig.
+4).
+"""
 
 from typing import Any
 
@@ -50,7 +52,7 @@ def through(
     space: bool = False,
     ax: Axes | None = None,
 ) -> Figure:
-    """Paths through what stands in the scene, coloured by speed; stars mark the goals.
+    """Plot paths through the scene, coloured by speed; stars mark the goals.
 
     recording   : (time, space, keypoint, individual), flown among buildings, trees or boxes, m and m/s
     start, stop : window of time, s; by default the whole flight
@@ -119,14 +121,14 @@ def draw_in_space(axes: Any, scenario: Scenario, paths: FlightPaths, scale: Norm
 
 
 def _draw_goals(axes: Any, points: NDArray[Any]) -> None:
-    """Goals."""
+    """Draw the goals."""
     if len(points):
         look: dict[str, Any] = {"s": 90.0, "color": style.ORANGE, "edgecolors": style.INK, "linewidths": 0.5}
         axes.scatter(*points.T, marker="*", zorder=6, label="goal", **look)
 
 
 def _triad(axes: Any, view: Projection, box: tuple[float, float, float, float]) -> None:
-    """Arrows of a round length to the east, north and up, at the lower left."""
+    """Draw arrows of a round length to the east, north and up, at the lower left."""
     left, right, bottom, top = box
     span = 0.16 * (right - left)
     power = 10.0 ** np.floor(np.log10(span))
@@ -153,7 +155,7 @@ def _around(shown: FlightPaths) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def shapes_near_paths(scenario: Scenario, paths: FlightPaths) -> NDArray[np.float64]:
-    """Rows of the shapes around the paths, without the ground."""
+    """Return rows of the shapes around the paths, without the ground."""
     shapes = scenario.stands().shapes
     low, high = _around(paths)
     inside = (shapes[:, 3:5] > low).all(axis=1) & (shapes[:, :2] < high).all(axis=1)
@@ -161,12 +163,13 @@ def shapes_near_paths(scenario: Scenario, paths: FlightPaths) -> NDArray[np.floa
 
 
 def draw_ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection | None:
-    """Ground plans; a higher solid is darker. Returns what a colour bar of heights (m) needs, where there are any."""
+    """Draw ground plans, higher solids darker. Return the mappable of a colour bar of heights (m), or None."""
     solid = None
     boxes, trunks = rows[rows[:, 6] == BOX], rows[rows[:, 6] == CYLINDER]
     patches: list[Any] = [Rectangle((r[0], r[1]), r[3] - r[0], r[4] - r[1]) for r in boxes]
     patches += [Circle((r[7], r[8]), r[9]) for r in trunks]
     if patches:
+        # Infinite shapes would take the whole range of greys.
         height = np.minimum(np.concatenate([boxes[:, 5], trunks[:, 5]]), 1000.0)
         grey = Normalize(0.0, max(float(height.max()), 1.0))
         solid = PatchCollection(
@@ -208,7 +211,7 @@ def outlines_in_space(rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
 
 
 def outline_from_above(row: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Ground plan of a shape as a line (point, 2), m."""
+    """Return the ground plan of a shape as a line (point, 2), m."""
     if row[6] == CYLINDER:
         turn = np.linspace(0.0, 2.0 * np.pi, 13)
         return np.column_stack([row[7] + row[9] * np.cos(turn), row[8] + row[9] * np.sin(turn)])
@@ -220,7 +223,7 @@ def outline_from_above(row: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def scenery_lines(recording: xr.Dataset, paths: FlightPaths) -> list[NDArray[np.float64]]:
-    """Outlines of what stands around the paths, as lines (point, axis) in m; none for tracks."""
+    """Return outlines of the solids around the paths, as lines (point, axis) in m; none for tracks."""
     scenario = scenario_or_none(recording)
     if scenario is None or scenario.scene.kind == "none":
         return []
@@ -261,7 +264,7 @@ def trajectories(
     colour: str = "auto",
     ax: Axes | None = None,
 ) -> Figure:
-    """Paths from above, or in space for a 3-D recording; dots mark where agents are at the end.
+    """Plot paths from above, or in space for a 3-D recording; dots mark where agents are at the end.
 
     Where a city, forest or mesh stands, the paths through it, from above. The picture is that of
     Vásárhelyi et al. 2018, Fig. 4.
@@ -317,12 +320,12 @@ def trajectories(
         _in_space(axes, shown, world, labels)
     else:
         _from_above(axes, shown, world, labels)
-    said = title_details(recording, shown) + (" · each agent in its own colour" if way == "agent" else "")
-    said += " · dots: at the end" + (f" · thick: {_agent_label(recording, chosen)}" if chosen >= 0 else "")
+    details = title_details(recording, shown) + (" · each agent in its own colour" if way == "agent" else "")
+    details += " · dots: at the end" + (f" · thick: {_agent_label(recording, chosen)}" if chosen >= 0 else "")
     if space and ax is None:
-        style.set_figure_title(figure, short_name(recording), said)
+        style.set_figure_title(figure, short_name(recording), details)
     else:
-        style.set_title(axes, short_name(recording), said)
+        style.set_title(axes, short_name(recording), details)
     if way != "agent":
         bar = style.add_colour_bar(
             figure, ScalarMappable(scale, cmap), axes, "heading" if way == "heading" else "speed (m/s)",
@@ -338,17 +341,19 @@ def trajectories(
 
 
 def _legible_seconds(paths: FlightPaths) -> float:
-    """Window of time in which all paths together are not so long that they cover each other, s."""
+    """Return the window of time in which the paths are short enough not to cover each other, s."""
     known = paths.speed[np.isfinite(paths.speed)]  # of one frame of tracks there is none
     length = float(known.mean()) * paths.agents if known.size else 0.0
     extent = float(np.max(np.nanmax(paths.position, axis=(0, 2)) - np.nanmin(paths.position, axis=(0, 2))))
+    # All paths together may cross the picture so many times before they hide each other.
     window = MAX_CROSSINGS * extent / max(length, 1e-12)
     return MAX_SECONDS if window >= MAX_SECONDS else float(f"{max(window, 1e-9):.1g}")
 
 
 def _most_telling_colour(paths: FlightPaths) -> str:
-    """What colours say most: speed, or where all fly equally fast the heading; in space who it is."""
+    """Choose the colouring: speed, or heading where all fly equally fast; in space the agent."""
     speed = paths.speed[np.isfinite(paths.speed)]
+    # Quantiles: one agent that starts late must not decide the colouring.
     low, high = np.quantile(speed, (0.05, 0.95)) if speed.size else (0.0, 0.0)
     if high - low > EQUAL_SPEED_SHARE * max(float(high), 1e-12):
         return "speed"
@@ -356,11 +361,12 @@ def _most_telling_colour(paths: FlightPaths) -> str:
 
 
 def _colour_values(paths: FlightPaths, colouring: str) -> tuple[Normalize, Any, NDArray[Any]]:
-    """Scale and colours, and the value of each agent at each frame (time, agent)."""
+    """Return scale and colours, and the value of each agent at each frame (time, agent)."""
     if colouring == "heading":
         angle = np.degrees(np.arctan2(paths.velocity[:, 1], paths.velocity[:, 0])) % 360.0
         return Normalize(0.0, 360.0), style.COMPASS_COLOURS, angle
     if colouring == "agent":
+        # Golden ratio: neighbouring numbers get hues far apart.
         share = np.arange(paths.agents) * 0.6180339887 % 1.0
         return Normalize(0.0, 1.0), style.COMPASS_COLOURS, np.broadcast_to(share, paths.speed.shape)
     return Normalize(*speed_range(paths)), style.SPEED_COLOURS, paths.speed
@@ -378,22 +384,23 @@ def _highlighted_agent(recording: xr.Dataset, agents: int, agent: int | None) ->
 def _agent_segments(
     paths: FlightPaths, world: arena.Parameters, values: NDArray[Any], middle: float
 ) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-    """Of each agent: segments (segment, end, axis) in m, and the value on them; none through a periodic face.
+    """Return segments (segment, end, axis), m, of each agent and their values; none through a periodic face.
 
     values : (time, agent); middle : 0.5 for the value half-way, 0 for that at the beginning
     """
     count = len(paths.times)
     stride = max(1, -(-(count - 1) * paths.agents // MAX_SEGMENTS))
+    # The last frame is always kept: the dots at the end lie on it.
     kept = np.unique(np.append(np.arange(0, count, stride), count - 1))
     where, speed = paths.position[kept], values[kept]
     step = np.diff(speed, axis=0)
-    found = []
+    per_agent = []
     for number in range(paths.agents):
         line = where[:, :, number]
         segments, mean = np.stack([line[:-1], line[1:]], axis=1), speed[:-1, number] + middle * step[:, number]
         inside = ~crosses_periodic_face(segments, world)
-        found.append((segments[inside], mean[inside]))
-    return found
+        per_agent.append((segments[inside], mean[inside]))
+    return per_agent
 
 
 def _draw(
@@ -415,6 +422,7 @@ def _draw(
     look: dict[str, Any] = {"linewidths": 0.7, "alpha": 0.85, "cmap": cmap, "zorder": 2, "norm": scale}
     if is_highlighted:
         axes.add_collection(kind(segments, colors="white", linewidths=3.6, zorder=3.0, capstyle="round", label="_halo"))
+        # A white halo and a grey ramp make the chosen path readable on top of all colours.
         dark = Normalize(scale.vmin, 1.3 * float(scale.vmax or 1.0))
         look = {"linewidths": 2.0, "cmap": "gray", "zorder": 3.5, "capstyle": "round", "norm": dark}
         values = values if cmap is style.SPEED_COLOURS else np.full(len(segments), scale.vmin)
@@ -434,7 +442,7 @@ def _draw_world(axes: Any, world: arena.Parameters) -> None:
 
 
 def _agent_label(recording: xr.Dataset, agent: int) -> str:
-    """What a picture calls an agent: its number in a flight, its name of tracks."""
+    """Return the label of an agent: its number in a flight, its name in tracks."""
     name = str(recording["individual"].values[agent]) if "individual" in recording.coords else str(agent)
     if name == f"agent_{agent}":
         return f"agent {agent}"
@@ -475,7 +483,7 @@ def _sparse_locator() -> Any:
 
 
 def rays_at_frame(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[CastRay], tuple[float, float, float]]:
-    """Rays that an agent cast at a frame of its recording, and the command (m/s) that it decided on."""
+    """Return the rays that an agent cast at a frame of its recording, and the command (m/s) that it decided on."""
     scenario = scenario_or_none(recording)
     if scenario is None or scenario.model.sight is None:
         raise RecordingError("recording: its model casts no rays; kidger does")
@@ -497,7 +505,7 @@ def rays_at_frame(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[C
 
 
 def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, ax: Axes | None = None) -> Figure:
-    """Rays of one agent from above: red where they met something, green the first free one, black what was flown.
+    """Plot the rays of one agent from above: red where they hit, green the first free one, black the flown command.
 
     recording : (time, space, keypoint, individual), of a law that casts rays, m and m/s; agent : whose rays
     start     : instant, s; by default the one at which this agent cast most rays in the flight's first 20 s
@@ -521,15 +529,15 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, a
         frame = int(max(few, key=lambda k: len(rays_at_frame(recording, agent, int(k))[0])))
     else:
         frame = int(np.abs(times - start).argmin())
-    found, command = rays_at_frame(recording, agent, frame)
+    cast, command = rays_at_frame(recording, agent, frame)
     scenario, shown = scenario_or_none(recording), paths_in_window(recording)
     assert scenario is not None
     x, y = (float(c) for c in shown.position[frame, :2, agent])
-    reach = 1.3 * max(ray.length for ray in found)
+    reach = 1.3 * max(ray.length for ray in cast)
     figure, axes = style.figure_and_axes(ax, 6.0, 5.6)
     draw_ground_plans(axes, shapes_near_paths(scenario, shown))
-    lines = [[(x, y), (x + ray.free * ray.x, y + ray.free * ray.y)] for ray in found]
-    colours = [style.GREEN if ray.free >= ray.length else style.RED for ray in found]
+    lines = [[(x, y), (x + ray.free * ray.x, y + ray.free * ray.y)] for ray in cast]
+    colours = [style.GREEN if ray.free >= ray.length else style.RED for ray in cast]
     axes.add_collection(LineCollection(lines, colors=colours, linewidths=0.8, alpha=0.8, zorder=3))
     pace = max(float(np.linalg.norm(command)), 1e-9)
     tip = (x + reach / 1.3 * command[0] / pace, y + reach / 1.3 * command[1] / pace)
@@ -540,6 +548,6 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, a
     axes.set(xlim=(x - reach, x + reach), ylim=(y - reach, y + reach))
     axes.set_aspect("equal")
     style.style_axes(axes, "east (m)", "north (m)", grid=False)
-    words = f"agent {agent} at {times[frame]:.4g} s · {len(found)} rays cast"
+    words = f"agent {agent} at {times[frame]:.4g} s · {len(cast)} rays cast"
     style.set_title(axes, short_name(recording), f"{words} · {title_details(recording)}")
     return figure

@@ -55,7 +55,7 @@ CHART_WIDTH = 0.62  # width of the chart beside the picture, in heights of it
 
 
 class VideoFrame:
-    """Everything that stands still, drawn once; and a picture of what moves at any instant."""
+    """Still parts of a video, drawn once, and a method that draws the moving parts at any instant."""
 
     def __init__(
         self, recording: xr.Dataset, start: float | None, stop: float | None, *, tail: float, height: int, speed: float,
@@ -79,6 +79,7 @@ class VideoFrame:
         left, right, bottom, top = picture_extent(first, world, self.view, margin=0.03, around=around)
         head = HEADER_HEIGHT * (top - bottom)
         aspect = float(np.clip((right - left) / (top + head - bottom), 0.4, 3.0))
+        # The chart widens the picture; the height, and with it the size of agents, stays.
         beside = CHART_WIDTH if chart else 0.0
         share = aspect / (aspect + beside)
         self.size = (to_even(height * (aspect + beside)), to_even(height))
@@ -103,10 +104,11 @@ class VideoFrame:
         _key(axes, self.scale)
         self.chart_cursor = _chart(self.canvas.figure, recording, chart, share, first) if chart else None
         self.canvas.draw()
+        # Blitting: axes, walls and text are drawn once; each frame restores these pixels and draws what moves.
         self.still = self.canvas.copy_from_bbox(self.canvas.figure.bbox)
 
     def render(self, instant: float) -> Array:
-        """Picture at an instant (s): (row, column, red green blue alpha), 8 bits each; valid until the next one."""
+        """Draw an instant (s): (row, column, red green blue alpha), 8 bits each; valid until the next call."""
         where = self._positions(instant)
         x, y = self.view(where, axis=0)
         x0, y0, tempo = self._velocities(instant)
@@ -133,18 +135,18 @@ class VideoFrame:
                 axes.plot(x, y, color=color, linewidth=1.4)
 
     def _positions(self, instant: float) -> Array:
-        """Positions of all agents (axis, agent), m."""
+        """Return positions of all agents (axis, agent), m."""
         return _interpolated(self.paths.times, self.paths.position, instant, self._periodic_halves)
 
     @property
     def _periodic_halves(self) -> Array | None:
-        """Ways along each axis that lead through a periodic face, m."""
+        """Return half the periods of the world along each axis, m: longer steps lead through a periodic face."""
         if self.world.edges != "periodic":
             return None
         return np.array(half_sizes(self.world)[: self.paths.position.shape[1]])
 
     def _velocities(self, instant: float) -> tuple[Array, Array, Array]:
-        """Velocities of all agents along the picture, and their speeds, m/s."""
+        """Return velocities of all agents along the picture, and their speeds, m/s."""
         values = _interpolated(self.paths.times, self.paths.velocity, instant)
         return *self.view(values, axis=0), np.sqrt((values**2).sum(0))
 
@@ -153,6 +155,7 @@ class VideoFrame:
         if self.tail_seconds <= 0.0 or instant - begin < 1e-9:
             self.tails.set_segments([])
             return
+        # Tails are resampled at equal times, so that they fade evenly whatever the period of the recording.
         moments = np.linspace(begin, instant, POINTS_PER_TAIL)
         past = np.stack([self._positions(float(m)) for m in moments])  # (moment, axis, agent)
         pieces = np.stack([past[:-1], past[1:]], axis=1)  # (moment, end, axis, agent)
@@ -167,7 +170,7 @@ class VideoFrame:
 
 
 def _canvas(size: tuple[int, int]) -> Any:
-    """A canvas of so many pixels (width, height), on a figure whose text grows with its height."""
+    """Make a canvas of so many pixels (width, height), on a figure whose text grows with its height."""
     dots = DPI_PER_PIXEL * size[1]
     figure = style.NotebookFigure((size[0] + 1e-3) / dots, (size[1] + 1e-3) / dots)
     figure.set_dpi(dots)
@@ -177,7 +180,7 @@ def _canvas(size: tuple[int, int]) -> Any:
 
 
 def _head(axes: Any, recording: xr.Dataset, speed: float) -> Any:
-    """Title and details above the picture; returns the clock, which is drawn with what moves."""
+    """Draw title and details above the picture; return the clock, which is drawn with the moving parts."""
     words: dict[str, Any] = {"va": "top", "transform": axes.transAxes}
     large: dict[str, Any] = {"fontsize": 12, "color": style.INK}
     small: dict[str, Any] = {"fontsize": 9, "color": style.GREY}
@@ -189,14 +192,14 @@ def _head(axes: Any, recording: xr.Dataset, speed: float) -> Any:
 
 
 def check_chart(chart: str, known_charts: Sequence[str], owner: str) -> None:
-    """Raise RecordingError for a chart of an order parameter that a flight does not have: also before it is flown."""
+    """Raise RecordingError for a chart of an order parameter that a flight does not have, also before the flight."""
     if chart and chart not in known_charts:
         hint = suggest(chart, known_charts, lead="; ")
         raise RecordingError(f"chart = {chart!r} is none that {owner} has: {', '.join(known_charts)}{hint}")
 
 
 def _chart(figure: Any, recording: xr.Dataset, name: str, share: float, first: FlightPaths) -> Any:
-    """An order parameter over time beside the picture; returns the line that moves."""
+    """Draw an order parameter over time beside the picture; return the line that moves."""
     course = over_time(recording)
     check_chart(name, list(course.columns), "this recording")
     values = course[name].dropna()
@@ -208,13 +211,14 @@ def _chart(figure: Any, recording: xr.Dataset, name: str, share: float, first: F
 
 
 def _interpolated(times: Array, values: Array, instant: float, period: Array | None = None) -> Array:
-    """Values (time, axis, agent) at an instant, linear between frames; the nearer frame's where one leaps farther."""
+    """Interpolate values (time, axis, agent) linearly between frames; at a jump take the nearer frame's."""
     after = int(np.clip(np.searchsorted(times, instant), 1, max(len(times) - 1, 1)))
     if len(times) == 1:
         return np.asarray(values[0])
     share = float(np.clip((instant - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0))
     step = values[after] - values[after - 1]
     if period is not None:
+        # An agent that leaves through a periodic face must not be drawn on a line across the whole world.
         through = (np.abs(step) > period[:, None]).any(axis=0)
         near = values[after if share >= 0.5 else after - 1]
         return np.asarray(np.where(through, near, values[after - 1] + share * step))
@@ -222,9 +226,10 @@ def _interpolated(times: Array, values: Array, instant: float, period: Array | N
 
 
 def _dart_corners(x: Array, y: Array, along: Array, up: Array, length: float) -> Array:
-    """Corners (agent, corner, axis) of darts at (x, y) that point along the velocities (along, up); all m, m/s."""
+    """Return corners (agent, corner, axis) of darts at (x, y) along the velocities (along, up); all m, m/s."""
     pace = np.hypot(along, up)
     still = ~(pace > 1e-9)
+    # An agent at rest has no heading; it points east instead of dividing by zero.
     hx, hy = np.where(still, 1.0, along / np.maximum(pace, 1e-9)), np.where(still, 0.0, up / np.maximum(pace, 1e-9))
     ahead, side = length * DART_OUTLINE[:, 0], length * DART_OUTLINE[:, 1]
     cx = x[:, None] + hx[:, None] * ahead - hy[:, None] * side
@@ -233,7 +238,7 @@ def _dart_corners(x: Array, y: Array, along: Array, up: Array, length: float) ->
 
 
 def _key(axes: Any, scale: Normalize) -> None:
-    """Small colour bar of speed in the second line of the head."""
+    """Draw a small colour bar of speed in the second line of the head."""
     low, high = float(scale.vmin or 0.0), float(scale.vmax or 1.0)
     inset = axes.inset_axes((0.42, 0.929, 0.16, 0.014))
     inset.imshow(np.linspace(0.0, 1.0, 256)[None, :], cmap=style.SPEED_COLOURS, aspect="auto")
@@ -244,7 +249,7 @@ def _key(axes: Any, scale: Normalize) -> None:
 
 
 def to_even(pixels: float) -> int:
-    """The nearest even number of pixels, which encoders ask for."""
+    """Return the nearest even number of pixels, which encoders need."""
     return 2 * max(16, round(pixels / 2.0))
 
 
@@ -323,8 +328,8 @@ def video(
             for number, instant in enumerate(instants):
                 try:
                     film.send(stage.render(float(instant)))
-                except OSError as fault:  # a broken pipe: ffmpeg is gone and does not say why
-                    raise RuntimeError(f"ffmpeg stopped after {number} pictures; is the disk full?") from fault
+                except OSError as error:  # a broken pipe: ffmpeg is gone and does not say why
+                    raise RuntimeError(f"ffmpeg stopped after {number} pictures; is the disk full?") from error
                 if done is not None:
                     done()
         finally:
@@ -334,13 +339,13 @@ def video(
 
 
 def import_ffmpeg() -> Any:
-    """The package imageio_ffmpeg, which brings an ffmpeg; raises PictureError with what to install."""
+    """Import the package imageio_ffmpeg, which brings an ffmpeg; raise PictureError with an install hint."""
     try:
         import imageio_ffmpeg
-    except ModuleNotFoundError as fault:
+    except ModuleNotFoundError as error:
         raise PictureError(
             "videos need imageio-ffmpeg: pip install 'airflock[video]'; airflock replay makes a page without it"
-        ) from fault
+        ) from error
     return imageio_ffmpeg
 
 
@@ -352,12 +357,12 @@ def frame_count(
     start: float | None = None,
     stop: float | None = None,
 ) -> int:
-    """Number of pictures in such a video."""
+    """Return the number of frames of such a video."""
     return len(_frame_times(recording, fps, speed, start, stop))
 
 
 def _frame_times(recording: xr.Dataset, fps: float, speed: float, start: float | None, stop: float | None) -> Array:
-    """Instants of the pictures, s."""
+    """Return the instants of the frames, s."""
     check_positive(fps=fps, speed=speed)
     if fps > 240.0:
         raise AirflockError(f"fps = {fps:g} lies outside (0, 240] 1/s")
@@ -365,32 +370,33 @@ def _frame_times(recording: xr.Dataset, fps: float, speed: float, start: float |
     times = recording["time"].values.astype(float)
     begin, end = time_window(times, start, stop)
     begin, end = max(begin, float(times[0])), min(end, float(times[-1]))
+    # 1e-9: a window of a whole number of frames keeps its last one in spite of rounding.
     count = max(1, math.floor((end - begin) * fps / speed + 1e-9) + 1)
     return begin + np.arange(count) * (speed / fps)
 
 
 def _film(path: Path, size: tuple[int, int], fps: float) -> Any:
-    """A running ffmpeg that takes one picture at a time."""
-    given: dict[str, Any] = {"fps": fps, "pix_fmt_in": "rgba", "macro_block_size": 1, "ffmpeg_log_level": "quiet"}
+    """Start an ffmpeg that takes one frame at a time."""
+    options: dict[str, Any] = {"fps": fps, "pix_fmt_in": "rgba", "macro_block_size": 1, "ffmpeg_log_level": "quiet"}
     if path.suffix.lower() == ".gif":
-        given |= {
+        options |= {
             "codec": "gif",
             "pix_fmt_out": "pal8",
             "output_params": ["-filter_complex", GIF_PALETTE_FILTER],
             "quality": None,
         }
     else:
-        given |= {"codec": "libx264", "quality": 8, "output_params": ["-movflags", "+faststart", "-f", "mp4"]}
-    film: Iterator[Any] = import_ffmpeg().write_frames(str(path), size, **given)
+        options |= {"codec": "libx264", "quality": 8, "output_params": ["-movflags", "+faststart", "-f", "mp4"]}
+    film: Iterator[Any] = import_ffmpeg().write_frames(str(path), size, **options)
     next(film)
     return film
 
 
 def _complete(path: Path, frames: int) -> None:
-    """Raise unless the file holds what was handed over; ffmpeg itself says nothing about a full disk at the end."""
+    """Raise unless the file holds every frame; ffmpeg itself reports nothing when the disk is full at the end."""
     try:
-        found, _ = import_ffmpeg().count_frames_and_secs(str(path))
-    except (RuntimeError, OSError) as fault:
-        raise RuntimeError("ffmpeg wrote no complete video; is the disk full?") from fault
-    if found != frames:
-        raise RuntimeError(f"ffmpeg kept {found} of {frames} pictures; is the disk full?")
+        count, _ = import_ffmpeg().count_frames_and_secs(str(path))
+    except (RuntimeError, OSError) as error:
+        raise RuntimeError("ffmpeg wrote no complete video; is the disk full?") from error
+    if count != frames:
+        raise RuntimeError(f"ffmpeg kept {count} of {frames} pictures; is the disk full?")

@@ -1,4 +1,4 @@
-"""Wash: the air that a formation leaves, from above, and what it makes of each bird's induced drag (Dimock & Selig)."""
+"""Plot of a formation's wash from above, and of each bird's induced drag (Dimock & Selig 2003)."""
 
 import math
 from types import FunctionType, SimpleNamespace
@@ -34,7 +34,7 @@ MAX_BIRDS = 60  # birds; the lifting line of more takes long without a compiler
 
 
 class SolvedFormation(NamedTuple):
-    """A flock as its lifting line sees it.
+    """Solution of a flock's lifting line.
 
     place       : (bird, axis) m: ahead, across (to the left), up
     circulation : (bird, segment) m²/s
@@ -54,6 +54,7 @@ def solve_formation(scenario: Scenario, position: Array, velocity: Array) -> Sol
     wing, n = scenario.wing, position.shape[1]
     m = segments_of(wing)
     sizes = shapes(n, m, "none")
+    # Plain lists: the rules are scalar Python here, and a picture shows one instant only.
     work = type(sizes)(*(np.zeros(size).tolist() for size in sizes))
     x, y, z = (part.tolist() for part in position.astype(float))
     vx, vy = (part.tolist() for part in velocity[:2].astype(float))
@@ -66,7 +67,9 @@ def solve_formation(scenario: Scenario, position: Array, velocity: Array) -> Sol
 
 
 def downwash(scenario: Scenario, formation: SolvedFormation, points: Array, without: int = -1) -> Array:
-    """Downwash, m/s, that all wings (but one) induce at points (point, axis), m, in the formation's own axes."""
+    """Return the downwash, m/s, that all wings (but one) induce at points (point, axis), m, in the formation's
+    axes.
+    """
     wing = scenario.wing
     m, h, core = segments_of(wing), pitch(wing), wing.core * wing.span
     total = np.zeros(len(points))
@@ -76,13 +79,15 @@ def downwash(scenario: Scenario, formation: SolvedFormation, points: Array, with
         dx, dy, dz = (points - place).T
         for segment in range(m):
             y = dy - (segment - 0.5 * (m - 1)) * h
+            # A horseshoe vortex is the difference of its two trailing legs (Dimock & Selig 2003, Eqs 5 and 6).
             ends = _filament_leg(dx, y + 0.5 * h, dz, core * core) - _filament_leg(dx, y - 0.5 * h, dz, core * core)
             total += circulation[segment] * filaments.SHARE * ends
     return total
 
 
 def _over_arrays(rule: Any) -> Any:
-    """A scalar rule of the aero package, as it stands, over arrays: its `math` is NumPy's."""
+    """Return a scalar rule of the aero package that works on arrays: its `math` is NumPy's."""
+    # The rule has one source: the simulator compiles it, the picture runs it over arrays.
     return FunctionType(rule.__code__, {**rule.__globals__, "math": SimpleNamespace(sqrt=np.sqrt)})
 
 
@@ -90,7 +95,8 @@ _filament_leg = _over_arrays(filaments.leg)
 
 
 def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None = None) -> Figure:
-    """A formation from above, flying up the picture: up- and downwash in its mean plane, each wing with its drag.
+    """Plot a formation from above, flying up the picture: up- and downwash in its mean plane, each wing with its
+    drag.
 
     The number beside a wing is its induced drag against a lone bird's: -30 % is saved.
 
@@ -111,33 +117,33 @@ def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None =
     if shown.agents > MAX_BIRDS:
         raise RecordingError(f"recording: has {shown.agents} birds; the wash can be drawn for at most {MAX_BIRDS}")
     frame = len(shown.times) - 1 if start is None else int(np.abs(shown.times - start).argmin())
-    found = solve_formation(scenario, shown.position[frame], shown.velocity[frame])
+    solved = solve_formation(scenario, shown.position[frame], shown.velocity[frame])
     span = float(scenario.wing.span)
-    low, high = found.place.min(axis=0), found.place.max(axis=0)
+    low, high = solved.place.min(axis=0), solved.place.max(axis=0)
     ahead = float(low[0]) - SPANS_BEHIND * span, float(high[0]) + SPANS_AHEAD * span
     right = -float(high[1]) - SPANS_BESIDE * span, -float(low[1]) + SPANS_BESIDE * span
     tall, wide = ahead[1] - ahead[0], right[1] - right[0]
     rows, columns = (max(2, math.ceil(FIELD_POINTS * side / max(tall, wide))) for side in (tall, wide))
     u, v = np.meshgrid(np.linspace(right[0], right[1], columns), np.linspace(ahead[0], ahead[1], rows))
-    points = np.column_stack([v.ravel(), -u.ravel(), np.full(u.size, found.place[:, 2].mean())])
-    field = -downwash(scenario, found, points).reshape(u.shape)
+    points = np.column_stack([v.ravel(), -u.ravel(), np.full(u.size, solved.place[:, 2].mean())])
+    field = -downwash(scenario, solved, points).reshape(u.shape)
     most = max(float(np.quantile(np.abs(field), 0.97)), 1e-6)
     figure, axes = style.figure_and_axes(ax, 6.4, float(np.clip(6.0 * tall / wide, 3.0, 8.0)))
     picture = axes.imshow(
         field, extent=(*right, *ahead), origin="lower", cmap="PuOr_r", norm=TwoSlopeNorm(0.0, -most, most),
         interpolation="bilinear", zorder=0,
     )  # fmt: skip
-    for place, drag in zip(found.place, found.drag, strict=True):
+    for place, drag in zip(solved.place, solved.drag, strict=True):
         middle = -place[1]
         axes.plot([middle - 0.5 * span, middle + 0.5 * span], [place[0]] * 2, color=style.INK, linewidth=2.4, zorder=3)
-        said = f"{100.0 * (drag / found.solo - 1.0):+.0f} %"
+        label = f"{100.0 * (drag / solved.solo - 1.0):+.0f} %"
         axes.annotate(
-            said, (middle, place[0]), (0.0, 5.0), textcoords="offset points", ha="center", fontsize=style.SMALL_SIZE,
+            label, (middle, place[0]), (0.0, 5.0), textcoords="offset points", ha="center", fontsize=style.SMALL_SIZE,
             color=style.INK, zorder=4, bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0.0, "pad": 1.0},
         )  # fmt: skip
     style.style_axes(axes, "across (m)", "ahead (m)", grid=False)
     axes.set(xlim=right, ylim=ahead, aspect="equal")
-    saving = 1.0 - found.drag.mean() / found.solo
+    saving = 1.0 - solved.drag.mean() / solved.solo
     against = f"{100.0 * abs(saving):.0f} % {'below' if saving >= 0.0 else 'above'} that of lone birds"
     instant = f"t = {shown.times[frame]:.4g} s · induced drag {against}"
     style.set_title(axes, short_name(recording), f"{title_details(recording)} · {instant}")

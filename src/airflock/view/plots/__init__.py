@@ -1,4 +1,4 @@
-"""Figures and video, without pyplot, so that threads and notebooks may draw side by side."""
+"""Plots as functions: each returns a figure, without pyplot, so that threads and notebooks may draw side by side."""
 
 from airflock.view.order_parameter_plots import flocked, heatmap, rotations, series, transfer
 from airflock.view.plot_by_kind import KINDS, plot
