@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 MODULES = {
-    "course": "course",
+    "course": "flight",
     "cpu": "cpu",
     "drivers": "drivers",
     "cuda_cells": "cuda.cells",
@@ -15,13 +15,13 @@ MODULES = {
     "cuda_kernel": "cuda.kernel",
     "interpreted": "interpreted",
     "measuring": "measuring",
-    "needs": "requirements",
+    "needs": "closed_flights",
     "passes_build": "passes.build",
     "passes_decide": "passes.decide",
     "passes_driver": "passes.driver",
     "passes_measure": "passes.measure",
     "passes_perceive": "passes.perceive",
-    "simulate": "simulate",
+    "simulate": "closed_flights",
     "specialise_values": "specialise.values",
     "stages": "stages",
     "stages_approach": "stages.approach",

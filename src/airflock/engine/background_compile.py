@@ -13,8 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import airflock
+from airflock.engine.driver_state import DriverState
 from airflock.engine.drivers import is_compiled
-from airflock.engine.state import DriverState
 
 SCRIPT = Path(__file__).with_name("one_driver.py")
 
