@@ -54,7 +54,8 @@ def still_has_fault(state: "DriverState", leaving: FaultOnset) -> bool:
 
 
 def replace_faults(state: "DriverState", due: Sequence[FaultOnset]) -> None:
-    """Go on with these faults: what has begun has their numbers and their end, and ends where it is none of them."""
+    """Replace the list of faults. Running faults take the new numbers and end; removed ones stop."""
+    # A change of the scenario replaces the list of faults: running ones take the new numbers, removed ones end.
     slots = range(state.agents) if state.slots is None else state.slots.tolist()
     agents = {lane: agent for agent, lane in enumerate(slots)}
     work, rows = state.arrays["work"], state.driver.ROWS
@@ -98,7 +99,9 @@ def _write(state: "DriverState", kind: Fault, slot: int, values: Mapping[str, An
 
 
 def remove_agents(state: "DriverState", agents: list[int]) -> None:
-    """Let agents be absent from now on; those who are so already stay so."""
+    """Make agents absent from now on; those that are absent already stay so."""
+    # Absent agents lie behind the others, so no loop has a test. A mask would have to be respected by every pair loop,
+    # mean, cluster and later metric; one that forgot it would count the absent agents.
     slots, here = _slots(state), state.here
     gone = sorted(slots[agent] for agent in agents if slots[agent] < here)
     if not gone:
@@ -109,7 +112,7 @@ def remove_agents(state: "DriverState", agents: list[int]) -> None:
 
 
 def add_agent(state: "DriverState", agent: int, position: list[float], velocity: list[float]) -> None:
-    """Let an absent agent be there from now on, as agents are at the start: known to all, with sound sensors."""
+    """Bring an absent agent back in the state of a start: known to all others, with sensors without errors."""
     here, order = state.here, state.order.tolist()
     lane = order.index(agent)
     before = sum(other < agent for other in order[:here])  # agents stay in the order of their numbers

@@ -103,6 +103,8 @@ def first_bad_step(state: DriverState, low: int, high: int, half: int = 0) -> in
     state : of a flight that is about to fly the step `low`, is finite there, and is not before the step `high`
     half  : as in `State.advance`, for the step `low`
     """
+    # Kernels never raise: a test per step would end vector loops. Flights are deterministic, so the step is found
+    # afterwards by flying again by halves.
     while high - low > 1:
         middle, kept = (low + high) // 2, state.buffer.copy()
         state.advance(low, middle, half)

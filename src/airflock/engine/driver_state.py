@@ -352,6 +352,7 @@ def hand_over(old: DriverState, new: DriverState, step: int) -> None:
     begin anew, what metrics remember of each agent goes on. Pairs are looked at again (`held` is new): the new numbers
     may call a distance a collision that the old did not.
     """
+    # Rows are matched by name whether or not the plan is the same: one path instead of two.
     lanes = _lanes(old, new)
     _rows(old, new, lanes)
     new.arrays["past"][...] = _under_way(old, new, step, lanes)
@@ -444,6 +445,7 @@ def _under_way(old: DriverState, new: DriverState, step: int, lanes: NDArray[np.
         made[:, :motion] = work[[new.driver.ROWS[name] for name in new.plan.motion]]
         return made
     coming, newest = -(-step // every), (step - 1 + old.whole("delay")) // every
+    # Packets under way stay under way: the ring is indexed again for the new delay.
     for k in range(coming, coming + len(made)):
         slot = past[max(0, min(k, newest)) % len(past)]
         made[k % len(made), :motion] = slot[:motion]
