@@ -32,7 +32,7 @@ def child(preset: str) -> None:
     import numpy as np
 
     from airflock.engine.cpu import fly_on_cpu
-    from airflock.engine.simulate import plan_of
+    from airflock.engine.plan import plan_of
     from airflock.engine.tables import world_tables
     from airflock.scenarios.files import load
 

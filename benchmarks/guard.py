@@ -45,7 +45,7 @@ ROWS = {
 def child() -> None:
     """Fly what standard input names (preset, settings, seed or none), and answer with seconds; one line each."""
     from airflock.engine.cpu import fly_on_cpu
-    from airflock.engine.simulate import plan_of
+    from airflock.engine.plan import plan_of
     from airflock.engine.tables import world_tables
     from airflock.scenarios.files import load, presets
     from airflock.support.errors import ScenarioError

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 MODULES = {
-    "course": "course",
+    "course": "flight",
     "cpu": "cpu",
     "drivers": "drivers",
     "cuda_cells": "cuda.large_flock",
@@ -15,13 +15,13 @@ MODULES = {
     "cuda_kernel": "cuda.flight_kernel",
     "interpreted": "interpreted",
     "measuring": "measuring",
-    "needs": "requirements",
+    "needs": "closed_flights",
     "passes_build": "passes.build",
     "passes_decide": "passes.stage_functions",
     "passes_driver": "passes.driver",
     "passes_measure": "passes.stage_functions",
     "passes_perceive": "passes.stage_functions",
-    "simulate": "simulate",
+    "simulate": "closed_flights",
     "specialise_values": "specialise.known_values",
     "stages": "stages",
     "stages_approach": "stages.approach",

@@ -91,7 +91,6 @@ def tune(folder):
     """A tuning of real flights, tiny ones, but for its pictures."""
     from importlib import import_module
 
-    from airflock.scenarios.scenario_builder import build_scenario
     from airflock.scenarios import build_scenario
 
     tuning = import_module("airflock.search.tuning_run")

@@ -11,8 +11,6 @@ from airflock.runs.flight_store import FlightStore
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
 from airflock.search import harden
-from airflock.scenarios.making import build_scenario
-from airflock.search import hardening as harden
 from airflock.search.evolution import run_sensitivity
 from airflock.search.hardening_steps import CARRIED, STOPS, StepResult, measures
 from airflock.support.errors import ScenarioError

@@ -66,7 +66,7 @@ def test_a_law_of_ones_own_is_refused_in_a_line_with_what_to_do():
 
 def test_a_flight_whose_change_waits_for_its_compiler_is_not_pickled_without_it(monkeypatch):
     flight = opened("vasarhelyi_2018/4ms", {})
-    monkeypatch.setattr("airflock.engine.course.in_background", lambda _: Future())
+    monkeypatch.setattr("airflock.engine.flight.run_in_background", lambda _: Future())
     flight.fault("motor", [2], wait=False, share=0.1)
     with pytest.raises(FlightError, match="^a change waits for its compiler"):
         pickle.dumps(flight)

@@ -1,9 +1,5 @@
 # The door: what other rooms may use; the rest is private to the room.
-from .flight import Flight as Flight
-from .measuring import measure_frames as measure_frames
-from .plan import Plan as Plan
-from .planning import plan_of as plan_of
-from .simulate import (
+from .closed_flights import (
     compile_for as compile_for,
     driver_text as driver_text,
     fly_world as fly_world,
@@ -11,7 +7,9 @@ from .simulate import (
     score_flight as score_flight,
     score_flights as score_flights,
 )
-from .snapshots import Snapshot as Snapshot
-from .state import DriverState as DriverState
+from .driver_state import DriverState as DriverState
+from .flight import Flight as Flight, Snapshot as Snapshot
+from .measuring import measure_frames as measure_frames
+from .plan import Plan as Plan, plan_of as plan_of
 from .text.generate import DriverSource as DriverSource
 from .text.probe import scratch_shapes as scratch_shapes

@@ -13,8 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import airflock
+from airflock.engine.driver_state import DriverState
 from airflock.engine.drivers import is_compiled
-from airflock.engine.state import DriverState
 
 SCRIPT = Path(__file__).with_name("one_driver.py")
 
@@ -32,6 +32,8 @@ def compile_in_background(state: DriverState) -> DriverState:
 
 def _in_a_process(state: DriverState) -> None:
     """Let a process compile a state's driver, and wait for its end. Raises OSError where none can be started."""
+    # Numba keeps the interpreter lock for long stretches: compiling in a thread made gaps of 66 to 171 ms in a page of
+    # 30 frames a second, a process below 50 ms. It is no fork: threads and LLVM are not made for that.
     driver = state.driver
     file = Path(str(driver.__file__))
     paths = [path for path in sys.path if os.path.isabs(path)]

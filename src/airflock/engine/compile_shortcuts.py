@@ -23,6 +23,7 @@ from numba.core.typing.context import BaseContext
 from airflock.engine.never_collected import frozen_imports
 
 TRIED = (0, 62), (0, 68)  # first and last version of Numba of which this was tried, beside 0.65
+# Outside the tested range Numba compiles as it likes: slower, with the same flights.
 IS_TESTED_VERSION = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
 SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
 

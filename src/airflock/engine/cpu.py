@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.driver_state import DriverState
 from airflock.engine.drivers import compile_messages, driver_of
 from airflock.engine.plan import Plan
-from airflock.engine.state import DriverState
 from airflock.engine.tables import WorldTables
 from airflock.support import check_interrupted
 

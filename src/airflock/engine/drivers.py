@@ -1,4 +1,4 @@
-"""Drivers: what flies a plan, compiled or interpreted; what is heard and said while it compiles."""
+"""Drivers: what flies a plan, compiled or interpreted; interruptions and messages while it compiles."""
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -16,6 +16,8 @@ from airflock.support import RuleError
 
 def flight_text(plan: Plan) -> str:
     """Text of the driver that flies a plan, the same whether samples are kept; each recording says by which."""
+    # Writing a text takes 0.06 s, half of a short interpreted flight. It is not kept on disk: a plan holds functions,
+    # and no file can show that they are unchanged.
     return _text(plan.built(keep_frames=False) if plan.record else plan)
 
 
@@ -36,17 +38,17 @@ def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
 
 
 def device_of(driver: ModuleType) -> str:
-    """What a driver flies on: cpu, or python, uncompiled."""
+    """Return the device of a driver: cpu, or python, uncompiled."""
     return "cpu" if hasattr(driver.advance, "overloads") else "python"
 
 
 def is_loaded(driver: ModuleType) -> bool:
-    """Whether a driver flies at once: it has been compiled or read in this process, or is interpreted."""
+    """Return True if a driver flies at once: it has been compiled or read in this process, or is interpreted."""
     return bool(getattr(driver.advance, "overloads", True))
 
 
 def is_compiled(driver: ModuleType) -> bool:
-    """Whether a driver flies without being compiled first: in this process, or from what an earlier one has kept."""
+    """Return True if a driver needs no compiling: this process has compiled it, or an earlier one has kept it."""
     return is_loaded(driver) or any(Path(driver.advance.stats.cache_path).glob("*.nbi"))
 
 
@@ -62,9 +64,9 @@ def function_compile_messages(function: Any, model: str) -> AbstractContextManag
 
 @contextmanager
 def rule_errors_of_compiler(model: str) -> Iterator[None]:
-    """Turn what the compiler says of a rule into one line; an interruption is heard after each of its passes.
+    """Turn an error of the compiler into one line, and react to an interruption after each of its passes.
 
-    Whoever waits for it at a terminal or in a notebook is told. Raises RuleError, GivenUp.
+    A user who waits at a terminal or in a notebook sees a message. Raises RuleError, GivenUp.
     """
     from numba.core.errors import NumbaError
     from numba.core.event import install_listener
@@ -74,7 +76,7 @@ def rule_errors_of_compiler(model: str) -> Iterator[None]:
     try:
         with install_listener("numba:run_pass", InterruptListener()), message_if_slow():
             yield
-    except NumbaError as fault:
-        lines = [line.strip() for line in str(fault).splitlines()]
+    except NumbaError as error:
+        lines = [line.strip() for line in str(error).splitlines()]
         said = next((line for line in lines if line and not line.startswith(("Failed in", "During", "File"))), "")
-        raise RuleError(f"model {model}: a rule does not compile, though plain Python takes it: {said}") from fault
+        raise RuleError(f"model {model}: a rule does not compile, though plain Python takes it: {said}") from error

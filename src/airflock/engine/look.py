@@ -20,8 +20,8 @@ from airflock.core import (
     random,
     silence,
 )
+from airflock.engine.driver_state import DriverState
 from airflock.engine.plan import NO_PACKET_TIME
-from airflock.engine.state import DriverState
 from airflock.scenarios import FlightWorld, Scenario, step_counts
 from airflock.world import edges
 

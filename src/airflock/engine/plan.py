@@ -1,14 +1,160 @@
 """Plan: what of a scenario is fixed when its driver is generated. Everything else is a number at run time."""
 
-from collections.abc import Callable
-from dataclasses import fields, replace
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, lru_cache
 from itertools import accumulate
-from typing import Any
+from typing import Any, NamedTuple
 
-from airflock.core import Fault, forward, vector_sizes
-from airflock.engine.facts import PlanProperties
-from airflock.world import beyond_nothing, edges
+from airflock.core import (
+    FEW_PACKETS,
+    Body,
+    Fault,
+    Metric,
+    Model,
+    Radio,
+    Sensor,
+    Topology,
+    argument_names,
+    choices,
+    forward,
+    vector_sizes,
+)
+from airflock.engine.text.probe import probe_body, probe_fault, probe_model, probe_radio, probe_sensor, probe_topology
+from airflock.parts.bodies import BODIES
+from airflock.parts.radios import DEFAULT_RADIO as USUAL_RADIO, RADIOS
+from airflock.parts.sensors import DEFAULT_SENSOR, SENSORS
+from airflock.scenarios import Scenario, box_fits_cells, metrics_use_cells, step_counts, uses_all_cores, uses_cells
+from airflock.support import check_precision
+from airflock.world import (
+    EDGE_RULES,
+    arena,
+    arena_ray,
+    arena_surfaces,
+    beyond_nothing,
+    edges,
+    is_off_centre,
+    obstacle_rule,
+    rays,
+)
+
+# Properties of a plan, and options of its driver.
+
+
+class GroupLaw(NamedTuple):
+    """A law that groups of a flock fly by, beside that of the others.
+
+    choices : its compile-time constants, by name
+    varied  : its numbers that differ among those who fly by it, as (letter, name)
+    """
+
+    model: Model
+    choices: tuple[tuple[str, str | float], ...]
+    varied: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """How a driver is built, whatever the scenario says.
+
+    bits        : 32 or 64 per number
+    record      : keep every sample (position, velocity, command) besides the running sums
+    given_start : the flight starts from positions and velocities that are handed over
+    grid        : neighbours by cells, all cores for one flock; else all pairs, one core
+    near        : order parameters look at pairs and links by cells, too, where their rules allow it; needs `grid`
+    absence     : agents may be absent: they lie behind those who are there (`engine.presence`)
+    """
+
+    bits: int = 32
+    keep_frames: bool = False
+    given_start: bool = False
+    grid: bool = False
+    near: bool = False
+    absence: bool = False
+
+
+@dataclass(frozen=True)
+class PlanProperties:
+    """Compile-time side of a flight: what the scenario says, and how it is built. `Plan` tells what follows from it.
+
+    build     : how it is built; bits, record, given_start and grid read it
+    numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order
+    surfaces  : surface function of each family of walls, in the order of the faces table
+    dryden    : gusts are those of the Dryden spectrum
+    polygon   : the arena is a polygon, whose edges are walls; raised: the middle of its heights is not 0
+    obstacle  : surface function of an obstacle
+    excursion : how far outside a position is
+    ray       : free distance along a direction
+    body      : what turns commands into motion; body_choices its compile-time constants
+    sensor    : what agents measure of themselves by; sensor_choices its compile-time constants
+    noisy     : it errs
+    edge      : what happens to a coordinate beyond the arena's faces, if anything
+    start     : region in which agents start
+    scene     : something stands in the world that agents see with rays, feel, or must not touch
+    goals     : the flock has goals; herd: the goal is a shepherd
+    own       : each agent has a goal of its own
+    stop      : the flight ends at its first collision
+    wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
+    aero_choices : those of drag descent, where it is added to the model
+    radio     : which packets arrive; radio_choices its compile-time constants. lossy: some are lost by radio.loss
+    few       : each of its rates sends at most `core.radio.FEW` packets in a decision
+    silent    : an agent stops while a neighbour that it has lost could be near
+    sequential: one agent after another perceives, decides and moves
+    faults    : kinds of fault that may occur
+    varied    : numbers that differ among agents, as (letter, name); each is a row
+    topology  : which of those whom an agent hears it meets; None: all. fading: signals differ by chance
+    laws      : laws of groups, beside `model`; the numbers of the first have the letter p1, and so on
+    law       : which of all laws the stages are made for that ask one: 0 is `model`; None where there is no other
+    grouped   : a rule asks for the groups of agents
+    """
+
+    model: Model
+    model_choices: tuple[tuple[str, str | float], ...]
+    numbers: tuple[tuple[str, tuple[str, ...]], ...]
+    metrics: tuple[Metric, ...]
+    surfaces: tuple[Callable[..., Any], ...]
+    excursion: Callable[..., float]
+    ray: Callable[..., float] = rays.to_nothing
+    body: Body = BODIES["multirotor"]
+    body_choices: tuple[tuple[str, str], ...] = ()
+    sensor: Sensor = SENSORS[DEFAULT_SENSOR]
+    sensor_choices: tuple[tuple[str, str], ...] = ()
+    edge_rule: Callable[..., Any] | None = None
+    start: str = "arena"
+    scene: bool = False
+    has_mesh: bool = False
+    goals: bool = False
+    stop: bool = False
+    wing_choices: tuple[tuple[str, str], ...] = ()
+    aero_choices: tuple[tuple[str, str], ...] = ()
+    is_shepherd: bool = False
+    own: bool = False
+    sequential: bool = False
+    dimensions: int = 2
+    has_sensor_error: bool = True
+    delayed: bool = True
+    lossy: bool = False
+    radio: Radio = RADIOS[USUAL_RADIO]
+    radio_choices: tuple[tuple[str, str], ...] = ()
+    few: bool = True
+    stops_for_lost: bool = False
+    windy: bool = False
+    dryden: bool = False
+    obstacles: bool = False
+    obstacle: Callable[..., Any] = arena.convex_obstacle
+    polygonal: bool = False
+    off_centre_height: bool = False
+    faults: tuple[Fault, ...] = ()
+    varied: tuple[tuple[str, str], ...] = ()
+    topology: Topology | None = None
+    fading: bool = False
+    laws: tuple[GroupLaw, ...] = ()
+    law: int | None = None
+    uses_groups: bool = False
+    build: BuildOptions = BuildOptions()
+
+
+# The plan.
 
 INTEGER_NAMES = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
@@ -286,3 +432,199 @@ class Plan(PlanProperties):
         """Where the numbers of each record stand in the parameter row."""
         ends = accumulate(len(names) for _, names in self.numbers)
         return {letter: slice(end - len(names), end) for (letter, names), end in zip(self.numbers, ends, strict=True)}
+
+
+# The plan of a scenario. Its rules are called once on the way, so that their errors appear.
+
+
+def plan_of(
+    scenario: Scenario,
+    *,
+    precision: int = 32,
+    record: bool = False,
+    metrics: tuple[Metric, ...] | None = None,
+    grid: bool | None = None,
+    near: bool | None = None,
+    given_start: bool = False,
+    absence: bool = False,
+) -> Plan:
+    """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
+
+    grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box too small for cells
+    near        : where neighbours are found by cells, order parameters go by cells, too; by default in large flocks
+    given_start : the start is handed over with each flight
+    absence     : agents may be absent; where a fault takes agents out, or empty batteries do, they may in any case
+    """
+    check_precision(precision)
+    key = "plan", precision, record, metrics, grid, near, given_start, absence
+    if key not in scenario.engine_cache:
+        build = _build(scenario, precision, record, grid, near, given_start, absence)
+        scenario.engine_cache[key] = _planned(scenario, metrics, build)
+    found: Plan = scenario.engine_cache[key]
+    return found
+
+
+def _build(
+    scenario: Scenario,
+    precision: int,
+    record: bool,
+    grid: bool | None,
+    near: bool | None,
+    given_start: bool,
+    absence: bool,
+) -> BuildOptions:
+    """How the driver of a scenario is built."""
+    cells = (uses_all_cores(scenario) if grid is None else grid) and box_fits_cells(scenario) and uses_cells(scenario)
+    return BuildOptions(
+        bits=precision,
+        keep_frames=record,
+        given_start=given_start,
+        grid=cells,
+        near=cells and (metrics_use_cells(scenario) if near is None else near),
+        absence=absence or scenario.can_land or any(kind.leaves is not None for kind in scenario.fault_kinds),
+    )
+
+
+def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None, build: BuildOptions) -> Plan:
+    """The plan itself."""
+    _probe_rules(scenario)
+    laws, kinds = scenario.laws, scenario.fault_kinds
+    return make_plan(
+        scenario.model,
+        scenario.parameters,
+        scenario.order_parameters if metrics is None else metrics,
+        scenario.world,
+        scenario.numbers,
+        build=build,
+        body=scenario.vehicle,
+        body_choices=_chosen(scenario.body),
+        sequential=scenario.flight.update == "sequential",
+        stop=scenario.metrics.stop == "collision",
+        wing_choices=_wing_choices(scenario, metrics),
+        aero_choices=_chosen(scenario.aero) if scenario.is_aerodynamic else (),
+        faults=kinds,
+        varied=scenario.varied,
+        laws=tuple(GroupLaw(law.model, constants_of(*law[:2], law.varied), law.varied) for law in laws[1:]),
+        uses_groups=bool(scenario.groups) and any(law.uses_groups for law in laws),
+        **_sensing(scenario),
+        **_hearing(scenario),
+        **_surroundings(scenario),
+    )
+
+
+def _probe_rules(scenario: Scenario) -> None:
+    """Call every rule of a scenario once, but those of its order parameters. Raises RuleError."""
+    for law in scenario.laws:
+        _probed(law.model, tuple(choices(law.parameters).items()))
+    for kind in scenario.fault_kinds:
+        probe_fault(kind)
+    probe_body(scenario.vehicle, _chosen(scenario.body))
+    if scenario.has_sensor_error:
+        probe_sensor(scenario.sensor)
+    probe_radio(scenario.transceiver)
+    if scenario.own_topology is not None:
+        probe_topology(scenario.own_topology)
+
+
+def _chosen(record: Any) -> tuple[tuple[str, str], ...]:
+    """Choices of a record, in the order of their names."""
+    return tuple(sorted(choices(record).items()))
+
+
+def _surroundings(scenario: Scenario) -> dict[str, Any]:
+    """What a plan says of start, scene, goals and wind."""
+    kind, wind = scenario.goals.kind, scenario.wind
+    return {
+        "start": scenario.start.kind,
+        "scene": scenario.has_scene,
+        "has_mesh": scenario.scene.kind == "mesh",
+        "goals": kind in ("points", "scene"),
+        "is_shepherd": kind in ("points", "scene") and scenario.goals.role == "herd",
+        "own": kind == "own",
+        "windy": wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
+        "dryden": wind.kind == "dryden",
+    }
+
+
+def _hearing(scenario: Scenario) -> dict[str, Any]:
+    """What a plan says of the radio, and of whom agents meet of those whom they hear."""
+    return {
+        "radio": scenario.transceiver,
+        # the kind of radios that share a record is none of the choices that rules can read
+        "radio_choices": tuple(pair for pair in _chosen(scenario.radio) if pair[0] != "kind"),
+        "few": _few_packets(scenario),
+        "delayed": step_counts(scenario)["delay"] > 0,
+        "lossy": scenario.radio.loss > 0.0,
+        "stops_for_lost": scenario.silence.rule == "stop",
+        "topology": scenario.topology_rule if any(law.model.neighbour is not None for law in scenario.laws) else None,
+        "fading": scenario.own_topology is not None or scenario.topology.fading > 0.0,
+    }
+
+
+def _sensing(scenario: Scenario) -> dict[str, Any]:
+    """What a plan says of a sensor: nothing of one that tells the truth, so that all such flights share a driver."""
+    if not scenario.has_sensor_error:
+        return {"has_sensor_error": False}
+    return {"has_sensor_error": True, "sensor": scenario.sensor, "sensor_choices": _chosen(scenario.sensors)}
+
+
+def _few_packets(scenario: Scenario) -> bool:
+    """Whether each rate of the radio sends at most FEW packets between two decisions; True where it has none."""
+    rates = [getattr(scenario.radio, name) for name in scenario.transceiver.rates]
+    period = step_counts(scenario)["decide_every"] * scenario.flight.dt
+    return max(rates, default=0.0) * period <= FEW_PACKETS - 0.1  # rounding may make it one packet more
+
+
+def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
+    """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
+    found = scenario.order_parameters if metrics is None else metrics
+    used = scenario.model.flock is not None or any(
+        "wing" in argument_names(metric.survey, "survey") for metric in found if metric.survey
+    )
+    return _chosen(scenario.wing) if used else ()
+
+
+@lru_cache
+def _probed(model: Model, chosen: tuple[tuple[str, str], ...]) -> None:
+    """Probe a model once per set of choices; its numbers decide nothing about the rules' text."""
+    probe_model(model, model.Parameters(**dict(chosen)))
+
+
+def constants_of(
+    model: Model, parameters: Any, varied: tuple[tuple[str, str], ...]
+) -> tuple[tuple[str, str | float], ...]:
+    """Choices of a law, and its usual numbers where they are so and do not differ among agents."""
+    usual: dict[str, str | float] = {
+        name: number
+        for name, number in model.usual.items()
+        if getattr(parameters, name) == number and ("p", name) not in varied
+    }
+    return tuple(sorted((usual | choices(parameters)).items()))
+
+
+def make_plan(
+    model: Model,
+    parameters: Any,
+    metrics: tuple[Metric, ...],
+    world: arena.Parameters,
+    numbers: Mapping[str, tuple[str, ...]],
+    **options: Any,
+) -> Plan:
+    """Plan for a model with these parameters (only their choices matter) in this world; numbers: fields by letter."""
+    surfaces, beyond = arena_surfaces(world)
+    return Plan(
+        model=model,
+        model_choices=constants_of(model, parameters, options.get("varied", ())),
+        numbers=tuple(numbers.items()),
+        metrics=metrics,
+        surfaces=surfaces,
+        excursion=beyond,
+        ray=arena_ray(world),
+        edge_rule=EDGE_RULES[world.edges],
+        dimensions=int(world.dimensions),
+        obstacles=bool(world.obstacles),
+        obstacle=obstacle_rule(world),
+        polygonal=world.arena == "polygon" and world.edges != "periodic",
+        off_centre_height=is_off_centre(world),
+        **options,
+    )

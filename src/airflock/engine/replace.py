@@ -1,4 +1,4 @@
-"""Replacement in generated text that says so when there was nothing to replace."""
+"""Replacement in generated text, with an error when there was nothing to replace."""
 
 from typing import TypeVar
 
@@ -10,7 +10,7 @@ class ReplacementError(Exception):
 
 
 def checked_replace(text: Text, old: str, new: str, count: int = -1) -> Text:
-    """Text, or lines, with `new` in place of `old`, which must occur. Whoever expects it only sometimes says when.
+    """Text, or lines, with `new` in place of `old`, which must occur; callers test first where it may be absent.
 
     count : so many occurrences at most, from the first on; all by default
 

@@ -33,6 +33,8 @@ def compiler_fingerprint() -> str:
 def load_driver(text: str, label: str) -> ModuleType:
     """Import a driver from its text; compiled code of an earlier process is reused."""
     _import_compiler()
+    # Numba's own cache looks at the time stamp of one file and would serve stale physics when a helper
+    # elsewhere changes.
     digest = hashlib.sha256(f"{compiler_fingerprint()}\n{text}".encode()).hexdigest()[:20]
     name = f"airflock_driver_{label}_{digest}"
     with _loading:  # a thread must not get a module that another one is still executing
@@ -58,6 +60,7 @@ def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
     module.__file__ = str(path)
     module.TEXT = text  # type: ignore[attr-defined]
     sys.modules[name] = module
+    # The text in memory runs, never the file: a changed file once flew other physics with status 0.
     exec(compile(text, path, "exec"), vars(module))  # our own text, and not what the file may hold by now
     seal_functions(module, digest)
     return module

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.landing import GroundContact, ground_contact
+from airflock.engine.absence_and_faults import GroundContact, ground_contact
 from airflock.engine.plan import INTEGER_NAMES, Plan
 from airflock.parts.bodies import dryden, wind
 from airflock.scenarios import ORDER, FaultOnset, Geometry, Scenario, StepTimes, draw_onsets, step_counts

@@ -176,7 +176,7 @@ class ComparedFlights:
         self._open()
 
     def _open(self, place_agents: bool = False) -> None:
-        """Begin the flights of all origins, agents placed if `place_agents`. Raises AirflockError, and changes nothing."""
+        """Begin the flights of all origins, with agents placed if asked. Raises AirflockError, and changes nothing."""
         sides = [FlightPane(origin, self.seed, self._interpret_first) for origin in self.sources]
         if len(sides) == 2 and sides[0].scenario.dimensions != sides[1].scenario.dimensions:
             flown = [f"{side.origin.where} in {side.scenario.dimensions}" for side in sides]

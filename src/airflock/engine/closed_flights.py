@@ -1,4 +1,4 @@
-"""Simulate: scenarios in, recordings or order parameters out, on all devices."""
+"""Closed flights: scenarios in, recordings or order parameters out, on all devices; and the errors of such flights."""
 
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
@@ -7,13 +7,116 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from airflock.engine import cpu, devices, failure, requirements
+from airflock.engine import cpu, devices
+from airflock.engine.driver_state import DriverState
 from airflock.engine.drivers import flight_driver, flight_text, is_loaded
-from airflock.engine.plan import Plan
-from airflock.engine.planning import plan_of
-from airflock.engine.state import DriverState
-from airflock.scenarios import Scenario, check_seed, start_error, step_counts, uses_all_cores, wrap_start
-from airflock.support import FlightError, run_in_threads
+from airflock.engine.layout import lane_count
+from airflock.engine.plan import Plan, plan_of
+from airflock.engine.stages.cells import CHUNKS, MAX_CELLS_PER_AGENT, SPARE
+from airflock.scenarios import (
+    Scenario,
+    check_seed,
+    cost,
+    largest_fitting,
+    start_error,
+    step_counts,
+    uses_all_cores,
+    wrap_start,
+)
+from airflock.support import FlightError, free_memory, run_in_threads
+
+# Memory and time that a flight needs, judged before it is compiled. What grows with the flock is counted: rows, past
+# states that a delay needs, a packet of each pair where the radio keeps them, the grid and the frames of a recording.
+
+SMALL = 2**28  # bytes that are not worth a look at what is free
+SHARE = 0.9  # of the free memory that one flight may take
+ROWS = 40  # numbers that a driver keeps of an agent besides its memory; the laws here keep 20 to 60
+
+
+def check_resources(scenario: Scenario, plan: Plan) -> None:
+    """Refuse a flight that memory cannot hold or nobody can wait for; raises FlightError with the number that fits."""
+    key = "needs", plan
+    if key not in scenario.engine_cache:
+        cost.check_run_time(scenario)
+        scenario.engine_cache[key] = estimated_bytes(scenario, plan, scenario.agents)
+    needed: int = scenario.engine_cache[key]
+    free = free_memory() if needed > SMALL else None
+    if free is None:
+        return
+    room = int(SHARE * free)
+    if needed <= room:
+        return
+    fit = largest_fitting(scenario.agents, lambda agents: estimated_bytes(scenario, plan, agents) <= room)
+    told = [f"agents = {scenario.agents} needs about {needed / 1e9:.3g} GB of memory and {free / 1e9:.3g} GB are free"]
+    told.append(f"about {fit} agents fit")
+    frames = _frames(scenario, plan, scenario.agents)
+    if frames > 0 and needed - frames <= room:
+        share = (room - needed + frames) / frames
+        told.append(f"or a recording of {share * scenario.flight.duration:.3g} s, or samples further apart")
+    raise FlightError(f"{scenario.name}: {'; '.join(told)}")
+
+
+def estimated_bytes(scenario: Scenario, plan: Plan, agents: int) -> int:
+    """Bytes that a flight of so many agents takes, about."""
+    times, real, width = step_counts(scenario), plan.bits // 8, lane_count(agents)
+    kept = max(len(getattr(memory, "_fields", ())) for memory in plan.memories)
+    kept += sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
+    past = times["ring"] * plan.in_ring if plan.late else 0
+    numbers = (ROWS + kept + past) * width + (agents * len(plan.of_pair) * width if plan.packets else 0)
+    cells = 8 * CHUNKS * (MAX_CELLS_PER_AGENT * agents + SPARE) if plan.grid else 0
+    return real * numbers + cells + _frames(scenario, plan, agents)
+
+
+def _frames(scenario: Scenario, plan: Plan, agents: int) -> int:
+    """Bytes of the frames of a recording, as they are flown and as they are handed over."""
+    if not plan.record:
+        return 0
+    times = step_counts(scenario)
+    return 2 * (times["steps"] // times["sample_every"] + 1) * 3 * plan.dimensions * agents * plan.bits // 8
+
+
+# Messages of a flight that could not start or went wrong, and the step at which it did.
+
+
+def no_place_message(scenario: Scenario, seed: int, agent: int) -> str:
+    """One line for an agent that found no place at the start."""
+    walls = scenario.start.wall_clearance
+    keys = ["start.separation", *(["start.wall_clearance"] if walls else [])]
+    room = f"{keys[0]} = {scenario.separation():g} m" + (f" and {keys[1]} = {walls:g} m" if walls else "")
+    return (
+        f"{scenario.name}: seed {seed}: agent {agent} of {scenario.agents} found no place at {room}; "
+        f"enlarge the arena or lower {' or '.join(keys)}"
+    )
+
+
+def not_finite_message(scenario: Scenario, seed: int, agent: int, step: int) -> str:
+    """One line for an agent whose state stopped being finite at a step."""
+    return (
+        f"{scenario.name}: seed {seed}: agent {agent} left the finite numbers at step {step} "
+        f"(t = {step * scenario.flight.dt:g} s)"
+    )
+
+
+def first_bad_step(state: DriverState, low: int, high: int, half: int = 0) -> int:
+    """First step after which a state is not finite, by halves.
+
+    state : of a flight that is about to fly the step `low`, is finite there, and is not before the step `high`
+    half  : as in `State.advance`, for the step `low`
+    """
+    # Kernels never raise: a test per step would end vector loops. Flights are deterministic, so the step is found
+    # afterwards by flying again by halves.
+    while high - low > 1:
+        middle, kept = (low + high) // 2, state.buffer.copy()
+        state.advance(low, middle, half)
+        if state.is_finite:
+            low, half = middle, 0
+        else:
+            high = middle
+            state.buffer[:] = kept
+    return high
+
+
+# Flights.
 
 
 def driver_text(scenario: Scenario, *, precision: int = 32) -> str:
@@ -43,7 +146,7 @@ def fly_world(
         start = check_start(scenario, plan, start)
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], notify)
     if chosen != "cuda":
-        requirements.check_resources(scenario, plan)
+        check_resources(scenario, plan)
     flown = devices.fly_one(scenario, plan, seed, chosen, start)
     return check_result(scenario, seed, flown, chosen, precision, start)
 
@@ -77,11 +180,11 @@ def check_result(
 ) -> cpu.DriverResult:
     """A flight that went well; raises FlightError for any other."""
     if result.status < 0:
-        raise FlightError(failure.no_place_message(scenario, seed, -result.status - 1))
+        raise FlightError(no_place_message(scenario, seed, -result.status - 1))
     bad = _first_bad(result)
     if bad is not None:
         raise FlightError(
-            failure.not_finite_message(scenario, seed, bad, _first_bad_step(scenario, seed, precision, start, device))
+            not_finite_message(scenario, seed, bad, _first_bad_step(scenario, seed, precision, start, device))
         )
     return result
 
@@ -98,7 +201,7 @@ def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, d
     """First step after which a state is not finite: flights are deterministic, so another one finds it by halves."""
     last = step_counts(scenario)["steps"]
     if device != "cuda":
-        return failure.first_bad_step(open_state(scenario, seed, precision, False, start, device=device), 0, last)
+        return first_bad_step(open_state(scenario, seed, precision, False, start, device=device), 0, last)
     plan = plan_of(scenario, precision=precision).built(given_start=start is not None)
 
     def bad(steps: int) -> bool:
@@ -140,7 +243,7 @@ def flight_plan(
     """The plan that `open_state` flies by, before any text is made. Raises FlightError where memory cannot hold it."""
     plan = plan_of(scenario, precision=precision, record=record, absence=absence)
     plan = plan.built(grid=False, bits=64) if device == "python" else plan
-    requirements.check_resources(scenario, plan)
+    check_resources(scenario, plan)
     return plan.built(given_start=given_start)
 
 
