@@ -15,7 +15,7 @@ from airflock.engine.initial_rows import law_memories, metric_memory_rows
 from airflock.engine.layout import aligned_zeros, buffer_layout
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_arrays
-from airflock.engine.passes.slots import sorts_by_cells
+from airflock.engine.passes.grid import sorts_by_cells
 from airflock.engine.plan import INTEGER_NAMES, Plan
 from airflock.engine.stages.approach import BEGUN, ENDED, GAP
 from airflock.engine.stages.state import fault_row, own_row
