@@ -57,7 +57,7 @@ def compared(draw: Draw) -> Verdict:
 def interpreted_flight(draw: Draw) -> cpu.DriverResult:
     """The flight by the text of its driver, every line of it."""
     scenario = draw.scenario.with_drawn_scene(draw.seed)
-    plan = plan_of(scenario, precision=64, keep_frames=True, grid=False).built(given_start=draw.start is not None)
+    plan = plan_of(scenario, precision=64, record=True, grid=False).built(given_start=draw.start is not None)
     with_all_lines = interpreted.flight_driver(plan, exact=True)
     with patch.object(cpu, "driver_of", lambda plan, device="cpu": with_all_lines):
         return cpu.fly_on_cpu(plan, tables(scenario, plan, draw.seed), draw.start, "python")

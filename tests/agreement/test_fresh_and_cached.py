@@ -6,7 +6,7 @@ import sys
 
 FLIGHT = """
 import hashlib, airflock
-from airflock.engine import fly
+from airflock.engine import fly_world as fly
 scenario = airflock.load("vasarhelyi_2018/4ms", {"duration": 20.0, "agents": 30, "metrics.kind": "order"})
 print(hashlib.sha256(fly(scenario, 5, record=True).frames.tobytes()).hexdigest())
 """

@@ -219,7 +219,7 @@ def test_who_is_out_of_sight_does_not_count():
     one, own = pilot(), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
     alone = one.decide(own, 1.0).command
     one.receive(1, State(9.0, 0.0, 0.0, 1.0, 0.0, 0.0), 1.0, 1.0)
-    assert one.decide(own, 1.0, only=()).command == alone != one.decide(own, 1.0, only={1}).command
+    assert one.decide(own, 1.0, visible=()).command == alone != one.decide(own, 1.0, visible={1}).command
 
 
 def test_an_autopilot_is_asked_for_a_velocity_whatever_the_law_commands():
@@ -258,7 +258,7 @@ def test_a_pilot_stops_later_for_whom_it_lost_when_it_held():
     stops = []
     for stands in (False, True):
         one, own = pilot(silence=Silence(rule="stop", closing=8.0)), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
-        one.receive(1, State(60.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, stands=stands)
+        one.receive(1, State(60.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, is_standing=stands)
         stops.append([age for age in range(1, 20) if one.lost_near(own, float(age))][0])
     assert stops == [7, 14]
     one.receive(1, State(60.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.5, 0.5)

@@ -18,7 +18,7 @@ PAPER = {
 }  # fmt: skip
 FRESH = """
 import hashlib
-from airflock.engine import fly
+from airflock.engine import fly_world as fly
 from airflock.scenarios.scenario_builder import build_scenario
 settings = {settings!r}
 found = build_scenario({{"model": {{"kind": "vasarhelyi_2018"}}}}, "test", settings)

@@ -42,7 +42,7 @@ def differ(name, seed):
     """Largest differences of a case."""
     kind, keys = CASES[name]
     found = load(kind, COMMON | keys)
-    plan = plan_of(found, precision=64, keep_frames=True).built(grid=True)
+    plan = plan_of(found, precision=64, record=True).built(grid=True)
     known, flown = fly_plainly(found, seed), fly_crowd(found, plan, seed)
     flock, other = Crowd(found, plan, seed), Crowd(found, plan, seed)
     for each in (flock, other) if name in ("periodic", "plane") else ():

@@ -229,7 +229,7 @@ def test_a_body_of_ones_own_remembers_from_one_file(tmp_path, seed):
     (tmp_path / "slow.py").write_text(SLOW)
     keys = {"agents": 3, "duration": 3.0, "start.separation": 5.0}
     scenario = load("vasarhelyi_2018/4ms", keys, body=str(tmp_path / "slow.py"))
-    assert airflock.check_body(scenario.vehicle).broken_names == ()
+    assert airflock.check_body(scenario.vehicle).broken == ()
     ours = fly_world(scenario, seed, precision=64, record=True, device="python")
     np.testing.assert_array_equal(ours.frames, fly_plainly(scenario, seed).frames)
     memory, b = scenario.vehicle.Memory(), scenario.body

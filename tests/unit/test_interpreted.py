@@ -65,7 +65,7 @@ def test_a_breakpoint_in_a_rule_stops_at_every_neighbour_and_nowhere_else():
 
 def test_a_breakpoint_in_a_stage_stops():
     found = small("viragh_2014")
-    plan = plan_of(found, precision=64, keep_frames=True).built(grid=False)
+    plan = plan_of(found, precision=64, record=True).built(grid=False)
     file = interpreted.flight_driver(plan).__file__
     seen = Stops().stopped_at(file, line_of(file, "o = viragh_2014_decide("), lambda: flown(found, 1))
     assert [values["i"] for values in seen] == [0, 1, 2] * 3

@@ -74,7 +74,7 @@ class Report:
         return "\n".join([f"{self.name}:", *(f"  {truth}" for truth in self.truths)])
 
     @property
-    def broken_names(self) -> tuple[str, ...]:
+    def broken(self) -> tuple[str, ...]:
         """Names of the truths that do not hold, declared or not."""
         return tuple(truth.name for truth in self.truths if truth.fault)
 

@@ -143,7 +143,7 @@ def display(
     --------
     >>> import airflock
     >>> show = airflock.display(["I "], 4, spacing=5.0)
-    >>> show.formed[0].drones, show.formed[0].collisions
+    >>> show.shape_reports[0].drones, show.shape_reports[0].collisions
     (4, 0)
     """
     planned = plan_shapes(shapes, drones, failing, failure, points, spacing, settings)
