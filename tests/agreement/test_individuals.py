@@ -700,7 +700,7 @@ def test_a_fault_that_has_waited_for_its_compiler_begins_when_it_is_taken_over(m
         waiting.append((Future(), job))
         return waiting[-1][0]
 
-    monkeypatch.setattr(course, "in_background", later)
+    monkeypatch.setattr(course, "run_in_background", later)
     flight = airflock.open(load(PAPER, SMALL), 1, device="python").advance(1.0)
     flight.fault("motor", [2], wait=False, share=0.0).fault("radio_silent", [1], wait=False).advance(0.5)
     assert flight.waiting and not flight.faults

@@ -22,7 +22,7 @@ def grounded(monkeypatch):
 
     for name in ("driver_of", "fly", "advance"):
         monkeypatch.setattr(cpu, name, flown)
-    monkeypatch.setattr(simulate, "in_threads", flown)
+    monkeypatch.setattr(simulate, "run_in_threads", flown)
 
 
 def refused(*arguments):
