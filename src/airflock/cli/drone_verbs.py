@@ -116,7 +116,13 @@ def fleet(
     errors.read(_check_one_card, card_file, loaded, numbers)
     errors.raise_errors()
     terminal.print_notes(loaded.notes)
-    how: dict[str, Any] = {"vehicle": vehicle, "mode": mode, "from_ground": ground, "join": join, "card_file": card_file}
+    how: dict[str, Any] = {
+        "vehicle": vehicle,
+        "mode": mode,
+        "from_ground": ground,
+        "join": join,
+        "card_file": card_file,
+    }
     how["stop_for_lost"] = True if silence is None and not against else silence
     series = flying.FleetRuns(loaded, vehicle)
     ticks = seeds * int(loaded.flight.duration + (SECONDS_BEFORE_START if ground else 0.0))
