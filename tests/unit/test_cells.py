@@ -46,7 +46,7 @@ class Sorted:
         oy, oz = cells.line_position(line, self.count)
         room = cells.agents_around(oy, oz, self.starts, self.count, plan=self.plan)
         box, who = self.heard[:, : room + 2 * words.BLOCK], np.zeros(room + 2 * words.BLOCK, int)
-        slab, middle, found = cells.copied_variables(
+        slab, middle, found = cells.copy_line(
             oy, oz, self.starts, self.flat, self.whose, self.whose, box, self.count, self.flock, self.numbers,
             plan=self.plan, carried=((cells.WHO, who),),
         )  # fmt: skip
