@@ -144,7 +144,7 @@ def campaign(case, asked, folder):
         done = json.loads(asked.kept.read_text())
     limit = time.monotonic() + float(os.environ.get("AIRFLOCK_LIMIT", "inf"))
     told = 0.0
-    how = {"batch": asked.batch or (25 if asked.kind in SLOW else BATCH), "hang": PATIENCE.get(asked.kind, HANG)}
+    how = {"batch": asked.batch or (25 if asked.what in SLOW else BATCH), "hang": PATIENCE.get(asked.what, HANG)}
     while done["cases"] < asked.count and time.monotonic() < limit:
         began, count = time.monotonic(), min(how["batch"], asked.count - done["cases"])
         first = asked.begin + done["cases"]
@@ -168,7 +168,7 @@ def told_of(asked, done):
     """One line: cases, how many were accepted, failures, seconds, cases a second."""
     rate = done["cases"] / max(done["seconds"], 1e-9)
     return (
-        f"{asked.kind}, seed {asked.seed}: {done['cases']} of {asked.count} cases, {done['accepted']} accepted, "
+        f"{asked.what}, seed {asked.seed}: {done['cases']} of {asked.count} cases, {done['accepted']} accepted, "
         f"{len(done['failures'])} failures, {done['seconds']:.0f} s, {rate:.3g} a second\n"
     )
 

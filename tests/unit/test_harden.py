@@ -10,7 +10,7 @@ from airflock.runs.executors import ThreadExecutor
 from airflock.runs.flight_store import FlightStore
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
-from airflock.search import harden
+from airflock.search import hardening as harden
 from airflock.search.evolution import run_sensitivity
 from airflock.search.hardening_steps import CARRIED, STOPS, StepResult, measures
 from airflock.support.errors import ScenarioError
