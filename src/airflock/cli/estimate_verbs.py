@@ -554,8 +554,8 @@ def _check(result: Any) -> None:
 def _inferred_json(result: Any) -> dict[str, Any]:
     """Return the result as plain values."""
     laws = [
-        {name: getattr(law, name) for name in ("name", "gain", "error", "ahead", "criterion", "inside", "missed")}
-        | {"numbers": {key: number.value for key, number in law.numbers.items()}}
+        {name: getattr(law, name) for name in ("name", "gain", "error", "ahead", "inside", "missed")}
+        | {"criterion": law.aic_difference, "numbers": {key: number.value for key, number in law.numbers.items()}}
         for law in result.laws
     ]
     best = None

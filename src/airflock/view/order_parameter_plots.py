@@ -1,6 +1,4 @@
-"""Plots of order parameters: over time, over goals, over swept keys, and as transfer functions (Vásárhelyi et al.
-2018).
-"""
+"""Plots of order parameters: over time, over goals, over swept keys, and as transfer functions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

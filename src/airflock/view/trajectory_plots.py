@@ -1,6 +1,4 @@
-"""Plots of paths: in the plane, in space, among buildings, and the rays of one agent (Vásárhelyi et al. 2018, Fig.
-4).
-"""
+"""Plots of paths: in the plane, in space, among buildings, and the rays of one agent."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Plot of a formation's wash from above, and of each bird's induced drag (Dimock & Selig 2003)."""
+"""Plot of a formation's wash from above, and of each bird's induced drag."""
 
 import math
 from types import FunctionType, SimpleNamespace
