@@ -26,7 +26,7 @@ def flights(fitness, f_wall=1.0, r_min_mean=13.5):
 def result(parameters, fitness=0.82, largest=0.9):
     around = {key: (0.9 * value, 1.1 * value) for key, value in parameters.items()}
     return SimpleNamespace(
-        fitness=fitness, largest=largest, above=3000, candidates=15000, parameters=parameters, ranges=around
+        fitness=fitness, largest=largest, above=3000, candidate_count=15000, parameters=parameters, ranges=around
     )
 
 

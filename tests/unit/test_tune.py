@@ -13,13 +13,13 @@ from hypothesis import given, strategies as st
 
 import airflock
 from airflock.certificates.campaign import campaign_from_request, scenario_identity
-from airflock.cli.flight_verbs import run as tuning
 from airflock.cli.options import parse_seconds
 from airflock.engine import score_flights
 from airflock.runs.flight_store import FlightStore
 from airflock.runs.folder import Interrupted
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
+from airflock.search import tuning_run as tuning
 from airflock.search.finals import RACE_ROUNDS
 from airflock.search.tune_report import default_rows, replay_files
 from airflock.search.tune_stages import (
