@@ -20,7 +20,7 @@ from airflock.runs.folder import Interrupted, open_folder
 from airflock.runs.search_space import with_parameters
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario_builder import build_scenario
-from airflock.search import harden
+from airflock.search import hardening as harden
 from airflock.search.evolution import BatchExecutor, run_study, study_executor, study_tasks
 from airflock.search.generations import Evaluator
 from airflock.search.study import combine_scenarios, load_study, make_study

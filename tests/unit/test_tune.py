@@ -260,10 +260,10 @@ def test_the_report_plays_the_worst_flights_and_tells_the_card_of_the_next(done)
 
 def test_the_worst_flight_of_each_limit_is_played(tmp_path, monkeypatch):
     """Of several limits the first alone had all replays; the flight with the only contact had none."""
-    monkeypatch.setattr("airflock.recordings.simulation.simulate", lambda _, seed: seed)
+    monkeypatch.setattr("airflock.recordings.simulate", lambda _, seed: seed)
     shows = []
     monkeypatch.setattr(
-        "airflock.view.replay_page.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed))
+        "airflock.view.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed))
     )
     worst = [{"limit": limit, "seed": seed} for limit, seeds in (("a", (1, 2, 3)), ("b", (4, 1))) for seed in seeds]
     made = SimpleNamespace(worst=worst, campaign=SimpleNamespace(parameters=lambda _: {}))
