@@ -50,6 +50,8 @@ class _MovedFinder(MetaPathFinder):
     """Name the new place of a module that has moved; asked last, so that it costs nothing else."""
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        if name in ("airflock.engine.course", "airflock.engine.snapshots"):  # what old pickles ask for first
+            raise ModuleNotFoundError("a flight or moment that was pickled before 0.1.0 cannot be read; fly it again")
         package, _, rest = name.partition(".")
         first = rest.partition(".")[0]
         if package == __name__ and first in _MOVED:

@@ -262,9 +262,7 @@ def test_the_worst_flight_of_each_limit_is_played(tmp_path, monkeypatch):
     """Of several limits the first alone had all replays; the flight with the only contact had none."""
     monkeypatch.setattr("airflock.recordings.simulate", lambda _, seed: seed)
     shows = []
-    monkeypatch.setattr(
-        "airflock.view.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed))
-    )
+    monkeypatch.setattr("airflock.view.replay", lambda seed: SimpleNamespace(save=lambda _: shows.append(seed)))
     worst = [{"limit": limit, "seed": seed} for limit, seeds in (("a", (1, 2, 3)), ("b", (4, 1))) for seed in seeds]
     made = SimpleNamespace(worst=worst, campaign=SimpleNamespace(parameters=lambda _: {}))
     found = SimpleNamespace(certificate=made, scenario=build_scenario(MINE, "mine"), folder=tmp_path)
