@@ -82,7 +82,5 @@ def test_moments_stay_on_their_device_and_with_what_is_recorded(other):
 
 @pytest.mark.parametrize("first", ["course\nCourse", "snapshots\nSnapshot"])
 def test_what_was_pickled_before_the_modules_moved_is_refused_in_one_line(first):
-    with pytest.raises(
-        ModuleNotFoundError, match="^a flight or moment that was pickled before .*; fly it again$"
-    ):
+    with pytest.raises(ModuleNotFoundError, match="^a flight or moment that was pickled before .*; fly it again$"):
         pickle.loads(f"cairflock.engine.{first}\n.".encode())

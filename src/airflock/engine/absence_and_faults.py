@@ -44,7 +44,7 @@ def begin_fault(state: "DriverState", onset: FaultOnset) -> None:
 
 
 def still_has_fault(state: "DriverState", leaving: FaultOnset) -> bool:
-    """Whether an agent still has the fault by which it is to leave: who has joined again since has none."""
+    """Return True if an agent still has the fault by which it is to leave: who has joined again since has none."""
     slot = leaving.agent if state.slots is None else int(state.slots[leaving.agent])
     work, rows = state.arrays["work"], state.driver.ROWS
     onset, lasts = (rows.get(fault_row(leaving.kind, name)) for name in ("onset", "lasts"))
@@ -186,7 +186,7 @@ SURE = 0.5  # share of the time that batteries last at least after which they ar
 
 @dataclass(frozen=True)
 class GroundContact:
-    """What tells who has landed.
+    """Finds the agents that have landed.
 
     ground  : its height, m
     body    : the rules; numbers : those of each agent, as drivers read them; wing : of all
@@ -220,7 +220,7 @@ class GroundContact:
 
 
 def ground_contact(scenario: Scenario, seed: int, real: Any) -> GroundContact | None:
-    """Who can land in a scenario; None where nobody can. real : type of the driver's numbers."""
+    """Return the record of agents that can land; None where none can. real : type of the driver's numbers."""
     if not scenario.can_land or scenario.ground is None:
         return None
     body = scenario.body

@@ -62,7 +62,7 @@ class SealedFiles(IndexDataCacheFile):  # type: ignore[misc]
                 file.write(given)
 
     def _sound(self, path: Path) -> bool:
-        """Whether a file is as it was sealed; one that is not is removed."""
+        """Return True if a file is as it was sealed; one that is not is removed."""
         try:
             sound = _seal(path).read_bytes() == self._seal_of(path, path.read_bytes())
         except OSError:

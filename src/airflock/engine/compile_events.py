@@ -41,7 +41,7 @@ def message_if_slow() -> Iterator[None]:
 
 
 def _watched() -> bool:
-    """Whether a person sees what this thread says: at a terminal or in a notebook, and not of one of many workers."""
+    """True if a person sees what this thread says: at a terminal or in a notebook, and not of one of many workers."""
     main = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
     return main and ("ipykernel" in sys.modules or sys.stderr.isatty())
 

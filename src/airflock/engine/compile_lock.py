@@ -26,7 +26,7 @@ PATIENCE = 300.0  # s; whoever holds a lock for longer has been stopped, and is 
 
 
 def locked_compile(compile_: Callable[[Any], Any], folder: Path) -> Callable[[Any], Any]:
-    """What compiles a function for a signature, or loads it from a folder, by one process at a time.
+    """Wrap a compilation so that one process at a time compiles, or loads from the folder.
 
     Where the folder holds an index, the function is loaded, for which nobody waits.
     """
@@ -69,7 +69,7 @@ def folder_lock(folder: Path, timeout: float = PATIENCE) -> Iterator[bool]:
 
 
 def _taken(handle: int, until: float) -> bool:
-    """Whether the lock was free in time."""
+    """Return True if the lock was free in time."""
     while True:
         try:
             locks.lock(handle)

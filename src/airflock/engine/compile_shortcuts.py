@@ -159,7 +159,7 @@ def _named(block: Any) -> set[str]:
 
 
 def _takes_place(usual: Callable[..., bool], function: Callable[..., Any]) -> bool:
-    """Whether an implementation of Numba's takes the place in the text as an argument."""
+    """Return True if an implementation of Numba's takes the place in the text as an argument."""
     if function not in _places:
         _places[function] = usual(function)
     return _places[function]
@@ -172,7 +172,7 @@ def _without_exits(usual: Callable[..., Any], code: Any) -> Any:
 
 
 def registry_sizes() -> Hashable:
-    """What grows when Numba gets new implementations, of operators and functions, or of modules that hold some."""
+    """Return the sizes of Numba's registries, which grow with every new implementation."""
     lowered = sum(len(getattr(builtin_registry, kind)) for kind in RegistryLoader.registry_items)
     typed = templates.builtin_registry
     return len(sys.modules), lowered, len(typed.functions), len(typed.attributes), len(typed.globals)
@@ -191,7 +191,7 @@ def _unchanged(usual: Callable[..., None]) -> None:
 
 
 def _known(usual: Callable[..., Any], *given: Any) -> Any:
-    """What a question about this processor and this LLVM came to the first time."""
+    """Return the remembered answer to a question about this processor and this LLVM."""
     if usual not in _once:
         _once[usual] = usual(*given)
     return _once[usual]

@@ -116,12 +116,12 @@ class ArrayRewritePass(NopythonRewrites):  # type: ignore[misc]
 
 
 def _stands_once(function: Any) -> bool:
-    """Whether a function is not made part of those that call it."""
+    """Return True if a function is not made part of those that call it."""
     return function.dispatcher.targetoptions.get("forceinline") is False
 
 
 def _holds_array(kind: Any) -> bool:
-    """Whether a type is that of an array, or of a record of some."""
+    """Return True if a type is that of an array, or of a record of some."""
     parts: Any = kind if isinstance(kind, types.BaseTuple) else ()
     return isinstance(kind, types.Array) or any(_holds_array(part) for part in parts)
 
@@ -205,7 +205,7 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
 
 
 def _when_grown(refresh: Callable[[], None]) -> Callable[[], None]:
-    """What looks for new implementations, which Numba does whenever it finds none, only where there are new ones."""
+    """Search for new implementations only if there are some; Numba searches whenever it finds none."""
     seen = -1
 
     def grown() -> None:

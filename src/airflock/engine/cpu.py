@@ -16,7 +16,7 @@ from airflock.support import check_interrupted
 
 @dataclass(frozen=True)
 class DriverResult:
-    """What a driver leaves behind.
+    """Result of a driver.
 
     values : order parameters combined over time, and the time to each goal (a list, s; nan: never)
     frames : (time, component, agent) or None

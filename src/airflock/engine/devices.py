@@ -102,7 +102,7 @@ def _slower(plan: Plan) -> float:
 
 
 def flies_by_cells(scenario: Scenario, plan: Plan, given_start: bool = False) -> bool:
-    """Whether a GPU flies a flock by cells, step by step, and not as one block; given: from given places."""
+    """Return True if a GPU flies a flock by cells, step by step, and not as one block; given: from given places."""
     from airflock.engine.cuda.large_flock import cell_plan_error
 
     return cell_plan_error(plan, scenario.agents) is None and (given_start or not scenario.separation())

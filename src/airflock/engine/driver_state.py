@@ -75,7 +75,7 @@ class DriverMemory:
         self._given = self._arrays()
 
     def arguments(self, first: int, last: int, half: int = 0, frames: NDArray[Any] | None = None) -> tuple[Any, ...]:
-        """What the driver is called with."""
+        """Return the arguments of the driver."""
         before, after = self._given
         return first, last, half, *before, self.no_frames if frames is None else frames, *after
 
@@ -96,7 +96,7 @@ class DriverMemory:
 
     @property
     def scene(self) -> tuple[NDArray[Any], ...]:
-        """What stands in the world and what is noted of it on the way, as `stages.scene` takes it."""
+        """Return the arrays of the scene and of the notes on it, in the order of `stages.scene`."""
         own, tables = self.arrays, self.tables
         shapes = own["shapes"] if len(tables.later) else tables.shapes
         return (
@@ -106,12 +106,12 @@ class DriverMemory:
 
     @property
     def has_ended(self) -> bool:
-        """Whether the flight has ended at a collision."""
+        """Return True if the flight has ended at a collision."""
         return bool(self.arrays["held"][ENDED] > 0.5)
 
     @property
     def begun(self) -> bool:
-        """Whether agents have their places."""
+        """Return True if agents have their places."""
         return bool(self.arrays["held"][BEGUN] > 0.5)
 
     @property
@@ -149,7 +149,7 @@ class DriverMemory:
 
     @property
     def is_finite(self) -> bool:
-        """Whether the positions and velocities of all agents are finite."""
+        """Return True if the positions and velocities of all agents are finite."""
         # as bytes: `all` of so few takes three times as long
         return not any(0 in np.isfinite(run, told).tobytes() for run, told in self._moving)
 
@@ -188,7 +188,7 @@ class DriverMemory:
 
     @property
     def has_slots(self) -> bool:
-        """Whether agents lie in slots (`passes.slots`): those of a large flock, and where some may be absent."""
+        """Return True if agents lie in slots (`passes.slots`): those of a large flock, and where some may be absent."""
         return "order" in self.driver.ROWS
 
     @property
@@ -244,7 +244,7 @@ class DriverState(DriverMemory):
         return cls(plan, world_tables(scenario, plan, seed, world), driver_of(plan, device), start)
 
     def copy(self) -> "DriverState":
-        """The same state in memory of its own."""
+        """Return a copy of the state in its own memory."""
         made = DriverState(self.plan, self.tables, self.driver, self.start)
         made.buffer[:] = self.buffer
         return made
@@ -413,7 +413,7 @@ def _rows(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) -> None:
 
 
 def _memories(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) -> None:
-    """What laws remember of each agent; by a law with another Memory an agent begins anew."""
+    """Carry the memories of laws over; under a law with another Memory an agent starts from the initial one."""
     laws, real = new.laws, new.arrays["mem"].dtype
     new.arrays["mem"][:] = law_memories(new.plan, laws, real)
     before, now = old.plan.memories, new.plan.memories
@@ -423,7 +423,7 @@ def _memories(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) -> N
 
 
 def _goes_on(row: str, old: Plan, new: Plan) -> bool:
-    """Whether a row of what a body or a sensor remembers means the same in both plans."""
+    """Return True if a row of what a body or a sensor remembers means the same in both plans."""
     return old.body == new.body if row.startswith("body") else old.senses and old.sensor == new.sensor
 
 
@@ -454,7 +454,7 @@ def _under_way(old: DriverState, new: DriverState, step: int, lanes: NDArray[np.
 
 
 def _remembered(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) -> None:
-    """What metrics of both plans remember of each agent."""
+    """Carry over the memories of the metrics that both plans have."""
     before = metric_memory_rows(old.plan)
     for metric, rows in metric_memory_rows(new.plan).items():
         if metric in before:
@@ -462,7 +462,7 @@ def _remembered(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) ->
 
 
 def _solved(old: DriverState, new: DriverState) -> list[str]:
-    """What rules of the whole flock carry from call to call, where wings are what they were; else it is found anew."""
+    """Carry over the workspace of rules of the whole flock if the wings are unchanged; otherwise solve again."""
     wing = new.plan.spans["wing"]
     if old.plan != new.plan or not np.array_equal(old.arrays["row"][wing], new.arrays["row"][wing]):
         return []

@@ -96,7 +96,7 @@ class Snapshot:
         return f"<Snapshot of {self.origin[0].name}, seed {self.origin[1]}, at {time:g} s>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises FlightError where another process could not import a law."""
+        """Return the state to pickle. Raises FlightError where another process could not import a law."""
         check_sendable(self.origin[0], self.scenario)
         return vars(self)
 
@@ -148,7 +148,7 @@ class FlightState:
 
     @property
     def has_ended(self) -> bool:
-        """Whether nothing more can be flown, not even the last sample."""
+        """Return True if nothing more can be flown, not even the last sample."""
         return self.state.has_ended or self.step > self.steps
 
     # ------------------------------------------------------------------------------------------------- flying
@@ -165,7 +165,7 @@ class FlightState:
 
     @property
     def is_ready(self) -> bool:
-        """Whether the driver in force flies at once."""
+        """Return True if the driver in force flies at once."""
         return is_compiled(self.state.driver)
 
     def compile(self, in_background: bool = False) -> None:
@@ -194,7 +194,7 @@ class FlightState:
             self._sampled.append((-(-first // every) + np.arange(len(frames))) * every * self.scenario.flight.dt)
 
     def _placed(self, done: int) -> int:
-        """What a driver returned. Raises FlightError if that is an agent that found no place."""
+        """Return the step that a driver returned. Raises FlightError if it names an agent that found no place."""
         if done < 0:
             raise FlightError(no_place_message(self.scenario, self.seed, -done - 1))
         return done
@@ -214,7 +214,7 @@ class FlightState:
 
     @property
     def waiting(self) -> bool:
-        """Whether a change waits for its compiler."""
+        """Return True if a change waits for its compiler."""
         return self._coming is not None
 
     @property
@@ -352,7 +352,7 @@ class FlightState:
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises FlightError where a change is on its way, or another process has not the code."""
+        """Return the state to pickle. Raises FlightError while a change compiles or where code cannot be imported."""
         if self.waiting:
             raise FlightError("a change waits for its compiler; let it come into force before the flight is pickled")
         check_sendable(self.origin[0], self.scenario)
@@ -370,7 +370,7 @@ class FlightState:
 
 
 def _same(origin: tuple[Scenario, int, int, Any], other: tuple[Scenario, int, int, Any]) -> bool:
-    """Whether two flights began alike: by the same scenario, seed and precision, at the same start."""
+    """Return True if two flights began alike: by the same scenario, seed and precision, at the same start."""
     return origin is other or (origin[:3] == other[:3] and np.array_equal(origin[3], other[3]))
 
 
@@ -420,17 +420,17 @@ class FlightObservations:
 
     @property
     def origin(self) -> tuple[Scenario, int, int, Any]:
-        """What it was opened with: scenario, seed, precision and start."""
+        """Return the scenario, seed, precision and start with which it was opened."""
         return self._course.origin
 
     @property
     def records(self) -> bool:
-        """Whether it keeps frames."""
+        """Return True if it keeps frames."""
         return self._course.record
 
     @property
     def events(self) -> list[Event]:
-        """What was done to it so far, in order."""
+        """Return the events so far, in order."""
         return self._course.events
 
     @property
@@ -455,7 +455,7 @@ class FlightObservations:
 
     @property
     def over(self) -> bool:
-        """Whether the flight has reached its duration, or has ended at a collision."""
+        """Return True if the flight has reached its duration, or has ended at a collision."""
         return self._course.step >= self._course.steps or self._state.has_ended
 
     @property
@@ -496,7 +496,7 @@ class FlightObservations:
 
     @property
     def decides(self) -> bool:
-        """Whether the agents decide at the next step to be flown."""
+        """Return True if the agents decide at the next step to be flown."""
         return self.step % self._state.whole("decide_every") == 0
 
     @property
@@ -506,7 +506,7 @@ class FlightObservations:
 
     @property
     def waiting(self) -> bool:
-        """Whether a change waits for its compiler."""
+        """Return True if a change waits for its compiler."""
         return self._course.waiting
 
     @property
@@ -532,7 +532,7 @@ class FlightObservations:
         return self.scenario.judged(self._state.values())
 
     def look(self, agent: int) -> AgentView:
-        """What an agent perceives, and the parts of its command.
+        """Return the percept of an agent, and the parts of its command.
 
         Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
 
@@ -883,7 +883,7 @@ class Flight(FlightActions):
 
     @property
     def ready(self) -> bool:
-        """Whether it flies at once; otherwise its driver is compiled first."""
+        """Return True if it flies at once; otherwise its driver is compiled first."""
         return self._course.is_ready
 
     def compile(self, *, aside: bool = False) -> "Flight":
@@ -1061,7 +1061,7 @@ class Flight(FlightActions):
         return twin
 
     def again(self) -> "Flight":
-        """The same flight from its start, with the same events to come.
+        """Return this flight from its start, with the same events to come.
 
         Raises ScenarioError, FlightError and ParameterError as opening it did; so only where files have changed
         meanwhile.

@@ -11,7 +11,7 @@ from airflock.engine.plan import Plan
 
 
 def metric_memories(plan: Plan, m: int, real: Any) -> NDArray[Any]:
-    """What metrics remember of each agent, at its start: (field, lane)."""
+    """Return the initial memories of metrics, (field, lane)."""
     blocks = [memory_defaults(metric.Memory, m, real) for metric in plan.metrics if metric.Memory is not None]
     return np.concatenate(blocks) if blocks else np.zeros((1, m), real)
 
@@ -24,7 +24,7 @@ def metric_memory_rows(plan: Plan) -> dict[tuple[str, Any], slice]:
 
 
 def law_memories(plan: Plan, laws: NDArray[Any], real: Any) -> NDArray[Any]:
-    """What laws remember at the start, (field, lane): of each lane what its law does; laws : number of each lane's."""
+    """Return the initial memories of laws, (field, lane), each lane by its law; laws : law of each lane."""
     found = [memory_defaults(record, 1, real)[:, 0] for record in plan.memories]
     table = np.zeros((max(map(len, found)), len(found)), real)
     for law, values in enumerate(found):
@@ -38,5 +38,5 @@ def memory_defaults(record: Any, m: int, real: Any) -> NDArray[Any]:
 
 
 def pair_values(plan: Plan, receivers: int, senders: int, real: Any) -> NDArray[Any]:
-    """What is kept of pairs of agents that have heard nothing of each other: (number, receiver, sender)."""
+    """Return the record of pairs that have heard nothing of each other: (number, receiver, sender)."""
     return np.tile(np.array(plan.of_pair, real)[:, None, None], (1, receivers, senders))

@@ -63,7 +63,7 @@ class PlainTable(dict[int, Any]):
 
 
 def plain_tables(tables: Any) -> Any:
-    """What a driver is given, such that it reads and writes plain numbers: arrays, tuples of them, numbers."""
+    """Return the arguments of a driver such that it reads and writes plain numbers: arrays, tuples of them, numbers."""
     if isinstance(tables, np.ndarray):
         return _numbers(tables) if tables.ndim == 1 else PlainTable(tables)
     if isinstance(tables, tuple):
@@ -72,7 +72,7 @@ def plain_tables(tables: Any) -> Any:
 
 
 def _given(name: str, given: Any) -> Any:
-    """What a driver is given for an argument: cells stay arrays, which are cut, reshaped and seen as integers."""
+    """Return one argument of a driver; cells stay arrays, which are cut, reshaped and viewed as integers."""
     return given if name == "cells" else plain_tables(given)
 
 
@@ -163,7 +163,7 @@ def _driver(build: Builder, label: str, lanes: str, exact: bool) -> ModuleType:
 
 
 def _skipping(text: str) -> str:
-    """The same text, in which a loop over pairs goes on to the next one where what it would find is not chosen.
+    """Return the text with loops over pairs that skip a pair whose result is not selected.
 
     Whatever follows `ok` in a loop goes through `choose(ok, ..., START)`, and START changes no total. Where another
     agent of the same loop is still to come, nothing is skipped.
@@ -182,7 +182,7 @@ def _skipping(text: str) -> str:
 
 
 def _bound(build: Builder) -> dict[str, Any]:
-    """What the stages call by name: rules and records as their authors wrote them, rows of numbers with choices."""
+    """Return the names that stages call: rules and records as written, rows of numbers with choices."""
     found: dict[str, Any] = dict(build.source.originals())
     for name, fields in build.source.rows.items():
         record, _, law = name.partition("_")

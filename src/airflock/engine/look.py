@@ -27,7 +27,7 @@ from airflock.world import edges
 
 
 def agent_view(scenario: Scenario, state: DriverState, agent: int, step: int, seed: int, world: int) -> AgentView:
-    """What `agent` perceived at the last decision up to `step`. Exact where the driver has just decided there."""
+    """Return the percept of `agent` at the last decision up to `step`; exact if the driver has just decided there."""
     plan, model = state.plan, scenario.law_of(agent).model
     every = state.whole("decide_every")
     number = step // every
@@ -61,7 +61,7 @@ def agent_view(scenario: Scenario, state: DriverState, agent: int, step: int, se
 
 
 def _memory(state: DriverState, model: Model, agent: int) -> Any:
-    """What a law remembers of an agent."""
+    """Return the memory of an agent's law."""
     if model.Memory is None:
         return None
     fields = len(model.Memory._fields)

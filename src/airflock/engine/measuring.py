@@ -59,7 +59,7 @@ def score_tables(
     device: str = "cpu",
     present: NDArray[np.bool_] | None = None,
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
-    """The same from the numbers of a world; the values of every instant as (time, value)."""
+    """Score frames from the numbers of a world; the values of every instant as (time, value)."""
     plan, tables = shared_plan(plan, tables)
     driver = interpreted.replay_driver(plan) if device == "python" else replay_driver(plan)
     real = tables.row.dtype
@@ -96,7 +96,7 @@ def score_tables(
 
 
 def shared_plan(plan: Plan, tables: WorldTables) -> tuple[Plan, WorldTables]:
-    """The same with what order parameters read first among the numbers: then one driver measures flights of all laws.
+    """Reorder numbers so that those of order parameters come first: one driver then measures flights of all laws.
 
     Of a law it would tell only how many numbers stand before those of the arena.
     """

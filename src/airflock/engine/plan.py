@@ -180,7 +180,7 @@ class Plan(PlanProperties):
         return hash(tuple(getattr(self, each.name) for each in fields(self)))
 
     def built(self, **changes: Any) -> "Plan":
-        """The same flight built otherwise: fields of `Build`."""
+        """Return this plan with other build options: fields of `BuildOptions`."""
         return replace(self, build=replace(self.build, **changes))
 
     @property
@@ -190,31 +190,31 @@ class Plan(PlanProperties):
 
     @property
     def record(self) -> bool:
-        """Whether every sample is kept."""
+        """Return True if every sample is kept."""
         return self.build.keep_frames
 
     @property
     def given_start(self) -> bool:
-        """Whether the start is handed over."""
+        """Return True if the start is handed over."""
         return self.build.given_start
 
     @property
     def grid(self) -> bool:
-        """Whether neighbours are found by cells."""
+        """Return True if neighbours are found by cells."""
         return self.build.grid
 
     @property
     def near(self) -> bool:
-        """Whether order parameters look at pairs and links by cells."""
+        """Return True if order parameters look at pairs and links by cells."""
         return self.build.grid and self.build.near
 
     @property
     def absence(self) -> bool:
-        """Whether agents may be absent."""
+        """Return True if agents may be absent."""
         return self.build.absence
 
     def of(self, law: int) -> "Plan":
-        """The same flight as the stages of one law see it: its model, and its numbers under the letter p."""
+        """Return this plan as the stages of one law see it: its model, and its numbers under the letter p."""
         if not self.laws or law == 0:
             return replace(self, law=law) if self.laws else self
         own, letters = self.laws[law - 1], {"p": "p0", f"p{law}": "p"}
@@ -229,7 +229,7 @@ class Plan(PlanProperties):
 
     @property
     def memories(self) -> tuple[type | None, ...]:
-        """What each law remembers of an agent."""
+        """Return the Memory record of each law."""
         return (self.model.Memory, *(own.model.Memory for own in self.laws))
 
     @property
@@ -245,22 +245,22 @@ class Plan(PlanProperties):
 
     @property
     def bounded(self) -> bool:
-        """Whether a place may lie outside: there is an arena, or something stands in the world."""
+        """Return True if a place may lie outside: there is an arena, or something stands in the world."""
         return self.excursion is not beyond_nothing or bool(self.obstacles) or self.scene
 
     @property
     def struck(self) -> bool:
-        """Whether a motion step asks which lanes suffer from a fault: all move at once, and there are such faults."""
+        """Return True if a motion step masks the lanes that a fault affects: all move at once, and there are such faults."""
         return bool(self.suffers("motion")) and not self.sequential
 
     @property
     def believes(self) -> bool:
-        """Whether what agents measure of themselves is not the truth: it has rows of its own."""
+        """Return True if what agents measure of themselves is not the truth: it has rows of its own."""
         return self.has_sensor_error or bool(self.suffers("sense"))
 
     @property
     def late(self) -> bool:
-        """Whether what is heard comes from the ring of past states."""
+        """Return True if what is heard comes from the ring of past states."""
         return self.has_sensor_error or self.delayed
 
     @property
@@ -281,22 +281,22 @@ class Plan(PlanProperties):
 
     @property
     def told(self) -> bool:
-        """Whether what others know of an agent is not the truth of this moment: it has rows of its own."""
+        """Return True if what others know of an agent is not the truth of this moment: it has rows of its own."""
         return self.late or self.sees or bool(self.suffers("sense", "tell"))
 
     @property
     def sees(self) -> bool:
-        """Whether agents see each other: then nobody is told anything, and what is kept for others is the truth."""
+        """Return True if agents see each other: nothing is sent, and the ring holds true states."""
         return self.radio.see is not None
 
     @property
     def perturbed(self) -> bool:
-        """Whether distances as perceived are not the true ones, which decide who is in range."""
+        """Return True if distances as perceived are not the true ones, which decide who is in range."""
         return self.told or self.believes or self.radio.keeps_packets or bool(self.suffers("radio"))
 
     @property
     def packets(self) -> bool:
-        """Whether agents keep the last packet of each other one."""
+        """Return True if agents keep the last packet of each other one."""
         return self.radio.keeps_packets or self.stops_for_lost
 
     @property
@@ -306,12 +306,12 @@ class Plan(PlanProperties):
 
     @property
     def turns(self) -> bool:
-        """Whether the radio carries senders of packets on otherwise than straight forward."""
+        """Return True if the radio carries senders of packets on otherwise than straight forward."""
         return self.radio.carry is not None and self.radio.carry is not forward
 
     @property
     def draws(self) -> bool:
-        """Whether one random number decides whether anything arrives; a rule `receive` draws its own."""
+        """Return True if one random number decides whether anything arrives; a rule `receive` draws its own."""
         return self.lossy or self.radio.missed is not None
 
     def rolls(self, names: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
@@ -320,7 +320,7 @@ class Plan(PlanProperties):
 
     @property
     def shades(self) -> bool:
-        """Whether the radio is asked with whether something stands between two agents, and something can."""
+        """Return True if the radio is asked with whether something stands between two agents, and something can."""
         return self.radio.asks_for("clear") and (self.obstacles or self.scene)
 
     @property
@@ -335,7 +335,7 @@ class Plan(PlanProperties):
 
     @property
     def of_pair(self) -> tuple[float, ...]:
-        """What is kept of each pair, as it is before anything was sent.
+        """Return the initial record of a pair, before anything was sent.
 
         Position, velocity and time stamp of the newest packet; where packets come late, the same of the one under way
         and when it is due (GONE: none is under way); the radio's Packet.
@@ -346,17 +346,17 @@ class Plan(PlanProperties):
 
     @property
     def hides(self) -> bool:
-        """Whether agents are asked whether something stands between them and others."""
+        """Return True if agents are asked whether something stands between them and others."""
         return self.meeting("hidden") and (self.obstacles or self.scene)
 
     @property
     def placed(self) -> bool:
-        """Whether offsets to all who are heard are kept: the topology asks for one of them, or for what is hidden."""
+        """Return True if offsets to all heard agents are kept: the topology reads them, or what is hidden."""
         return self.hides or any(self.meeting(name) for name in ("dx", "dy", "dz"))
 
     @property
     def fades(self) -> bool:
-        """Whether the strength of a signal is drawn."""
+        """Return True if the strength of a signal is drawn."""
         return self.meeting("fade") and self.fading
 
     @property
@@ -365,11 +365,11 @@ class Plan(PlanProperties):
         return None if self.topology is None else self.topology.meet
 
     def meeting(self, name: str) -> bool:
-        """Whether the rule of the topology asks for something by this name."""
+        """Return True if the rule of the topology asks for something by this name."""
         return self.topology is not None and self.topology.asks_for(name)
 
     def varies(self, letter: str) -> bool:
-        """Whether a number of this record differs among agents."""
+        """Return True if a number of this record differs among agents."""
         return any(of == letter for of, _ in self.varied)
 
     @property
@@ -398,7 +398,7 @@ class Plan(PlanProperties):
 
     @property
     def senses(self) -> bool:
-        """Whether the sensor makes of the true state the one that is believed; else its errors are added."""
+        """Return True if the sensor makes of the true state the one that is believed; else its errors are added."""
         return self.has_sensor_error and self.sensor.measure is not None
 
     @property
@@ -409,17 +409,17 @@ class Plan(PlanProperties):
 
     @property
     def periodic(self) -> bool:
-        """Whether offsets are taken to the nearest image."""
+        """Return True if offsets are taken to the nearest image."""
         return self.edge_rule is edges.wrap
 
     @property
     def flows(self) -> bool:
-        """Whether agents come nearer by their velocities alone, all in the same step; not where faces throw back."""
+        """Return True if agents approach by their velocities alone, all in one step; not where faces throw back."""
         return not self.sequential and (self.edge_rule is None or self.periodic)
 
     @property
     def integration(self) -> str:
-        """Whether positions move by the velocity before ("old") or after ("new") the body has moved."""
+        """Return True if positions move by the velocity before ("old") or after ("new") the body has moved."""
         return dict(self.body_choices).get("integration", self.body.integration)
 
     @property
@@ -532,7 +532,7 @@ def _chosen(record: Any) -> tuple[tuple[str, str], ...]:
 
 
 def _surroundings(scenario: Scenario) -> dict[str, Any]:
-    """What a plan says of start, scene, goals and wind."""
+    """Return the properties of a plan that describe start, scene, goals and wind."""
     kind, wind = scenario.goals.kind, scenario.wind
     return {
         "start": scenario.start.kind,
@@ -547,7 +547,7 @@ def _surroundings(scenario: Scenario) -> dict[str, Any]:
 
 
 def _hearing(scenario: Scenario) -> dict[str, Any]:
-    """What a plan says of the radio, and of whom agents meet of those whom they hear."""
+    """Return the properties of a plan that describe the radio and the topology."""
     return {
         "radio": scenario.transceiver,
         # the kind of radios that share a record is none of the choices that rules can read
@@ -562,14 +562,14 @@ def _hearing(scenario: Scenario) -> dict[str, Any]:
 
 
 def _sensing(scenario: Scenario) -> dict[str, Any]:
-    """What a plan says of a sensor: nothing of one that tells the truth, so that all such flights share a driver."""
+    """Return the properties of a plan that describe the sensor; a perfect one adds none: such flights share a driver."""
     if not scenario.has_sensor_error:
         return {"has_sensor_error": False}
     return {"has_sensor_error": True, "sensor": scenario.sensor, "sensor_choices": _chosen(scenario.sensors)}
 
 
 def _few_packets(scenario: Scenario) -> bool:
-    """Whether each rate of the radio sends at most FEW packets between two decisions; True where it has none."""
+    """Return True if each rate of the radio sends at most FEW packets between two decisions; True where it has none."""
     rates = [getattr(scenario.radio, name) for name in scenario.transceiver.rates]
     period = step_counts(scenario)["decide_every"] * scenario.flight.dt
     return max(rates, default=0.0) * period <= FEW_PACKETS - 0.1  # rounding may make it one packet more

@@ -14,7 +14,7 @@ from airflock.engine.text.rewrite import law_suffix
 
 @dataclass(frozen=True)
 class StepEvent:
-    """What is done together in a step.
+    """Stages of a step that are due together.
 
     stages : in their order
     every  : integer of a world: steps from one time to the next; empty: at each step
@@ -68,6 +68,6 @@ def _of_laws(stage: str, plan: Plan) -> list[str]:
 
 
 def sequential_stages(plan: Plan) -> tuple[str, ...]:
-    """What each agent in turn does in a sequential step."""
+    """Return the stages that each agent runs in turn in a sequential step."""
     events = stages_of_events(plan)
     return tuple(stage for stage in (*events["decide"], *events["move"]) if stage not in AT_ONCE)

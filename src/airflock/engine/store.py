@@ -25,7 +25,7 @@ _loading = Lock()
 
 @cache
 def compiler_fingerprint() -> str:
-    """What makes machine code of a text here: versions, processor, and our own passes."""
+    """Return the versions, processor and passes of ours that turn a text into machine code."""
     passes = hashlib.sha256(b"".join((Path(__file__).parent / name).read_bytes() for name in PASSES))
     return f"{toolchain_versions()}|{passes.hexdigest()}"
 

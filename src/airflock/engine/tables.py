@@ -49,7 +49,7 @@ class WorldTables:
     ground_contact: GroundContact | None = None
 
     def changed(self, **whole: int) -> "WorldTables":
-        """The same world with other integers, by their names in `plan.INTEGER_NAMES`."""
+        """Return this world with other integers, by their names in `plan.INTEGER_NAMES`."""
         return replace(self, whole=np.array([(self.integers | whole)[name] for name in INTEGER_NAMES], np.int64))
 
     @property
@@ -82,7 +82,7 @@ def driver_records(scenario: Scenario, period: float) -> dict[str, Any]:
 
 
 def driver_geometry(scenario: Scenario) -> Geometry:
-    """What drivers read of world, start and goals."""
+    """Return the numbers of world, start and goals that drivers read."""
     begin, goals = scenario.start, scenario.goals
     half, extent = half_sizes(scenario.world), start_extents(scenario)
     return Geometry(
@@ -160,7 +160,7 @@ def _common(scenario: Scenario, plan: Plan) -> WorldTables:
 
 
 def agent_values(scenario: Scenario, plan: Plan, seed: int) -> Any:
-    """What differs among agents, (number, agent): numbers with the tolerances of manufacture, law, group."""
+    """Return the numbers that differ among agents, (number, agent): with manufacturing tolerances, law and group."""
     made = np.zeros((len(plan.columns), scenario.agents))
     known = {"law": scenario.law_indices, "group": scenario.group_indices}
     for c, (letter, name) in enumerate(plan.columns):
