@@ -250,7 +250,7 @@ class Plan(PlanProperties):
 
     @property
     def struck(self) -> bool:
-        """Return True if a motion step masks the lanes that a fault affects: all move at once, and there are such faults."""
+        """Return True if a motion step masks the lanes that a fault affects: all agents move at once."""
         return bool(self.suffers("motion")) and not self.sequential
 
     @property
@@ -562,7 +562,7 @@ def _hearing(scenario: Scenario) -> dict[str, Any]:
 
 
 def _sensing(scenario: Scenario) -> dict[str, Any]:
-    """Return the properties of a plan that describe the sensor; a perfect one adds none: such flights share a driver."""
+    """Return the properties of a plan that describe the sensor; a perfect one adds none, so that drivers are shared."""
     if not scenario.has_sensor_error:
         return {"has_sensor_error": False}
     return {"has_sensor_error": True, "sensor": scenario.sensor, "sensor_choices": _chosen(scenario.sensors)}
