@@ -74,15 +74,15 @@ def replace_faults(state: "DriverState", due: Sequence[FaultOnset]) -> None:
 def fault_memory_rows(plan: Plan) -> dict[str, tuple[str, str]]:
     """Rows of what rules of faults may repeat: each with the row of that state now and of the true one."""
     return {
-        fault_memory_row(kind.name, asked, what): (("m" if asked == "believed" else "h") + what[3:], what[3:])
+        fault_memory_row(kind.name, state_kind, what): (("m" if state_kind == "believed" else "h") + what[3:], what[3:])
         for kind in plan.faults
-        for asked in DISTURBED_STATES
-        for what in kind.kept(asked)
+        for state_kind in DISTURBED_STATES
+        for what in kind.kept(state_kind)
     }
 
 
 def _began(state: "DriverState", onset: FaultOnset) -> Any:
-    """When a fault began, s, as its column tells it."""
+    """When a fault began, s, as its column holds it."""
     real = state.arrays["work"].dtype.type
     return real(onset.step) * real(state.dt)
 
@@ -160,7 +160,7 @@ def _set(state: "DriverState", here: int) -> None:
         store[:, :, lanes] = pair_values(plan, store.shape[1], count, work.dtype)
     count, real = state.agents - here, work.dtype
     state.arrays["memory"][:, lanes] = metric_memories(plan, count, real)
-    for name in state.solved:  # what rules of the whole flock go on from is found anew
+    for name in state.solved:  # what rules of the whole flock start from is solved again
         state.arrays[name][...] = 0.0
     state.fill_varied()
     state.arrays["mem"][:, lanes] = law_memories(plan, state.laws[lanes], real)
@@ -207,7 +207,7 @@ class GroundContact:
         }
 
     def land(self, state: "DriverState") -> None:
-        """Put away whoever is empty and on the ground."""
+        """Remove agents that are on the ground with an empty battery."""
         empty = [agent for agent, lasts in self.battery_times(state).items() if lasts <= 0.0]
         if empty:
             height = state.rows(["z"])[0]

@@ -47,13 +47,13 @@ def check_resources(scenario: Scenario, plan: Plan) -> None:
     if needed <= room:
         return
     fit = largest_fitting(scenario.agents, lambda agents: estimated_bytes(scenario, plan, agents) <= room)
-    told = [f"agents = {scenario.agents} needs about {needed / 1e9:.3g} GB of memory and {free / 1e9:.3g} GB are free"]
-    told.append(f"about {fit} agents fit")
+    parts = [f"agents = {scenario.agents} needs about {needed / 1e9:.3g} GB of memory and {free / 1e9:.3g} GB are free"]
+    parts.append(f"about {fit} agents fit")
     frames = _frames(scenario, plan, scenario.agents)
     if frames > 0 and needed - frames <= room:
         share = (room - needed + frames) / frames
-        told.append(f"or a recording of {share * scenario.flight.duration:.3g} s, or samples further apart")
-    raise FlightError(f"{scenario.name}: {'; '.join(told)}")
+        parts.append(f"or a recording of {share * scenario.flight.duration:.3g} s, or samples further apart")
+    raise FlightError(f"{scenario.name}: {'; '.join(parts)}")
 
 
 def estimated_bytes(scenario: Scenario, plan: Plan, agents: int) -> int:
@@ -136,7 +136,7 @@ def fly_world(
 ) -> cpu.DriverResult:
     """Fly one world. Raises FlightError where agents find no room or a state stops being finite.
 
-    device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
+    device : cpu, cuda, python (no compiler, double precision), or auto, which passes its pick to `notify`
     """
     seed = check_seed(seed)
     scenario = scenario.with_drawn_scene(seed)
@@ -296,7 +296,7 @@ def score_flights(
 ) -> list[dict[str, float]]:
     """Order parameters of many flights, flight i with seeds[i]; side by side on all cores, or together on a GPU.
 
-    device : cpu, cuda, python (no compiler, double precision), or auto, which tells `notify` what it picked
+    device : cpu, cuda, python (no compiler, double precision), or auto, which passes its pick to `notify`
     """
     seeds = [check_seed(seed) for seed in seeds]
     if device != "cpu":

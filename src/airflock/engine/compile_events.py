@@ -1,4 +1,4 @@
-"""Numba's passes as they begin, to hear Ctrl-C; and what is said to whoever waits for the compiler."""
+"""Numba's passes as they begin, to hear Ctrl-C; and the message to a user who waits for the compiler."""
 
 import multiprocessing
 import sys
@@ -22,7 +22,7 @@ class InterruptListener(Listener):  # type: ignore[misc]  # Numba has no types
         check_interrupted()
 
     def on_end(self, event: Event) -> None:
-        """Nothing; the next pass is asked."""
+        """Do nothing at the end of a pass; the next one checks."""
 
 
 @contextmanager
@@ -31,13 +31,13 @@ def message_if_slow() -> Iterator[None]:
     if not _watched():
         yield
         return
-    told = threading.Timer(PATIENCE, _say)
-    told.daemon = True
-    told.start()
+    timer = threading.Timer(PATIENCE, _say)
+    timer.daemon = True
+    timer.start()
     try:
         yield
     finally:
-        told.cancel()
+        timer.cancel()
 
 
 def _watched() -> bool:

@@ -151,7 +151,7 @@ class DriverMemory:
     def is_finite(self) -> bool:
         """Return True if the positions and velocities of all agents are finite."""
         # as bytes: `all` of so few takes three times as long
-        return not any(0 in np.isfinite(run, told).tobytes() for run, told in self._moving)
+        return not any(0 in np.isfinite(run, finite).tobytes() for run, finite in self._moving)
 
     @cached_property
     def _moving(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:
@@ -349,7 +349,7 @@ def hand_over(old: DriverState, new: DriverState, step: int) -> None:
 
     Rows that only the new plan has are filled from what they stand for: a measured position from the true one, what a
     fault may repeat from what was believed or heard last. What is under way by radio stays under way. Sums over time
-    begin anew, what metrics remember of each agent goes on. Pairs are looked at again (`held` is new): the new numbers
+    start again, what metrics remember of each agent goes on. Pairs are looked at again (`held` is new): the new numbers
     may call a distance a collision that the old did not.
     """
     # Rows are matched by name whether or not the plan is the same: one path instead of two.
@@ -359,7 +359,7 @@ def hand_over(old: DriverState, new: DriverState, step: int) -> None:
     if new.plan.dryden == old.plan.dryden:
         new.arrays["gust"][:] = old.arrays["gust"]
     if old.plan.packets and new.plan.packets:
-        kept = None if old.plan.radio == new.plan.radio else 2 * new.plan.dimensions + 1  # another radio begins anew
+        kept = None if old.plan.radio == new.plan.radio else 2 * new.plan.dimensions + 1  # another radio starts again
         new.arrays["store"][:kept] = old.arrays["store"][:kept, lanes[: old.agents]][..., lanes]
     _remembered(old, new, lanes)
     if np.array_equal(old.tables.shapes, new.tables.shapes) and old.arrays["later"].shape == new.arrays["later"].shape:
@@ -368,7 +368,7 @@ def hand_over(old: DriverState, new: DriverState, step: int) -> None:
     if old.plan.goals and new.plan.goals and old.arrays["reached"].shape == new.arrays["reached"].shape:
         for name in ("aim", "reached"):
             new.arrays[name][...] = old.arrays[name]
-    if new.plan.own:  # to new points all set out anew
+    if new.plan.own:  # all set out again to new points
         new.arrays["aim"][3] = -1.0
         if old.plan.own and np.array_equal(old.tables.goals, new.tables.goals):
             new.arrays["aim"][:] = old.arrays["aim"]
@@ -398,7 +398,7 @@ def _rows(old: DriverState, new: DriverState, lanes: NDArray[np.int64]) -> None:
     repeated = fault_memory_rows(new.plan)
     other = {name for name in new.plan.beginnings if not _goes_on(name, old.plan, new.plan)}
     for name, place in new.driver.ROWS.items():
-        if name in other:  # another body or sensor begins to remember anew
+        if name in other:  # another body or sensor starts with an empty memory
             continue
         stand = [
             name,

@@ -117,7 +117,7 @@ def check_sendable(*scenarios: Scenario) -> None:
 
 
 class FlightState:
-    """A flight as its drivers see it: steps flown one after another, whatever is asked of it between them.
+    """A flight as its drivers see it: steps flown one after another, whatever is read between them.
 
     scenario : in force now; seed, precision, record, device, absence : of the whole flight
     start    : positions and velocities to start from, (component, agent), or None
@@ -219,7 +219,7 @@ class FlightState:
 
     @property
     def latest_scenario(self) -> Scenario:
-        """The scenario last asked for: one that waits for its compiler, or the one in force."""
+        """Return the latest scenario: one that waits for its compiler, or the one in force."""
         return self._coming[0] if self._coming else self.scenario
 
     def change(self, new: Scenario, event: Event, wait: bool) -> None:
@@ -370,7 +370,7 @@ class FlightState:
 
 
 def _same(origin: tuple[Scenario, int, int, Any], other: tuple[Scenario, int, int, Any]) -> bool:
-    """Return True if two flights began alike: by the same scenario, seed and precision, at the same start."""
+    """Return True if two flights have the same beginning: the same scenario, seed and precision, at the same start."""
     return origin is other or (origin[:3] == other[:3] and np.array_equal(origin[3], other[3]))
 
 
@@ -536,7 +536,7 @@ class FlightObservations:
 
         Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
 
-        Raises FlightError for an agent that is not there, and RuleError for a rule that asks for what cannot be told
+        Raises FlightError for an agent that is not there, and RuleError for a rule that needs what is not known
         outside of the flight.
 
         Examples
@@ -632,7 +632,7 @@ class FlightActions(FlightObservations):
         return self
 
     def change(self, settings: Mapping[str, Any], *, wait: bool = True) -> Self:
-        """Set keys of the scenario anew by `settings`, such as {"model.p_rep": 0.2}; from the next step or decision on.
+        """Change keys of the scenario by `settings`, such as {"model.p_rep": 0.2}; from the next step or decision on.
 
         Everything that a scenario file says may change but agents, dimensions, dt and start. A new window of scores
         begins. Where other text must be compiled, `wait` says whether to wait for it; if not, the flight goes on under
@@ -650,7 +650,7 @@ class FlightActions(FlightObservations):
         return self._change(settings, Event(self.step, "change", settings), wait)
 
     def _change(self, settings: Mapping[str, Any], event: Event, wait: bool) -> Self:
-        """Set keys of the scenario anew, as an event says."""
+        """Change keys of the scenario, as an event says."""
         if self._course.has_ended:
             raise FlightError(f"{self.scenario.name}: the flight has ended at t = {self.time:g} s; nothing can change")
         self._course.change(with_settings(self._course.latest_scenario, settings), event, wait)
@@ -716,7 +716,7 @@ class FlightActions(FlightObservations):
     def fault(self, kind: str, agents: Sequence[int] | int | None = None, *, wait: bool = True, **numbers: Any) -> Self:
         """Let a fault begin, as an entry of [[faults]] with at = now does. A new window of scores begins.
 
-        kind   : such as "motor"; agents : whom it hits
+        kind   : such as "motor"; agents : those affected
         numbers : of the kind, such as share=0.2; lasts (s), number (how many, drawn); or group instead of agents
         wait   : as in `change`
         Raises ScenarioError, or FlightError once the flight has ended; the flight is as it was.
@@ -728,8 +728,8 @@ class FlightActions(FlightObservations):
         >>> flight.advance(0.5).fault("motor", agents=3, share=0.2).advance(0.5).faults[0]["agent"]
         3
         """
-        whom = {} if agents is None else {"agents": [*agents] if isinstance(agents, Iterable) else [agents]}
-        given = settings_dict({"kind": kind, **whom, **numbers}, self.scenario.name)
+        affected = {} if agents is None else {"agents": [*agents] if isinstance(agents, Iterable) else [agents]}
+        given = settings_dict({"kind": kind, **affected, **numbers}, self.scenario.name)
         base = self._course.latest_scenario
         at = (self.step + (1 if self._course.has_sensed else 0)) * self.scenario.flight.dt
         entry = {"at": at, **given}
@@ -801,10 +801,10 @@ def _within(what: str, given: list[Any], most: float, unit: str, why: str) -> No
 def flight_html(flight: "Flight") -> str:
     """Its sentence, and a table of order parameters since the last change, with units and meanings."""
     done = [event.kind for event in flight.events]
-    told = [f"{done.count(kind)} × {kind}" for kind in dict.fromkeys(done)]
+    parts = [f"{done.count(kind)} × {kind}" for kind in dict.fromkeys(done)]
     absent = int((~flight.present).sum())
-    told += [f"{absent} absent"] if absent else []
-    beside = f" ({escape(', '.join(told))})" if told else ""
+    parts += [f"{absent} absent"] if absent else []
+    beside = f" ({escape(', '.join(parts))})" if parts else ""
     head = f"<p><b>{escape(repr(flight).strip('<>'))}</b>{beside}</p>"
     if not flight.step:
         return f"{head}<p>nothing is flown yet</p>"
@@ -818,7 +818,7 @@ def flight_html(flight: "Flight") -> str:
 
 
 class Flight(FlightActions):
-    """One flight of a scenario, open: it goes on when it is told to, and may be changed on its way.
+    """One flight of a scenario, open: it goes on at each call of `advance`, and may be changed on its way.
 
     Its bits are those of the closed flight, whatever the parts in which it is advanced. A change is a scenario: checked
     whole, in force from the next step or decision on, and the beginning of a new window of scores.
@@ -887,7 +887,7 @@ class Flight(FlightActions):
         return self._course.is_ready
 
     def compile(self, *, aside: bool = False) -> "Flight":
-        """Have its driver compiled, and fly nothing; in any thread, while nothing else is asked of it. Returns it.
+        """Have its driver compiled, and fly nothing; in any thread, while nothing else uses it. Returns it.
 
         aside : by another process, so that no other thread of this one is held up meanwhile
 
@@ -932,8 +932,8 @@ class Flight(FlightActions):
         except (TypeError, ValueError, OverflowError):
             count = 0
         if count < 1:
-            asked = f"steps = {steps!r}" if steps is not None else f"seconds = {seconds!r}"
-            raise FlightError(f"advance: {asked} is not at least one motion step of {dt:g} s")
+            duration = f"steps = {steps!r}" if steps is not None else f"seconds = {seconds!r}"
+            raise FlightError(f"advance: {duration} is not at least one motion step of {dt:g} s")
         return count
 
     def _fly_to(self, last: int) -> None:

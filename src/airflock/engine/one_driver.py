@@ -1,7 +1,7 @@
 """One driver compiled and kept by a process of its own; `engine.background_compile` starts it. No module imports it.
 
-What it is asked for comes by its standard input: the text of a driver, which holds every rule, so that no file of
-anybody's is run. The input stays open; its end means that whoever asked has gone.
+The request comes by standard input: the text of a driver, which holds every rule, so that no file of
+anybody's is run. The input stays open; its end means that the process that sent the request has gone.
 """
 
 import json
@@ -12,14 +12,14 @@ from threading import Thread
 
 
 def main() -> None:
-    """Compile what is asked for."""
-    asked = json.loads(sys.stdin.readline())
+    """Compile the driver of a request."""
+    request = json.loads(sys.stdin.readline())
     Thread(target=_end_with_the_input, daemon=True).start()
-    sys.path[:] = asked["paths"]
+    sys.path[:] = request["paths"]
     from airflock.engine.store import load_driver
 
-    driver = load_driver(asked["text"], asked["label"])
-    driver.advance.compile(pickle.loads(bytes.fromhex(asked["types"])))
+    driver = load_driver(request["text"], request["label"])
+    driver.advance.compile(pickle.loads(bytes.fromhex(request["types"])))
 
 
 def _end_with_the_input() -> None:

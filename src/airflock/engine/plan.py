@@ -75,7 +75,7 @@ class BuildOptions:
 
 @dataclass(frozen=True)
 class PlanProperties:
-    """Compile-time side of a flight: what the scenario says, and how it is built. `Plan` tells what follows from it.
+    """Compile-time side of a flight: what the scenario says, and how it is built. `Plan` derives the rest from it.
 
     build     : how it is built; bits, record, given_start and grid read it
     numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order
@@ -102,7 +102,7 @@ class PlanProperties:
     sequential: one agent after another perceives, decides and moves
     faults    : kinds of fault that may occur
     varied    : numbers that differ among agents, as (letter, name); each is a row
-    topology  : which of those whom an agent hears it meets; None: all. fading: signals differ by chance
+    topology  : which of the agents that it hears an agent meets; None: all. fading: signals differ by chance
     laws      : laws of groups, beside `model`; the numbers of the first have the letter p1, and so on
     law       : which of all laws the stages are made for that ask one: 0 is `model`; None where there is no other
     grouped   : a rule asks for the groups of agents
@@ -168,7 +168,7 @@ GONE = -1.0  # s; when what is not under way is due
 class Plan(PlanProperties):
     """The facts of a flight, and what follows from them.
 
-    It is made by `engine.plan_of` alone; whoever needs the same flight built otherwise asks for `built`.
+    It is made by `engine.plan_of` alone; `built` gives the same flight with other build options.
     """
 
     def __hash__(self) -> int:
@@ -320,7 +320,7 @@ class Plan(PlanProperties):
 
     @property
     def shades(self) -> bool:
-        """Return True if the radio is asked with whether something stands between two agents, and something can."""
+        """Return True if the radio needs to know whether something stands between two agents, and something can."""
         return self.radio.asks_for("clear") and (self.obstacles or self.scene)
 
     @property
@@ -346,7 +346,7 @@ class Plan(PlanProperties):
 
     @property
     def hides(self) -> bool:
-        """Return True if agents are asked whether something stands between them and others."""
+        """Return True if flights test whether something stands between agents."""
         return self.meeting("hidden") and (self.obstacles or self.scene)
 
     @property

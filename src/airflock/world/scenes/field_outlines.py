@@ -30,7 +30,7 @@ Ring = list[tuple[float, float]]
 
 @dataclass(frozen=True)
 class Outline:
-    """One shape of a file: its name, its rings in degrees (longitude, latitude), and heights (m) that it tells.
+    """One shape of a file: its name, its rings in degrees (longitude, latitude), and heights (m) that it gives.
 
     shape : of one that is no polygon, and so is left out: what it is
     """
@@ -116,22 +116,22 @@ def parse_kml(text: str) -> list[Outline]:
     return list(_placed(parse_xml(text), "", {}))
 
 
-def _placed(element: Element, name: str, told: Mapping[str, str]) -> Iterator[Outline]:
-    """Shapes within an element, with the name of the nearest thing around them that has one, and what is told of it."""
+def _placed(element: Element, name: str, data: Mapping[str, str]) -> Iterator[Outline]:
+    """Shapes within an element, with the name of the nearest thing around them that has one, and its extended data."""
     name = next((shortened(one.text, 60) for one in element.children if one.tag == "name" and one.text), name)
     if element.tag == "Placemark":
-        told = {key: value for one in element.children if one.tag == "ExtendedData" for key, value in _data(one)}
+        data = {key: value for one in element.children if one.tag == "ExtendedData" for key, value in _data(one)}
     if element.tag == "Polygon":
         shells, holes = (
             [ring for one in element.children if one.tag == tag for ring in _rings(one)]
             for tag in ("outerBoundaryIs", "innerBoundaryIs")
         )
-        yield Outline(name or "polygon", shells[0] if shells else [], holes, heights_of(_numbers(told)))
+        yield Outline(name or "polygon", shells[0] if shells else [], holes, heights_of(_numbers(data)))
         return
     if element.tag in NO_AREA:
         yield Outline(name or "a shape", [], shape=element.tag)
     for one in element.children:
-        yield from _placed(one, name, told)
+        yield from _placed(one, name, data)
 
 
 def _data(extended: Element) -> Iterator[tuple[str, str]]:
@@ -145,10 +145,10 @@ def _data(extended: Element) -> Iterator[tuple[str, str]]:
             yield from _data(one)
 
 
-def _numbers(told: Mapping[str, str]) -> dict[str, Any]:
+def _numbers(data: Mapping[str, str]) -> dict[str, Any]:
     """Texts of a KML as numbers where they are some; without those that are empty."""
     found: dict[str, Any] = {}
-    for key, value in told.items():
+    for key, value in data.items():
         try:
             found[key] = float(value) if value else None
         except ValueError:
@@ -179,8 +179,8 @@ ENDLESS = 1e5  # m; heights of an obstacle that has none, where others have
 LARGE = 5000.0  # m; beyond, a degree is not the same everywhere
 SAME = 1e-3  # m; corners that lie no farther apart are one
 STRAIGHT = 0.01  # m; a corner that moves an outline by less is none, as on a straight side with points on it
-MANY = 12  # corners, from which on it is told how many fewer would do
-COARSE = 1.0  # m; of what is told then
+MANY = 12  # corners, from which on a note says how many fewer would do
+COARSE = 1.0  # m; tolerance that this note assumes
 Solid = tuple[str, Polygon, Mapping[str, float]]  # name, plan in m, and heights (m) of what must not be entered
 
 
