@@ -7,7 +7,8 @@ import lazy_loader
 
 __version__ = "0.1.0"
 
-# Packages that stood here before 0.1.0 → where their modules are now. A script that names one is told so in one line.
+# Packages that stood here before 0.1.0 → where their modules are now. A script that names one is
+# told so in one line.
 _MOVED = {
     "aero": "parts.aero",
     "body": "parts.bodies",

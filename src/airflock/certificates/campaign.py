@@ -277,7 +277,8 @@ def _read(scenario: Scenario, key: str) -> bool:
     return bool(re.search(rf"\b{READ_AS[section]}\.{name}\b", driver_text(above)))
 
 
-# A flight with an event is flown again, sampled at every step. Measuring all flights so would take thrice the time.
+# A flight with an event is flown again, sampled at every step. Measuring all flights so would take
+# thrice the time.
 PARTS = 60  # of a flight that is flown again: when an event happened is known to a sixtieth of its duration
 
 

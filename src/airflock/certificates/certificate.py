@@ -504,7 +504,8 @@ def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None
 
 def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
     """Return errors of bounds and verdicts that do not follow from the counts."""
-    # A changed file has to fail here even if its checksum was recomputed: every number follows from counts and limits.
+    # A changed file has to fail here even if its checksum was recomputed: every number follows from
+    # counts and limits.
     faults = []
     if document["flights"]["first_seed"] != certificate_seed(campaign.hash, COUNT_PURPOSE, 0):
         faults.append("its seeds are not those that the scenario fixes")

@@ -266,12 +266,14 @@ def with_planned_flights(campaign: Campaign, executor: Executor, budget: float, 
         known = read_toml_file(folder / f"{CAMPAIGN_KIND}.toml").get("flights")
         return replace(campaign, flights=known if isinstance(known, int) else None)
     began = time.monotonic()
-    # Seeds of their own, far behind those of tolerances: a flight that chose the number must not count.
+    # Seeds of their own, far behind those of tolerances: a flight that chose the number must not
+    # count.
     own = [certificate_seed(campaign.hash, TOLERANCE_PURPOSE, (1 << 29) + i) for i in range(TRIAL)]
     for landed in executor.fly([Flight(0, i, campaign.parameters(s), s) for i, s in enumerate(own)]):
         if landed.values is None:
             raise StudyError(f"{campaign.scenario.name}: seed {landed.flight.seed}: {landed.reason}")
     able = 0.9 * budget * TRIAL / max(time.monotonic() - began, 1e-6)
-    # Two digits: a round number shows that the count did not choose it. A tenth of the time is kept as a margin.
+    # Two digits: a round number shows that the count did not choose it. A tenth of the time is kept
+    # as a margin.
     digits = 10.0 ** max(0, math.floor(math.log10(max(able, 1.0))) - 1)
     return replace(campaign, flights=max(1, min(int(able / digits) * int(digits), (1 << 30) - 1)))

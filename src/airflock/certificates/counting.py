@@ -165,7 +165,8 @@ class _Counting:
 
     def goes_on(self) -> bool:
         """Count the landed flights; return True if more can decide anything and there is time for them."""
-        # Only a prefix of the seeds counts, so that slow flights are not under-represented in what has landed.
+        # Only a prefix of the seeds counts, so that slow flights are not under-represented in what
+        # has landed.
         rows, verdicts = self.result.rows, self.result.verdicts
         while len(rows) in self.scores:
             rows.append(self.scores[len(rows)])
@@ -183,7 +184,8 @@ class _Counting:
         if self.fresh < FIRST or math.isinf(left):
             self.chunk = max(FIRST, math.ceil(CHUNK * self.result.rate))
             return True
-        # Flights that the remaining time allows. A limit that needs many more is given up, so that others get the time.
+        # Flights that the remaining time allows. A limit that needs many more is given up, so that
+        # others get the time.
         able = len(rows) + left * self.result.rate
         for verdict in still:
             first = self._first(verdict)  # a limit with an event may yet be refuted

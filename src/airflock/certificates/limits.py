@@ -157,8 +157,8 @@ def parse_limits(texts: list[str], scenario: Scenario) -> tuple[EventLimit, ...]
 
 
 EARLY = 16  # flights at the first look that could refute
-# Sizes fixed in advance, look k pays alpha / (k (k + 1)): all bounds hold together, whatever the reason to stop. The
-# price is 23 % more flights at 95 % than for one fixed look.
+# Sizes fixed in advance, look k pays alpha / (k (k + 1)): all bounds hold together, whatever the
+# reason to stop. The price is 23 % more flights at 95 % than for one fixed look.
 GROWTH = 1.5  # ratio of two sizes: a limit is shown after at most so many times the flights that would do
 
 
@@ -179,7 +179,8 @@ def flights_needed(limit: float, alpha: float) -> int:
 
 def look_schedule(limit: float, alpha: float) -> Iterator[tuple[int, float, float]]:
     """Yield looks in their order: flights, alpha of the upper bound (0: not used), alpha of the lower bound."""
-    # Before the first size that could show the limit only refutation is possible, so only the lower bound pays there.
+    # Before the first size that could show the limit only refutation is possible, so only the lower
+    # bound pays there.
     shows, turn, size = flights_needed(limit, alpha * alpha_share(1)), 0, float(EARLY)
     while math.ceil(size) < shows:
         turn += 1
@@ -270,8 +271,8 @@ def _of_share(events: int, flights: int) -> float:
 
 def _of_tail(room: NDArray[np.float64]) -> float:
     """Return the index of one candidate by an exponential tail of its nearest flights; infinite if it has none."""
-    # The nearest tenth as an exponential tail was 0.88 to 2.91 times the truth in 80 % of trials, a normal one 0.08 to
-    # 3.11 times.
+    # The nearest tenth as an exponential tail was 0.88 to 2.91 times the truth in 80 % of trials, a
+    # normal one 0.08 to 3.11 times.
     nearest = np.sort(room)[: max(FEWEST, round(NEAREST * len(room))) + 1]
     begin, excess = nearest[-1], float((nearest[-1] - nearest[:-1]).mean())
     if begin <= 0.0 or excess == 0.0:
@@ -281,11 +282,12 @@ def _of_tail(room: NDArray[np.float64]) -> float:
 
 def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the index of each candidate (candidate,) from the distances of all flights to the limit."""
-    # Shrunk towards all candidates (James & Stein): without it the lucky ones win, and their sets then collide in up to
-    # 4e-3 of flights where 1.7e-4 was allowed.
+    # Shrunk towards all candidates (James & Stein): without it the lucky ones win, and their sets
+    # then collide in up to 4e-3 of flights where 1.7e-4 was allowed.
     sizes, own = np.array([len(room) for room in rooms]), np.array([room.mean() for room in rooms])
     squares, freedom = np.array([((room - room.mean()) ** 2).sum() for room in rooms]), sizes - 1
-    # The share of differences between candidates that chance does not explain (one-way analysis of variance).
+    # The share of differences between candidates that chance does not explain (one-way analysis of
+    # variance).
     left, flat = 1.0, not freedom.any()  # left of each difference, after what chance explains
     if not flat and len(rooms) > 1:
         within, between = float(squares.sum()) / int(freedom.sum()), float(own.var(ddof=1))
@@ -293,13 +295,15 @@ def _together(rooms: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     means = own.mean() + left * (own - own.mean())
     around = np.full(len(rooms), own.mean()) if flat else means  # where each flew once: around the common mean
     away = np.concatenate([room - mean for room, mean in zip(rooms, around, strict=True)])
-    # Deviations towards the event only: distances above the mean say nothing of the dangerous side of a skew score.
+    # Deviations towards the event only: distances above the mean say nothing of the dangerous side
+    # of a skew score.
     below = away[away < 0.0]
     counted = len(away) - (1.0 if flat else left * len(rooms))
     variance = float((below**2).mean()) * len(away) / counted if len(below) else 0.0
     pooled = variance
     if not flat:
-        # Spread is pooled over candidates of similar means: wide flocks' distances vary more than narrow ones'.
+        # Spread is pooled over candidates of similar means: wide flocks' distances vary more than
+        # narrow ones'.
         near = np.argsort(np.abs(own[:, None] - own[None, :]), axis=1, kind="stable")[:, :LIKE]
         pooled = squares[near].sum(axis=1) / np.maximum(freedom[near].sum(axis=1), 1)
     spread = np.sqrt(left * pooled + (1.0 - left) * variance)

@@ -113,8 +113,9 @@ def run_repetition(
     mean_branch_lead : mean number of samples before the first crossing from which noise is drawn again
     size  : flights of a level
     """
-    # Subset simulation: each level is a quantile of the scores below the level before, so that its conditional
-    # probability is about SHARE. The product of these probabilities is that of the target.
+    # Subset simulation: each level is a quantile of the scores below the level before, so that its
+    # conditional probability is about SHARE. The product of these probabilities is that of the
+    # target.
     level = max(particle.least for particle in start)
     p, below = len(start) / counted, list(start)
     made = Repetition([(level, p)], below)
@@ -144,7 +145,8 @@ def _moved(
     flock: list[LineageFlight], level: float, fly: FlyLineages, batch: int, back: float, rng: np.random.Generator
 ) -> list[LineageFlight]:
     """Move each flight by one Metropolis-Hastings step: branch it before its crossing, accept or keep the old one."""
-    # The moment of branching depends on the crossing, so its ratio exp(-(new - old) / back) enters the acceptance.
+    # The moment of branching depends on the crossing, so its ratio exp(-(new - old) / back) enters
+    # the acceptance.
     size = len(flock)
     gaps, chances = rng.exponential(back, size), rng.random(size)
     crossings = [particle.crossing(level) for particle in flock]
@@ -221,7 +223,8 @@ def _disagreement(repetitions: Sequence[Repetition], levels: Sequence[float], va
     """The first level at which repetitions and counting cannot both be right; empty if there is none."""
     n, rest = len(values), 0.5 * (1.0 - SURE)
     for level in levels:
-        # Exact binomial interval of counting against the t-interval of splitting: they have to overlap.
+        # Exact binomial interval of counting against the t-interval of splitting: they have to
+        # overlap.
         k = sum(value <= level for value in values)
         least = float(beta.ppf(rest, k, n - k + 1)) if k else 0.0
         most = float(beta.ppf(1.0 - rest, k + 1, n - k)) if k < n else 1.0
@@ -233,7 +236,8 @@ def _disagreement(repetitions: Sequence[Repetition], levels: Sequence[float], va
 
 
 REPETITIONS = 5
-# 100 flights a level gave three of four repetitions inside the interval of counting, 200 gave 29 of 30.
+# 100 flights a level gave three of four repetitions inside the interval of counting, 200 gave 29 of
+# 30.
 SIZE = 200  # flights of a level
 FEWEST = 2000  # flights from which repetitions start, each from its share of them
 START = 100  # flights with which a repetition goes on: the nearest ones of its share
@@ -270,7 +274,8 @@ def estimate_by_splitting(
         seeds, least = _topped_up(flyer, own, values)
     except BudgetSpent:
         return _refused(target, "time ran out before there were enough flights to start from")
-    # Repetitions start from disjoint flights, so that they are independent and their spread is an honest interval.
+    # Repetitions start from disjoint flights, so that they are independent and their spread is an
+    # honest interval.
     share, runs, period = len(least) // REPETITIONS, [], sample_period(campaign.scenario)
     for number in range(REPETITIONS):
         fly = LineageFlyer(flyer, number, threads, len(counted_rows.rows))

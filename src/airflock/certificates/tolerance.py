@@ -85,7 +85,8 @@ class ValueScreen:
             return
         for _ in self.flyer.fly(batch, [flight]):
             pass
-        # A new kind of number (a delay above zero) compiles another driver. That takes seconds and is no flight time.
+        # A new kind of number (a delay above zero) compiles another driver. That takes seconds and
+        # is no flight time.
         waited = time.monotonic() - began
         self.end += waited
         self.flyer = replace(self.flyer, until=self.flyer.until + waited)
@@ -159,7 +160,8 @@ class ValueTrials:
 
 def _axis(screen: ValueScreen, key: str, how: Quantity, nominal: float) -> dict[str, Any]:
     """Move one number until it is no longer safe, then halve the way between."""
-    # Doubling brackets the first unsafe value in few trials. Bisection is geometric: tolerances are factors.
+    # Doubling brackets the first unsafe value in few trials. Bisection is geometric: tolerances are
+    # factors.
     first = nominal or FIRST_VALUE[key]
     last, end = first * REACH ** worse_direction(key), ""
     trials, safe, bad = ValueTrials(screen, key, compiles=not nominal), nominal, math.nan

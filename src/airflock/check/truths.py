@@ -125,7 +125,8 @@ class UnitScale(NamedTuple):
     second: float
 
 
-# Powers of two round nothing, so only guards such as TINY and numbers with hidden units can tell the flights apart.
+# Powers of two round nothing, so only guards such as TINY and numbers with hidden units can tell
+# the flights apart.
 UNIT_SCALES = (UnitScale(2.0, 4.0), UnitScale(0.5, 0.25))
 DIMENSIONS = {
     "": (0, 0), "1": (0, 0), "dB": (0, 0), "rad": (0, 0), "deg": (0, 0), "kg": (0, 0), "m": (1, 0), "cm": (1, 0),
@@ -178,8 +179,8 @@ def rescaled_scenario(scenario: Scenario, units: UnitScale) -> Scenario:
     return replace(scenario, **{section.field: records[section.key] for section in ORDER})
 
 
-# The generated text runs on numbers that refuse integers and uncast literals: `2 * k` is detected by running, not
-# guessed from the text.
+# The generated text runs on numbers that refuse integers and uncast literals: `2 * k` is detected
+# by running, not guessed from the text.
 class SinglePrecision(float):
     """A number that only meets its like."""
 

@@ -180,7 +180,8 @@ class VerbCommand(TyperCommand):
         except Exception as error:
             if type(error).__name__ not in VALUE_ERROR_NAMES:
                 raise
-            # typer stops at the first bad value; parsing again option by option finds the others as well.
+            # typer stops at the first bad value; parsing again option by option finds the others as
+            # well.
             rest, errors, carried = self._one_by_one(ctx, args)
         for name, line in non_finite_errors(ctx):
             ctx.params[name] = INVALID

@@ -137,7 +137,8 @@ def main() -> None:
     except AirflockError as error:
         _end(str(error), error)
     except BrokenPipeError:
-        # The reader of a pipe has gone (head, less): Python would complain once more when it flushes at exit.
+        # The reader of a pipe has gone (head, less): Python would complain once more when it
+        # flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except (KeyboardInterrupt, BdbQuit) as stop:  # while the verb is looked up, or after it; a debugger that is left

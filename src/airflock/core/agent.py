@@ -110,8 +110,8 @@ def sum_neighbours(
     terms = []
     for heard in neighbours:
         given = pair_arguments(own, heard, index, group)
-        # The order of sums is that of a driver: neighbours by index, so that plain Python and a compiled driver agree
-        # to rounding.
+        # The order of sums is that of a driver: neighbours by index, so that plain Python and a
+        # compiled driver agree to rounding.
         if given["r2"] <= near * near + TINY:  # which r2 carries as a guard: a neighbour at exactly the reach counts
             given["p"] = p
             terms.append(call_rule(model.neighbour, "neighbour", given, model.name))
@@ -198,7 +198,8 @@ def met_neighbours(
     x, y, z = own.x, own.y, own.z
     offsets = [(h.state.x - x, h.state.y - y, h.state.z - z) for h in found]
     count = len(found)
-    # TINY is added as in a driver, so that a rule which divides by r2 meets the same numbers in plain Python.
+    # TINY is added as in a driver, so that a rule which divides by r2 meets the same numbers in
+    # plain Python.
     squares = [dx * dx + dy * dy + dz * dz + TINY for dx, dy, dz in offsets]
     hidden = [0.0] * count
     if place is not None and topology.asks_for("hidden"):

@@ -68,7 +68,8 @@ def check_memory_record(
     argument_names : names that the rule requests; record : what the file defines under `name`, if anything
     """
     word = name.lower()
-    # Without a start value the first call of a rule would read scratch of the driver, so every field needs one.
+    # Without a start value the first call of a rule would read scratch of the driver, so every
+    # field needs one.
     if (word in argument_names) is (record is None):
         raise RuleError(f"{owner}: a rule {rule} that asks for {word} and a NamedTuple {name} come together")
     if record is not None and set(getattr(record, "_field_defaults", {})) != set(getattr(record, "_fields", "-")):
@@ -85,7 +86,8 @@ def argument_names(rule: Callable[..., Any], kind: str, owner: str = "") -> tupl
     """Return the argument names of a rule, checked against the vocabulary of its kind."""
     arguments = inspect.signature(rule).parameters
     names = tuple(arguments)
-    # Signatures are cheap to check once; the cache keeps this off the path of a flight in plain Python.
+    # Signatures are cheap to check once; the cache keeps this off the path of a flight in plain
+    # Python.
     from airflock.core.vocabulary import VOCABULARY  # here, because the chapters of the kinds import this one
 
     known = VOCABULARY[kind]

@@ -52,7 +52,8 @@ FAULT_RULES: Mapping[str, tuple[int, str]] = {
     "leaves": (1, "time from the fault's beginning until it is absent, s"),
 }
 AT_NAMES = tuple(f"at_{letter}{axis}" for letter in ("", "v") for axis in "xyz")  # "at_x" to "at_vz"
-# State that `sense` or `tell` disturbs: the one believed, the one sent of it, and the one sent instead.
+# State that `sense` or `tell` disturbs: the one believed, the one sent of it, and the one sent
+# instead.
 DISTURBED_STATES: Mapping[str, str] = {"believed": "sense", "sent": "sense", "told": "tell"}
 ENTRY_KEYS = ("kind", "at", "until", "lasts", "per_hour", "agents", "group", "number")  # of an entry of [[faults]]
 
@@ -178,7 +179,8 @@ def fault(namespace: Any, name: str = "") -> Fault:
     ]
     if kept:
         raise RuleError(f"fault {name}: Parameters.{kept[0]}: a flight keeps something else of that name; give another")
-    # Numbers become columns of the table that a driver reads; a choice would need a driver of its own.
+    # Numbers become columns of the table that a driver reads; a choice would need a driver of its
+    # own.
     if choices(record()):
         raise RuleError(f"fault {name}: Parameters holds a choice; make a kind of its own for each")
     return made

@@ -29,7 +29,8 @@ def rule_errors(rule: Callable[..., Any]) -> list[str]:
         what = "has a decorator" if hasattr(rule, "__wrapped__") or hasattr(rule, "py_func") else "is an object"
         raise RuleError(f"{place_of(rule)}: rule {name} {what}; a rule is a plain function")
     node = tree_of(rule)
-    # All errors of a rule are collected before one is raised, so that an author mends a file in one go.
+    # All errors of a rule are collected before one is raised, so that an author mends a file in one
+    # go.
     errors: list[tuple[ast.AST, str]] = [(node, text) for text in _of_signature(node, rule.__code__.co_varnames)]
     for item in walk_tree(node):
         errors += [(item, text) for text in (*_of_text(item, node), *_of_numbers(item, rule), *_of_names(item, rule))]

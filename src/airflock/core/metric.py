@@ -123,7 +123,8 @@ class Metric:
     cluster: Callable[..., Any] | None = None
     Cluster: type[Any] | None = None
     Memory: type[Any] | None = None
-    # A promise, not a hint: a metric that contributes beyond it is measured wrongly without any error.
+    # A promise, not a hint: a metric that contributes beyond it is measured wrongly without any
+    # error.
     within: Callable[..., float] | None = None
     settled: Callable[..., bool] | None = None
     linked_within: Callable[..., float] | None = None

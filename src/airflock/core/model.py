@@ -261,7 +261,8 @@ def add_laws(base: Model, extra: Model) -> Model:
     """
     for error in composition_errors(base, extra):
         raise RuleError(error)
-    # A list of laws was rejected: two records of parameters would need names of their own in every rule.
+    # A list of laws was rejected: two records of parameters would need names of their own in every
+    # rule.
     return replace(
         base,
         name=f"{base.name}_and_{extra.name}",

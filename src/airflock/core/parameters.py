@@ -63,8 +63,8 @@ class VectorMeta(type):
         cls.VECTORS = known | {key: len(fields) for key, fields in declared.items()}
         if not declared:
             return
-        # Components take the place of the vector before the record becomes a dataclass, so that units, ranges, keys,
-        # searches, columns and GPU registers know scalars only.
+        # Components take the place of the vector before the record becomes a dataclass, so that
+        # units, ranges, keys, searches, columns and GPU registers know scalars only.
         notes: dict[str, Any] = {}
         for key, note in inspect.get_annotations(cls).items():
             parts = component_names(key, len(declared[key])) if key in declared else (key,)

@@ -59,8 +59,8 @@ class PacketPolicy:
     radio: Radio | None = None
     k: Any = None
 
-    # A simulated agent differs from a drone by settings only: packets of a constant delay count once, and stamps of
-    # wrong clocks are believed.
+    # A simulated agent differs from a drone by settings only: packets of a constant delay count
+    # once, and stamps of wrong clocks are believed.
     @classmethod
     def simulated(cls, radio: Radio, k: Any) -> "PacketPolicy":
         """As a simulated agent hears: packets of a plain radio count once, of one that keeps them until the next."""

@@ -135,8 +135,8 @@ def either(a, b):
 
 def packets(step, rate, period):
     """Number of packets that a link of `rate` (1/s) sends in decision number `step` of length `period` (s)."""
-    # The difference of two rounded counts, so that a rate that does not divide the decision rate is met exactly on
-    # average; 1e-6 absorbs the rounding of step * rate * period.
+    # The difference of two rounded counts, so that a rate that does not divide the decision rate is
+    # met exactly on average; 1e-6 absorbs the rounding of step * rate * period.
     return math.floor((step + 1.0) * rate * period + 1e-6) - math.floor(step * rate * period + 1e-6)
 
 

@@ -8,9 +8,9 @@ device binds its own form of the same arithmetic (`airflock.engine.primitives`).
 
 import math
 
-# Every stream of the project; each may draw 256 times per step. Numbers are never reused: 4, 5 and 9 are taken.
-# Streams 4 and 5 were the loss and the link of each packet; one draw replaced both. A number is never used again, so
-# that no old and new flight share noise by accident.
+# Every stream of the project; each may draw 256 times per step. Numbers are never reused: 4, 5 and
+# 9 are taken. Streams 4 and 5 were the loss and the link of each packet; one draw replaced both. A
+# number is never used again, so that no old and new flight share noise by accident.
 SENSOR = 1  # Langevin noise of own and of sent measurements
 OUTER = 2  # white outer noise on the acceleration
 START = 3  # where the agents start
@@ -58,8 +58,8 @@ def xor32(a, b):
 def philox(c0, c1, c2, c3, k0, k1):
     """Four random words of 32 bits from a counter of four words and a key of two."""
     c0, c1, c2, c3, k0, k1 = c0 & MASK, c1 & MASK, c2 & MASK, c3 & MASK, k0 & MASK, k1 & MASK
-    # Ten rounds, as in the paper. The rounds are written twice: with operators they take 0.6 of the time in plain
-    # Python, by primitives a device binds its own words.
+    # Ten rounds, as in the paper. The rounds are written twice: with operators they take 0.6 of the
+    # time in plain Python, by primitives a device binds its own words.
     for _ in range(10):
         a, b = 0xD2511F53 * c0, 0xCD9E8D57 * c2
         c0, c1, c2, c3 = (b >> 32) ^ c1 ^ k0, b & MASK, (a >> 32) ^ c3 ^ k1, a & MASK
@@ -99,7 +99,8 @@ def random_words(seed, stream, world, step, agent, draw=0):
 
 def pair_number(receiver, sender, agents):
     """Number of a pair among so many agents. Four receivers share one: the word of each is receiver & 3 of the four."""
-    # Four receivers share the four words of one call. The number does not depend on who draws or in which order.
+    # Four receivers share the four words of one call. The number does not depend on who draws or in
+    # which order.
     return (receiver >> 2) * agents + sender
 
 
@@ -116,8 +117,8 @@ def uniform(word):
 def normal_pair(a, b):
     """Two independent normal numbers N(0, 1) from two words (Box and Muller); at most 5.8 standard deviations."""
     radius = math.sqrt(-2.0 * math.log(uniform(a)))
-    # The angle lies within a quarter turn, where a polynomial for sine and cosine is short; two further bits choose
-    # the quarter, so that no bit of the word is used twice.
+    # The angle lies within a quarter turn, where a polynomial for sine and cosine is short; two
+    # further bits choose the quarter, so that no bit of the word is used twice.
     angle = (((b << 2) & MASK) ^ 0x80000000) - 0x80000000  # the lower 30 bits as a signed word
     s = math.sin(angle * (QUARTER_PI / 2147483648.0))
     c = math.cos(angle * (QUARTER_PI / 2147483648.0))

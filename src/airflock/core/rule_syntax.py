@@ -17,7 +17,8 @@ WORDS = {"ctx", "op", "ops", "id", "attr", "name", "asname", "module", "level", 
 def walk_tree(tree: ast.AST) -> list[ast.AST]:
     """All nodes of a tree in the order of `ast.walk`, without contexts (`Load`), operators and what is imported."""
     found = [tree]
-    # The list grows while the loop reads it: that is the breadth-first order of `ast.walk`, without its queue.
+    # The list grows while the loop reads it: that is the breadth-first order of `ast.walk`, without
+    # its queue.
     for node in found:  # which grows
         for name in _FIELDS[type(node)]:
             below = getattr(node, name, None)
@@ -68,8 +69,8 @@ def integer_names(rule: Callable[..., Any]) -> frozenset[str]:
     node = tree_of(rule)
     found = {name for name, value in rule.__globals__.items() if type(value) is int}
     found -= set(rule.__code__.co_varnames)
-    # A fixed point: a name that turns out to hold an integer may make others integers, so passes repeat until nothing
-    # is new. Rules are short; two or three passes are enough.
+    # A fixed point: a name that turns out to hold an integer may make others integers, so passes
+    # repeat until nothing is new. Rules are short; two or three passes are enough.
     while True:
         known = len(found)
         for item in walk_tree(node):
@@ -194,8 +195,8 @@ def fields_read(rule: Callable[..., Any], record: str) -> frozenset[str] | None:
                         return None
                     found |= below
                     followed += 1
-    # Every mention of the record must be an attribute or an argument that was followed; any other use may read all
-    # fields.
+    # Every mention of the record must be an attribute or an argument that was followed; any other
+    # use may read all fields.
     return frozenset(found) if followed == sum(_is(item, record) for item in nodes) else None
 
 

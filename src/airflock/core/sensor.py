@@ -194,8 +194,8 @@ class SensorState:
             normal = (*random.normal_pair(low[0], low[1]), random.normal_pair(high[0], high[1])[0])
             off = add_errors(self.sensor, self.s, self.off, normal, period)
             return off[:3], off[3:]
-        # All numbers are drawn whether the rule requests them or not: a draw is a function of its counter, so an
-        # unused one shifts nothing.
+        # All numbers are drawn whether the rule requests them or not: a draw is a function of its
+        # counter, so an unused one shifts nothing.
         draws = draw_numbers(self.seed, number, self.agent)
         time = number * period
         found, self._memory = call_measure(self.sensor, self.s, true, self._memory, time, period, draws)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from airflock.core.maths import shorten
 from airflock.core.parameters import Parameters as Record, choice, quantity
 
-# Patience is the delay of the radio and 0.5 s: with 2 s the second without data is flown blind, and four of forty
-# flights came below 3 m.
+# Patience is the delay of the radio and 0.5 s: with 2 s the second without data is flown blind, and
+# four of forty flights came below 3 m.
 SPARE = 0.5  # s; our choice: two decisions without news; with 1 s, four flights of 40 came below 3 m
 GRACE = 1e-3  # s; two clocks that count the same decisions differ by less
 USUAL = 4.0  # m/s; our choice: the speed at which the numbers were found
@@ -49,8 +49,8 @@ class SilenceParameters(Record):
         1.0, "s", low=0.0, high=60.0, source=OURS,
         meaning="an agent that has stopped goes on once no lost neighbour could have been near for this long",
     )  # fmt: skip
-    # By then the autopilot of the neighbour has landed it. A failsafe that hovers would keep it at the height of the
-    # flock.
+    # By then the autopilot of the neighbour has landed it. A failsafe that hovers would keep it at
+    # the height of the flock.
     forget: float = quantity(
         20.0, "s", low=0.0, high=3600.0, source=OURS, meaning="age of data after which a neighbour is given up"
     )
@@ -65,8 +65,8 @@ def with_defaults(s: SilenceParameters, speed: float, delay: float = 0.0, rule: 
     speed : that the law prefers, m/s; 0 where it prefers none, which counts as 4 m/s
     delay : of the radio, s
     """
-    # Twice the speed of the flock, as if both flew towards each other. The own way is counted already, but this
-    # margin was enough in forty blackouts.
+    # Twice the speed of the flock, as if both flew towards each other. The own way is counted
+    # already, but this margin was enough in forty blackouts.
     closing = 2.0 * (speed or USUAL) if s.closing is None else s.closing
     patience = delay + SPARE if s.patience is None else s.patience
     return replace(s, closing=closing, patience=patience, rule=rule or s.rule)
@@ -96,8 +96,8 @@ def could_be_near(distance, age, s):
 
     Data younger than `s.patience` stop nobody. Its reach grows at `s.closing`; it is given up at the age `s.forget`.
     """
-    # The reach grows with the whole age of the data, not from `patience` on: for so long the neighbour may have
-    # flown. The weaker rule left 31 of 40 flights below 3 m.
+    # The reach grows with the whole age of the data, not from `patience` on: for so long the
+    # neighbour may have flown. The weaker rule left 31 of 40 flights below 3 m.
     lost = (age > s.patience) & (age < s.forget)
     return 1.0 if lost & (distance - s.keep < s.closing * age) else 0.0
 

@@ -23,8 +23,8 @@ from airflock.world import FAR_AWAY
 if TYPE_CHECKING:
     from airflock.engine.driver_state import DriverState
 
-# Fault columns: written when a fault begins or changes. What a rule may repeat of the state that it disturbs is no
-# such column: decisions keep it (`stages.faults.mislead`).
+# Fault columns: written when a fault begins or changes. What a rule may repeat of the state that it
+# disturbs is no such column: decisions keep it (`stages.faults.mislead`).
 
 
 def begin_fault(state: "DriverState", onset: FaultOnset) -> None:
@@ -55,7 +55,8 @@ def still_has_fault(state: "DriverState", leaving: FaultOnset) -> bool:
 
 def replace_faults(state: "DriverState", due: Sequence[FaultOnset]) -> None:
     """Replace the list of faults. Running faults take the new numbers and end; removed ones stop."""
-    # A change of the scenario replaces the list of faults: running ones take the new numbers, removed ones end.
+    # A change of the scenario replaces the list of faults: running ones take the new numbers,
+    # removed ones end.
     slots = range(state.agents) if state.slots is None else state.slots.tolist()
     agents = {lane: agent for agent, lane in enumerate(slots)}
     work, rows = state.arrays["work"], state.driver.ROWS
@@ -100,8 +101,9 @@ def _write(state: "DriverState", kind: Fault, slot: int, values: Mapping[str, An
 
 def remove_agents(state: "DriverState", agents: list[int]) -> None:
     """Make agents absent from now on; those that are absent already stay so."""
-    # Absent agents lie behind the others, so no loop has a test. A mask would have to be respected by every pair loop,
-    # mean, cluster and later metric; one that forgot it would count the absent agents.
+    # Absent agents lie behind the others, so no loop has a test. A mask would have to be respected
+    # by every pair loop, mean, cluster and later metric; one that forgot it would count the absent
+    # agents.
     slots, here = _slots(state), state.here
     gone = sorted(slots[agent] for agent in agents if slots[agent] < here)
     if not gone:
@@ -177,9 +179,9 @@ def _put(state: "DriverState", places: list[int]) -> None:
         arrays["store"][..., : state.agents] = arrays["store"][..., at]
 
 
-# Agents on the ground with an empty battery. Bodies state how long their batteries last at least (`endures`), so a
-# flight is watched step by step only while an agent falls. An agent is put away before the first step at which it is
-# empty and on the ground, whatever the cuts.
+# Agents on the ground with an empty battery. Bodies state how long their batteries last at least
+# (`endures`), so a flight is watched step by step only while an agent falls. An agent is put away
+# before the first step at which it is empty and on the ground, whatever the cuts.
 
 SURE = 0.5  # share of the time that batteries last at least after which they are looked at again: drivers round
 

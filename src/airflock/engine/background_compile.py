@@ -32,8 +32,9 @@ def compile_in_background(state: DriverState) -> DriverState:
 
 def _in_a_process(state: DriverState) -> None:
     """Let a process compile a state's driver, and wait for its end. Raises OSError where none can be started."""
-    # Numba keeps the interpreter lock for long stretches: compiling in a thread made gaps of 66 to 171 ms in a page of
-    # 30 frames a second, a process below 50 ms. It is no fork: threads and LLVM are not made for that.
+    # Numba keeps the interpreter lock for long stretches: compiling in a thread made gaps of 66 to
+    # 171 ms in a page of 30 frames a second, a process below 50 ms. It is no fork: threads and LLVM
+    # are not made for that.
     driver = state.driver
     file = Path(str(driver.__file__))
     paths = [path for path in sys.path if os.path.isabs(path)]
@@ -43,7 +44,8 @@ def _in_a_process(state: DriverState) -> None:
         "label": file.stem,
         "types": pickle.dumps(tuple(map(driver.advance.typeof_pyval, state.arguments(0, 0)))).hex(),
     }
-    # isolated (-I, -S): neither the folder in which somebody works nor a start-up file decides what is imported
+    # isolated (-I, -S): neither the folder in which somebody works nor a start-up file decides what
+    # is imported
     with subprocess.Popen(
         [sys.executable, "-I", "-S", str(SCRIPT)],
         env={**os.environ, "AIRFLOCK_CACHE": str(file.parents[2])},

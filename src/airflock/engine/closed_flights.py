@@ -25,8 +25,9 @@ from airflock.scenarios import (
 )
 from airflock.support import FlightError, free_memory, run_in_threads
 
-# Memory and time that a flight needs, judged before it is compiled. What grows with the flock is counted: rows, past
-# states that a delay needs, a packet of each pair where the radio keeps them, the grid and the frames of a recording.
+# Memory and time that a flight needs, judged before it is compiled. What grows with the flock is
+# counted: rows, past states that a delay needs, a packet of each pair where the radio keeps them,
+# the grid and the frames of a recording.
 
 SMALL = 2**28  # bytes that are not worth a look at what is free
 SHARE = 0.9  # of the free memory that one flight may take
@@ -103,8 +104,8 @@ def first_bad_step(state: DriverState, low: int, high: int, half: int = 0) -> in
     state : of a flight that is about to fly the step `low`, is finite there, and is not before the step `high`
     half  : as in `State.advance`, for the step `low`
     """
-    # Kernels never raise: a test per step would end vector loops. Flights are deterministic, so the step is found
-    # afterwards by flying again by halves.
+    # Kernels never raise: a test per step would end vector loops. Flights are deterministic, so the
+    # step is found afterwards by flying again by halves.
     while high - low > 1:
         middle, kept = (low + high) // 2, state.buffer.copy()
         state.advance(low, middle, half)

@@ -20,8 +20,8 @@ from airflock.support import locks
 
 NAME = "lock"
 LOOK = 0.05  # s from one try to the next
-# Workers that all compile the same driver take as many times the processor time. A lock ends with its process; one
-# that is stopped while it has the lock delays the others by five minutes at most.
+# Workers that all compile the same driver take as many times the processor time. A lock ends with
+# its process; one that is stopped while it has the lock delays the others by five minutes at most.
 PATIENCE = 300.0  # s; whoever holds a lock for longer has been stopped, and is waited for no more
 
 

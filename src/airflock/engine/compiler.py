@@ -69,7 +69,8 @@ class InlinedLowering(DriverLowering):
         state.flags.no_compile = True
         super().run_pass(state)
         found, described = state["cr"], state["cr"].fndesc
-        # Python may not call it: behind it stands a method of C, one for each function, that says so as a KeyError
+        # Python may not call it: behind it stands a method of C, one for each function, that says
+        # so as a KeyError
         entry = f"{{{described.qualname.split('.')[-1]}, which only other functions of its driver call}}".format
         state.targetctx.insert_user_function(entry, described, [state.library])
         state["cr"] = found._replace(cfunc=entry)

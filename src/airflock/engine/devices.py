@@ -17,8 +17,9 @@ from airflock.support import DeviceError, available_cores, check_device
 
 MOST_TOGETHER = 20_000  # agents whose pairs one block of a GPU can look at in reasonable time
 WORTH = 5.0  # s of work on all cores from which a GPU is worth its start
-# How much longer a block of a GPU takes for one flock than a core does, and how many flocks a multiprocessor flies in
-# the time of one. Measured: one NVIDIA H200 beside a core of its machine, 1,000 steps of four presets.
+# How much longer a block of a GPU takes for one flock than a core does, and how many flocks a
+# multiprocessor flies in the time of one. Measured: one NVIDIA H200 beside a core of its machine,
+# 1,000 steps of four presets.
 SOLVING, SEEING, IN_TURN, USUAL = 120.0, 4.0, 6.0, 1.0
 SIDE_BY_SIDE = 2.5
 BY_CELLS = 40.0  # cores that a GPU stands for with one big flock (100,000 boids)

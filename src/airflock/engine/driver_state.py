@@ -24,7 +24,8 @@ from airflock.engine.totals import combine_sums, goal_times
 from airflock.scenarios import FaultOnset, Scenario
 from airflock.world import FAR_AWAY
 
-# Memory: named arrays; all that lasts from step to step lies in one buffer, so that one copy keeps it.
+# Memory: named arrays; all that lasts from step to step lies in one buffer, so that one copy keeps
+# it.
 
 AGENTS, RING = INTEGER_NAMES.index("agents"), INTEGER_NAMES.index("ring")
 

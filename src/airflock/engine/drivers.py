@@ -16,8 +16,8 @@ from airflock.support import RuleError
 
 def flight_text(plan: Plan) -> str:
     """Text of the driver that flies a plan, the same whether samples are kept; each recording says by which."""
-    # Writing a text takes 0.06 s, half of a short interpreted flight. It is not kept on disk: a plan holds functions,
-    # and no file can show that they are unchanged.
+    # Writing a text takes 0.06 s, half of a short interpreted flight. It is not kept on disk: a
+    # plan holds functions, and no file can show that they are unchanged.
     return _text(plan.built(keep_frames=False) if plan.record else plan)
 
 

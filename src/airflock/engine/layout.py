@@ -76,7 +76,8 @@ def buffer_layout(
     }
     shaped |= {name: (array.shape, array.dtype) for name, array in beginnings.items()}
     shaped |= {name: (size, real) for name, size in kept}
-    # last, since faults and agents that differ add to them: what lies before lies to their first rows as ever
+    # last, since faults and agents that differ add to them: what lies before lies to their first
+    # rows as ever
     shaped |= {"work": ((count, m), real), "past": ((ring, plan.in_ring, m), real)}
     places, end = [], 0
     for name, (shape, kind) in shaped.items():

@@ -10,7 +10,8 @@ from numba.core.runtime import rtsys  # type: ignore[attr-defined]  # Numba has 
 from airflock.engine.compile_shortcuts import IS_TESTED_VERSION
 from airflock.engine.layout import CACHE_LINE
 
-# what Numba calls the body of a loop over threads, what unpacks its arguments, and what hands its parts to threads
+# what Numba calls the body of a loop over threads, what unpacks its arguments, and what hands its
+# parts to threads
 OF_LOOPS = ("__numba_parfor_gufunc", "<numba.np.ufunc.wrappers.", "parallelgufuncwrapper")
 
 
@@ -43,8 +44,8 @@ class DriverLibrary(JITCodeLibrary):  # type: ignore[misc]
         """
         for function in self._final_module.functions:
             if not function.is_declaration and any(b"noinline" in found for found in function.attributes):
-                # Internal linkage lets LLVM hand over only what is read of an array; whole records took a
-                # tenth of a flight of 30 agents.
+                # Internal linkage lets LLVM hand over only what is read of an array; whole records
+                # took a tenth of a flight of 30 agents.
                 function.linkage = "internal"
         super()._optimize_final_module()
 

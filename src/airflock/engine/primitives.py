@@ -20,7 +20,8 @@ MACHINE = """
 u32 = np.uint32
 u64 = np.uint64
 """
-# Words of 32 bits as such, for processors that multiply them as fast as they add them: those of a GPU.
+# Words of 32 bits as such, for processors that multiply them as fast as they add them: those of a
+# GPU.
 NARROW = (
     MACHINE
     + """
@@ -49,7 +50,8 @@ def uniform(word):
     return (real(np.int32(word >> u32(9))) + real(0.5)) * real(1.0 / 8388608.0)
 """
 )
-# Words of 32 bits in lanes of 64: one product has both halves. In lanes of 32, LLVM multiplies three times for them.
+# Words of 32 bits in lanes of 64: one product has both halves. In lanes of 32, LLVM multiplies
+# three times for them.
 WIDE = (
     MACHINE
     + """
@@ -79,7 +81,8 @@ def uniform(word):
 """
 )
 
-# log: x = 2^e m with m near 1; log m by a polynomial (Cephes' logf coefficients), or by the series of atanh.
+# log: x = 2^e m with m near 1; log m by a polynomial (Cephes' logf coefficients), or by the series
+# of atanh.
 LOG32 = """
 @njit(**INLINE)
 def log_uniform(u):

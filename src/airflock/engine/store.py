@@ -33,8 +33,8 @@ def compiler_fingerprint() -> str:
 def load_driver(text: str, label: str) -> ModuleType:
     """Import a driver from its text; compiled code of an earlier process is reused."""
     _import_compiler()
-    # Numba's own cache looks at the time stamp of one file and would serve stale physics when a helper
-    # elsewhere changes.
+    # Numba's own cache looks at the time stamp of one file and would serve stale physics when a
+    # helper elsewhere changes.
     digest = hashlib.sha256(f"{compiler_fingerprint()}\n{text}".encode()).hexdigest()[:20]
     name = f"airflock_driver_{label}_{digest}"
     with _loading:  # a thread must not get a module that another one is still executing

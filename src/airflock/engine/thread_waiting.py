@@ -9,8 +9,8 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# 4,000 boids beside one busy process take 404 ms at the library's 300,000, 55 ms at 30,000, and 6 ms if threads sleep
-# at once, which costs up to three times as much alone.
+# 4,000 boids beside one busy process take 404 ms at the library's 300,000, 55 ms at 30,000, and 6
+# ms if threads sleep at once, which costs up to three times as much alone.
 LOOKS = "30000"  # as fast as 300,000 where nobody else needs a processor, and 4 to 7 times as fast where somebody does
 NAME = "GOMP_SPINCOUNT"
 CHOSEN = NAME, "OMP_WAIT_POLICY"

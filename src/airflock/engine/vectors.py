@@ -87,7 +87,8 @@ def apart(typing_context):
     return types.void(), emit
 """
 
-# Only in drivers that sort agents into cells: a short loop that copies the few agents of a cell costs more than they.
+# Only in drivers that sort agents into cells: a short loop that copies the few agents of a cell
+# costs more than they.
 BLOCK_TEXT = """
 @intrinsic
 def copy_block(typing_context, to, row, at, source, first, shift):

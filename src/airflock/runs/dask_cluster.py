@@ -91,7 +91,8 @@ class DaskCluster:
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
         """Yield each flight as soon as it is over; hand out only so many at a time."""
-        # With a time limit one flight per thread: waiting in a worker's queue must not count as flying.
+        # With a time limit one flight per thread: waiting in a worker's queue must not count as
+        # flying.
         from distributed import wait
 
         waiting = list(reversed(flights))
@@ -148,7 +149,8 @@ class DaskCluster:
         fault = future.exception() if future.status == "error" else None
         lost = fault is None or type(fault).__name__ in ("KilledWorker", "CommClosedError", "CancelledError")
         tries[key] = tries.get(key, 0) + 1
-        # A flight is rarely the cause of a lost worker, so it flies again; after LOSSES workers it fails.
+        # A flight is rarely the cause of a lost worker, so it flies again; after LOSSES workers it
+        # fails.
         if lost and tries[key] < LOSSES:
             return None
         reason = f"its worker was lost {tries[key]} times" if lost else f"{type(fault).__name__}: {fault}"

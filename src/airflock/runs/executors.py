@@ -75,8 +75,8 @@ class ThreadExecutor:
         other_scores : functions of further scenarios of the study
         """
         self.scores, self.name = (score, *other_scores), f"{platform.node()}:{os.getpid()}"
-        # Plain threads, one flight each: a compiled flight releases the interpreter. prange would need a second
-        # compilation and see Ctrl-C only at the end.
+        # Plain threads, one flight each: a compiled flight releases the interpreter. prange would
+        # need a second compilation and see Ctrl-C only at the end.
         self.pool = ThreadPoolExecutor(max(1, threads))
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[FlightResult]:
@@ -91,7 +91,8 @@ class ThreadExecutor:
                 for future in over:
                     yield future.result()
         except KeyboardInterrupt:
-            # Flights cannot be interrupted: those in the air end and are stored, those that wait are cancelled.
+            # Flights cannot be interrupted: those in the air end and are stored, those that wait
+            # are cancelled.
             in_the_air = [future for future in waiting if not future.cancel()]
             for future in in_the_air:
                 yield future.result()

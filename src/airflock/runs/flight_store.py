@@ -20,8 +20,8 @@ from airflock.runs.executors import FlightResult
 from airflock.support import FormatError, StudyError, as_error, locks, parse_json, parse_json_object
 
 FILE, LOCK = "evaluations.sqlite", "writer.lock"
-# Tables have no row numbers, so contents do not depend on the order in which flights land. One flight is the unit: a
-# kill loses only what is in the air.
+# Tables have no row numbers, so contents do not depend on the order in which flights land. One
+# flight is the unit: a kill loses only what is in the air.
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS session (
   session INTEGER PRIMARY KEY, began TEXT, host TEXT, versions TEXT

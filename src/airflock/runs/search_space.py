@@ -39,7 +39,8 @@ class SearchAxis:
 
     def value(self, x: float, floor: float = -math.inf) -> float:
         """Value at coordinate x in [0, 1], not below `floor`."""
-        # The range shrinks to what the floor leaves, so that every point of the cube is an allowed set.
+        # The range shrinks to what the floor leaves, so that every point of the cube is an allowed
+        # set.
         low, high = min(max(self.low, floor), self.high), self.high
         x = min(max(x, 0.0), 1.0)
         if self.integer:

@@ -30,9 +30,9 @@ def step_counts(scenario: Scenario) -> dict[str, int]:
 # --- Cells: neighbours are found in cells as wide as the reach of a law ---
 
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
-# Agents from which order parameters look at pairs by cells: below, all pairs in vectors are as fast. A pair costs four
-# times as much where its offset goes to the nearest image. Measured: one sample of `zapotecatl` on one thread, of 1,000
-# to 8,000 agents.
+# Agents from which order parameters look at pairs by cells: below, all pairs in vectors are as
+# fast. A pair costs four times as much where its offset goes to the nearest image. Measured: one
+# sample of `zapotecatl` on one thread, of 1,000 to 8,000 agents.
 NEAR_FROM, NEAR_FROM_IN_A_BOX = 6000, 2000
 
 
@@ -122,7 +122,8 @@ TIMES = (("days", 86400.0), ("h", 3600.0), ("min", 60.0))
 # Counted and not timed, as an answer is needed before anything is compiled. Shipped presets took
 # 0.2 to 1.6 times the estimate, so 30 days refuse nothing that anybody waits for.
 LONGEST = 30 * 86400.0  # s of a processor that one flight may take; nobody waits longer for one
-# s of one core (2 cores of 2025, single precision). Measured: flights of 31 presets take 0.20 to 1.62 of the estimate.
+# s of one core (2 cores of 2025, single precision). Measured: flights of 31 presets take 0.20 to
+# 1.62 of the estimate.
 PAIR = 7e-10  # for one look at one other agent
 STEP = 4e-9  # for one motion step of one agent
 SIGHT = 2e-6  # for one look of one agent among a hundred buildings

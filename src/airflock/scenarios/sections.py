@@ -91,8 +91,8 @@ class Section(NamedTuple):
 
 
 # One tuple feeds file tables, Scenario, search space and driver columns. When five lists were
-# matched by position, two swapped entries would have flown with wrong numbers and no error.
-# The order is that of the columns of a driver's row; everything finds its numbers by letter and name.
+# matched by position, two swapped entries would have flown with wrong numbers and no error. The
+# order is that of the columns of a driver's row; everything finds its numbers by letter and name.
 ORDER = (
     Section("model", None, "p"),
     Section("body", motion.Parameters, "b"),

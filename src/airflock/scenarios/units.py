@@ -13,8 +13,8 @@ from airflock.core import Declaration, Points, Quantity, declarations, format_wi
 
 DEGREE = math.pi / 180.0
 FOOT, MILE, NAUTICAL_MILE = 0.3048, 1609.344, 1852.0
-# declared unit → what else may be written → factor to the declared one; feet, miles, pounds and knots are the
-# international ones of 1959, g is the standard gravity of 1901
+# declared unit → what else may be written → factor to the declared one; feet, miles, pounds and
+# knots are the international ones of 1959, g is the standard gravity of 1901
 UNITS: dict[str, dict[str, float]] = {
     "m": {
         "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": 0.0254, "ft": FOOT, "yd": 3.0 * FOOT, "mi": MILE,

@@ -481,7 +481,8 @@ def run_sensitivity(
         points = sample_morris.sample(problem, samples, seed=seed)
     batch = CandidateBatch(method, samples, 0)
     k = study.whole("seeds")
-    # Common random numbers: otherwise the chance of single flights would pass for an effect of a parameter.
+    # Common random numbers: otherwise the chance of single flights would pass for an effect of a
+    # parameter.
     seeds = [[study.seed(3, j) for j in range(k)]] * len(points)
     rows = Evaluator(study, store, executor, on_flight).evaluate(batch, np.asarray(points), seeds=seeds)
     values = np.array([np.nan if row[0] is None else row[0] for row in rows])
@@ -523,7 +524,8 @@ class BatchExecutor:
                 reason = str(error).splitlines()[0] if str(error) else type(error).__name__
                 yield FlightResult(flights[0], None, reason, time.perf_counter() - begin, self.device)
                 return
-            # One bad flight ends the whole batch. Halving finds it in log2 steps, and all others keep their result.
+            # One bad flight ends the whole batch. Halving finds it in log2 steps, and all others
+            # keep their result.
             half = len(flights) // 2
             yield from self._fly(flights[:half])
             yield from self._fly(flights[half:])

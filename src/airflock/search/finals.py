@@ -65,7 +65,8 @@ def conclude_study(
     flown = store.flown(SCORE)
     values, each = _scored(study, flown)
     mean, sd, low, high = mean_interval(values)
-    # The best value of the search is the luckiest, so the winner is scored on seeds that have chosen nothing.
+    # The best value of the search is the luckiest, so the winner is scored on seeds that have
+    # chosen nothing.
     safe = _safe(study, sound)
     good = _as_good(study, safe, mean)
     result = EvolveResult(
@@ -167,7 +168,8 @@ def select_finalists(
     signs = np.array([-1.0 if objective.maximise else 1.0 for objective in study.objectives])
     known = candidates[candidates[names].notna().all(axis=1)].drop_duplicates(list(study.space.keys))
     losses = known[names].to_numpy() * signs
-    # Ranks of excess come first here, too: a fast candidate that breaks limits must not fill the final.
+    # Ranks of excess come first here, too: a fast candidate that breaks limits must not fill the
+    # final.
     if study.limits:
         losses = rank_by_excess(losses, known[EXCESS_COLUMN].to_numpy())
         order = np.argsort(losses[:, 0], kind="stable")
@@ -202,8 +204,8 @@ def fly_by_successive_halving(
 
     Returns the fitness of all finalists, of each over all its flights, and the index of the best of the last round.
     """
-    # A third of the seeds for all, the rest for the better half: 660 of 6,208 flights were mostly spent on points that
-    # were far behind after 20; the median search went from 243 to 234 s.
+    # A third of the seeds for all, the rest for the better half: 660 of 6,208 flights were mostly
+    # spent on points that were far behind after 20; the median search went from 243 to 234 s.
     study, first, again = evaluator.study, max(1, len(fresh) // 3), evaluator.study.whole("again")
     further = [study.seed(1, len(fresh) + j) for j in range(2 * len(fresh))]
     half = max(again, (len(points) + 1) // 2)
@@ -292,7 +294,8 @@ UPPER = 0.2  # share of all candidates whose spread is the unit of distance
 
 def smoothed_losses(points: NDArray[np.float64], losses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean loss (candidate,) over each candidate and its neighbours; points (candidate, axis)."""
-    # Axes are scaled by the spread of the good candidates: along an axis that matters they stand close together.
+    # Axes are scaled by the spread of the good candidates: along an axis that matters they stand
+    # close together.
     good = points[np.argsort(losses, kind="stable")[: max(2, int(UPPER * len(points)))]]
     scale = np.maximum(good.std(axis=0), 1e-9)
     tree = cKDTree(points / scale)

@@ -64,10 +64,12 @@ class Evaluator:
                 self.note(False)
         n, last = len(places), max(len(row) for row in numbers)
         alive = list(range(len(parameters)))
-        # A race flies one more seed of each remaining candidate in each pass; otherwise one pass flies all seeds.
+        # A race flies one more seed of each remaining candidate in each pass; otherwise one pass
+        # flies all seeds.
         for seen in range(1, last + 1) if racing else [last]:
             missing = [
-                # One number holds seed and scenario, so that the scenarios of a seed lie side by side in the store.
+                # One number holds seed and scenario, so that the scenarios of a seed lie side by
+                # side in the store.
                 Flight(i, j * n + k, {**parameters[i], **shorter}, seed, k)
                 for i in alive
                 for j, seed in enumerate(numbers[i][:seen])
@@ -100,7 +102,8 @@ class Evaluator:
 
     def _still_needed(self, flown: FlightScores, alive: Sequence[int], seen: int, last: int) -> list[int]:
         """Return the candidates that fly on after `seen` of `last` seeds."""
-        # Stored flights of later seeds must not count: a resumed search would decide with more than the first.
+        # Stored flights of later seeds must not count: a resumed search would decide with more than
+        # the first.
         first, n = self.study.objectives[0], len(self.study.scenarios)
         candidates = 1 + max(i for i, _ in flown)
         values = [
@@ -150,7 +153,8 @@ def remaining_candidates(
     values : (candidate, seed so far) of all candidates of the generation; None: failed, which ends a candidate
     seeds_left : seeds that are still to come
     """
-    # CMA-ES moves by the better half, so only candidates that cannot reach it even with best luck are dropped.
+    # CMA-ES moves by the better half, so only candidates that cannot reach it even with best luck
+    # are dropped.
     sign = 1.0 if maximise else -1.0
     scored = [[sign * value for value in row if value is not None] for row in values]
     failed = [len(row) < len(given) for row, given in zip(scored, values, strict=True)]
@@ -191,8 +195,8 @@ class FlightLength:
 
     def end_generation(self, values: Sequence[float | None]) -> None:
         """Take the first objective of all candidates of a generation (None: failed) and lengthen flights if due."""
-        # Values of one length are compared with each other only, so the rule holds for any objective. Fixed thresholds
-        # (0.35, 0.5, 0.6) were tried and fitted one law.
+        # Values of one length are compared with each other only, so the rule holds for any
+        # objective. Fixed thresholds (0.35, 0.5, 0.6) were tried and fitted one law.
         if self.whole:
             return
         found = [-float("inf") if value is None else self.sign * value for value in values]
@@ -356,8 +360,8 @@ def run_search(
 
 def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[np.float64]]:
     """Run the optimiser once; return its mean (axis,) after each generation of whole flights, if it has one."""
-    # Optimiser state is not stored: replay with the stored flights takes 4 ms a generation and notices another version
-    # of pycma, which a pickle would follow astray.
+    # Optimiser state is not stored: replay with the stored flights takes 4 ms a generation and
+    # notices another version of pycma, which a pickle would follow astray.
     study, store = evaluator.study, evaluator.store
     first = study.objectives[0]
     state = make_optimiser(
@@ -387,7 +391,8 @@ def _run(evaluator: Evaluator, run: int, tally: ProgressTally) -> list[NDArray[n
             )
         state.tell(points, losses)
         centre = state.centre()
-        # Means of generations with short flights are no finalists: their fitness is on another scale.
+        # Means of generations with short flights are no finalists: their fitness is on another
+        # scale.
         if length.whole:
             tally.end_generation(sound, first.maximise)
             seen += values
@@ -432,8 +437,8 @@ def _asked(store: FlightStore, batch: CandidateBatch, points: NDArray[np.float64
     if not stored:
         return points
     known = np.array(stored)
-    # A rebuilt optimiser may differ in the last bits on another machine. A larger difference is another optimiser,
-    # which would learn from flights of points that are not its own.
+    # A rebuilt optimiser may differ in the last bits on another machine. A larger difference is
+    # another optimiser, which would learn from flights of points that are not its own.
     if known.shape != points.shape or not np.allclose(known, points, rtol=0.0, atol=SAME):
         raise StudyError(
             f"{store.path}: run {batch.run}, generation {batch.generation} cannot be rebuilt here: the optimiser asks "

@@ -41,7 +41,8 @@ from airflock.search.study_result import mean_interval
 from airflock.support import ScenarioError
 
 SAFETY = ("f_coll", "f_disc", "f_cluster", "f_wall")  # partial fitnesses that are constraints; the others are its price
-# The recipe of Table S4, flown to its end, moved the partial fitness of walls from 0.995 to 0.14 in an L-shaped field.
+# The recipe of Table S4, flown to its end, moved the partial fitness of walls from 0.995 to 0.14 in
+# an L-shaped field.
 SLACK = 0.02  # by which the mean of one may fall, and the share of flights with a contact may rise
 WALLS = ("clearance", "phi_wall", "n_contacts", "f_wall")  # scores of what flies into walls and obstacles
 RESERVE = SearchSettings().reserve  # how many times rarer than allowed an event is to look, as in a search
@@ -74,7 +75,8 @@ class Constraints:
         for scenario, was, now in zip(scenarios, before, after, strict=True):
             if found := violation_text(was, now) or self._limit_broken(scenario, was, now):
                 return f"{found}, in {scenario.name}" if len(scenarios) > 1 else found
-        # Safety is worth more than the price: a step towards limits that are not kept yet may cost any fitness.
+        # Safety is worth more than the price: a step towards limits that are not kept yet may cost
+        # any fitness.
         if self.short(scenarios, after) < self.short(scenarios, before):
             return ""
         price = float((join_scenarios(before)["fitness"] - join_scenarios(after)["fitness"]).mean())
@@ -328,7 +330,8 @@ def harden(
         threads,
         done,
     )
-    # Walls first if they are hit more often than agents: a step that widens distances drives agents into walls.
+    # Walls first if they are hit more often than agents: a step that widens distances drives agents
+    # into walls.
     found = [trial.first]
     hit = float((join_scenarios(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()

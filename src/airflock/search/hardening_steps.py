@@ -31,8 +31,8 @@ class HardeningStep:
     braking_lead: float = 0.0
 
 
-# ratios of Table S4 to Table S1, columns 4, 6, 8 m/s: p_rep 2.3, 1.4, 1.7; C_frict 10, 10, 8; v_shill 0.74, 0.71, 0.61;
-# r0_shill from 0.3, 0.5, 0.1 m to 0, 5, 30 m
+# ratios of Table S4 to Table S1, columns 4, 6, 8 m/s: p_rep 2.3, 1.4, 1.7; C_frict 10, 10, 8;
+# v_shill 0.74, 0.71, 0.61; r0_shill from 0.3, 0.5, 0.1 m to 0, 5, 30 m
 TABLE_S4_STEPS = (
     HardeningStep("p_rep up", {"model.p_rep": 1.5}, f"{S4}: gain increased to prevent collisions"),
     HardeningStep("c_frict up", {"model.c_frict": 3.0}, f"{S4}: increased substantially to minimise oscillations"),

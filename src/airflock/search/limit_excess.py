@@ -44,7 +44,8 @@ def limit_excess(
         short = reliability_index(allowed_probability(limit, scenario, duration_share) / reserve) - reliability_indices(
             limit, flights
         )
-        # Without spread the index is infinite: a finite bound keeps sums and ranks of excesses defined.
+        # Without spread the index is infinite: a finite bound keeps sums and ranks of excesses
+        # defined.
         found += np.clip(short, 0.0, FARTHEST)
     return found
 
@@ -65,8 +66,9 @@ def batch_excess(
 
 def rank_by_excess(losses: NDArray[np.float64], excess: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return losses (candidate, objective) by which candidates that break limits rank after all that keep them."""
-    # Ranks, not penalties: CMA-ES is invariant to the scale of fitness, and a weight is a number that nobody can know.
-    # The augmented Lagrangian ended between 2e-6 and 1e-2 where 1.7e-3 was allowed.
+    # Ranks, not penalties: CMA-ES is invariant to the scale of fitness, and a weight is a number
+    # that nobody can know. The augmented Lagrangian ended between 2e-6 and 1e-2 where 1.7e-3 was
+    # allowed.
     worst = losses.max(axis=0)
     broken = worst + excess[:, None] + TIE * (losses - worst) / np.maximum(np.ptp(losses, axis=0), TIE)
     return np.where(excess[:, None] > 0.0, broken, losses)

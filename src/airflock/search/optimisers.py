@@ -170,7 +170,8 @@ def _pymoo_genetic(bits: int, population: int, seed: int, mutation: float, cross
     except ModuleNotFoundError as error:
         raise StudyError("the genetic algorithm needs pymoo: pip install 'airflock[evolve]'") from error
 
-    # pymoo merges parents and children and keeps the best. The published algorithm replaces the whole population.
+    # pymoo merges parents and children and keeps the best. The published algorithm replaces the
+    # whole population.
     class Generational(GA):  # type: ignore[misc]
         """Children replace their parents, even better ones."""
 
@@ -217,7 +218,8 @@ class NonDominatedSorting:
 
 def pareto_front(losses: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the indices of candidates that no other dominates; losses (candidate, objective)."""
-    # Sorted by the first objective, a candidate can only be dominated by one before it: one pass over the front so far.
+    # Sorted by the first objective, a candidate can only be dominated by one before it: one pass
+    # over the front so far.
     order = np.lexsort(losses.T[::-1])
     kept = np.empty(len(losses), np.int64)
     n = 0

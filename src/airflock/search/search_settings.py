@@ -17,10 +17,10 @@ CONSTANT_SEEDS_SHARE = (
 FEWEST = 8  # generations of a search with growing flights: one at least of each length but the last
 
 
-# More generations, larger populations and averages alone all ended 0.035 below Table S1 at 6 m/s: single flights rank
-# sets that are mostly good and sometimes bad. More flights late stay at the optimum.
-# A third of the published study's flights. Measured with benchmarks/time_to_target.py: 9 of 10 searches reach the
-# fitness of Table S1 at 6 m/s.
+# More generations, larger populations and averages alone all ended 0.035 below Table S1 at 6 m/s:
+# single flights rank sets that are mostly good and sometimes bad. More flights late stay at the
+# optimum. A third of the published study's flights. Measured with benchmarks/time_to_target.py: 9
+# of 10 searches reach the fitness of Table S1 at 6 m/s.
 FAST: Mapping[str, Any] = {
     "population": 24, "generations": 72, "late_seeds": 9, "averages": 2, "windows": 4, "pool": 20, "top": 4,
     "final_seeds": 60, "again": 3,

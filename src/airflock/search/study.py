@@ -67,7 +67,8 @@ class Study:
         """Return the flights of a candidate in a generation: from `seeds` up to `late_seeds` in equal ratios."""
         first, last = self.search.seeds, self.search.late_seeds
         begin, end = CONSTANT_SEEDS_SHARE * self.search.generations, max(1.0, self.search.generations - 1.0)
-        # Early candidates differ much and one flight ranks them; late ones differ by less than chance does.
+        # Early candidates differ much and one flight ranks them; late ones differ by less than
+        # chance does.
         grown = min(max(0.0, (generation - begin) / max(end - begin, 1.0)), 1.0)
         return round(float(first * (max(first, last) / first) ** grown))
 
@@ -315,7 +316,8 @@ def _entry(entry: Any, number: int) -> tuple[str, Mapping[str, Any], list[str]]:
 
 def common_space(scenarios: Sequence[Scenario]) -> tuple[SearchSpace, list[str]]:
     """Return the default space of the first scenario, with bounds that hold those of the others; and notes."""
-    # One set of numbers has to fly in all scenarios, so the search sees every region that is usual in one of them.
+    # One set of numbers has to fly in all scenarios, so the search sees every region that is usual
+    # in one of them.
     space, notes = default_space(scenarios[0])
     if len(scenarios) == 1:
         return space, notes

@@ -66,8 +66,9 @@ def make_plan(budget: float, rate: float, *, warm: bool = False, flights_for_lim
     flights_for_limits : flights that show if the rarest limit is kept: at most so many for each finalist and each step
     Raises StudyError if the budget is too small.
     """
-    # Fixed when it begins and kept on resume: the same flights are flown, whatever the machine is doing by then.
-    # A quarter of the search is left for its finals: race, final and score. The generations take the rest.
+    # Fixed when it begins and kept on resume: the same flights are flown, whatever the machine is
+    # doing by then. A quarter of the search is left for its finals: race, final and score. The
+    # generations take the rest.
     flights = budget * SEARCH * rate
     finals = flights / 4.0
     top = 4

@@ -170,8 +170,8 @@ def _off_the_walls(scenario: Scenario) -> list[float]:
 
     Half of the distance between agents, or r_coll.
     """
-    # Starts as close as 1 cm to a wall decided `clearance` of most flights, whatever the law: a fitness of 0.05, with
-    # room at the start 0.777.
+    # Starts as close as 1 cm to a wall decided `clearance` of most flights, whatever the law: a
+    # fitness of 0.05, with room at the start 0.777.
     drawn = scenario.start.kind in ("arena", "ball", "box")
     if not (measures_walls(scenario) and drawn) or "wall_clearance" in scenario.document.get("start", {}):
         return []

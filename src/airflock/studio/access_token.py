@@ -92,7 +92,8 @@ def check_access(
 @contextmanager
 def require_token(token: str, port: int) -> Iterator[None]:
     """Let the servers of websockets that start inside require the token."""
-    # viser has no access control, so the server is wrapped while it starts; the web socket included.
+    # viser has no access control, so the server is wrapped while it starts; the web socket
+    # included.
     serve, name = websockets.asyncio.server.serve, f"airflock_{port}"
 
     def with_check(handler: Any, *where: Any, process_request: Callable[..., Any], **rest: Any) -> Any:

@@ -412,7 +412,8 @@ class BrowserView:
         node = self._trails[self._turn % TRAIL_PIECES]
         self._turn += is_complete
         node.points = np.stack([begin, end], 1)
-        # Trails are mixed with the background instead of being transparent: segments of viser have no opacity each.
+        # Trails are mixed with the background instead of being transparent: segments of viser have
+        # no opacity each.
         pale = _linear_light(0.45 * colour + 0.55 * 235)
         node.colors = np.repeat(pale[:, None], 2, axis=1)
 
@@ -428,7 +429,8 @@ class BrowserView:
         if not len(points) and name in self._bare:
             return
         (self._bare.discard if len(points) else self._bare.add)(name)
-        # a page that gets more places than colours draws the rest pale: both keep one size, which seldom grows
+        # a page that gets more places than colours draws the rest pale: both keep one size, which
+        # seldom grows
         room = self._room[name] = max(self._room[name], 1 << (max(len(points), 1) - 1).bit_length())
         places, tones = np.zeros((room, 2, 3), np.float32), np.zeros((room, 2, 3), np.uint8)
         places[: len(points)] = points

@@ -68,7 +68,8 @@ class FlightPage:
             if moved or acted or refresh:
                 self.frame(refresh)
             refreshed = now if refresh else refreshed
-            # A late frame is not caught up: after a pause of the machine the page goes on at its usual rate.
+            # A late frame is not caught up: after a pause of the machine the page goes on at its
+            # usual rate.
             drawn = max(drawn + 1.0 / FRAMES_PER_SECOND, now)
             acted = self._run_actions_until(drawn)
 

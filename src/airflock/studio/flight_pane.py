@@ -367,8 +367,9 @@ class FlightPane:
         """
         if self._compiled_flight is None:
             return None
-        # The compiled flight flies from the start to the present step, so that saved bits are those of a compiled
-        # flight. Carrying the interpreted state over would save a flight that nobody can fly again.
+        # The compiled flight flies from the start to the present step, so that saved bits are those
+        # of a compiled flight. Carrying the interpreted state over would save a flight that nobody
+        # can fly again.
         interpreted, (self.flight, self._compiled_flight) = self.flight, (self._compiled_flight.result(), None)
         start = self.flight.snapshot()
         self._replay(interpreted.events)
@@ -480,7 +481,8 @@ class FlightPane:
 
     def change(self, settings: Mapping[str, Any]) -> None:
         """Set keys of the scenario from now on; what must be compiled comes into force when that is done."""
-        # Faults begun by hand are not in the file, so their first values must be remembered for undo.
+        # Faults begun by hand are not in the file, so their first values must be remembered for
+        # undo.
         by_hand = {key: scenario_value(self.scenario, key) for key in settings if self._is_manual_fault(key)}
         self.flight.change(settings, wait=False)
         self._manual_fault_values = {**by_hand, **self._manual_fault_values}

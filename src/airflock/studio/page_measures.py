@@ -72,8 +72,8 @@ class AgentPairs:
         far = distance
         if size * size > 2 * MAX_LINKS:  # a denser flock than can be drawn: as far as so many neighbours reach
             count = min(size - 1, max(1, 2 * MAX_LINKS // size))
-            # The 90 % quantile of the distance to the n-th neighbour bounds the pairs before they are listed:
-            # all pairs of 1,000 agents within radio range would be half a million.
+            # The 90 % quantile of the distance to the n-th neighbour bounds the pairs before they
+            # are listed: all pairs of 1,000 agents within radio range would be half a million.
             far = min(distance, float(np.quantile(self._tree.query(self._tree.data, k=count + 1)[0][:, -1], 0.9)))
         pairs = self.within(far)
         length = np.linalg.norm(self.position[pairs[:, 1]] - self.position[pairs[:, 0]], axis=1)
@@ -139,7 +139,8 @@ class PaneChartData:
             self._window = len(flight.windows)
             self.fresh()
         scores = flight.scores()
-        # A paused page calls again with the same moment; counting it twice would bend the histograms.
+        # A paused page calls again with the same moment; counting it twice would bend the
+        # histograms.
         if self.instants and self.instants[-1].time == flight.time:
             return scores
         speed, apart = np.sqrt((velocity**2).sum(1)), pairs.apart()

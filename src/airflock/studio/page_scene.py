@@ -75,7 +75,8 @@ class CollisionList:
     def go_back(self, time: float, pane_count: int) -> None:
         """Drop collisions that began after a time, s, and those of closed panes; the rest may continue."""
         kept = {c: min(last, time) for c, last in self._last_seen.items() if c.time <= time and c.side < pane_count}
-        # Pairs that touched at that moment are still the same collision when the flight goes on from there.
+        # Pairs that touched at that moment are still the same collision when the flight goes on
+        # from there.
         still = [c for c, last in self._last_seen.items() if c in kept and last >= time]
         self._last_seen = kept
         self._ongoing = {
@@ -231,7 +232,8 @@ class DrawnFlock:
     def look(self) -> None:
         """Take the present moment; for a flight that stopped, keep the last one that can be drawn."""
         position, velocity = self.side.motion
-        # A diverged flight keeps its last finite picture: nan would spread through the meshes of the page.
+        # A diverged flight keeps its last finite picture: nan would spread through the meshes of
+        # the page.
         if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
             return
         self.position, self.velocity = position, velocity

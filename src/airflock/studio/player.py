@@ -402,7 +402,8 @@ class Player(ComparedFlights):
 
     def ask(self, action: Callable[[], None]) -> None:
         """Queue an action for the next frame; from any thread."""
-        # Actions wait for the next frame: no callback of the page touches the flight from its own thread.
+        # Actions wait for the next frame: no callback of the page touches the flight from its own
+        # thread.
         self._asked.put(action)
 
     def run_actions_within(self, seconds: float) -> bool:
@@ -418,7 +419,8 @@ class Player(ComparedFlights):
             acted = self._settled() or acted
         if self.is_paused or self.failure_message or self.over:
             return acted
-        # A slow flight must not freeze the page: at most the steps that fit into one busy interval, as measured.
+        # A slow flight must not freeze the page: at most the steps that fit into one busy interval,
+        # as measured.
         steps = min(self.clock.due(elapsed), max(1, int(self._steps_per_second * MAX_BUSY_SECONDS)))
         if not steps:
             return acted

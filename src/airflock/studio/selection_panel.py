@@ -161,7 +161,8 @@ def _neighbour_lines(view: Seen, own: NDArray[Any], size: float, measured: NDArr
     believed[:, :axes] = measured[:axes, who].T
     believed[0] = view.own[:3]
     ghosts = np.vstack([cross_segments(believed[:1], 0.7 * size), cross_segments(believed[1:], 0.25 * size)])
-    # Without sensor errors belief and truth are the same, and the crosses would only hide the agents.
+    # Without sensor errors belief and truth are the same, and the crosses would only hide the
+    # agents.
     off = float(np.linalg.norm(believed[0] - own)) > 0.0
     return {
         "heard": (np.stack([np.broadcast_to(own, noticed.shape), noticed], 1), None),

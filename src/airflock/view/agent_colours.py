@@ -18,7 +18,8 @@ from airflock.scenarios import LETTERS, Scenario
 
 # ---- Colour maps
 
-# viridis of matplotlib (van der Walt and Smith 2015, CC0), nine of its colours, without the yellow end
+# viridis of matplotlib (van der Walt and Smith 2015, CC0), nine of its colours, without the yellow
+# end
 RAMP_STOPS = np.array(
     [[68, 1, 84], [72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137], [53, 183, 121],
      [109, 205, 89], [180, 222, 44]], float,
@@ -78,8 +79,8 @@ def cluster_labels(position: NDArray[Any], distance: float, period: NDArray[Any]
     if count < 2 or not distance > 0.0:
         return np.full(count, -1, np.intp)
     tree = cKDTree(points if period is None else np.mod(points + 0.5 * period, period), boxsize=period)
-    # A few nearest links join almost the whole flock at the cost of one query; all pairs within the distance
-    # would grow with the square of a dense flock.
+    # A few nearest links join almost the whole flock at the cost of one query; all pairs within the
+    # distance would grow with the square of a dense flock.
     apart, other = tree.query(tree.data, k=min(FIRST_LINKS, count), distance_upper_bound=distance)
     near = np.isfinite(apart) & (np.arange(count)[:, None] != other)
     label = _component_labels(np.nonzero(near)[0], other[near], count)
@@ -91,7 +92,8 @@ def cluster_labels(position: NDArray[Any], distance: float, period: NDArray[Any]
         first = np.concatenate([np.nonzero(near)[0], rest[links.row]])
         label = _component_labels(first, np.concatenate([other[near], links.col]), count)
     least = np.full(label.max() + 1, count, np.intp)
-    # Labels are renamed to the smallest agent number, so that a cluster keeps its colour from frame to frame.
+    # Labels are renamed to the smallest agent number, so that a cluster keeps its colour from frame
+    # to frame.
     np.minimum.at(least, label, np.arange(count))
     return np.where(np.bincount(label)[label] > 1, least[label], -1)
 

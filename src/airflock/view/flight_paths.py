@@ -179,7 +179,8 @@ def projection(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.
     if axes == 2:
         return Projection(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
     a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
-    # Oblique parallel projection: lengths compare anywhere in the picture, which perspective would spoil.
+    # Oblique parallel projection: lengths compare anywhere in the picture, which perspective would
+    # spoil.
     right = np.array([-math.sin(a), math.cos(a), 0.0])
     up = np.array([-math.cos(a) * math.sin(e), -math.sin(a) * math.sin(e), math.cos(e)])
     return Projection(right, up)

@@ -70,12 +70,13 @@ def pack_positions(position: NDArray[Any], rows: Sequence[NDArray[np.uint8]] = (
     positions = np.asarray(position, float)
     low, high = positions.min(axis=(0, 2)), positions.max(axis=(0, 2))
     quantum = np.maximum((high - low) / MAX_QUANTA, 1e-12)
-    # Differences modulo 2^16 never clip and add up without loss: a minute of 1,000 drones takes 5 MB,
-    # the export of viser 15.
+    # Differences modulo 2^16 never clip and add up without loss: a minute of 1,000 drones takes 5
+    # MB, the export of viser 15.
     whole = np.round((positions - low[:, None]) / quantum[:, None]).astype(np.uint16)
     steps = whole.copy()
     steps[1:] -= whole[:-1]  # modulo 2^16, which adding up undoes
-    # Low and high bytes apart: slow agents leave the high ones at 0 or 255, which zlib packs to almost nothing.
+    # Low and high bytes apart: slow agents leave the high ones at 0 or 255, which zlib packs to
+    # almost nothing.
     series = np.ascontiguousarray(steps.transpose(1, 2, 0)).ravel()
     data = (series & 0xFF).astype(np.uint8).tobytes() + (series >> 8).astype(np.uint8).tobytes()
     data += b"".join(np.diff(row, axis=0, prepend=row[:1] * 0).T.tobytes() for row in rows)  # modulo 2^8
@@ -159,7 +160,8 @@ def _cluster_layer(scenario: Scenario, position: NDArray[Any], present: NDArray[
     frames, axes, agents = position.shape
     world = scenario.world
     box = 2.0 * np.array(half_sizes(world)[:axes]) if world.edges == "periodic" else None
-    # Clusters change slowly; on long recordings every n-th frame is clustered and its labels are repeated.
+    # Clusters change slowly; on long recordings every n-th frame is clustered and its labels are
+    # repeated.
     every = max(1, math.ceil(frames * agents / MAX_CLUSTERED_POSITIONS))
     least = np.full((frames, agents), -1)
     for first in range(0, frames, every):
@@ -337,7 +339,8 @@ def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
         return frames
     times = np.arange(len(frames))[:, None]
     last = np.maximum.accumulate(np.where(present, times, -1), axis=0)
-    # Index of the last frame with the agent, found by a running maximum instead of a loop over agents.
+    # Index of the last frame with the agent, found by a running maximum instead of a loop over
+    # agents.
     source = np.where(last >= 0, last, present.argmax(axis=0))
     kept = np.take_along_axis(frames, source[:, None, :], axis=0)
     ever = present.any(axis=0)

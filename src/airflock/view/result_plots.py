@@ -240,7 +240,8 @@ def _draw_saturation(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> N
     k = np.arange(len(run) - 3)
     k = k[(run[k] == run[k + 3]) & (np.abs(logs.command[k + 2] - logs.command[k]).max(axis=1) < 1e-9)]
     k = k[:: max(1, len(k) // MAX_POINTS)]
-    # four rows: the outer two give the gap, the inner two the acceleration, so that no noise of the log is in both
+    # four rows: the outer two give the gap, the inner two the acceleration, so that no noise of the
+    # log is in both
     gap = logs.command[k] - 0.5 * (logs.velocity[k] + logs.velocity[k + 3])
     size = np.maximum(np.linalg.norm(gap, axis=1), 1e-9)
     step = (logs.time[k + 2] - logs.time[k + 1])[:, None]
@@ -270,7 +271,8 @@ def _noise(panel: Axes, logs: FlightLogs, result: IdentifyResult) -> None:
     for lag in range(1, 5):
         k = np.arange(len(logs.time) - lag)
         k = k[run[k] == run[k + lag]]
-        # The command must have stood still in between, or the prediction from one row does not hold.
+        # The command must have stood still in between, or the prediction from one row does not
+        # hold.
         for between in range(1, lag):
             k = k[np.abs(logs.command[k + between] - logs.command[k]).max(axis=1) < 1e-9]
         gap = logs.command[k] - logs.velocity[k]

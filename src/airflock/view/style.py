@@ -195,8 +195,8 @@ def add_colour_bar(
 
 # no dates: the same figure gives the same file
 UNDATED_METADATA: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-# TrueType, because many publishers refuse the Type 3 fonts that are Matplotlib's default; and ids in .svg that do not
-# differ from time to time. Both can be said only to all of Matplotlib.
+# TrueType, because many publishers refuse the Type 3 fonts that are Matplotlib's default; and ids
+# in .svg that do not differ from time to time. Both can be said only to all of Matplotlib.
 FILE_SETTINGS: Any = {"pdf.fonttype": 42, "svg.hashsalt": "airflock"}
 _settings_lock = threading.Lock()
 

@@ -104,7 +104,8 @@ class VideoFrame:
         _key(axes, self.scale)
         self.chart_cursor = _chart(self.canvas.figure, recording, chart, share, first) if chart else None
         self.canvas.draw()
-        # Blitting: axes, walls and text are drawn once; each frame restores these pixels and draws what moves.
+        # Blitting: axes, walls and text are drawn once; each frame restores these pixels and draws
+        # what moves.
         self.still = self.canvas.copy_from_bbox(self.canvas.figure.bbox)
 
     def render(self, instant: float) -> Array:
@@ -155,7 +156,8 @@ class VideoFrame:
         if self.tail_seconds <= 0.0 or instant - begin < 1e-9:
             self.tails.set_segments([])
             return
-        # Tails are resampled at equal times, so that they fade evenly whatever the period of the recording.
+        # Tails are resampled at equal times, so that they fade evenly whatever the period of the
+        # recording.
         moments = np.linspace(begin, instant, POINTS_PER_TAIL)
         past = np.stack([self._positions(float(m)) for m in moments])  # (moment, axis, agent)
         pieces = np.stack([past[:-1], past[1:]], axis=1)  # (moment, end, axis, agent)
@@ -218,7 +220,8 @@ def _interpolated(times: Array, values: Array, instant: float, period: Array | N
     share = float(np.clip((instant - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0))
     step = values[after] - values[after - 1]
     if period is not None:
-        # An agent that leaves through a periodic face must not be drawn on a line across the whole world.
+        # An agent that leaves through a periodic face must not be drawn on a line across the whole
+        # world.
         through = (np.abs(step) > period[:, None]).any(axis=0)
         near = values[after if share >= 0.5 else after - 1]
         return np.asarray(np.where(through, near, values[after - 1] + share * step))

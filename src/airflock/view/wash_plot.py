@@ -79,7 +79,8 @@ def downwash(scenario: Scenario, formation: SolvedFormation, points: Array, with
         dx, dy, dz = (points - place).T
         for segment in range(m):
             y = dy - (segment - 0.5 * (m - 1)) * h
-            # A horseshoe vortex is the difference of its two trailing legs (Dimock & Selig 2003, Eqs 5 and 6).
+            # A horseshoe vortex is the difference of its two trailing legs (Dimock & Selig 2003,
+            # Eqs 5 and 6).
             ends = _filament_leg(dx, y + 0.5 * h, dz, core * core) - _filament_leg(dx, y - 0.5 * h, dz, core * core)
             total += circulation[segment] * filaments.SHARE * ends
     return total

@@ -29,8 +29,8 @@ def gather(x, y, z, sight, shapes, nodes, links, near):
     """
     n = 0
     i = 0
-    # The tree lies in depth-first order with the number of the next node to visit where a box is missed, so that no
-    # stack is needed: kernels on a GPU have none.
+    # The tree lies in depth-first order with the number of the next node to visit where a box is
+    # missed, so that no stack is needed: kernels on a GPU have none.
     while i < len(nodes):
         if beside(x, y, z, nodes, i) <= sight * sight:
             for k in range(links[i][1], links[i][2]):
@@ -70,7 +70,8 @@ def cast(x, y, z, ux, uy, uz, length, radius, shapes, nodes, links):
     iy = inverse(uy)
     iz = inverse(uz)
     i = 0
-    # `best` shrinks with each hit, so later boxes are skipped by the same test that skips those out of the way.
+    # `best` shrinks with each hit, so later boxes are skipped by the same test that skips those out
+    # of the way.
     while i < len(nodes):
         s = entry(
             x, y, z, ix, iy, iz, nodes[i][0], nodes[i][1], nodes[i][2], nodes[i][3], nodes[i][4], nodes[i][5], radius

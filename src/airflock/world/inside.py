@@ -29,8 +29,8 @@ def outwards(ux, uy, uz, shapes, k):
 
 def winding(x, y, z, ux, uy, uz, shapes, nodes, links):
     """Crossings outwards less those inwards of the line from a position along u, through closed surfaces."""
-    # Odd wherever the parity of crossings is odd, so faces that look inwards cost nothing; parts with a free edge are
-    # left out.
+    # Odd wherever the parity of crossings is odd, so faces that look inwards cost nothing; parts
+    # with a free edge are left out.
     count = 0.0
     ix = inverse(ux)
     iy = inverse(uy)
@@ -52,8 +52,8 @@ def winding(x, y, z, ux, uy, uz, shapes, nodes, links):
 
 def inside(x, y, z, shapes, nodes, links):
     """1.0 if a position lies within closed surfaces made of triangles or, in a plane, of segments; else 0.0."""
-    # Three directions without a rational relation to axes or to each other: edges of buildings are parallel to axes,
-    # and one line through a shared edge may count it twice.
+    # Three directions without a rational relation to axes or to each other: edges of buildings are
+    # parallel to axes, and one line through a shared edge may count it twice.
     if winding(x, y, z, 0.3103, 0.1702, 0.9353, shapes, nodes, links) == 0.0:
         return 0.0
     if winding(x, y, z, -0.6403, 0.5401, -0.5462, shapes, nodes, links) == 0.0:

@@ -25,8 +25,8 @@ def obstacle(x, y, z, edges, first, last):
 
     Distance (m) is positive outside; the normal points away from the polygon, also from within.
     """
-    # One shill agent at the nearest point of the whole polygon. One for each edge would make a round tree of 16 edges
-    # push eight times as hard as a tree of two.
+    # One shill agent at the nearest point of the whole polygon. One for each edge would make a
+    # round tree of 16 edges push eight times as hard as a tree of two.
     best = 1e30
     px = 0.0
     py = 0.0
@@ -70,7 +70,8 @@ def hidden(x, y, qx, qy, edges, corners):
     """
     ux = 0.999 * (qx - x)
     uy = 0.999 * (qy - y)
-    # Only edges of the arena hide an edge; obstacles do not, so that a square with obstacles flies as it always did.
+    # Only edges of the arena hide an edge; obstacles do not, so that a square with obstacles flies
+    # as it always did.
     for e in range(corners):
         ax = edges[e][0] - x
         ay = edges[e][1] - y

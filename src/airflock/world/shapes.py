@@ -40,7 +40,8 @@ def from_box(x, y, z, x0, y0, z0, x1, y1, z1):
     px = max(dx, 0.0)
     py = max(dy, 0.0)
     pz = max(dz, 0.0)
-    # scaled by the largest component, so that neither a great nor a tiny one leaves the numbers of single precision
+    # scaled by the largest component, so that neither a great nor a tiny one leaves the numbers of
+    # single precision
     qx = px / outside
     qy = py / outside
     qz = pz / outside

@@ -129,8 +129,8 @@ def edge_rows(world: arena.Parameters) -> tuple[list[list[float]], int, list[lis
     spans = []
 
     def add(corners: Corners) -> None:
-        # Counter-clockwise rings have their inner side on the left, which the sign of every surface function relies
-        # on.
+        # Counter-clockwise rings have their inner side on the left, which the sign of every surface
+        # function relies on.
         ring = counter_clockwise(corners)
         rows.extend([*a[:2], *b[:2]] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
 

@@ -155,8 +155,8 @@ def frame_at(data: bytes, start: int) -> tuple[MavlinkFrame | None, int]:
     if len(data) < whole:
         return None, 0
     sent_checksum = int.from_bytes(data[end : end + CHECKSUM_LENGTH], "little")
-    # Only the checksum distinguishes a frame from a payload byte that happens to be 0xFD, so a mismatch
-    # costs one byte, not the length that the false header claims.
+    # Only the checksum distinguishes a frame from a payload byte that happens to be 0xFD, so a
+    # mismatch costs one byte, not the length that the false header claims.
     if sent_checksum != checksum(data[start + 1 : end], layout.crc_extra):
         return None, 1
     return MavlinkFrame(head[5], head[6], message_number(head), data[start + HEADER_LENGTH : end]), whole - start

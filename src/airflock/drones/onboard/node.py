@@ -228,7 +228,8 @@ class Node:
         order = self.operator.next_order()
         if self.phase in PREFLIGHT_PHASES and self.operator.missed(self.utc(now), self.card.turn(self.member)):
             self._notes.append("not started: something was missing when its turn came; order the start once more")
-        # The limiter would stop at the fence anyway; refusing the order gives the operator a reason.
+        # The limiter would stop at the fence anyway; refusing the order gives the operator a
+        # reason.
         if order == OrderKind.GOTO and self._is_goal_outside():
             order = None
             self._notes.append("the point that was ordered lies outside the fence; not followed")

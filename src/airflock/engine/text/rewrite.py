@@ -298,8 +298,8 @@ class RuleRewriter(VectorUnroller):
         if node.id in GIVEN or node.id in self.source.names() or node.id.startswith("percept_"):
             return node
         value = self.notes.free(node.id)
-        # Global constants are inlined, real ones in the precision of the driver; bool first, as it is an
-        # int in Python.
+        # Global constants are inlined, real ones in the precision of the driver; bool first, as it
+        # is an int in Python.
         if isinstance(value, bool):
             return ast.Constant(value)
         if isinstance(value, float):

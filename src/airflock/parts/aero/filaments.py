@@ -54,8 +54,8 @@ def influences(table, row, dx, dy, dz, m, h, core2):
 
 def add_wash(wash, i, table, row, circulation, j, m):
     """Add to row i of `wash` what the circulations in row j induce: one row of the table stands for the block."""
-    # The influence of segment e on point k depends on k - e only, so one row of 2 m - 1 numbers stands for the m x m
-    # block.
+    # The influence of segment e on point k depends on k - e only, so one row of 2 m - 1 numbers
+    # stands for the m x m block.
     last = lanes(m) - m
     for first in range((m + 3) // 4):
         e = 4 * first
@@ -72,8 +72,8 @@ def add_wash(wash, i, table, row, circulation, j, m):
 
 def add_product(result, i, matrix, vector, j, m):
     """Add to row i of `result` the product of a symmetric matrix (lanes(m), m) with row j of `vector`."""
-    # Four source segments at a time: LLVM then vectorises over control points without a remainder (24 ns for a pair,
-    # else 92).
+    # Four source segments at a time: LLVM then vectorises over control points without a remainder
+    # (24 ns for a pair, else 92).
     for first in range((m + 3) // 4):
         e = 4 * first
         a = vector[j][e]

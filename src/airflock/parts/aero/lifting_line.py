@@ -157,8 +157,8 @@ def settle(n, work, circulation, wing):
     m = segments_of(wing)
     limit = wing.tolerance * circulation_sum(wing)
     change = FAR
-    # Three to eight sweeps settle a formation, each with m² multiplications for a pair; for five wings of 20 segments
-    # that is 60,000 instead of 330,000 by elimination.
+    # Three to eight sweeps settle a formation, each with m² multiplications for a pair; for five
+    # wings of 20 segments that is 60,000 instead of 330,000 by elimination.
     for _ in range(SWEEPS):
         change = 0.0
         for i in range(n):
@@ -166,8 +166,8 @@ def settle(n, work, circulation, wing):
             change = max(change, carry(i, m, work, circulation))
         if change <= limit:
             break
-    # Wings that nearly overlap do not converge. One dense factorisation then answers, so that no penalty value has to
-    # stand for a fitness.
+    # Wings that nearly overlap do not converge. One dense factorisation then answers, so that no
+    # penalty value has to stand for a fitness.
     if change > 1000.0 * limit:
         assemble(n, m, work)
         factorise(work.dense, work.pivots, n * m)

@@ -170,8 +170,8 @@ def move(vx, vy, vz, cx, cy, cz, wx, wy, wz, memory, dt, b, wing):
     speed = max(v + b.gravity * (thrust - drag - sine) * dt, 0.1 * v)
     climb = clamp(angle + b.gravity / v * (n * math.cos(bank) - math.cos(angle)) * dt, -1.5, 1.5)
     turn = b.gravity * n * math.sin(bank) / (v * math.cos(angle)) * dt
-    # The state is turned by angles, not pushed by forces, which would gain 0.18 m/s each second in a turn of 1 g at
-    # 14 m/s with steps of 0.05 s.
+    # The state is turned by angles, not pushed by forces, which would gain 0.18 m/s each second in
+    # a turn of 1 g at 14 m/s with steps of 0.05 s.
     across = speed * math.cos(climb)
     c = math.cos(turn)
     s = math.sin(turn)

@@ -16,8 +16,8 @@ def wander(tau, dt):
 
     A step keeps the share 1 - dt/tau of the gap and adds 2 dt; for dt = 0 this is tau.
     """
-    # Noise is drawn at every motion step, so the variance is larger than tau by dt / (2 tau); the continuous form
-    # biased the outer noise by 0.9 %.
+    # Noise is drawn at every motion step, so the variance is larger than tau by dt / (2 tau); the
+    # continuous form biased the outer noise by 0.9 %.
     return tau / (1.0 - 0.5 * dt / tau)
 
 

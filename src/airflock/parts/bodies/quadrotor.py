@@ -86,8 +86,8 @@ class Parameters(Record):
     weak: float = battery_end()
 
 
-# Torque lags as well as thrust: with a lag of thrust alone the tilt differed by 2.3° from that of rotorpy after a
-# sudden turn, now by 1.3°.
+# Torque lags as well as thrust: with a lag of thrust alone the tilt differed by 2.3° from that of
+# rotorpy after a sudden turn, now by 1.3°.
 class Memory(NamedTuple):
     """State of a quadrotor from step to step.
 

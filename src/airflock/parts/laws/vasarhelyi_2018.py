@@ -141,6 +141,7 @@ def decide(own, sums, walls, p):
     y = p.v_flock * own.hy + sums.y + walls.y
     z = p.v_flock * own.hz + sums.z + walls.z
     length = norm(x, y, z)
-    # Only the rescaled sum reproduces Table S2: with Eq. 11 as printed phi_vel is 2.9 instead of 3.8 m/s at 4 m/s.
+    # Only the rescaled sum reproduces Table S2: with Eq. 11 as printed phi_vel is 2.9 instead of
+    # 3.8 m/s at 4 m/s.
     k = p.v_flock / length if p.limit == "rescale" else min(1.0, p.v_max / length)
     return k * x, k * y, k * z

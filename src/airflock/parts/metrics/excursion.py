@@ -37,8 +37,8 @@ class Sample(NamedTuple):
 
 def agent(excursion):
     """Distance outside (m) of one agent, and its clearance (m)."""
-    # The clearance is a distance so that a search can see how near a flight came: contacts are 0 in every good
-    # flight.
+    # The clearance is a distance so that a search can see how near a flight came: contacts are 0 in
+    # every good flight.
     return Agent(max(excursion, 0.0), 1.0 if excursion > 0.0 else 0.0, -excursion)
 
 

@@ -47,9 +47,9 @@ def workspace(n, q, wing):
 
 def survey(n, x, y, z, q, work, shared):
     """Mark the agents in the order of the program's loop over pairs."""
-    # The authors' program skips pairs of a boid that is marked already. It matters where a quarter collides: 0.553 by
-    # this count, 0.547 by Eq. 18, more than the spread of 15 flights. The order of boids decides, hence a rule of the
-    # whole flock.
+    # The authors' program skips pairs of a boid that is marked already. It matters where a quarter
+    # collides: 0.553 by this count, 0.547 by Eq. 18, more than the spread of 15 flights. The order
+    # of boids decides, hence a rule of the whole flock.
     mark = work.mark
     for i in range(n):
         mark[0][i] = 0.0

@@ -97,7 +97,8 @@ def missed(distance, fast, slow, k):
 
 def missed_few(distance, fast, slow, k):
     """Probability that nothing arrives, for at most three packets on each link."""
-    # Up to three packets a decision are products; real powers were a large part of the former cost of a link.
+    # Up to three packets a decision are products; real powers were a large part of the former cost
+    # of a link.
     return thrice(1.0 - received(distance, 0.0, k), fast) * thrice(1.0 - received(distance, 1.0, k), slow)
 
 

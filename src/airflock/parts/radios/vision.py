@@ -96,8 +96,8 @@ def receive(dx, dy, dz, vx, vy, clear, u0, packet, k):
 
 def gains(since, smoothing):
     """Shares of a surprise that correct a position (1) and a velocity (1/s), this long (s) after the last picture."""
-    # A fading-memory filter of first order: one number for a pair. A Kalman filter would keep four more for gains
-    # that become constant within a second.
+    # A fading-memory filter of first order: one number for a pair. A Kalman filter would keep four
+    # more for gains that become constant within a second.
     kept = math.exp(-max(since, 0.0) / smoothing)
     return 1.0 - kept * kept, (1.0 - kept) * (1.0 - kept) / max(since, 1e-6)
 

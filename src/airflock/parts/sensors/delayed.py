@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from airflock.core import SensorParameters, quantity
 
-# The states are kept in the Memory of the sensor, four measurements back, with cubic interpolation, since a ring of
-# states for one sensor would be one more mechanism.
+# The states are kept in the Memory of the sensor, four measurements back, with cubic interpolation,
+# since a ring of states for one sensor would be one more mechanism.
 LONGEST = 4.0  # periods that the Memory reaches back
 
 

@@ -92,8 +92,8 @@ def measure(
     """
     sound = memory.begun > 0.5  # at the first measurement, the drift is drawn from its stationary distribution
     keep = math.exp(-period / s.drift_time) if sound else 0.0
-    # The exact factor for any period, and a first value from the stationary distribution: shares of time then have
-    # closed forms that tests compare with.
+    # The exact factor for any period, and a first value from the stationary distribution: shares of
+    # time then have closed forms that tests compare with.
     push = math.sqrt(1.0 - keep * keep)
     dx = keep * memory.drift_x + s.sd * push * g0
     dy = keep * memory.drift_y + s.sd * push * g1
@@ -104,7 +104,8 @@ def measure(
     white = s.white if sound else 0.0
 
     left = max(memory.jump_left - period, 0.0)
-    # Half a period as the limit, so that rounding of the time left neither adds nor drops a measurement.
+    # Half a period as the limit, so that rounding of the time left neither adds nor drops a
+    # measurement.
     if left < 0.5 * period:
         jumps = u0 < 1.0 - math.exp(-s.jump_rate * period) and sound
         left = s.jump_time if jumps else 0.0

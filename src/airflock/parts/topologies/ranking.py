@@ -10,8 +10,9 @@ def kth_least(n, values, heap, k):
 
     heap : scratch of n numbers; the greatest of the k least lies in front
     """
-    # A heap of the k least in one pass: k is small and n may be thousands, and sorting would need memory in a kernel.
-    # The limit is compared with the very numbers among which it was found, so that rounding cannot lose the k-th.
+    # A heap of the k least in one pass: k is small and n may be thousands, and sorting would need
+    # memory in a kernel. The limit is compared with the very numbers among which it was found, so
+    # that rounding cannot lose the k-th.
     size = 0
     worst = HEARD_LIMIT
     for j in range(n):

@@ -56,8 +56,9 @@ def meet(n, dx, dy, r2, met):
 
     dx, dy : offsets, m; r2 : their squares, m²
     """
-    # Neighbours are the corners of the convex hull of the inverted offsets d / |d|², the polar dual of the cell: open
-    # cells need no box, and nothing is sorted (gift wrapping, n steps for each neighbour).
+    # Neighbours are the corners of the convex hull of the inverted offsets d / |d|², the polar dual
+    # of the cell: open cells need no box, and nothing is sorted (gift wrapping, n steps for each
+    # neighbour).
     first = n
     for j in range(n):
         met[j] = 1.0 if r2[j] <= SAME else 0.0
