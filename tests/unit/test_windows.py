@@ -147,4 +147,4 @@ def test_only_the_module_of_locks_asks_for_what_posix_alone_has():
         for line in path.read_text(encoding="utf-8").splitlines()
         if line.strip() in ("import fcntl", "import termios", "import resource", "import pwd")
     }
-    assert asking == {"locks.py", "node_program.py", "isolated.py"}
+    assert asking == {"locks.py", "node_program.py", "reader_process.py"}
