@@ -18,6 +18,7 @@ from .contract import (
     State as State,
     argument_names as argument_names,
     call_rule as call_rule,
+    find_members as find_members,
     initial_values as initial_values,
     namespace_names as namespace_names,
 )

@@ -9,11 +9,14 @@ import inspect
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import make_dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, NamedTuple, TypeVar
 
 from airflock.core.parameters import Parameters, number_names
 from airflock.support import RuleError, shortened, suggest
 
+T = TypeVar("T")
 COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": "1"}  # and their units
 REDUCTIONS = ("sum", "min", "max")
 OVER_TIME = ("mean", *REDUCTIONS)  # how the samples of a flight combine
@@ -42,6 +45,28 @@ def namespace_names(namespace: Any, name: str = "") -> tuple[dict[str, Any], str
     found = dict(namespace) if isinstance(namespace, Mapping) else dict(vars(namespace))
     found = {key: value.__func__ if isinstance(value, staticmethod) else value for key, value in found.items()}
     return found, name or str(found.get("NAME") or found.get("__name__", "own")).rpartition(".")[2].strip("_")
+
+
+def find_members(package: str, rules: Collection[str], gather: Callable[[Any], T]) -> dict[str, T]:
+    """Gather the parts of one kind from the modules of a folder, by name in alphabetical order.
+
+    A file that is laid into the folder is a member; no list names it.
+
+    package : dotted name of the folder; rules: a module that defines one of them is a part, others are helpers
+    gather  : makes a part from a module, such as `airflock.body`
+
+    Raises RuleError if two modules have one name.
+    """
+    members: dict[str, T] = {}
+    folder = import_module(package)
+    for entry in iter_modules(folder.__path__, f"{package}."):
+        module = import_module(entry.name)
+        if any(rule in vars(module) for rule in rules):
+            name = namespace_names(module)[1]
+            if name in members:
+                raise RuleError(f"{entry.name}: another file of {package} is named {name!r}, too")
+            members[name] = gather(module)
+    return dict(sorted(members.items()))
 
 
 def merge_parameters(common: type, record: Any, owner: str) -> type:

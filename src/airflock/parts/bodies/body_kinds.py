@@ -1,19 +1,11 @@
 """The bodies that a scenario can name: the key body.kind."""
 
-from airflock.core import Body, body
-from airflock.parts.bodies import direct, fixed_wing, jostled, motion, quadrotor, steered, turning
+from airflock.core import Body, body, find_members
 
-BODIES: dict[str, Body] = {
-    "multirotor": body(motion, "multirotor"),
-    "quadrotor": body(quadrotor, "quadrotor"),
-    "fixed_wing": body(fixed_wing, "fixed_wing"),
-    "direct": body(direct, "direct"),
-    "jostled": body(jostled, "jostled"),
-    "steered": body(steered, "steered"),
-    "heading": body(turning, "heading"),
-}
+BODIES: dict[str, Body] = find_members("airflock.parts.bodies", ["ACCEPTS"], body)
+DEFAULT_BODIES = {"velocity": "multirotor", "acceleration": "steered", "heading": "heading"}
 
 
 def default_body(command: str) -> str:
-    """Name of the first body that accepts a COMMAND: what a scenario without body.kind flies."""
-    return next(name for name, found in BODIES.items() if found.accepts == command)
+    """Return the name of the body that a scenario without body.kind flies, for a law that gives this command."""
+    return DEFAULT_BODIES[command]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from airflock.core import Parameters as Record, quantity, shorten
 
+NAME = "multirotor"
 ACCEPTS = "velocity"  # the COMMAND that this body takes
 INTEGRATION = "old"  # positions move by the velocity before the step (authors' program)
 S5 = "Vásárhelyi et al. 2018, Table S5"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from airflock.core import Parameters as Record, arc_cosine, choice, norm, quantity
 
+NAME = "heading"
 ACCEPTS = "heading"
 INTEGRATION = "new"  # unless the key body.integration says otherwise
 

@@ -5,44 +5,11 @@ from dataclasses import is_dataclass, make_dataclass
 from types import ModuleType
 from typing import Any
 
-from airflock.core import Metric, MetricSet, Parameters as Record, metric, namespace_names
-from airflock.parts.metrics import (
-    avoidance,
-    collisions,
-    contacts,
-    correlation,
-    environment,
-    excursion,
-    fitness_dimock,
-    fitness_kidger,
-    fitness_vasarhelyi,
-    flocked,
-    groups,
-    marks,
-    milling,
-    nearest,
-    parameters,
-    polarisation,
-    power,
-    quality,
-    rotation,
-    shape,
-    speed,
-    steadiness,
-    swarms,
-)
+from airflock.core import Metric, MetricSet, Parameters as Record, find_members, metric, namespace_names
+from airflock.parts.metrics import fitness_dimock, fitness_kidger, fitness_vasarhelyi, parameters, quality
 from airflock.support import RuleError
 
-METRICS: dict[str, Metric] = {
-    found.name: found
-    for found in map(
-        metric,
-        (
-            avoidance, collisions, contacts, correlation, environment, excursion, flocked, groups, marks, milling,
-            nearest, polarisation, power, quality, rotation, shape, speed, steadiness, swarms,
-        ),
-    )
-}  # fmt: skip
+METRICS: dict[str, Metric] = find_members("airflock.parts.metrics", ["sample"], metric)
 
 
 def _named(*names: str) -> tuple[Metric, ...]:

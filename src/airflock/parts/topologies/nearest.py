@@ -5,6 +5,8 @@ All who are as near as the k-th are met as well, so that no number of an agent d
 
 from airflock.parts.topologies.ranking import kth_least
 
+NEAR = True  # no agent farther than the k-th changes the choice
+
 
 def meet(n, r2, met, heap, t):
     """Fill `met`: 1.0 for each of the first n who is no farther than the k-th nearest.

@@ -6,6 +6,8 @@ and the way to the other's centre passes through it; a way that only touches is 
 
 from airflock.parts.topologies.ranking import HEARD_LIMIT
 
+NEAR = True  # whoever is farther away hides nobody
+
 
 def meet(n, dx, dy, dz, r2, hidden, met, t):
     """Fill `met`: 1.0 for each of the first n who can be seen.

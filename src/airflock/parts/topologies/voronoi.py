@@ -11,6 +11,8 @@ side of the hull is no corner. Those at the very same place are met together. Ea
 
 from airflock.parts.topologies.ranking import HEARD_LIMIT
 
+FLAT = True  # cells of a plane
+
 STRAIGHT = 1e-5  # rad; resolution of single precision
 SAME = 1e-9  # m²; so near that no cell divides the two
 
