@@ -10,7 +10,7 @@ import ast
 import copy
 import hashlib
 
-from airflock.core.rule_syntax import walk_tree
+from airflock.core.law import walk_tree
 
 TURNS = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move", "overrule")
 STAGES = (

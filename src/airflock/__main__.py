@@ -1,6 +1,6 @@
 """`python -m airflock` is the command `airflock`."""
 
-from airflock.cli.main import main
+from airflock.cli import main
 
 if __name__ == "__main__":
     main()

@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 import airflock
-from airflock.core.rule_syntax import walk_tree
+from airflock.core.law import walk_tree
 
 LEFT_OUT = ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.alias
 

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from airflock.core.rule_syntax import fields_read
+from airflock.core.law import fields_read
 from airflock.core.vocabulary import Mean
 from airflock.parts.metrics.metric_sets import METRICS
 

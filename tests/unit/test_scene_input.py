@@ -236,7 +236,7 @@ def test_a_file_of_another_kind_is_not_flown_as_text(tmp_path, monkeypatch, shap
 
 @pytest.mark.parametrize("text", ["2.0", "U.S.A", "GO ... NOW", "heart.pgn ", "A" * 300 + "."])
 def test_a_text_with_a_point_in_it_is_still_a_text(monkeypatch, text):
-    from airflock.displays import display_shapes as shapes
+    from airflock.displays import shows as shapes
 
     monkeypatch.setattr(shapes, "_pixels_of_text", lambda _: np.ones((50, 50), bool))
     assert shape_points(text, 10).shape == (10, 3)

@@ -33,7 +33,7 @@ from airflock.studio.flight_pane import (
     slider_span,
 )
 from airflock.studio.page_measures import difference_table_html, scenario_differences
-from airflock.studio.page_panels import OpeningPanel
+from airflock.studio.page_panels import KEY_EXAMPLE, OpeningPanel, PerceptLines, _named_vectors, parse_setting
 from airflock.studio.page_scene import (
     BOTH_PANES,
     AgentColouring,
@@ -44,12 +44,10 @@ from airflock.studio.page_scene import (
     joined_colours,
 )
 from airflock.studio.player import FlightRequest, KeptSnapshots, PageClock, Player
-from airflock.studio.selection_panel import PerceptLines, _named_vectors
-from airflock.studio.tuning_panel import KEY_EXAMPLE, parse_setting
 from airflock.support.errors import ParameterError, RuleError, ScenarioError, StudioError
 from airflock.view import agent_colours
 from airflock.view.agent_colours import AgentColours, cluster_labels
-from airflock.view.scene_solids import dart_mesh, scenario_geometry, velocity_quaternions
+from airflock.view.replay_page import dart_mesh, scenario_geometry, velocity_quaternions
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}

@@ -29,6 +29,12 @@ from .fault import (
     Fault as Fault,
     fault as fault,
 )
+from .law import (
+    fields_read as fields_read,
+    resolve_global as resolve_global,
+    tree_of as tree_of,
+    walk_tree as walk_tree,
+)
 from .maths import (
     FAR as FAR,
     TINY as TINY,
@@ -93,12 +99,6 @@ from .radio import (
     arrival_probability as arrival_probability,
     forward as forward,
     loss_probability as loss_probability,
-)
-from .rule_syntax import (
-    fields_read as fields_read,
-    resolve_global as resolve_global,
-    tree_of as tree_of,
-    walk_tree as walk_tree,
 )
 from .sensor import (
     COMPONENTS as COMPONENTS,

@@ -3,12 +3,218 @@
 import ast
 import inspect
 import math
+import textwrap
+import types
 from collections.abc import Callable, Iterator
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
-from airflock.core.rule_syntax import BITWISE, integer_names, is_integer, tree_of, walk_tree
 from airflock.support import RuleError
+
+# ---- Rules as text: their syntax trees, the integers in them, and the fields of a record that they read.
+
+LEAVES = ast.Name, ast.Constant, ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop
+WORDS = {"ctx", "op", "ops", "id", "attr", "name", "asname", "module", "level", "names", "kind", "type_comment"}
+
+
+def walk_tree(tree: ast.AST) -> list[ast.AST]:
+    """All nodes of a tree in the order of `ast.walk`, without contexts (`Load`), operators and what is imported."""
+    found = [tree]
+    # The list grows while the loop reads it: that is the breadth-first order of `ast.walk`, without
+    # its queue.
+    for node in found:  # which grows
+        for name in _FIELDS[type(node)]:
+            below = getattr(node, name, None)
+            if isinstance(below, list):
+                found += [item for item in below if isinstance(item, ast.AST)]
+            elif isinstance(below, ast.AST):
+                found.append(below)
+    return found
+
+
+class _Fields(dict[type[ast.AST], tuple[str, ...]]):
+    """Fields of a kind of node in which others may stand."""
+
+    def __missing__(self, kind: type[ast.AST]) -> tuple[str, ...]:
+        below = () if issubclass(kind, LEAVES) else tuple(name for name in kind._fields if name not in WORDS)
+        return self.setdefault(kind, below)
+
+
+_FIELDS = _Fields()
+
+
+BITWISE = (ast.LShift, ast.RShift, ast.BitAnd, ast.BitOr, ast.BitXor)
+KEEPING = {"min", "max", "abs"}  # integers of integers
+MAKING = {"int", "len"}
+
+
+@lru_cache(maxsize=4096)
+def _source(rule: Callable[..., Any]) -> str:
+    """Text of a rule; finding its end in its file takes longer than all else that is done with it."""
+    return textwrap.dedent(inspect.getsource(rule))
+
+
+def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
+    """Syntax tree of a rule from its own source file or notebook cell."""
+    try:
+        text = _source(rule)
+    except (OSError, TypeError) as error:
+        raise RuleError(f"the source of rule {rule.__name__} is not available: {error}") from error
+    node = ast.parse(text).body[0]
+    if not isinstance(node, ast.FunctionDef):
+        raise RuleError(f"rule {getattr(rule, '__name__', rule)} is no plain function")
+    return node
+
+
+@cache
+def integer_names(rule: Callable[..., Any]) -> frozenset[str]:
+    """Names in a rule that hold integers: its variables, and integers of its module."""
+    node = tree_of(rule)
+    found = {name for name, value in rule.__globals__.items() if type(value) is int}
+    found -= set(rule.__code__.co_varnames)
+    # A fixed point: a name that turns out to hold an integer may make others integers, so passes
+    # repeat until nothing is new. Rules are short; two or three passes are enough.
+    while True:
+        known = len(found)
+        for item in walk_tree(node):
+            for used in _integer_places(item, rule):
+                found |= set(_terms(used))
+            if isinstance(item, ast.For) and _called(item.iter) == "range":
+                found |= set(_terms(item.target))
+            if isinstance(item, ast.Assign):
+                for target, value in _pairs(item):
+                    if is_integer(value, found, rule):
+                        found |= set(_terms(target))
+        if len(found) == known:
+            return frozenset(found)
+
+
+def is_integer(node: ast.expr, integers: set[str] | frozenset[str], rule: Callable[..., Any]) -> bool:
+    """Return True if an expression is an integer, given the names that hold integers."""
+    if isinstance(node, ast.Constant):
+        return type(node.value) is int
+    if isinstance(node, ast.Name):
+        return node.id in integers
+    if isinstance(node, ast.UnaryOp):
+        return is_integer(node.operand, integers, rule)
+    if isinstance(node, ast.IfExp):
+        return is_integer(node.body, integers, rule) and is_integer(node.orelse, integers, rule)
+    if isinstance(node, ast.BinOp):
+        if isinstance(node.op, BITWISE):
+            return True
+        sides = is_integer(node.left, integers, rule) and is_integer(node.right, integers, rule)
+        return sides and not isinstance(node.op, (ast.Div, ast.Pow))
+    if isinstance(node, ast.Call):
+        name = _called(node)
+        if name in KEEPING:
+            return all(is_integer(argument, integers, rule) for argument in node.args)
+        return name in MAKING or _gives_integer(resolve_function(name, rule))
+    return False
+
+
+def _integer_places(item: ast.AST, rule: Callable[..., Any]) -> Iterator[ast.expr]:
+    """Expressions that can only be integers, because of where they stand."""
+    if isinstance(item, ast.Subscript):
+        yield from item.slice.elts if isinstance(item.slice, ast.Tuple) else [item.slice]
+    elif isinstance(item, ast.BinOp) and isinstance(item.op, BITWISE):
+        yield from (item.left, item.right)
+    elif isinstance(item, ast.BinOp) and isinstance(item.op, ast.FloorDiv) and isinstance(item.right, ast.Constant):
+        yield from [item.left] if type(item.right.value) is int else []
+    elif isinstance(item, ast.Call):
+        called = resolve_function(_called(item), rule)
+        if _called(item) == "range":
+            yield from item.args
+        elif called is not None:
+            names = called.__code__.co_varnames[: called.__code__.co_argcount]
+            integers = integer_names(called)
+            yield from (given for name, given in zip(names, item.args, strict=False) if name in integers)
+
+
+def _terms(node: ast.AST) -> Iterator[str]:
+    """Names of which a sum, a product or a tuple is made; not those inside calls, subscripts and attributes."""
+    if isinstance(node, ast.Name):
+        yield node.id
+    elif isinstance(node, ast.BinOp):
+        yield from _terms(node.left)
+        yield from _terms(node.right)
+    elif isinstance(node, ast.UnaryOp):
+        yield from _terms(node.operand)
+    elif isinstance(node, ast.Tuple):
+        for part in node.elts:
+            yield from _terms(part)
+
+
+def _pairs(item: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
+    """Yield pairs of target and value of an assignment, tuples taken apart."""
+    for target in item.targets:
+        if isinstance(target, ast.Tuple) and isinstance(item.value, ast.Tuple):
+            yield from zip(target.elts, item.value.elts, strict=False)
+        elif not isinstance(target, ast.Tuple):
+            yield target, item.value
+
+
+def _called(node: ast.AST) -> str:
+    """Name of what a call calls."""
+    return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+
+
+def resolve_global(name: str, rule: Callable[..., Any]) -> Any:
+    """Return the value of a free name of a rule; None if it has none."""
+    closure = dict(zip(rule.__code__.co_freevars, rule.__closure__ or (), strict=True))
+    return rule.__globals__.get(name, closure[name].cell_contents if name in closure else None)
+
+
+def resolve_function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] | None:
+    """The plain function that a rule calls by this name; None for itself."""
+    found = resolve_global(name, rule)
+    return found if isinstance(found, types.FunctionType) and found is not rule else None
+
+
+@cache
+def _gives_integer(rule: Callable[..., Any] | None) -> bool:
+    """Return True if every value that a function returns is an integer."""
+    if rule is None:
+        return False
+    node = tree_of(rule)
+    returned = [item.value for item in walk_tree(node) if isinstance(item, ast.Return) and item.value is not None]
+    return bool(returned) and all(is_integer(value, integer_names(rule), rule) for value in returned)
+
+
+@cache
+def fields_read(rule: Callable[..., Any], record: str) -> frozenset[str] | None:
+    """Fields that a rule may read of the record that it calls by this name; None where its text leaves it open."""
+    nodes = walk_tree(tree_of(rule))
+    found: set[str] = set()
+    followed = 0
+    for item in nodes:
+        if isinstance(item, ast.Attribute) and _is(item.value, record):
+            found.add(item.attr)
+            followed += 1
+        elif isinstance(item, ast.Call):
+            for place, given in enumerate(item.args):
+                if _is(given, record):
+                    below = _read_below(item, place, rule)
+                    if below is None:
+                        return None
+                    found |= below
+                    followed += 1
+    # Every mention of the record must be an attribute or an argument that was followed; any other
+    # use may read all fields.
+    return frozenset(found) if followed == sum(_is(item, record) for item in nodes) else None
+
+
+def _is(node: ast.AST, name: str) -> bool:
+    return isinstance(node, ast.Name) and node.id == name
+
+
+def _read_below(call: ast.Call, place: int, rule: Callable[..., Any]) -> frozenset[str] | None:
+    """Return the fields that a function reads of the record that a rule passes as this argument."""
+    called = resolve_function(call.func.id, rule) if isinstance(call.func, ast.Name) else None
+    if called is None or any(isinstance(given, ast.Starred) for given in call.args):
+        return None
+    names = list(inspect.signature(called).parameters)
+    return fields_read(called, names[place]) if place < len(names) else None
+
 
 ALLOWED_CALLS = {"min", "max", "abs", "float", "int", "range", "len"}
 RENAMED_BUILTINS = {"min": "least", "max": "most"}  # what a driver calls instead: no name for a variable beside it
@@ -20,6 +226,9 @@ HEAPED = ast.List, ast.Dict, ast.Set
 FORBIDDEN = (
     ast.Try, ast.With, ast.Raise, ast.Lambda, ast.ListComp, ast.DictComp, ast.SetComp, ast.GeneratorExp, ast.NamedExpr,
 )  # fmt: skip
+
+
+# ---- Errors in a rule
 
 
 def rule_errors(rule: Callable[..., Any]) -> list[str]:

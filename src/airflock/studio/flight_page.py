@@ -8,12 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.studio.browser_view import BrowserView
-from airflock.studio.measurement_panel import ComparisonPanel, MeasurementPanel
-from airflock.studio.page_panels import ActionPanel, OpeningPanel, PagePanel, PlaybackPanel, status_html
+from airflock.studio.page_panels import (
+    ActionPanel,
+    ComparisonPanel,
+    MeasurementPanel,
+    OpeningPanel,
+    PagePanel,
+    PlaybackPanel,
+    SelectionPanel,
+    TuningPanel,
+    status_html,
+)
 from airflock.studio.page_scene import PageScene
 from airflock.studio.player import Player
-from airflock.studio.selection_panel import SelectionPanel
-from airflock.studio.tuning_panel import TuningPanel
 
 FRAMES_PER_SECOND = 30  # per second of real time
 CHARTS_PER_SECOND = 5  # per second

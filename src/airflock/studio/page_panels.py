@@ -1,16 +1,38 @@
-"""Panels of a flight page: base class, playback, actions on the world, and opening of scenarios."""
+"""Panels of a flight page: playback, actions, opening of scenarios, measurements, tuning and the selected agent."""
 
 import html
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path, PureWindowsPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.scenarios import presets
-from airflock.studio.flight_pane import FlightPane, free_path
+from airflock.core import AgentView as Seen, Model, argument_names
+from airflock.engine import DriverState as Memory
+from airflock.parts.faults import KINDS as KINDS_OF_FAULT
+from airflock.scenarios import (
+    FIXED_KEYS,
+    TOP_LEVEL_KEYS,
+    FlightWorld,
+    GoalCourse,
+    Scenario,
+    expand_short_keys,
+    is_fault_key,
+    presets,
+)
+from airflock.search import shipped_study_axes
+from airflock.studio import page_measures as measures
+from airflock.studio.flight_pane import (
+    FlightPane,
+    ParameterControl,
+    fault_controls,
+    free_path,
+    scenario_controls,
+    scenario_value,
+)
+from airflock.studio.page_measures import difference_table_html, score_table_html
 from airflock.studio.page_scene import (
     BOTH_PANES,
     FOLLOW_CHOICES,
@@ -20,16 +42,21 @@ from airflock.studio.page_scene import (
     PageScene,
     available_colourings,
 )
+from airflock.studio.player import Player
 from airflock.support import (
     MAX_BYTES,
     AirflockError,
     FormatError,
+    ScenarioError,
     StudioError,
     TextError,
+    as_error,
     atomic,
     parse_toml,
+    parse_toml_value,
     printable,
 )
+from airflock.view import agent_colours, arrow_lines, rays_and_command, term_name_and_unit, vector_values
 
 if TYPE_CHECKING:
     from airflock.studio.flight_page import FlightPage
@@ -371,3 +398,661 @@ def read_scenario_text(name: str, content: bytes) -> str:
     if not name.lower().endswith(".toml"):
         raise StudioError(f"{name}: is not a scenario file; its name must end with .toml")
     return text
+
+
+# ---- Measurement: charts of order parameters, speeds and distances, histograms, scores
+
+BAND_NAMES = ("paper +", "paper −")
+
+
+class MeasurementPanel(PagePanel):
+    """Charts of one pane, or of two in one picture."""
+
+    def __init__(self, page: "FlightPage", tab: Any):
+        super().__init__(page)
+        self.tab = tab
+        self._charts: list[Any] = []
+        self._score_names: list[str] = []
+        self.scores: list[dict[str, Any]] = []
+        self.name = ""  # of the order parameter that is drawn
+
+    def rebuild(self) -> None:
+        """Start again, for as many panes as there are."""
+        player = self.player
+        scores = player.sides[0].flight.scores()
+        self._score_names = [name for name, value in scores.items() if isinstance(value, (int, float))]
+        if self.name not in self._score_names:
+            self.name = measures.default_score(dict.fromkeys(self._score_names), player.sides[0].scenario.published)
+        self.sides = []
+        for side, flock in zip(player.sides, self.scene.flocks, strict=True):
+            far = float(side.scenario.resolved_metrics().r_cluster or 1.0)
+            apart = flock.pairs.apart()
+            far = min(far, 4.0 * float(np.median(apart))) if len(apart) else far
+            self.sides.append(measures.PaneChartData(self.scene.top, max(far, 1e-6)))
+            self.sides[-1].name = self.name
+        self._make_charts()
+
+    def _make_charts(self) -> None:
+        """Make menu, charts and table."""
+        panel, player = self.widgets, self.player
+        for chart in self._charts:
+            chart.remove()
+        two, names = len(player.sides) > 1, self._score_names
+        banded = self.name in player.sides[0].scenario.published
+        tags = [f" {name}" for name in PANE_NAMES] if two else [""]
+        with self.tab:
+            self.score_menu = panel.add_menu(
+                "order parameter", names, self.name, lambda n: player.ask(lambda: self._choose(n))
+            )
+            self.score_chart = panel.add_chart(
+                "since the last change", [*(f"value{t}" for t in tags), *(BAND_NAMES if banded else ())], band=banded
+            )
+            words = ("mean", "slowest", "fastest")
+            self.speed_chart = panel.add_chart(
+                "speed (m/s)", [f"{w}{t}" for t in tags for w in (words[:1] if two else words)]
+            )
+            self.nearest = panel.add_chart("smallest distance (m)", [f"nearest pair{t}" for t in tags])
+            self.speed_histogram_chart = panel.add_chart(
+                "speeds since the last change", [f"share{t}" for t in tags], across="m/s"
+            )
+            self.distance_histogram_chart = panel.add_chart(
+                "distance to the nearest", [f"share{t}" for t in tags], across="m"
+            )
+            self.table = panel.text()
+        self._charts = [
+            self.score_menu,
+            self.score_chart,
+            self.speed_chart,
+            self.nearest,
+            self.speed_histogram_chart,
+            self.distance_histogram_chart,
+            self.table,
+        ]
+
+    def _choose(self, name: str) -> None:
+        """Draw another order parameter from now on; with a band only where the paper reports its value."""
+        self.name = name
+        for side in self.sides:
+            side.name = name
+            side.score_course.clear()
+        self._make_charts()
+
+    def clear(self) -> None:
+        """Clear the charts: the flight is at another time."""
+        for side in self.sides:
+            side.clear()
+
+    def refresh(self) -> None:
+        """Add the present moment and draw everything."""
+        flocks, two = self.scene.flocks, len(self.sides) > 1
+        for side in self.sides:
+            if side.speed_histogram.edges[-1] < self.scene.top:
+                side.speed_histogram = measures.Histogram(self.scene.top)
+        flights = [flock.side.flight for flock in flocks]
+        self.scores = [
+            side.note(flock.side.flight, flock.velocity, flock.pairs)
+            for side, flock in zip(self.sides, flocks, strict=True)
+        ]
+        instants = [np.array(side.instants) for side in self.sides]
+        count = min(map(len, instants))
+        parts = [part[len(part) - count :] for part in instants]
+        columns = (1,) if two else (1, 2, 3)
+        time = np.ascontiguousarray(parts[0][:, 0])
+        self.speed_chart.data = time, *(np.ascontiguousarray(part[:, c]) for part in parts for c in columns)
+        self.nearest.data = time, *(np.ascontiguousarray(part[:, 4]) for part in parts)
+        self._draw_course()
+        for chart, shares in (
+            (self.speed_histogram_chart, [side.speed_histogram.steps for side in self.sides]),
+            (self.distance_histogram_chart, [side.distance_histogram.steps for side in self.sides]),
+        ):
+            chart.data = _joined_outlines(shares)
+        self.table.content = score_table_html(flights, self.scores)
+
+    def _draw_course(self) -> None:
+        courses = [np.array(side.score_course).reshape(-1, 2) for side in self.sides]
+        longest = max(courses, key=len)
+        if not len(longest):
+            return
+        time = longest[:, 0].copy()
+        values = [
+            np.interp(time, course[:, 0], course[:, 1], left=math.nan) if len(course) else np.full(len(time), math.nan)
+            for course in courses
+        ]
+        published = self.player.sides[0].scenario.published
+        edges = []
+        if self.name in published:
+            mean, spread = published[self.name]
+            edges = [np.full(len(time), mean + sign * (spread or 0.0)) for sign in (1.0, -1.0)]
+        self.score_chart.data = time, *values, *edges
+
+
+def _joined_outlines(outlines: list[Any]) -> tuple[Any, ...]:
+    """Return outlines of histograms over one axis: values and the share of each at them."""
+    if len(outlines) == 1:
+        return tuple(outlines[0])
+    values = np.union1d(outlines[0][0], outlines[1][0])
+    both = np.repeat(values, 2)[1:-1]
+    middle = 0.5 * (both[::2] + both[1::2])
+    found = []
+    for edges, shares in outlines:
+        place = np.searchsorted(edges[::2], middle, side="right") - 1
+        inside = middle <= edges[-1]
+        found.append(np.repeat(np.where(inside, shares[::2][np.clip(place, 0, len(shares) // 2 - 1)], 0.0), 2))
+    return both, *found
+
+
+# ---- Measurement: comparison of two flights
+
+NO_COMPARISON_TEXT = (
+    "“Fork here” starts a second flight beside this one, from now on and with the same noise. The controls then act "
+    "on B: they differ only in what you change."
+)
+
+
+class ComparisonPanel(PagePanel):
+    """Controls to fork, to choose the active pane, and to read the differences."""
+
+    def __init__(self, page: "FlightPage", tab: Any):
+        super().__init__(page)
+        self.tab = tab
+        self.widgets.row({"Fork here": self.ask(self._fork), "End comparison": self.ask(self._end_comparison)})
+        self.text = self.widgets.text()
+        self._pane_menu: Any = None
+
+    def _fork(self) -> None:
+        collisions, hand = self.scene.collisions, self.player.hand
+        self.player.fork()
+        collisions.join(hand)
+        collisions.fork()
+        self.page.rebuild()
+
+    def _end_comparison(self) -> None:
+        hand = self.player.hand
+        self.player.join()
+        self.scene.collisions.join(hand)
+        self.page.rebuild()
+
+    def _ask_for_pane(self, name: str) -> None:
+        self.player.ask(lambda: self._taken(PANE_NAMES.index(name)))
+
+    def _taken(self, index: int) -> None:
+        self.player.hand = min(index, len(self.player.sides) - 1)
+        self.page.tuning.rebuild()
+
+    def rebuild(self) -> None:
+        """Show a menu of the active pane, if there are two."""
+        if self._pane_menu is not None:
+            self._pane_menu.remove()
+            self._pane_menu = None
+        if len(self.player.sides) > 1:
+            with self.tab:
+                self._pane_menu = self.widgets.add_menu(
+                    "controls act on", tuple(PANE_NAMES), PANE_NAMES[self.player.hand], self._ask_for_pane
+                )
+
+    def refresh(self) -> None:
+        """Show one table of the differences: parameters and order parameters."""
+        sides = self.player.sides
+        if len(sides) < 2:
+            self.text.content = small_print_html(NO_COMPARISON_TEXT)
+            return
+        first, second = (side.origin for side in sides)
+        other = second.beside(first) if second is not first else "forked from A"
+        names = [f"<b>A</b> {html.escape(first.where)}", f"<b>B</b> {html.escape(other)}"]
+        same = difference_table_html(sides[0].scenario, sides[1].scenario)
+        scores = score_table_html([side.flight for side in sides], self.page.measurement.scores)
+        self.text.content = small_print_html("<br>".join(names)) + same + scores
+
+
+# ---- Tuning: sliders and menus of every parameter of the active pane, undo, and files to save
+
+KEY_EXAMPLE = "radio.delay = 400 ms, or goals.points = [[0, 50, 0]]"
+RESTART_HINTS = {"agents": "“agents” under Play starts another flight", "dt": "write it into the scenario file"}
+
+
+class TuningPanel(PagePanel):
+    """Sliders of one pane."""
+
+    def __init__(self, page: "FlightPage", tab: Any):
+        super().__init__(page)
+        self.tab = tab
+        self._handles: dict[str, tuple[Any, ParameterControl]] = {}
+        self._folders: list[Any] = []
+        self._controls_for: Any = None
+        self._fault_folders: list[Any] = []
+        self._fault_names: Any = None
+        panel, player = self.widgets, self.player
+        panel.row(
+            {
+                "Undo": self.ask(lambda: self.show_on_controls(player.side.undo())),
+                "Back to preset": self.ask(lambda: self.show_on_controls(player.side.undo_all())),
+            }
+        )
+        panel.row(
+            {
+                "Save scenario (.toml)": self.ask(self._save_toml),
+                "Save flight (.nc)": self.ask(self._save_recording),
+                "Save replay (.html)": self.ask(self._save_replay),
+            }
+        )
+        self.command = panel.text()
+        self.setting_field = panel.field("any key", f"for instance {KEY_EXAMPLE}")
+        panel.row({"Set": self.ask(self._set)})
+
+    def rebuild(self) -> None:
+        """Make the controls of the active pane; again only for another law or pane."""
+        preset, two = self.player.preset, len(self.player.sides) > 1
+        made_for = preset.model, preset.records.keys(), self.player.side.origin.where, self.player.hand if two else None
+        if made_for != self._controls_for:
+            for folder in [*self._folders, *self._fault_folders]:
+                folder.remove()
+            self._fault_folders, self._fault_names, self._handles, self._controls_for = [], None, {}, made_for
+            self._folders = self._made(scenario_controls(preset, shipped_study_axes(preset)))
+        self._rebuild_faults()
+        self.show_values()
+
+    def _rebuild_faults(self) -> None:
+        """Make the controls of faults again when other faults are in force: some may be begun by hand."""
+        entries = self.player.scenario.faults
+        faults = [entry.fault.name for entry in entries]
+        if faults != self._fault_names:
+            for folder in self._fault_folders:
+                folder.remove()
+            self._handles = {key: made for key, made in self._handles.items() if not is_fault_key(key)}
+            self._fault_folders, self._fault_names = self._made(fault_controls(entries)), faults
+
+    def _made(self, controls: Mapping[str, list[ParameterControl]]) -> list[Any]:
+        """Make folders of controls, by section."""
+        folders = []
+        with self.tab:
+            for section, own in controls.items():
+                name = f"{PANE_NAMES[self.player.hand]}: {section}" if len(self.player.sides) > 1 else section
+                folder = self.widgets.folder(name, section.startswith("model"))
+                folders.append(folder)
+                with folder:
+                    for control in own:
+                        self._handles[control.key] = self.widgets.add_control(control, self._ask_to_change), control
+        return folders
+
+    def show_values(self) -> None:
+        """Show the values in force."""
+        values = {key: scenario_value(self.player.scenario, key) for key in self._handles}
+        self.show_on_controls({key: value for key, value in values.items() if value != self._handles[key][0].value})
+
+    def show_on_controls(self, values: dict[str, Any]) -> None:
+        """Show values on their controls."""
+        for key, value in values.items():
+            if key in self._handles:
+                self._handles[key][0].value = value
+
+    def _ask_to_change(self, key: str, value: Any) -> None:
+        self.player.ask(lambda: self._changed(key, value))
+
+    def _changed(self, key: str, value: Any) -> None:
+        try:
+            self.player.change(key, value)
+        except AirflockError:
+            self.show_on_controls({key: scenario_value(self.player.scenario, key)})
+            raise
+
+    def _set(self) -> None:
+        """Set a key by its name, as --set does; also one without a slider, or beyond the ends of its slider."""
+        key, value = parse_setting(self.setting_field.value, self.player.scenario)
+        self.player.change(key, value)
+        self.setting_field.value = ""
+        self.show_values()
+
+    def _save_toml(self) -> None:
+        self._saved(self.player.save_toml(free_path(Path(f"{file_stem(self.player)}_tuned.toml"))))
+
+    def _save_recording(self) -> None:
+        self._saved(self.player.save_recording(free_path(Path(f"{file_stem(self.player)}_seed{self.player.seed}.nc"))))
+
+    def _save_replay(self) -> None:
+        self._saved(self.player.save_replay(free_path(Path(f"{file_stem(self.player)}_seed{self.player.seed}.html"))))
+
+    def _saved(self, path: Path) -> None:
+        self.player.note = f"saved {path.absolute()}"
+        self.player.fault(self.player.note)
+        self.widgets.notify("Saved", str(path.absolute()))
+
+    def refresh(self) -> None:
+        """Show the command that opens this scenario again, with a button that copies it, and controls of new
+        faults.
+        """
+        self._rebuild_faults()
+        command = html.escape(self.player.command, quote=True)
+        self.command.content = small_print_html(f"<code>{command}</code><br>{copy_button_html(command)}")
+
+
+def copy_button_html(command: str) -> str:
+    """Return a button that copies a command, escaped here; the page's script (`access_token`) copies it."""
+    look = "border:1px solid #0072B2;border-radius:4px;background:none;color:#0072B2;cursor:pointer;margin-top:0.3em"
+    return f"<button type='button' style='{look}' data-copy=\"{command}\">Copy command</button>"
+
+
+def parse_setting(text: str, scenario: Scenario) -> tuple[str, Any]:
+    """Return key and value of a line such as `radio.delay = 400 ms`; raises ScenarioError for an unknown key."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not (key and equals and value):
+        raise ScenarioError([f"{text.strip() or 'any key'}: write KEY = VALUE, for instance model.p_rep = 0.14"])
+    with as_error(key):
+        found = parse_toml_value(value)
+    if "." in key:
+        return key, found
+    if key in FIXED_KEYS:
+        raise ScenarioError([f"{key} = {value}: {FIXED_KEYS[key]} cannot change in flight; {RESTART_HINTS[key]}"])
+    if key in TOP_LEVEL_KEYS:
+        raise ScenarioError([f"{key}: cannot be changed while a flock flies; write it into the scenario file"])
+    records = {section: type(record) for section, record in scenario.records.items()}
+    whole, _, faults = expand_short_keys({key: found}, records, ())
+    if faults:
+        raise ScenarioError(faults)
+    return next(iter(whole.items()))
+
+
+def file_stem(player: Player) -> str:
+    """Return the stem of file names of the active pane."""
+    return Path(player.side.origin.where).with_suffix("").name
+
+
+# ---- Selection: percepts of the clicked agent
+
+NO_LINES = np.zeros((0, 2, 3))
+WAKE_SPANS = 6.0  # spans of a wake that are drawn
+LONGEST_ARROW = 5.0  # darts; length of the longest arrow
+VELOCITY_ARGUMENTS = {"dvx", "dvy", "dvz", "dv"}  # arguments of a rule that aligns velocities
+FREE_RAY_COLOUR, HIT_RAY_COLOUR = agent_colours.GREEN, agent_colours.RED
+
+
+class PerceptDrawing(NamedTuple):
+    """Lines about one agent by kind (`LINE_STYLES`): segments (segment, 2, 3) m, their colours, and words.
+
+    Kinds that are not named show nothing.
+    """
+
+    lines: dict[str, tuple[NDArray[Any], NDArray[Any] | None]]
+    html: str
+
+
+class PerceptLines:
+    """Percepts of the selected agent as lines; keeps the world last seen, and the strongest value of each term."""
+
+    def __init__(self) -> None:
+        self._world: tuple[Scenario, FlightWorld] | None = None
+        self._strongest: dict[str, float] = {}
+
+    def of(self, pane: FlightPane, agent: int, dart_length: float, max_speed: float) -> PerceptDrawing:
+        """Return the percepts of an agent.
+
+        size : of a dart, m; top : speed that gives the longest arrow, m/s
+        """
+        seen, scenario = pane.flight.look(agent), pane.scenario
+        own = np.array(seen.true[:3])
+        lines = _neighbour_lines(seen, own, dart_length, pane.flight.measured)
+        wish = np.zeros(3)
+        wish[: len(seen.command)] = seen.command
+        lines["command"] = arrow_lines(own, own + wish * (LONGEST_ARROW * dart_length / max(max_speed, 1e-9))), None
+        points, tones, named = self._term_arrows(seen, own, dart_length, scenario.model)
+        lines["terms"] = points, tones
+        words = [*_agent_words(seen, scenario), *named]
+        memory = pane.flight.snapshot().state
+        if scenario.model.sight is not None:
+            found, said = self._ray_lines(scenario, memory, seen)
+            lines["rays"] = found
+            words.append(said)
+        if "model.circulation" in memory.arrays or "power.circulation" in memory.arrays:
+            lines["wake"] = _wake_segments(scenario, pane.motion), None
+            words.append(_drag_text(memory, agent))
+        return PerceptDrawing(lines, "<br>".join(words))
+
+    def _term_arrows(
+        self, seen: Seen, own: NDArray[Any], size: float, model: Model
+    ) -> tuple[NDArray[Any], NDArray[Any], list[str]]:
+        """Return arrows of the law's terms: of all neighbours, of each, and of all surfaces.
+
+        Terms of a law have units of their own, so each is as long as it is beside the strongest of its kind so far.
+        """
+        pieces, tones, words = [], [], []
+        for number, (name, vector, parts) in enumerate(_named_vectors(seen, model)):
+            strength = float(np.linalg.norm(vector))
+            longest = max([strength, *(float(np.linalg.norm(part)) for part in parts)])
+            # Terms have units of their own: each is scaled by the strongest of its kind so far.
+            most = self._strongest[name] = max(self._strongest.get(name, 0.0), longest)
+            tone, scale = (
+                agent_colours.TERM_COLOURS[number % len(agent_colours.TERM_COLOURS)],
+                LONGEST_ARROW * size / max(most, 1e-9),
+            )
+            shafts = np.vstack(
+                [arrow_lines(own, own + vector * scale), *([[own, own + part * scale]] for part in parts)]
+            )
+            pieces.append(shafts)
+            tones.append(np.tile(tone, (len(shafts), 1)))
+            words.append(f"{_colour_mark_html(tone)} {html.escape(name)} {strength:.3g}, at most {most:.3g}")
+        if not pieces:
+            return NO_LINES, np.zeros((0, 3)), []
+        return np.vstack(pieces), np.vstack(tones), words
+
+    def _ray_lines(
+        self, scenario: Scenario, memory: Memory, seen: Seen
+    ) -> tuple[tuple[NDArray[Any], NDArray[Any]], str]:
+        """Return the fan of rays that the agent casts: green where free, red up to the hit."""
+        if self._world is None or self._world[0] is not scenario:
+            self._world = scenario, FlightWorld(scenario)
+        place, course = self._world[1], GoalCourse(scenario)
+        if len(memory.arrays["later"]):
+            # Obstacles that appear in flight are hidden in the driver's own copy until they appear.
+            place.shapes[:] = memory.arrays["shapes"].astype(float).tolist()
+        if course.points and scenario.goals.kind != "own":
+            x, y, z = memory.arrays["aim"][:3].astype(float).tolist()
+            course.at = x, y, z
+        rays, _ = rays_and_command(scenario, place, course, seen.own, seen.heard, seen.time, seen.agent)
+        at = np.array(seen.own[:3])
+        ends = np.array([[ray.free * ray.x, ray.free * ray.y, ray.free * ray.z] for ray in rays]).reshape(-1, 3)
+        free = np.array([ray.free >= ray.length for ray in rays], bool)
+        tones = np.where(free[:, None], FREE_RAY_COLOUR, HIT_RAY_COLOUR)
+        rays_cast = "1 ray" if len(free) == 1 else f"{len(free)} rays"
+        said = f"casts {rays_cast}: {_colour_mark_html(FREE_RAY_COLOUR)} {int(free.sum())} free, "
+        said += f"{_colour_mark_html(HIT_RAY_COLOUR)} {int((~free).sum())} met something"
+        return (np.stack([np.broadcast_to(at, ends.shape), at + ends], 1), tones), said
+
+
+def _named_vectors(view: Seen, model: Model) -> list[tuple[str, NDArray[Any], list[NDArray[Any]]]]:
+    """Return the law's vectors by its own words: each with the part of each neighbour; then the surfaces.
+
+    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour of equal velocity
+    would cause, too, and alignment, which is the rest.
+    """
+    found: list[tuple[str, NDArray[Any], list[NDArray[Any]]]] = []
+    for name, vector in (vector_values(view.sums) if view.sums else {}).items():
+        parts = [vector_values(term)[name] for term in view.terms]
+        if (
+            name
+            or model.terms
+            or model.neighbour is None
+            or not VELOCITY_ARGUMENTS & set(argument_names(model.neighbour, "neighbour"))
+        ):
+            found.append((term_name_and_unit(model, name)[0], vector, parts))
+            continue
+        # The rule evaluated with equal velocities is the repulsion; the remainder is the alignment.
+        resting = [vector_values(term)[name] for term in view.alike]
+        moving = [part - same for part, same in zip(parts, resting, strict=True)]
+        found += [
+            (word, sum(terms, np.zeros(3)), terms) for word, terms in (("repulsion", resting), ("alignment", moving))
+        ]
+    if view.walls:
+        found += [(f"walls {name}".strip(), vector, []) for name, vector in vector_values(view.walls).items()]
+    return found
+
+
+def _neighbour_lines(view: Seen, own: NDArray[Any], size: float, measured: NDArray[Any]) -> dict[str, Any]:
+    """Return lines to the neighbours that the law uses; crosses at their measured and believed positions.
+
+    measured : (component, agent), what each believes of itself, m and m/s
+    """
+    at = np.array([other.state[:3] for other in view.heard]).reshape(-1, 3)
+    noticed = at[np.array(_noticed_neighbours(view), bool)]
+    believed = np.zeros((1 + len(at), 3))
+    who = [view.agent, *(other.who for other in view.heard)]
+    axes = len(measured) // 2
+    believed[:, :axes] = measured[:axes, who].T
+    believed[0] = view.own[:3]
+    ghosts = np.vstack([cross_segments(believed[:1], 0.7 * size), cross_segments(believed[1:], 0.25 * size)])
+    # Without sensor errors belief and truth are the same, and the crosses would only hide the
+    # agents.
+    off = float(np.linalg.norm(believed[0] - own)) > 0.0
+    return {
+        "heard": (np.stack([np.broadcast_to(own, noticed.shape), noticed], 1), None),
+        "ghosts": (cross_segments(at, 0.5 * size), None),
+        "measured": (ghosts if off else NO_LINES, None),
+    }
+
+
+def _noticed_neighbours(view: Seen) -> list[bool]:
+    """Return a mask of the heard neighbours that change the law's result; all if it has no rule of one neighbour."""
+    return [any(term) for term in view.terms] if view.terms else [True] * len(view.heard)
+
+
+def cross_segments(places: NDArray[Any], half: float) -> NDArray[Any]:
+    """Return two strokes at each place (place, 3), m."""
+    cross = half * np.array([[[-1, -1, 0], [1, 1, 0]], [[-1, 1, 0], [1, -1, 0]]], float)
+    return np.asarray((places[:, None, None] + cross).reshape(-1, 2, 3))
+
+
+def _agent_words(view: Seen, scenario: Scenario) -> list[str]:
+    """Return the text about an agent."""
+    oldest = max((other.age for other in view.heard), default=0.0)
+    off = math.dist(view.true[:3], view.own[:3])
+    wish = ", ".join(f"{part:.2f}" for part in view.command)
+    unit = {"velocity": " m/s", "acceleration": " m/s²"}.get(scenario.model.command, "")
+    others = "nobody" if not view.heard else "1 other" if len(view.heard) == 1 else f"{len(view.heard)} others"
+    heard = f"hears {others}" + (f", at most {oldest:.2g} s old" if view.heard else "")
+    if sum(_noticed_neighbours(view)) < len(view.heard):
+        heard += f"; its law notices {sum(_noticed_neighbours(view))}"
+    crossed = f"{_colour_mark_html(agent_colours.PURPLE, '✕')} where they were heard"
+    if off > 0.0:
+        crossed += (
+            f" {_colour_mark_html(agent_colours.BLUE, '✕')} where each believes to be; this one is {off:.2g} m off"
+        )
+    return [
+        f"<b>agent {view.agent}</b>, {math.hypot(*view.true[3:]):.2f} m/s",
+        f"{_colour_mark_html(agent_colours.ORANGE)} {heard}",
+        crossed,
+        f"{_colour_mark_html(agent_colours.RED)} command ({wish}){unit}",
+    ]
+
+
+def _colour_mark_html(tone: tuple[int, int, int], mark: str = "━") -> str:
+    red, green, blue = tone
+    return f"<span style='color:#{red:02x}{green:02x}{blue:02x}'>{mark}</span>"
+
+
+def _wake_segments(scenario: Scenario, motion: tuple[NDArray[Any], NDArray[Any]]) -> NDArray[Any]:
+    """Return the two outermost trailing legs of every wing, straight back."""
+    position, velocity = (part.astype(float) for part in motion)
+    span, ahead = float(scenario.wing.span), np.array([1.0, 0.0, 0.0])
+    if scenario.wing.frame == "ground":
+        mean = velocity.mean(axis=0) * [1.0, 1.0, 0.0]
+        ahead = mean / max(float(np.linalg.norm(mean)), 1e-9)
+    across = 0.5 * span * np.array([-ahead[1], ahead[0], 0.0])
+    ends = position[:, None] + np.array([-across, across])
+    return np.asarray(np.stack([ends, ends - WAKE_SPANS * span * ahead], 2).reshape(-1, 2, 3))
+
+
+def _drag_text(memory: Memory, agent: int) -> str:
+    """Return the drag of a bird, and the effect of the others' wash on it."""
+    which = "power" if "shared_power_drag" in memory.driver.ROWS else "model"
+    drag = float(memory.rows([f"shared_{which}_drag"])[0, agent])
+    said = f"{_colour_mark_html(agent_colours.SKY)} wakes; induced drag {drag:.3g} N"
+    if which == "power":
+        alone = float(memory.rows(["shared_power_solo"])[0, agent])
+        said += f", {100.0 * (drag / max(alone, 1e-9) - 1.0):+.0f} % of a lone bird's"
+    return said
+
+
+# ---- Selection: panel, and a push
+
+AGENT_LINE_KINDS = tuple(kind for kind in agent_colours.LINE_STYLES if kind != "links")
+NOTHING_SELECTED_TEXT = small_print_html("click an agent, or press S")
+
+
+class SelectionPanel(PagePanel):
+    """Panel of the selected agent, counted through the agents of all panes."""
+
+    def __init__(self, page: "FlightPage"):
+        super().__init__(page)
+        self.chosen: int | None = None
+        self.percept_lines = PerceptLines()
+        with self.widgets.folder("Selected agent"):
+            self.about = self.widgets.text(NOTHING_SELECTED_TEXT)
+            self.widgets.row(
+                {
+                    "Previous": self.ask(lambda: self.select_next(-1)),
+                    "Next": self.ask(lambda: self.select_next(1)),
+                    "Push": self.ask(self.push),
+                    "None": self.ask(lambda: self.select(None)),
+                }
+            )
+            self.fault = self.widgets.add_menu(
+                "fault", tuple(KINDS_OF_FAULT), "motor", lambda _: None, "begins at once"
+            )
+            self.widgets.row({"Let it fail": self.ask(self.begin_fault)})
+        self.widgets.command("Next agent", "S", self.ask(lambda: self.select_next(1)))
+
+    def rebuild(self) -> None:
+        """Clear the selection for another flight."""
+        self.chosen, self.percept_lines = None, PerceptLines()
+
+    def select(self, agent: int | None) -> None:
+        """Select an agent, or none."""
+        self.chosen = agent
+        self.page.frame(True)
+
+    def select_next(self, count: int) -> None:
+        """Select an agent some numbers on."""
+        many = len(self.scene.positions)
+        self.select(((-1 if self.chosen is None and count > 0 else self.chosen or 0) + count) % many)
+
+    def at(self, origin: NDArray[Any], direction: NDArray[Any]) -> None:
+        """Select the agent nearest to a ray, if it is near."""
+        away = self.scene.positions - origin
+        along = np.maximum(away @ direction, 0.0)
+        off = np.linalg.norm(away - along[:, None] * direction, axis=1)
+        best = int(off.argmin())
+        self.select(best if off[best] < 2.0 * self.scene.size else None)
+
+    def push(self) -> None:
+        """Push the selected agent, at twice the flock's speed."""
+        if self.chosen is not None:
+            side, agent = self.scene.pane_and_agent(self.chosen)
+            self.player.push(agent, 2.0 * self.scene.top / 1.5, side)
+
+    def refresh(self) -> None:
+        """Show percepts and command of the selected agent."""
+        if self.chosen is None:
+            self.about.content = NOTHING_SELECTED_TEXT
+            for kind in AGENT_LINE_KINDS:
+                self.view.extra(kind, np.zeros((0, 2, 3)))
+            return
+        if self.player.failure_message:
+            return  # what it perceived last stays
+        number, agent = self.scene.pane_and_agent(self.chosen)
+        flock = self.scene.flocks[number]
+        if not flock.side.flight.present[agent]:
+            self._show(PerceptDrawing({}, f"<b>agent {agent}</b> has left"), flock.offset, number)
+            return
+        drawn = self.percept_lines.of(flock.side, agent, self.scene.size, self.scene.top)
+        self._show(drawn, flock.offset, number)
+
+    def _show(self, drawn: PerceptDrawing, offset: NDArray[Any], side: int) -> None:
+        for kind in AGENT_LINE_KINDS:
+            points, tones = drawn.lines.get(kind, (np.zeros((0, 2, 3)), None))
+            self.view.extra(kind, points + offset, tones)
+        where = f" of {PANE_NAMES[side]}" if len(self.player.sides) > 1 else ""
+        self.about.content = small_print_html(drawn.html.replace("</b>", f"{where}</b>", 1))
+
+    def begin_fault(self) -> None:
+        """Begin the fault that the menu names in the selected agent."""
+        if self.chosen is not None:
+            side, agent = self.scene.pane_and_agent(self.chosen)
+            self.player.sides[side].flight.fault(self.fault.value, agent, wait=False)
