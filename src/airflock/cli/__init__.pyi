@@ -1,2 +1,2 @@
 # The door: what other rooms may use. `lazy_loader` and type checkers read it here; the rest is private to the room.
-from . import main as main
+from .main import main as main
