@@ -3,8 +3,8 @@
 import threading
 import time
 
-from airflock.engine import compile_events
-from airflock.engine.compile_events import COMPILING, message_if_slow
+from airflock.engine import drivers as compile_events
+from airflock.engine.drivers import COMPILING, message_if_slow
 
 
 def sit_down(monkeypatch):

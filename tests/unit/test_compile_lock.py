@@ -31,7 +31,7 @@ print(json.dumps([sum(driver.advance.stats.cache_hits.values()), sum(driver.adva
 HELD = """
 import sys, time
 from pathlib import Path
-from airflock.engine.compile_lock import folder_lock
+from airflock.engine.numba_private.sealed_cache import folder_lock
 
 with folder_lock(Path(sys.argv[1])) as held:
     print(held, flush=True)

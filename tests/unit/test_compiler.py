@@ -1,6 +1,7 @@
-"""The compiler of drivers: Numba's machine code, with less work."""
+"""The compiler of drivers: Numba's machine code, without what nobody calls."""
 
 import gc
+import os
 import platform
 import re
 import subprocess
@@ -15,11 +16,9 @@ from numba.core.errors import NumbaError
 
 import airflock
 from airflock.engine import plan_of
-from inside import CALLED, INNER, KNOWN, SPARED, flight_driver
+from inside import CALLED, INNER, flight_driver, is_tested
 
-as_tried = pytest.mark.skipif(
-    not KNOWN, reason="another version of Numba than those that were tried compiles as it likes"
-)
+by_own_compiler = pytest.mark.skipif(not is_tested(), reason="drivers are compiled by plain njit here")
 
 OPTIONS = {"fastmath": True, "error_model": "numpy", "nogil": True, "forceinline": True, "_nrt": False}
 
@@ -67,6 +66,7 @@ def whole_lines(monkeypatch):
     monkeypatch.setattr(JITCodeLibrary, "add_ir_module", with_whole_lines)
 
 
+@by_own_compiler
 def test_machine_code_is_that_of_numba(whole_lines):
     xs, ys = np.linspace(-2.0, 2.0, 101, dtype=np.float32), np.ones(101, np.float32)
     (_, ours), (_, theirs) = pair_of_functions(OPTIONS | INNER, OPTIONS | CALLED), pair_of_functions(OPTIONS, OPTIONS)
@@ -76,6 +76,7 @@ def test_machine_code_is_that_of_numba(whole_lines):
     assert instructions(ours) == instructions(theirs)
 
 
+@by_own_compiler
 def test_a_function_is_compiled_once_for_all_whole_numbers_that_its_callers_write_out():
     @njit(**OPTIONS | INNER)
     def times(x, k):
@@ -107,6 +108,7 @@ def test_a_function_that_adds_up_an_array_knows_the_length_that_its_caller_write
     assert len(total.signatures) == 2
 
 
+@by_own_compiler
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names a register of x86-64")
 @pytest.mark.parametrize("spread", [False, True], ids=["one thread", "all cores"])
 def test_vectors_on_the_stack_lie_whole_in_lines_of_the_cache(spread):
@@ -133,6 +135,7 @@ def test_vectors_on_the_stack_lie_whole_in_lines_of_the_cache(spread):
     assert re.search(r"and[lq]\s+\$-64, %[er]sp", loop.inspect_asm(loop.signatures[0]))
 
 
+@by_own_compiler
 def test_a_function_that_only_others_call_refuses_python():
     rule, loop = pair_of_functions(OPTIONS | INNER, OPTIONS | CALLED)
     xs = np.ones(3, np.float32)
@@ -158,25 +161,6 @@ def test_the_garbage_collector_is_left_as_it_was():
             gc.set_threshold(*usual)
 
 
-def parts_of_numba():
-    return [vars(owner)[name] for owner, name, _ in SPARED]
-
-
-def test_numba_is_left_as_it_was():
-    usual = parts_of_numba()
-    rule, loop = pair_of_functions(OPTIONS | INNER, OPTIONS | CALLED)
-    loop(np.ones(3, np.float32), np.ones(3, np.float32))
-    assert parts_of_numba() == usual
-
-    @njit(**CALLED)
-    def wrong(x):
-        return x + "m"
-
-    with pytest.raises(NumbaError):
-        wrong(1.0)
-    assert parts_of_numba() == usual
-
-
 def test_closures_lists_and_whole_arrays_are_compiled_where_there_are_any():
     @njit(**CALLED)
     def of_all(xs):
@@ -190,32 +174,7 @@ def test_closures_lists_and_whole_arrays_are_compiled_where_there_are_any():
     assert of_all(xs) == 14.0 * 2.0 + 6.0 + 14.0 * 2.0
 
 
-@as_tried
-def test_a_loop_over_threads_becomes_machine_code_where_it_is_called_alone(monkeypatch):
-    made, usual = [], JITCodeLibrary._finalize_specific
-    monkeypatch.setattr(JITCodeLibrary, "_finalize_specific", lambda found: made.append(found.name) or usual(found))
-
-    @njit(**OPTIONS | INNER, parallel=True)
-    def doubled(xs):
-        for i in prange(xs.shape[0]):
-            xs[i] = 2.0 * xs[i]
-        return 0
-
-    @njit(**OPTIONS | CALLED)
-    def squared(xs):
-        doubled(xs)
-        doubled(xs)
-        return xs[0]
-
-    xs = np.arange(1000.0)
-    assert squared(xs) == 0.0
-    assert (xs == 4.0 * np.arange(1000.0)).all()
-    assert [name.split(".")[-1] for name in made] == [
-        "squared"
-    ]  # not the loop's body, what unpacks its arguments, and what hands its parts to threads
-
-
-@as_tried
+@by_own_compiler
 def test_a_driver_compiles_without_scipy_and_whoever_needs_it_has_it():
     text = """
 import sys
@@ -247,3 +206,21 @@ def test_loops_of_noise_stand_in_a_driver_once():
     assert text.count("= random_philox(") == 1 and text.count(" draw(m, ") == 3  # itself, perceive, move
     assert text.count("normal_pair(u") == 0 and text.count(" normal(m, ") == 5  # itself, two of each
     assert text.count("= langevin_error(") == 1 and text.count(" wander(m, ") == 5  # itself, four rows
+
+
+def test_outside_the_tested_versions_plain_numba_flies_the_same_bits(tmp_path):
+    """The guard: no private module is imported, and a flight has the bits of the driver compiler."""
+    text = """
+import sys
+import airflock
+flight = airflock.simulate(airflock.load("vasarhelyi_2018/4ms", {"agents": 6, "duration": 5.0}), seed=3)
+private = [name for name in sys.modules if name.startswith("airflock.engine.numba_private.")]
+print(len(private), flight["position"].values.tobytes().hex())
+"""
+    runs = []
+    for plain in ("", "1"):
+        own = os.environ | {"AIRFLOCK_CACHE": str(tmp_path), "AIRFLOCK_PLAIN_NUMBA": plain}
+        process = subprocess.run([sys.executable, "-c", text], env=own, check=True, capture_output=True, text=True)
+        runs.append(process.stdout.split())
+    assert runs[1][0] == "0"
+    assert runs[0][1] == runs[1][1]

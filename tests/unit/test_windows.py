@@ -77,7 +77,7 @@ except StudyError as fault:
     print("process" in str(fault))
 os.close(handle)
 os.close(store._lock(Path(".")))
-from airflock.engine.compile_lock import folder_lock
+from airflock.engine.numba_private.sealed_cache import folder_lock
 with folder_lock(Path(".")) as held, folder_lock(Path("."), timeout=0.0) as twice:
     print(held, twice)
 """

@@ -1,5 +1,8 @@
 """Drivers: what flies a plan, compiled or interpreted; interruptions and messages while it compiles."""
 
+import multiprocessing
+import sys
+import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import cache, lru_cache
@@ -11,7 +14,10 @@ from airflock.engine import interpreted
 from airflock.engine.passes.driver import flight_driver_text
 from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
-from airflock.support import RuleError
+from airflock.support import RuleError, check_interrupted
+
+COMPILING = "compiling … (only once for this kind of flight; later flights start at once)"
+PATIENCE = 1.0  # s until a user who waits sees it
 
 
 def flight_text(plan: Plan) -> str:
@@ -69,9 +75,17 @@ def rule_errors_of_compiler(model: str) -> Iterator[None]:
     A user who waits at a terminal or in a notebook sees a message. Raises RuleError, GivenUp.
     """
     from numba.core.errors import NumbaError
-    from numba.core.event import install_listener
+    from numba.core.event import Listener, install_listener
 
-    from airflock.engine.compile_events import InterruptListener, message_if_slow
+    class InterruptListener(Listener):  # type: ignore[misc]  # Numba has no types
+        """Each thread that compiles hears of its own passes."""
+
+        def on_start(self, event: Any) -> None:
+            """Give up the work of this thread if it was interrupted. Raises GivenUp."""
+            check_interrupted()
+
+        def on_end(self, event: Any) -> None:
+            """Do nothing at the end of a pass; the next one checks."""
 
     try:
         with install_listener("numba:run_pass", InterruptListener()), message_if_slow():
@@ -80,3 +94,29 @@ def rule_errors_of_compiler(model: str) -> Iterator[None]:
         lines = [line.strip() for line in str(error).splitlines()]
         said = next((line for line in lines if line and not line.startswith(("Failed in", "During", "File"))), "")
         raise RuleError(f"model {model}: a rule does not compile, though plain Python takes it: {said}") from error
+
+
+@contextmanager
+def message_if_slow() -> Iterator[None]:
+    """Say once that something is compiled, if it takes longer than PATIENCE, to a person who waits for it."""
+    if not _watched():
+        yield
+        return
+    timer = threading.Timer(PATIENCE, _say)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _watched() -> bool:
+    """True if a person sees what this thread says: at a terminal or in a notebook, and not of one of many workers."""
+    main = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
+    return main and ("ipykernel" in sys.modules or sys.stderr.isatty())
+
+
+def _say() -> None:
+    sys.stderr.write(f"{COMPILING}\n")
+    sys.stderr.flush()

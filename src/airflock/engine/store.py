@@ -2,7 +2,8 @@
 
 The hash covers the whole driver text (all rules, ours and the user's, are inside), the versions of the compiler, our
 own passes of it and the processor. What runs is always the text that was generated, never a file's; compiled code is
-loaded only under a seal (`engine.checksums`), from a folder that belongs to the user alone (`airflock.support.cache`).
+loaded only under a seal (`numba_private.sealed_cache`), from a folder that belongs to the user alone
+(`airflock.support.cache`).
 """
 
 import hashlib
@@ -14,11 +15,12 @@ from threading import Lock
 from types import ModuleType
 
 from airflock.engine.never_collected import frozen_imports
+from airflock.engine.numba_private import is_tested
 from airflock.support import DRIVERS, atomic, cache_folder, private_folder, shrink, toolchain_versions
 
 SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
 
-PASSES = ("compiler.py", "compile_shortcuts.py", "libraries.py")  # what makes machine code of a driver's text
+PASSES = ("compiler.py", "numba_private/driver_compiler.py")  # what makes machine code of a driver's text
 
 _loading = Lock()
 
@@ -27,7 +29,7 @@ _loading = Lock()
 def compiler_fingerprint() -> str:
     """Return the versions, processor and passes of ours that turn a text into machine code."""
     passes = hashlib.sha256(b"".join((Path(__file__).parent / name).read_bytes() for name in PASSES))
-    return f"{toolchain_versions()}|{passes.hexdigest()}"
+    return f"{toolchain_versions()}|{passes.hexdigest()}{'' if is_tested() else '|plain'}"
 
 
 def load_driver(text: str, label: str) -> ModuleType:
@@ -46,12 +48,13 @@ def _import_compiler() -> None:
     with _loading:
         if "numba" not in sys.modules:
             with frozen_imports():
-                from airflock.engine import checksums, compiler  # noqa: F401
+                from airflock.engine import compiler  # noqa: F401
+
+                if is_tested():
+                    from airflock.engine.numba_private import sealed_cache  # noqa: F401
 
 
 def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
-    from airflock.engine.checksums import seal_functions
-
     try:
         path = _written(cache_folder() / DRIVERS / digest, label, text)
     except OSError:  # filled up since it was looked at
@@ -62,7 +65,10 @@ def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
     sys.modules[name] = module
     # The text in memory runs, never the file: a changed file once flew other physics with status 0.
     exec(compile(text, path, "exec"), vars(module))  # our own text, and not what the file may hold by now
-    seal_functions(module, digest)
+    if is_tested():
+        from airflock.engine.numba_private.sealed_cache import seal_functions
+
+        seal_functions(module, digest)
     return module
 
 

@@ -2,8 +2,8 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from functools import lru_cache
-from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from airflock.engine.cpu import DriverResult
 from airflock.engine.cuda.block_layout import BlockLayout, block_layout
 from airflock.engine.cuda.cuda_builder import PAIR_ROWS
-from airflock.engine.cuda.cuda_compile import first_launch
 from airflock.engine.cuda.flight_kernel import ARGUMENTS, flight_text, onset_tables, presence_results
 from airflock.engine.initial_rows import law_memories, metric_memories, pair_values
+from airflock.engine.numba_private.cuda_compiler import first_launch, without_occupancy_warning
 from airflock.engine.passes.build import sampled_columns
 from airflock.engine.passes.flock import flock_rules, scratch_sizes
 from airflock.engine.plan import Plan
@@ -199,15 +199,9 @@ def _fly(
 
 
 def configure_kernel(kernel: Any, blocks: int, threads: int) -> Any:
-    """A kernel for so many blocks. Numba warns of fewer than 128; here they are as many as there are flocks."""
-    if is_simulated():
+    """Return a kernel for so many blocks; here they are as many as there are flocks."""
+    with nullcontext() if is_simulated() else without_occupancy_warning():
         return kernel[blocks, threads]
-    settings: Any = import_module("numba.cuda.core.config")
-    warned, settings.CUDA_LOW_OCCUPANCY_WARNINGS = settings.CUDA_LOW_OCCUPANCY_WARNINGS, 0
-    try:
-        return kernel[blocks, threads]
-    finally:
-        settings.CUDA_LOW_OCCUPANCY_WARNINGS = warned
 
 
 def make_arguments(
