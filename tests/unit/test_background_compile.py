@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import pytest
 from numba.core.errors import NumbaError
 
-from inside import SCRIPT, compile_aside, load_driver
+from inside import SCRIPT, DriverState, load_driver
 
+compile_aside = DriverState.compile_in_background
 TEXT = "from numba import njit\n\n@njit(cache=True)\ndef advance(first, last):\n    return {answer}\n"
 
 
@@ -47,7 +48,7 @@ def test_this_process_compiles_where_no_other_can(state, monkeypatch, python):
     flight = state(f"first * last + {number}")
     monkeypatch.setattr(sys, "executable", python)
     if python == sys.executable:  # one that starts, and does not find what it needs
-        monkeypatch.setattr(sys.modules[compile_aside.__module__], "SCRIPT", "/nowhere/script.py")
+        monkeypatch.setattr(sys.modules[load_driver.__module__], "SCRIPT", "/nowhere/script.py")
     assert compile_aside(flight) == 30 + number
     assert counts(flight) == (0, 1)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.absence_and_faults import begin_fault, fault_memory_rows, remove_agents, still_has_fault
-from airflock.engine.drivers import compile_messages, device_of, driver_of
+from airflock.engine.drivers import compile_messages, device_of, driver_of, is_compiled
 from airflock.engine.initial_rows import law_memories, metric_memory_rows
 from airflock.engine.layout import aligned_zeros, buffer_layout
 from airflock.engine.passes import grid
@@ -19,6 +19,7 @@ from airflock.engine.passes.grid import sorts_by_cells
 from airflock.engine.plan import INTEGER_NAMES, Plan
 from airflock.engine.stages.approach import BEGUN, ENDED, GAP
 from airflock.engine.stages.state import fault_row, own_row
+from airflock.engine.store import compile_by_process
 from airflock.engine.tables import WorldTables, world_tables
 from airflock.engine.totals import combine_sums, goal_times
 from airflock.scenarios import FaultOnset, Scenario
@@ -232,6 +233,15 @@ class DriverState(DriverMemory):
             self.advance(0, 0)
         marks[BEGUN] = begun
         return self
+
+    def compile_in_background(self) -> "DriverState":
+        """Have another process compile the driver, and load it; for a thread that may wait. Returns the state.
+
+        Where no process can be started, or it fails for any reason, this thread compiles and says what is wrong.
+        """
+        if not is_compiled(self.driver):
+            compile_by_process(self.driver, tuple(map(self.driver.advance.typeof_pyval, self.arguments(0, 0))))
+        return self.compile()
 
     @classmethod
     def of(

@@ -16,7 +16,6 @@ from airflock import __version__
 from airflock.core import COMMANDS, AgentView
 from airflock.engine import cpu
 from airflock.engine.absence_and_faults import add_agent, remove_agents, replace_faults
-from airflock.engine.background_compile import compile_in_background
 from airflock.engine.closed_flights import (
     first_bad_step,
     flight_plan,
@@ -171,7 +170,7 @@ class FlightState:
     def compile(self, in_background: bool = False) -> None:
         """Have it compiled, here or by another process."""
         if in_background:
-            compile_in_background(self.state)
+            self.state.compile_in_background()
         else:
             self.state.compile()
 
@@ -242,7 +241,7 @@ class FlightState:
         """The state that is to take over, written and compiled aside; interpreted, it is written at once."""
         if self.device == "python":
             return run_in_background(self._opened(scenario, absence).compile)
-        return run_in_background(lambda: compile_in_background(self._opened(scenario, absence)))
+        return run_in_background(lambda: self._opened(scenario, absence).compile_in_background())
 
     def apply_pending_change(self) -> None:
         """Take the change over that has been compiled meanwhile."""

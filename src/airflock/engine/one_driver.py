@@ -1,4 +1,4 @@
-"""One driver compiled and kept by a process of its own; `engine.background_compile` starts it. No module imports it.
+"""One driver compiled and kept by a process of its own; `engine.store` starts it. No module imports it.
 
 The request comes by standard input: the text of a driver, which holds every rule, so that no file of
 anybody's is run. The input stays open; its end means that the process that sent the request has gone.
@@ -18,7 +18,7 @@ def main() -> None:
     sys.path[:] = request["paths"]
     from airflock.engine.store import load_driver
 
-    driver = load_driver(request["text"], request["label"])
+    driver = load_driver(request["text"], request["label"], by_process=False)
     driver.advance.compile(pickle.loads(bytes.fromhex(request["types"])))
 
 

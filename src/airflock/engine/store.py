@@ -7,13 +7,20 @@ loaded only under a seal (`numba_private.sealed_cache`), from a folder that belo
 """
 
 import hashlib
+import json
 import os
+import pickle
+import subprocess
 import sys
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
+from typing import Any
 
+import airflock
 from airflock.engine.never_collected import frozen_imports
 from airflock.engine.numba_private import is_tested
 from airflock.support import DRIVERS, atomic, cache_folder, private_folder, shrink, toolchain_versions
@@ -21,6 +28,8 @@ from airflock.support import DRIVERS, atomic, cache_folder, private_folder, shri
 SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
 
 PASSES = ("compiler.py", "numba_private/driver_compiler.py")  # what makes machine code of a driver's text
+
+SCRIPT = Path(__file__).with_name("one_driver.py")
 
 _loading = Lock()
 
@@ -32,15 +41,18 @@ def compiler_fingerprint() -> str:
     return f"{toolchain_versions()}|{passes.hexdigest()}{'' if is_tested() else '|plain'}"
 
 
-def load_driver(text: str, label: str) -> ModuleType:
-    """Import a driver from its text; compiled code of an earlier process is reused."""
+def load_driver(text: str, label: str, *, by_process: bool = True) -> ModuleType:
+    """Import a driver from its text; compiled code of an earlier process is reused.
+
+    by_process : where plain Numba compiles, it does so in a process of its own, and this one loads the code
+    """
     _import_compiler()
     # Numba's own cache looks at the time stamp of one file and would serve stale physics when a
     # helper elsewhere changes.
     digest = hashlib.sha256(f"{compiler_fingerprint()}\n{text}".encode()).hexdigest()[:20]
     name = f"airflock_driver_{label}_{digest}"
     with _loading:  # a thread must not get a module that another one is still executing
-        return sys.modules[name] if name in sys.modules else _import(name, digest, text, label)
+        return sys.modules[name] if name in sys.modules else _import(name, digest, text, label, by_process)
 
 
 def _import_compiler() -> None:
@@ -54,7 +66,7 @@ def _import_compiler() -> None:
                     from airflock.engine.numba_private import sealed_cache  # noqa: F401
 
 
-def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
+def _import(name: str, digest: str, text: str, label: str, by_process: bool) -> ModuleType:
     try:
         path = _written(cache_folder() / DRIVERS / digest, label, text)
     except OSError:  # filled up since it was looked at
@@ -69,7 +81,58 @@ def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
         from airflock.engine.numba_private.sealed_cache import seal_functions
 
         seal_functions(module, digest)
+    elif by_process and hasattr(module, "advance"):
+        module.advance.compile = _compiled_by_process(module, module.advance.compile)
     return module
+
+
+def _compiled_by_process(module: ModuleType, compile_: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Wrap the compilation by plain Numba so that what flies is always code from the cache."""
+
+    # In the process that compiles, calls reach copies of functions that were optimised one by one;
+    # in code that is loaded they reach those optimised together. The last bits of a flight differ.
+    def compiled(signature: Any) -> Any:
+        if not any(Path(module.advance.stats.cache_path).glob("*.nbi")):
+            compile_by_process(module, signature)
+        return compile_(signature)
+
+    return compiled
+
+
+def compile_by_process(driver: ModuleType, types: tuple[Any, ...]) -> None:
+    """Have another process compile a driver for these argument types, and keep it; wait for its end.
+
+    Nothing happens where no process can be started, or it fails for any reason: then this process compiles.
+    """
+    # Numba keeps the interpreter lock for long stretches: compiling in a thread made gaps of 66 to
+    # 171 ms in a page of 30 frames a second, a process below 50 ms. It is no fork: threads and LLVM
+    # are not made for that.
+    if not sys.executable:  # a program that has Python inside does not know where it is
+        return
+    file = Path(str(driver.__file__))
+    paths = [path for path in sys.path if os.path.isabs(path)]
+    request = {
+        "paths": [*paths, str(Path(airflock.__file__).parents[1])],
+        "text": driver.TEXT,
+        "label": file.stem,
+        "types": pickle.dumps(types).hex(),
+    }
+    # isolated (-I, -S): neither the folder in which somebody works nor a start-up file decides what
+    # is imported
+    with (
+        suppress(OSError),
+        subprocess.Popen(
+            [sys.executable, "-I", "-S", str(SCRIPT)],
+            env={**os.environ, "AIRFLOCK_CACHE": str(file.parents[2])},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        ) as process,
+    ):
+        assert process.stdin is not None
+        process.stdin.write(f"{json.dumps(request)}\n".encode())
+        process.stdin.flush()
+        process.wait()  # with its input open: the end of this process is the end of that one
 
 
 def _written(folder: Path, label: str, text: str) -> Path:
