@@ -112,7 +112,7 @@ def _reproduced(name: str) -> str:
 
 def order_parameters(drawn: bool) -> None:
     """Definition, unit, range, reference and a picture of low and high of every order parameter."""
-    from airflock.parts.metrics import fitness_dimock, fitness_kidger, fitness_vasarhelyi, metric_sets as registry
+    from airflock.parts.metrics import metric_sets as registry
 
     known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
     homes: dict[str, Any] = {}
@@ -126,8 +126,8 @@ def order_parameters(drawn: bool) -> None:
         for name, about in registry.reported_values(found).items():
             units.setdefault(name, about)
             sets.setdefault(name, []).append(kind)
-    for module in (fitness_kidger, fitness_dimock, fitness_vasarhelyi):
-        homes |= dict.fromkeys(module.REPORTS, module.fitness)
+    for found in registry.SETS.values():
+        homes |= dict.fromkeys(found.reports, found.fitness)
     wrong = sorted(set(units) ^ set(known))
     if wrong:
         raise ExtensionError(f"order_parameters.toml and parts/metrics/metric_sets.py differ in {', '.join(wrong)}")

@@ -19,10 +19,9 @@ from airflock.certificates.campaign import (
     used_and_unused_keys,
 )
 from airflock.certificates.certificate import NOT_SAID, check_certificate, scores_digest, with_checksum
-from airflock.certificates.certification import certify, run_campaign
+from airflock.certificates.certification import ValueScreen, certify, run_campaign, value_batch
 from airflock.certificates.counting import CampaignFlyer
 from airflock.certificates.limits import parse_limit, parse_limits, rate_per_hour, take_look
-from airflock.certificates.tolerance import ValueScreen, value_batch
 from airflock.cli.main import app
 from airflock.engine import score_flights
 from airflock.runs.executors import FlightResult, ThreadExecutor

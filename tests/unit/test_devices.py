@@ -47,7 +47,7 @@ def test_a_missing_gpu_is_an_error_where_it_is_named_and_a_note_where_not(absent
 
 
 def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypatch):
-    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 2)
+    monkeypatch.setattr("airflock.engine.closed_flights.available_cores", lambda: 2)
     said = []
     assert pick_device([SMALL], "auto", notify=said.append) == "cpu"
     many = scenario(agents=100, duration=600.0)
@@ -58,15 +58,15 @@ def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present, monkeypat
 
 def test_auto_leaves_to_many_cores_what_one_thread_of_a_gpu_would_solve(present, monkeypatch):
     many, said = [load("dimock_2003/physical")] * 10_000, []
-    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 16)
+    monkeypatch.setattr("airflock.engine.closed_flights.available_cores", lambda: 16)
     assert pick_device(many, "auto", notify=said.append) == "cpu"
     assert said == ["device auto: cpu, about 19 s of work on 16 cores, where the GPU would take 1.1e+02 s"]
-    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 1)
+    monkeypatch.setattr("airflock.engine.closed_flights.available_cores", lambda: 1)
     assert pick_device(many, "auto") == "cuda"
 
 
 def test_one_long_flight_is_no_work_for_a_gpu(present, monkeypatch):
-    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 1)
+    monkeypatch.setattr("airflock.engine.closed_flights.available_cores", lambda: 1)
     long = load("zapotecatl_2016/best", {"duration": 2e4})
     assert cost.estimated_seconds(long) > 50.0
     assert pick_device([long], "auto") == "cpu"
@@ -74,7 +74,7 @@ def test_one_long_flight_is_no_work_for_a_gpu(present, monkeypatch):
 
 
 def test_a_big_flock_has_all_of_a_gpu_to_itself(present, monkeypatch):
-    monkeypatch.setattr("airflock.engine.devices.available_cores", lambda: 16)
+    monkeypatch.setattr("airflock.engine.closed_flights.available_cores", lambda: 16)
     keys = {"agents": 100_000, "world.edges": "periodic", "world.arena": "square", "world.side": 46.0,
             "world.height": 46.0, "start.separation": 0.0, "metrics.kind": "order", "dt": 0.02}  # fmt: skip
     assert pick_device([load("zapotecatl_2016/literal", {**keys, "duration": 400.0})], "auto") == "cuda"
@@ -140,7 +140,7 @@ def test_the_step_at_which_a_closed_flight_left_the_finite_numbers_is_found(wron
         state[:, 1] = np.nan if flown[-1] >= wrong else 0.0
         return Flown({}, None, state, 0)
 
-    monkeypatch.setattr(simulate.devices, "fly_one", fly_one)
+    monkeypatch.setattr(simulate, "fly_one", fly_one)
     with pytest.raises(FlightError, match=f"agent 1 left the finite numbers at step {wrong} "):
         simulate.check_result(SMALL, 0, fly_one(SMALL), "cuda")
     assert steps == 20

@@ -16,6 +16,7 @@ from airflock.recordings.simulation import to_plain_values
 from airflock.support.errors import RecordingError
 from airflock.view.flight_paths import paths_in_window, projection
 from airflock.view.order_parameter_plots import flocked
+from airflock.view.rules_plot import downwash, solve_formation, wash
 from airflock.view.trajectory_plots import (
     VIEW_ELEVATION_DEG,
     outlines_in_space,
@@ -27,7 +28,6 @@ from airflock.view.trajectory_plots import (
     trajectories,
 )
 from airflock.view.video_writer import VideoFrame, video
-from airflock.view.wash_plot import downwash, solve_formation, wash
 from airflock.world.shapes import BOX, CYLINDER
 
 

@@ -19,6 +19,7 @@ from .certificate import (
 from .certification import (
     COUNT_BUDGET_SHARE as COUNT_BUDGET_SHARE,
     campaign_executor as campaign_executor,
+    check_map_axes as check_map_axes,
     flight_folder as flight_folder,
     run_campaign as run_campaign,
     with_planned_flights as with_planned_flights,
@@ -37,4 +38,3 @@ from .limits import (
     reliability_indices as reliability_indices,
 )
 from .splitting import check_split as check_split
-from .tolerance import check_map_axes as check_map_axes

@@ -80,8 +80,8 @@ class Certificate:
 
     verdicts  : one for each limit; hazards: timing of events by limit, where events have a moment
     rows      : scores of all flights that were counted, in the order of their seeds
-    tolerance : plain values of `airflock.certificates.tolerance`, empty if not requested
-    splitting : the same of `airflock.certificates.splitting`; over: of `airflock.certificates.tolerance`
+    tolerance : plain values of `airflock.certificates.certification`, empty if not requested
+    splitting : the same of `airflock.certificates.splitting`; over: of `airflock.certificates.certification`
     versions  : of what flew, and on which processor
     seconds, rate : of this process, s; flights per second
     where     : file or name of the scenario, by which flights are flown again

@@ -7,11 +7,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import product, takewhile
 from pathlib import Path
 from typing import Any
 
 from airflock.certificates.campaign import (
     CAMPAIGN_KIND,
+    FIRST_VALUE,
+    MAP_PURPOSE,
     TOLERANCE_PURPOSE,
     Campaign,
     CampaignTask,
@@ -19,20 +22,26 @@ from airflock.certificates.campaign import (
     certificate_seed,
     check_certify_budget,
     check_workers,
+    environment_numbers,
     limit_score_function,
+    read_intervals,
     tolerance_keys,
+    worse_direction,
 )
 from airflock.certificates.certificate import Certificate, EventTiming, event_timing
 from airflock.certificates.counting import CampaignFlyer, CountResult, OnCountProgress, count_events
+from airflock.certificates.limits import InterimLook, alpha_share, flights_needed, look_schedule, take_look
 from airflock.certificates.splitting import check_split
-from airflock.certificates.tolerance import check_map_axes, map_bounds
+from airflock.core import Quantity
 from airflock.runs import (
+    CandidateBatch,
     DaskCluster,
     Executor,
     Flight,
     FlightStore,
     Interrupted,
     ThreadExecutor,
+    declared_numbers,
     open_folder,
     program_versions,
     read_toml_file,
@@ -40,9 +49,237 @@ from airflock.runs import (
     write_toml_file,
 )
 from airflock.scenarios import Scenario, formats, scenario_variant
-from airflock.support import ErrorCollector, StudyError, expand_path
+from airflock.support import ErrorCollector, ScenarioError, StudyError, expand_path, suggest
+
+# ---- Tolerance: how far each number of the environment may move until a limit can no longer be shown
+
+# Every value that is tried flies the same seeds, so that values differ by nothing but themselves. A value is safe where
+# the upper bound falls below the limit. It is not shown where the bound does not fall below the limit within
+# MAX_FLIGHTS_FACTOR times the fewest flights that could show it, or where the lower bound exceeds the limit. Rare
+# limits would need too many flights at each value: they are screened at LEVEL per flight. Numbers that are zero are
+# moved up from a first value (`FIRST_VALUE`).
+
+LEVEL = 0.02  # probability per flight at which rare limits are screened
+MAX_FLIGHTS_FACTOR = 4.0  # flights at one value, as a multiple of those that show the level without an event
+REACH = 8.0  # factor up to which a number is moved; of zero: of the first value
+HALVINGS = 3  # after a value that is safe and one that is not are known
+TIME_OVER = "time was over"
+
+
+def find_tolerances(flyer: CampaignFlyer, counted: CountResult, keys: Sequence[str]) -> dict[str, Any]:
+    """Find the largest value of each key at which the events of all limits stay below a level, and the next value.
+
+    Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal; of zero
+    none), flights, and the interval that the scenario's file gives, if any.
+    """
+    campaign = flyer.campaign
+    level = screening_level(campaign)
+    screen = ValueScreen(flyer, level)
+    events = sum(any(limit.has_happened(row) for limit in campaign.limits) for row in counted.rows)
+    result: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
+    if not counted.rows or take_look(len(counted.rows), events, 1.0 - campaign.confidence, 0.0).high > level:
+        result["reason"] = f"without any change, the scenario is not shown to stay below {100.0 * level:g} % per flight"
+        return result
+    known, said = environment_numbers(campaign.scenario), read_intervals(campaign.scenario.document)
+    for done, key in enumerate(keys):
+        flyer.report(f"tolerance of {key}")
+        screen.share_time(len(keys) - done)
+        axis = _axis(screen, key, *known[key])
+        result["axis"].append(axis | ({"interval": list(said[key])} if key in said else {}))
+    return result
+
+
+def screening_level(campaign: Campaign) -> float:
+    """Return the probability per flight against which values are judged: that of the limits, at least LEVEL."""
+    return max([LEVEL, *(p for p in map(campaign.probability, campaign.limits) if p is not None)])
+
+
+class ValueScreen:
+    """Screen that judges one value at a time against a level per flight, on seeds that all values share.
+
+    end : moment of `time.monotonic` at which the time for all values is spent, s
+    """
+
+    def __init__(self, flyer: CampaignFlyer, level: float, purpose: int = TOLERANCE_PURPOSE):
+        self.flyer, self.level, self.purpose, self.end = flyer, level, purpose, flyer.until
+        alpha = 1.0 - flyer.campaign.confidence
+        most = MAX_FLIGHTS_FACTOR * flights_needed(level, alpha * alpha_share(1))
+        self.look_schedule = list(takewhile(lambda due: due[0] <= most, look_schedule(level, alpha)))
+
+    def begin(self, batch: CandidateBatch, parameters: Mapping[str, float]) -> None:
+        """Fly the first flight of a value outside of the budget's time, so that its driver is compiled."""
+        began, (flight,) = time.monotonic(), self._flights(parameters, [0])
+        if self.flyer.is_time_over or self.flyer.store.flown(batch):
+            return
+        for _ in self.flyer.fly(batch, [flight]):
+            pass
+        # A new kind of number (a delay above zero) compiles another driver. That takes seconds and
+        # is no flight time.
+        waited = time.monotonic() - began
+        self.end += waited
+        self.flyer = replace(self.flyer, until=self.flyer.until + waited)
+
+    def share_time(self, parts: int) -> None:
+        """Give the next of so many parts its share of the time that is left."""
+        left = self.end - time.monotonic()
+        self.flyer = self.flyer.with_budget(left / parts)
+
+    def _flights(self, parameters: Mapping[str, float], numbers: Sequence[int]) -> list[Flight]:
+        campaign = self.flyer.campaign
+        own = [certificate_seed(campaign.hash, self.purpose, number) for number in numbers]
+        return [
+            Flight(0, number, {**campaign.parameters(each), **parameters}, each)
+            for number, each in zip(numbers, own, strict=True)
+        ]
+
+    def judged(self, batch: CandidateBatch, parameters: Mapping[str, float]) -> tuple[str, InterimLook | None]:
+        """Return safe, unsafe, open, or a reason why it cannot be flown; and the last look."""
+        # Flights in rounds between looks: a value that is clearly safe or unsafe needs few of them.
+        campaign = self.flyer.campaign
+        flown = {number: values for (_, number), values in self.flyer.store.flown(batch).items()}
+        events, done, last = 0, 0, None
+        for size, above, below in self.look_schedule:
+            missing = [number for number in range(done, size) if number not in flown]
+            if missing and self.flyer.is_time_over:
+                return TIME_OVER, last
+            for landed in self.flyer.fly(batch, self._flights(parameters, missing)):
+                flown[landed.flight.repeat] = landed.values
+                if landed.values is None:
+                    return f"cannot be flown: {landed.reason}", last
+            rows = [flown[number] for number in range(done, size)]
+            if any(row is None for row in rows):
+                return "cannot be flown", last
+            events += sum(any(limit.has_happened(row or {}) for limit in campaign.limits) for row in rows)
+            done, last = size, take_look(size, events, above, below)
+            if last.high < self.level:
+                return "safe", last
+            if last.low > self.level:
+                return "unsafe", last
+        return "open", last
+
+
+def value_batch(stage: str, parameters: Mapping[str, float]) -> CandidateBatch:
+    """Return the batch of flights at these values. Its name holds them: a campaign may resume with other keys."""
+    return CandidateBatch(f"{stage}: {', '.join(f'{key} = {value!r}' for key, value in parameters.items())}", 0, 0)
+
+
+class ValueTrials:
+    """Values of one number that are tried one after another.
+
+    flights : flown at all of them; verdict : on the last one, as `Screen.judged` says it
+    """
+
+    def __init__(self, screen: ValueScreen, key: str, *, compiles: bool):
+        """`compiles`: the first flight may wait for another driver, which takes none of the time for flights."""
+        self._screen, self._key, self._compiles = screen, key, compiles
+        self.flights, self.verdict = 0, ""
+
+    def safe(self, value: float) -> bool | None:
+        """Return True if a value is safe, None if time ended before that was known."""
+        parameters = {self._key: value}
+        batch = value_batch("tolerance", parameters)
+        self._screen.flyer.store.ask(batch, [[value]], [parameters])
+        if self._compiles and not self.flights:
+            self._screen.begin(batch, parameters)
+        self.verdict, last = self._screen.judged(batch, parameters)
+        self.flights += last.flights if last else 0
+        return None if self.verdict == TIME_OVER else self.verdict == "safe"
+
+
+def _axis(screen: ValueScreen, key: str, how: Quantity, nominal: float) -> dict[str, Any]:
+    """Move one number until it is no longer safe, then halve the way between."""
+    # Doubling brackets the first unsafe value in few trials. Bisection is geometric: tolerances are
+    # factors.
+    first = nominal or FIRST_VALUE[key]
+    last, end = first * REACH ** worse_direction(key), ""
+    trials, safe, bad = ValueTrials(screen, key, compiles=not nominal), nominal, math.nan
+    while worse_direction(key) * (last - safe) > 1e-9 * last:
+        candidate = _whole(how, min(max(safe * 2.0 ** worse_direction(key) or first, how.low), how.high))
+        if candidate == safe:
+            end = f"the end of its range, {how.span}"
+            break
+        good = trials.safe(candidate)
+        if not good:
+            bad = candidate if good is not None else math.nan
+            break
+        safe = candidate
+    for _ in range(0 if math.isnan(bad) else HALVINGS):
+        middle = _whole(how, math.sqrt(safe * bad) if safe else 0.5 * bad)
+        if middle in (safe, bad):
+            break
+        good = trials.safe(middle)
+        if good is None:
+            break
+        safe, bad = (middle, bad) if good else (safe, middle)
+    said = "" if trials.verdict in ("safe", "unsafe", "open") else trials.verdict
+    note = "; ".join(text for text in (_kind(screen.flyer.campaign, key), end or said) if text)
+    made: dict[str, Any] = {"key": key, "unit": how.unit, "nominal": nominal, "safe": safe, "flights": trials.flights}
+    made |= ({"factor": safe / nominal} if nominal else {}) | ({} if math.isnan(bad) else {"not_shown": bad})
+    return made | ({"note": note} if note else {})
+
+
+def _kind(campaign: Campaign, key: str) -> str:
+    """Return the kind of the fault to which a number belongs; else empty."""
+    place = key.removeprefix("faults[").partition("]")[0]
+    return campaign.scenario.faults[int(place)].fault.name if place.isdecimal() else ""
+
+
+def _whole(how: Quantity, value: float) -> float:
+    return float(round(value)) if how.whole else value
+
+
+MAX_CELLS = 400  # cells
+
+
+def check_map_axes(scenario: Scenario, axes: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
+    """The two axes of a map; ScenarioError with everything that is wrong with them."""
+    known, faults = declared_numbers(scenario), []
+    if len(axes) != 2:
+        faults.append(f"map: needs two keys, not {len(axes)}")
+    for key, values in axes.items():
+        if key not in known:
+            faults.append(f"map: {key} is not a number of {scenario.name}{suggest(key, known, lead='; ')}")
+            continue
+        how = known[key][0]
+        for value in values:
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not how.low <= value <= how.high:
+                faults.append(f"map: {key} = {value!r} lies outside {how.span}")
+        if len(set(values)) < 2 or sorted(values) != list(values):
+            faults.append(f"map: {key}: give at least two values that grow")
+    if math.prod(len(values) for values in axes.values()) > MAX_CELLS:
+        faults.append(f"map: more than {MAX_CELLS} cells")
+    if faults:
+        raise ScenarioError(faults)
+    return {key: [float(value) for value in values] for key, values in axes.items()}
+
+
+def map_bounds(flyer: CampaignFlyer, axes: Mapping[str, Sequence[float]]) -> dict[str, Any]:
+    """Verdict and bounds of every cell, on seeds that all cells share.
+
+    Returns plain values: level, keys, their units, values, and for each cell values, verdict, low, high (per flight),
+    flights.
+    """
+    screen = ValueScreen(flyer, screening_level(flyer.campaign), MAP_PURPOSE)
+    cells = []
+    for number, values in enumerate(product(*axes.values())):
+        flyer.report(f"map: cell {number + 1} of {math.prod(len(v) for v in axes.values())}")
+        parameters = dict(zip(axes, values, strict=True))
+        batch = value_batch("map", parameters)
+        flyer.store.ask(batch, [list(values)], [parameters])
+        verdict, found = screen.judged(batch, parameters)
+        cell: dict[str, Any] = {"values": list(values), "verdict": verdict, "low": 0.0, "high": 1.0, "flights": 0}
+        if found is not None:
+            cell |= {"low": found.low, "high": found.high, "flights": found.flights, "events": found.events}
+        cells.append(cell)
+    units = [declared_numbers(flyer.campaign.scenario)[key][0].unit for key in axes]
+    result: dict[str, Any] = {"level": screen.level, "keys": list(axes), "units": units}
+    return result | {"axes": [list(values) for values in axes.values()], "cell": cells}
+
 
 COUNT_BUDGET_SHARE = 2.0 / 3.0  # share of the budget that counting may take if tolerances are requested
+
+
+# ---- Certification
 
 
 def certify(
@@ -199,8 +436,6 @@ def run_campaign(
 
                 rare = splitting(flyer.with_budget(left(0.5 if keys else 1.0)), counted, threads, where)
             if keys:
-                from airflock.certificates.tolerance import find_tolerances
-
                 tolerances = find_tolerances(flyer.with_budget(left(0.5 if axes else 1.0)), counted, keys)
             cells = map_bounds(flyer.with_budget(left()), axes) if axes else {}
         except KeyboardInterrupt as stop:

@@ -15,9 +15,8 @@ from airflock.support import AirflockError, RecordingError, suggest
 from airflock.view.flight_paths import scenario_or_none
 from airflock.view.order_parameter_plots import flocked, series, transfer
 from airflock.view.result_plots import received
-from airflock.view.rules_plot import rules
+from airflock.view.rules_plot import rules, wash
 from airflock.view.trajectory_plots import rays, through, trajectories
-from airflock.view.wash_plot import wash
 
 KINDS = (
     "trajectories", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash", "reception",

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from airflock.core import bell, peak, rising
 from airflock.parts.metrics.parameters import Parameters
 
+NAME = "vasarhelyi"
+METRICS = ["speed", "correlation", "nearest", "collisions", "excursion", "rotation", "polarisation"]
 REPORTS = {
     "f_speed": ("", "partial fitness: speed"),
     "f_coll": ("", "partial fitness: collisions"),

@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import Any
 
 from airflock.core import Metric, MetricSet, Parameters as Record, find_members, metric, namespace_names
-from airflock.parts.metrics import fitness_dimock, fitness_kidger, fitness_vasarhelyi, parameters, quality
+from airflock.parts.metrics import parameters, quality
 from airflock.support import RuleError
 
 METRICS: dict[str, Metric] = find_members("airflock.parts.metrics", ["sample"], metric)
@@ -33,49 +33,6 @@ def _groups(q: Any) -> tuple[Metric, ...]:
     return _counted(GROUPS, q)
 
 
-SETS: dict[str, MetricSet] = {
-    found.name: found
-    for found in (
-        MetricSet(
-            "vasarhelyi",
-            _named("speed", "correlation", "nearest", "collisions", "excursion", "rotation", "polarisation"),
-            parameters.Parameters,
-            fitness=fitness_vasarhelyi.fitness,
-            reports=fitness_vasarhelyi.REPORTS,
-            best="fitness",
-        ),
-        MetricSet(
-            "zapotecatl", QUALITY, parameters.Parameters, _quality, best="quality", faults=quality.faults
-        ),
-        MetricSet("groups", GROUPS, parameters.Parameters, _groups, best="quality", faults=quality.faults),
-        MetricSet(
-            "contacts",
-            _named("speed", "polarisation", "nearest", "collisions", "contacts", "excursion"),
-            parameters.Parameters,
-        ),
-        MetricSet("order", _named("speed", "polarisation", "milling", "shape"), parameters.Parameters),
-        MetricSet(
-            "kidger",
-            _named(
-                "flocked", "swarms", "polarisation", "nearest", "collisions", "environment", "avoidance", "speed"
-            ),
-            parameters.Parameters,
-            fitness=fitness_kidger.fitness,
-            reports=fitness_kidger.REPORTS,
-            violates=fitness_kidger.VIOLATES,
-            best="fitness",
-        ),
-        MetricSet(
-            "dimock",
-            _named("power", "steadiness", "collisions"),
-            parameters.Parameters,
-            fitness=fitness_dimock.fitness,
-            reports=fitness_dimock.REPORTS,
-            violates=fitness_dimock.VIOLATES,
-            best="fitness",
-        ),
-    )
-}  # fmt: skip
 DEFAULT_SET = "vasarhelyi"  # the set of a scenario without metrics.kind
 POWER_SETTINGS = {"metrics.kind": "dimock", "metrics.fitness": "sound"}  # settings that measure the power of wings
 
@@ -191,3 +148,18 @@ def reported_values(metric_set_: MetricSet) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every order parameter that flights scored by a set report."""
     own = {name: about for each in metric_set_.metrics for name, about in each.reports.items()}
     return own | dict(metric_set_.reports) | GOALS | PRESENCE
+
+
+SETS: dict[str, MetricSet] = {
+    **find_members("airflock.parts.metrics", ["fitness"], metric_set),
+    "zapotecatl": MetricSet(
+        "zapotecatl", QUALITY, parameters.Parameters, _quality, best="quality", faults=quality.faults
+    ),
+    "groups": MetricSet("groups", GROUPS, parameters.Parameters, _groups, best="quality", faults=quality.faults),
+    "contacts": MetricSet(
+        "contacts",
+        _named("speed", "polarisation", "nearest", "collisions", "contacts", "excursion"),
+        parameters.Parameters,
+    ),
+    "order": MetricSet("order", _named("speed", "polarisation", "milling", "shape"), parameters.Parameters),
+}

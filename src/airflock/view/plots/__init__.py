@@ -3,11 +3,10 @@
 from airflock.view.order_parameter_plots import flocked, heatmap, rotations, series, transfer
 from airflock.view.plot_by_kind import KINDS, plot
 from airflock.view.result_plots import received, stood
-from airflock.view.rules_plot import rules
+from airflock.view.rules_plot import rules, wash
 from airflock.view.search_plots import convergence, fitness_scatter, pareto, slices
 from airflock.view.style import save_figure
 from airflock.view.trajectory_plots import rays, through, trajectories
-from airflock.view.wash_plot import wash
 
 __all__ = [
     "KINDS", "convergence", "fitness_scatter", "flocked", "heatmap", "pareto", "plot", "rays", "received",
