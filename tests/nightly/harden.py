@@ -80,7 +80,7 @@ def judged(seed: int, folder: Path | None) -> dict[str, Any]:
     try:
         steps = harden(scenario, range(STEP), threads=1)
     except ScenarioError as fault:
-        return {**told, "refused": fault.faults[0], "held": True, "grown": False}
+        return {**told, "refused": fault.errors[0], "held": True, "grown": False}
     fresh = range(FIRST, FIRST + JUDGED)
     before, after = fly_parameters(scenario, [steps[0].parameters, steps[-1].parameters], fresh, 1, None)
     walls = contacts(before) > float((before["n_coll"] > 0.0).mean())

@@ -15,7 +15,7 @@ def faults(tmp_path, text):
     file.write_text('extends = "vasarhelyi_2018/4ms"\n' + text)
     with pytest.raises(ScenarioError) as told:
         airflock.load(file)
-    return [line.removeprefix(f"{file}: ") for line in told.value.faults]
+    return [line.removeprefix(f"{file}: ") for line in told.value.errors]
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_a_file_without_a_law_says_what_to_write(tmp_path):
     file.write_text("agents = 5\n[world]\narena = 'square'\n")
     with pytest.raises(ScenarioError) as told:
         airflock.load(file)
-    (line,) = told.value.faults
+    (line,) = told.value.errors
     written = 'write a law under [model], for instance kind = "vasarhelyi_2018", or begin the file with extends ='
     assert f"model.kind is missing; {written}" in line and "couzin_2002" in line and "None" not in line
 
@@ -108,4 +108,4 @@ def test_what_is_no_scenario_says_what_takes_it(tmp_path, name, line):
     for take in (airflock.load, airflock.validate):
         with pytest.raises(ScenarioError) as told:
             take(tmp_path / name)
-        assert told.value.faults[0].startswith(f"{tmp_path / name}: {line}") and len(told.value.faults) == 1
+        assert told.value.errors[0].startswith(f"{tmp_path / name}: {line}") and len(told.value.errors) == 1

@@ -43,7 +43,7 @@ def test_a_file_of_functions_that_no_objective_names_is_refused(tmp_path):
     for objective in ("", 'maximise = "phi_vel"'):
         with pytest.raises(ScenarioError) as fault:
             load_study(study_file(tmp_path, law, objective), trust=True)
-        (said,) = fault.value.faults
+        (said,) = fault.value.errors
         assert "objective.own = 'obj.py': no objective names a function of this file" in said
         assert said.endswith("write objective.maximise = 'quick' (it holds quick, slow)")
     with pytest.raises(ScenarioError, match="it holds no function"):

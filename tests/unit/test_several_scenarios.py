@@ -169,7 +169,7 @@ def test_all_faults_of_scenarios_are_told_together():
         "scenarios[4].set = 3 is not a table",
     ):
         assert words in told
-    assert len(fault.value.faults) == 5
+    assert len(fault.value.errors) == 5
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_all_faults_of_scenarios_are_told_together():
 def test_each_fault_of_several_scenarios_is_one_line(document, words):
     with pytest.raises(ScenarioError) as fault:
         make_study(document, "two.toml")
-    assert words in str(fault.value) and len(fault.value.faults) == 1
+    assert words in str(fault.value) and len(fault.value.errors) == 1
 
 
 def test_a_step_of_hardening_that_breaks_what_held_in_one_of_two_scenarios_is_undone(monkeypatch):

@@ -79,7 +79,7 @@ def test_what_cannot_be_extended_is_told_with_the_file_s_name(tmp_path, monkeypa
     written(tmp_path, text)
     with pytest.raises(ScenarioError) as caught:
         load("mine.toml")
-    assert len(caught.value.faults) == 1 and "mine.toml" in caught.value.faults[0] and fault in caught.value.faults[0]
+    assert len(caught.value.errors) == 1 and "mine.toml" in caught.value.errors[0] and fault in caught.value.errors[0]
 
 
 def test_a_last_word_that_one_section_has_is_that_key():

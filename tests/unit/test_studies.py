@@ -229,7 +229,7 @@ def test_files_that_are_no_store_and_full_disks_are_one_line(tmp_path):
 def test_each_fault_of_a_study_is_one_line(tables, search, words):
     with pytest.raises(ScenarioError) as fault:
         toys.study(tables, **search)
-    assert words in str(fault.value) and len(fault.value.faults) == 1
+    assert words in str(fault.value) and len(fault.value.errors) == 1
 
 
 def test_unknown_order_parameters_name_the_known_ones(tmp_path):

@@ -98,7 +98,7 @@ def test_a_converted_value_is_checked_against_the_declared_range():
 def test_a_unit_of_something_else_is_refused_once(settings, fault):
     with pytest.raises(ScenarioError) as caught:
         load(NAME, settings)
-    assert len(caught.value.faults) == 1 and fault in caught.value.faults[0]
+    assert len(caught.value.errors) == 1 and fault in caught.value.errors[0]
 
 
 @pytest.mark.parametrize(

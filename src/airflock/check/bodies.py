@@ -45,7 +45,7 @@ def check_body(body: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
     parameters : mapping, optional
         Values that differ from the defaults, by name.
     seed : int
-        Of the random motions; it stands in every fault.
+        Of the random motions; it stands in every mismatch.
 
     Returns
     -------
@@ -124,11 +124,11 @@ def _apart(a: NDArray[np.float64], b: NDArray[np.float64], number: int, seed: in
 
 
 def _turns(found: Body, b: Any, motions: list[Motion], turn: NDArray[np.float64], seed: int) -> str:
-    faults = (
+    errors = (
         _apart(_moved(found, b, {k: turn @ v for k, v in m.items()}, 0.02), turn @ _moved(found, b, m, 0.02), i, seed)
         for i, m in enumerate(motions)
     )
-    return next(filter(None, faults), "")
+    return next(filter(None, errors), "")
 
 
 def _rest(found: Body, b: Any) -> str:
@@ -160,9 +160,9 @@ def _units(found: Body, b: Any, motions: list[Motion], seed: int) -> str:
         for number, motion in enumerate(motions):
             scaled = {k: scale[k] * v for k, v in motion.items()}
             moved = _moved(found, other, scaled, 0.02 * units.second, rescaled(WING, units))
-            fault = _apart(moved / scale["v"], _moved(found, b, motion, 0.02), number, seed)
-            if fault:
-                return f"{fault}: a unit is declared wrongly, or the rule contains a number that has a unit"
+            mismatch = _apart(moved / scale["v"], _moved(found, b, motion, 0.02), number, seed)
+            if mismatch:
+                return f"{mismatch}: a unit is declared wrongly, or the rule contains a number that has a unit"
     return ""
 
 

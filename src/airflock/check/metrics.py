@@ -32,7 +32,7 @@ RULES = ("pair", "linked", "agent", "member", "cluster", "sample", "survey")
 FlockTrack = NDArray[np.float64]  # (instant, agent, component): position (m) and velocity (m/s)
 
 
-def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
+def check_metric(part: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     """Run the standing list of truths on an order parameter and return a report with one line a truth.
 
     A flock that is turned, shifted, renumbered or seen in a mirror keeps its order parameters; one agent alone and two
@@ -41,12 +41,12 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
 
     Parameters
     ----------
-    what : Metric, MetricSet, list, namespace or str
+    part : Metric, MetricSet, list, namespace or str
         Order parameters: a metric, a set, its name or file (.py), a list of metrics, or a namespace such as globals().
     dimensions : int
         2 or 3.
     seed : int
-        Of the random flocks; it stands in every fault.
+        Of the random flocks; it stands in every mismatch.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     >>> airflock.check_metric("order").broken
     ()
     """
-    found = require_part(METRIC_SET_KIND.from_caller(what))
+    found = require_part(METRIC_SET_KIND.from_caller(part))
     scenario = _scenario(found, dimensions)
     rng = np.random.default_rng(check_seed(seed))
     flocks = [_flock(rng, dimensions) for _ in range(FLIGHTS)]
@@ -133,8 +133,8 @@ def _measured(scenario: Scenario, flock: FlockTrack, q: Any = None, second: floa
 
 
 def _rules(metrics: Sequence[Metric]) -> str:
-    found = [fault for m in metrics for kind in RULES if (rule := getattr(m, kind)) for fault in law.rule_errors(rule)]
-    return found[0] if found else ""
+    errors = [error for m in metrics for kind in RULES if (rule := getattr(m, kind)) for error in law.rule_errors(rule)]
+    return errors[0] if errors else ""
 
 
 def _reports(scenario: Scenario, flock: FlockTrack) -> str:
@@ -152,9 +152,9 @@ def _units_of(scenario: Scenario) -> dict[str, str]:
 
 def _same(scenario: Scenario, flocks: Sequence[FlockTrack], others: Sequence[FlockTrack], seed: int) -> str:
     for number, (flock, other) in enumerate(zip(flocks, others, strict=True)):
-        fault = _apart(_measured(scenario, other), _measured(scenario, flock))
-        if fault:
-            return f"flock {number} of seed {seed}: {fault}"
+        mismatch = _apart(_measured(scenario, other), _measured(scenario, flock))
+        if mismatch:
+            return f"flock {number} of seed {seed}: {mismatch}"
     return ""
 
 
@@ -182,10 +182,10 @@ def _units(scenario: Scenario, flocks: Sequence[FlockTrack], seed: int) -> str:
         for number, flock in enumerate(flocks):
             values = _measured(scenario, flock)
             wanted = {name: value * _factor(known, name, units) for name, value in values.items()}
-            fault = _apart(_measured(other, flock * scale, q, units.second), wanted, CLOSE_IN_OTHER_UNITS)
-            if fault:
+            mismatch = _apart(_measured(other, flock * scale, q, units.second), wanted, CLOSE_IN_OTHER_UNITS)
+            if mismatch:
                 hidden = "a unit is declared wrongly, or a rule contains a number that has a unit"
-                return f"flock {number} of seed {seed}: {fault}: {hidden}"
+                return f"flock {number} of seed {seed}: {mismatch}: {hidden}"
     return ""
 
 

@@ -76,7 +76,7 @@ def check_model(
     dimensions : int
         2 or 3.
     seed : int
-        Of the random scenes; it stands in every fault.
+        Of the random scenes; it stands in every mismatch.
     compiled : bool
         Also fly the law compiled, which takes some seconds, and compare.
 
@@ -243,9 +243,9 @@ def _units(law: TestedLaw, scenes: Sequence[Scene], seed: int) -> str:
         other = replace(law, scenario=rescaled_scenario(law.scenario, units))
         by = unit_factor(COMMANDS[law.model.command], units)
         answers = [other.command(in_units(scene, units)) / by for scene in scenes]
-        fault = _worst(answers, expected, seed, CLOSE_IN_FLIGHT)
-        if fault:
-            return f"{fault}: {HIDDEN}"
+        mismatch = _worst(answers, expected, seed, CLOSE_IN_FLIGHT)
+        if mismatch:
+            return f"{mismatch}: {HIDDEN}"
     return _units_in_flight(law, seed)
 
 

@@ -41,7 +41,7 @@ def check_radio(radio: Any, parameters: Mapping[str, Any] | None = None, *, seed
     parameters : mapping, optional
         Values that differ from the defaults, by name.
     seed : int
-        Of the random pairs; it stands in every fault.
+        Of the random pairs; it stands in every mismatch.
 
     Returns
     -------

@@ -51,7 +51,7 @@ def check_sensor(sensor: Any, parameters: Mapping[str, Any] | None = None, *, se
     parameters : mapping, optional
         Values that differ from the defaults, by name.
     seed : int
-        Of the random tracks; it stands in every fault.
+        Of the random tracks; it stands in every mismatch.
 
     Returns
     -------
@@ -129,11 +129,11 @@ def _apart(a: Track, b: Track, number: int, seed: int) -> str:
 
 def _place(found: Sensor, s: Any, tracks: list[Track], period: float, seed: int) -> str:
     shift = np.array([1234.0, -567.0, 89.0, 0.0, 0.0, 0.0])
-    faults = (
+    errors = (
         _apart(_believed(found, s, t + shift, period, seed), _believed(found, s, t, period, seed) + shift, k, seed)
         for k, t in enumerate(tracks)
     )
-    return next(filter(None, faults), "")
+    return next(filter(None, errors), "")
 
 
 def _bounded(found: Sensor, s: Any, period: float, seed: int) -> str:
@@ -157,9 +157,9 @@ def _units(found: Sensor, s: Any, tracks: list[Track], period: float) -> str:
         scale, other = _scale(units), rescaled(s, units)
         for number, track in enumerate(tracks):
             scaled = _believed(found, other, track * scale, period * units.second, number)
-            fault = _apart(scaled / scale, _believed(found, s, track, period, number), number, number)
-            if fault:
-                return f"{fault}: a unit is declared wrongly, or the rule contains a number that has a unit"
+            mismatch = _apart(scaled / scale, _believed(found, s, track, period, number), number, number)
+            if mismatch:
+                return f"{mismatch}: a unit is declared wrongly, or the rule contains a number that has a unit"
     return ""
 
 

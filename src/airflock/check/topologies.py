@@ -51,7 +51,7 @@ def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *
     parameters : mapping, optional
         Values that differ from the defaults, by name.
     seed : int
-        Of the random flocks; it stands in every fault.
+        Of the random flocks; it stands in every mismatch.
 
     Returns
     -------
@@ -85,11 +85,11 @@ def check_topology(topology: Any, parameters: Mapping[str, Any] | None = None, *
     return run_truths(f"topology {found.name}", truths, found.violates)
 
 
-def _gathered(what: Any) -> Topology:
-    found, faults = TOPOLOGY_KIND.from_caller(what)
-    if found is None and not faults:
-        faults = [f"topology {what!r}: agents meet all whom they hear; there is no rule to check"]
-    return require_part((found, faults))
+def _gathered(source: Any) -> Topology:
+    found, errors = TOPOLOGY_KIND.from_caller(source)
+    if found is None and not errors:
+        errors = [f"topology {source!r}: agents meet all whom they hear; there is no rule to check"]
+    return require_part((found, errors))
 
 
 def _flocks(found: Topology, seed: int) -> Iterator[Neighbours]:

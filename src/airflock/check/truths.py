@@ -45,21 +45,21 @@ class Truth:
 
     name: str
     statement: str
-    fault: str = ""
+    mismatch: str = ""
     reason: str = ""
 
     @property
     def is_broken(self) -> bool:
         """Return True if the truth is broken without being declared in VIOLATES."""
-        return bool(self.fault) and not self.reason
+        return bool(self.mismatch) and not self.reason
 
     def __str__(self) -> str:
         """One line for a person."""
-        if not self.fault:
+        if not self.mismatch:
             return f"holds   {self.name}: {self.statement}"
         if self.reason:
             return f"breaks  {self.name}, as declared: {self.reason}"
-        return f"BREAKS  {self.name}: {self.statement}; {self.fault}"
+        return f"BREAKS  {self.name}: {self.statement}; {self.mismatch}"
 
 
 @dataclass(frozen=True)
@@ -76,15 +76,15 @@ class Report:
     @property
     def broken(self) -> tuple[str, ...]:
         """Names of the truths that do not hold, declared or not."""
-        return tuple(truth.name for truth in self.truths if truth.fault)
+        return tuple(truth.name for truth in self.truths if truth.mismatch)
 
 
 def require_part(part_and_errors: tuple[Part | None, list[str]]) -> Part:
     """Return the part that was read; raise a ScenarioError that lists the errors if there are any."""
-    what, faults = part_and_errors
-    if faults or what is None:
-        raise ScenarioError(faults)
-    return what
+    part, errors = part_and_errors
+    if errors or part is None:
+        raise ScenarioError(errors)
+    return part
 
 
 def run_truths(name: str, truths: TruthTable, violates: Mapping[str, str]) -> Report:
@@ -98,12 +98,12 @@ def run_truths(name: str, truths: TruthTable, violates: Mapping[str, str]) -> Re
     made = []
     for key, (says, check) in truths.items():
         try:
-            fault = check()
+            mismatch = check()
         except RuleError as error:
-            fault = str(error).splitlines()[0]
+            mismatch = str(error).splitlines()[0]
         except (ArithmeticError, ValueError) as error:  # of the rule itself: a division by zero, a root of -1
-            fault = f"{type(error).__name__}: {error}"
-        made.append(Truth(key, says, fault, violates.get(key, "")))
+            mismatch = f"{type(error).__name__}: {error}"
+        made.append(Truth(key, says, mismatch, violates.get(key, "")))
     report = Report(name, tuple(made))
     if any(truth.is_broken for truth in made):
         raise CheckError("\n".join(f"{name}: {truth}" for truth in made if truth.is_broken))
@@ -112,9 +112,9 @@ def run_truths(name: str, truths: TruthTable, violates: Mapping[str, str]) -> Re
 
 def parameters_with_values(record: type, values: Any, section: str) -> Any:
     """A record of parameters with the values that a caller gives by name; the others keep their defaults."""
-    made, faults = schema.read_section(section, settings_dict(values, f"check of {section}"), record)
-    if faults:
-        raise ScenarioError(faults)
+    made, errors = schema.read_section(section, settings_dict(values, f"check of {section}"), record)
+    if errors:
+        raise ScenarioError(errors)
     return made
 
 

@@ -159,8 +159,8 @@ def _choices(parameter: Any) -> list[str]:
 
 # ---- Verbs
 
-ERRORS_KEY = "airflock.parts.faults"  # of a command line, in the context of its verb
-VALUE_ERROR_NAMES = ("BadParameter", "MissingParameter")  # faults of one option alone
+ERRORS_KEY = "airflock.errors"  # of a command line, in the context of its verb
+VALUE_ERROR_NAMES = ("BadParameter", "MissingParameter")  # errors of one option alone
 NUMBER_TYPE_NAMES = ("IntParamType", "FloatParamType", "IntRange", "FloatRange")  # kinds of options
 
 

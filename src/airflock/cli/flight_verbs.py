@@ -394,7 +394,7 @@ def merge_similar_notes(notes: Iterable[str]) -> Iterator[str]:
 def check_distinct_keys(keys: Sequence[str], plot: Path | None) -> None:
     """Refuse a key that is swept twice, and a picture of more keys than it has axes."""
     errors = [f"--over {key}: given {keys.count(key)} times; give all its values in one --over" for key in keys]
-    errors = [fault for fault, key in zip(errors, keys, strict=True) if keys.count(key) > 1]
+    errors = [error for error, key in zip(errors, keys, strict=True) if keys.count(key) > 1]
     if plot is not None and len(set(keys)) > 2:
         errors.append(f"--plot {plot}: a picture shows 1 or 2 keys, not {len(set(keys))}; leave it out, or sweep fewer")
     if errors:
@@ -623,16 +623,16 @@ def display(
     """
     from airflock.displays import fly_show, plan_shapes
 
-    faults: list[str] = []
-    with collect_errors(faults):
+    errors: list[str] = []
+    with collect_errors(errors):
         options.check_writable((save, RECORDINGS), (plot, PICTURES), reads=shapes)
     settings: dict[str, Any] = {}
-    with collect_errors(faults):
+    with collect_errors(errors):
         settings = options.parse_settings(changes)
     layouts = []
-    with collect_errors(faults):
+    with collect_errors(errors):
         layouts = plan_shapes(shapes, drones, failing, failure, points, spacing, settings, "--")
-    options.raise_errors(faults)
+    options.raise_errors(errors)
     show = fly_show(layouts, drones, failing, failure, seed, settings)
     rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.shape_reports, strict=True)]
     if save is not None:

@@ -69,7 +69,7 @@ def validate(
     trust: options.Trust = False,
     as_json: options.Json = False,
 ) -> None:
-    """Check scenario and study files (every fault at once), or fly a recording again and compare the bits.
+    """Check scenario and study files (every error at once), or fly a recording again and compare the bits.
 
     With --json, each file has a verdict (null if it is wrong), its faults and its notes. Exit status 2 if any is wrong.
 
@@ -84,12 +84,12 @@ def validate(
             for note in entry["notes"]:
                 terminal.print_message(f"note: {name}: {note}")
             typer.echo(f"{name}: {entry['verdict']}")
-    faults = [fault for entry in checked for fault in entry["faults"]]
+    errors = [error for entry in checked for error in entry["faults"]]
     if not as_json:
-        options.raise_errors(faults)
+        options.raise_errors(errors)
         return
     terminal.print_json({"files": checked})
-    if faults:
+    if errors:
         raise typer.Exit(2)
 
 
@@ -97,16 +97,15 @@ def _checked(name: str, changed: dict[str, Any], law: str | None, trust: bool) -
     """Return verdict, notes and errors of one file; each error begins with its name."""
     from airflock.search import ValidationReport, validate
 
-    found: list[str] = []
+    errors: list[str] = []
     valid: ValidationReport | None = None
-    with collect_errors(found):
+    with collect_errors(errors):
         valid = validate(name, changed, law, trust=trust)
-    faults = [fault if name in fault else f"{name}: {fault}" for fault in found]
     return {
         "file": name,
         "verdict": valid.verdict if valid else None,
         "notes": list(valid.notes) if valid else [],
-        "faults": faults,
+        "faults": [error if name in error else f"{name}: {error}" for error in errors],
     }
 
 

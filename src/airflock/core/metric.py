@@ -75,7 +75,7 @@ METRIC_SET = {
         "duration": "time flown, s",
         "q": "metric parameters",
     },
-    "faults": {
+    "errors": {
         "q": "metric parameters",
         "largest": "largest extension, m; 0.0 without an arena",
         "edges": "world.edges",
@@ -239,7 +239,7 @@ class MetricSet:
     reports    : of what `fitness` gives: unit and meaning
     best       : the order parameter that is larger in a better flight; empty if none is
     violates   : truths of `airflock.check_metric` that its fitness breaks, and why (VIOLATES)
-    faults     : of any of q, largest (extension, m), edges → what is wrong with the parameters, one line each
+    errors     : of any of q, largest (extension, m), edges → what is wrong with the parameters, one line each
     """
 
     name: str
@@ -249,7 +249,7 @@ class MetricSet:
     fitness: Callable[..., Mapping[str, float]] | None = None
     reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     best: str = ""
-    faults: Callable[..., list[str]] | None = None
+    errors: Callable[..., list[str]] | None = None
     violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
@@ -258,8 +258,8 @@ class MetricSet:
     def __post_init__(self) -> None:
         if self.fitness is not None:
             argument_names(self.fitness, "fitness", self.name)
-        if self.faults is not None:
-            argument_names(self.faults, "faults", self.name)
+        if self.errors is not None:
+            argument_names(self.errors, "errors", self.name)
         names = [item.name for item in self.metrics]
         values = [value for item in self.metrics for value in item.Sample._fields]
         for which, found in (("metric", names), ("value", values)):

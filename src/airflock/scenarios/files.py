@@ -111,7 +111,7 @@ def load(
     Raises
     ------
     ScenarioError
-        With one line per fault: file, key, value, unit, allowed range, and the nearest right key.
+        With one line per error: file, key, value, unit, allowed range, and the nearest right key.
     RuleError
         If a law or another part of your own breaks the contract of its kind.
 
@@ -287,7 +287,7 @@ def _extended(
     try:
         base, place = read(name, folder)
     except ScenarioError as error:
-        raise ScenarioError([f"{where}: extends = {name!r}: {line}" for line in error.faults]) from error
+        raise ScenarioError([f"{where}: extends = {name!r}: {line}" for line in error.errors]) from error
     # The base's own files are named relative to the base, so they become absolute before the merge.
     base, _ = _extended(_with_paths(base, place), name, place, read, (*chain, name))
     for key in OF_ITS_OWN:

@@ -114,9 +114,9 @@ def import_user_file(path: Path, where: str, *, trust: bool) -> ModuleType:
     return module
 
 
-def _beside(path: Path, fault: BaseException) -> str:
+def _beside(path: Path, error: BaseException) -> str:
     """Return a hint for a missing module that lies beside the importing file; "" for any other error."""
-    wanted = str(fault.name).partition(".")[0] if isinstance(fault, ModuleNotFoundError) else ""
+    wanted = str(error.name).partition(".")[0] if isinstance(error, ModuleNotFoundError) else ""
     if not wanted or not is_file(path.with_name(f"{wanted}.py")):
         return ""
     return f"; code of your own is one file, also of those who get it from you: write into it what {wanted}.py has"

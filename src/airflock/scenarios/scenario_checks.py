@@ -77,12 +77,12 @@ def topology_errors(kind: Topology | None, world: Any, model: Model | None) -> l
 
 def metric_errors(measures: MetricSet, q: Any, world: Any) -> list[str]:
     """Return the errors that a metric set finds in its parameters beyond single ranges."""
-    if q is None or world is None or measures.faults is None:
+    if q is None or world is None or measures.errors is None:
         return []
     # A metric set names the arguments that its check needs; the same call serves sets of the user's
     # own.
     given = {"q": q, "largest": largest_extension(world), "edges": world.edges}
-    return list(call_rule(measures.faults, "faults", given, measures.name))
+    return list(call_rule(measures.errors, "errors", given, measures.name))
 
 
 def silence_errors(rule: str, flight: Any, model: Model | None) -> list[str]:

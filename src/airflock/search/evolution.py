@@ -411,7 +411,7 @@ def validate(
     Raises
     ------
     AirflockError
-        With one line for each fault: key, value, unit, allowed range, and the nearest right key.
+        With one line for each error: key, value, unit, allowed range, and the nearest right key.
 
     Examples
     --------

@@ -349,10 +349,10 @@ def harden(
 
 def hardening_request(scenarios: Sequence[Scenario], cost: float, limit: str | Sequence[str] = ()) -> Constraints:
     """Return the constraints of a request. Raises ScenarioError with all errors together."""
-    held, faults = read_limits({"limits": limit}, scenarios)
-    faults += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
-    if faults:
-        raise ScenarioError(faults)
+    held, errors = read_limits({"limits": limit}, scenarios)
+    errors += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
+    if errors:
+        raise ScenarioError(errors)
     return Constraints(held, cost)
 
 

@@ -167,44 +167,44 @@ def search_errors(
     space  : None if it could not be read
     limits : True if the study has limits
     """
-    faults = [
+    errors = [
         f"search.{name} = {value:g} is not a whole number"
         for name in WHOLE
         if (value := getattr(search, name)) != int(value)
     ]
     if search.algorithm == MULTI_OBJECTIVE and len(objectives) < 2:
-        faults.append(
+        errors.append(
             f"search.algorithm = '{MULTI_OBJECTIVE}' is for several objectives, but there is one; "
             "give objective.maximise a list"
         )
     if search.algorithm != MULTI_OBJECTIVE and len(objectives) > 1:
-        faults.append(
+        errors.append(
             f"search.algorithm = '{search.algorithm}' takes one objective, but there are {len(objectives)}; "
             f"give one, or search.algorithm = '{MULTI_OBJECTIVE}'"
         )
-    faults += _only_cmaes(search) + _racing_faults(search, objectives, over_scenarios)
+    errors += _only_cmaes(search) + _racing_faults(search, objectives, over_scenarios)
     if limits and search.racing != "none":
-        faults.append("search.racing compares fitness and knows no limits; leave out objective.limits or search.racing")
+        errors.append("search.racing compares fitness and knows no limits; leave out objective.limits or search.racing")
     if search.again and (limits or len(objectives) > 1):
-        faults.append("search.again compares one fitness; leave it at 0 with limits or several objectives")
+        errors.append("search.again compares one fitness; leave it at 0 with limits or several objectives")
     if search.flights == "growing":
         if search.generations < FEWEST:
-            faults.append(
+            errors.append(
                 f"search.flights = 'growing' needs at least {FEWEST} generations, but search.generations = "
                 f"{search.generations:g}"
             )
         if space is not None and "duration" in {*space.keys, *space.fixed, *space.tied}:
-            faults.append("search.flights = 'growing' sets the duration, which the space does, too; leave out one")
+            errors.append("search.flights = 'growing' sets the duration, which the space does, too; leave out one")
     populations = [round(search.population * search.growth**run) for run in range(min(int(search.restarts), 20) + 1)]
     odd = [population for population in populations if population % 2]
     if search.algorithm == "ga" and odd:
         grown = "" if odd[0] == populations[0] else " after restarts that enlarge it"
-        faults.append(f"search.population = {odd[0]}{grown} is odd: in algorithm ga two parents have two children")
+        errors.append(f"search.population = {odd[0]}{grown} is odd: in algorithm ga two parents have two children")
     flights = search.population * search.growth**search.restarts * search.generations * (search.restarts + 1.0)
     flights *= max(search.seeds, search.late_seeds)
     if flights >= 2 ** (SEED_BITS - 4):
-        faults.append(f"search: {flights:g} flights are more than a study can number")
-    return faults
+        errors.append(f"search: {flights:g} flights are more than a study can number")
+    return errors
 
 
 def _only_cmaes(search: SearchSettings) -> list[str]:
@@ -224,11 +224,11 @@ def _racing_faults(search: SearchSettings, objectives: Sequence[Objective], over
     """Why candidates of this search cannot race."""
     if search.racing == "none":
         return []
-    faults = []
+    errors = []
     if search.seeds < 2:
-        faults.append("search.racing needs at least 2 flights of a candidate; give search.seeds = 4, for instance")
+        errors.append("search.racing needs at least 2 flights of a candidate; give search.seeds = 4, for instance")
     if search.random_numbers == "fresh":
-        faults.append("search.racing needs common seeds; give search.random_numbers = 'generation'")
+        errors.append("search.racing needs common seeds; give search.random_numbers = 'generation'")
     if any(objective.over_seeds != "mean" for objective in objectives) or over_scenarios != "mean":
-        faults.append("search.racing compares means; leave over_seeds and over_scenarios at 'mean'")
-    return faults
+        errors.append("search.racing compares means; leave over_seeds and over_scenarios at 'mean'")
+    return errors

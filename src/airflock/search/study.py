@@ -174,9 +174,9 @@ def load_study(
         )
 
 
-def _once(where: str, fault: str) -> str:
+def _once(where: str, error: str) -> str:
     """Prefix an error with the name of its file, but not twice."""
-    return fault if fault.startswith(f"{where}: ") else f"{where}: {fault}"
+    return error if error.startswith(f"{where}: ") else f"{where}: {error}"
 
 
 def make_study(
@@ -195,21 +195,21 @@ def make_study(
     scenario : in place of its key of that name; or several, in place of `scenarios`
     limits   : in place of those of its objective; each candidate then flies twice at least, unless `search` has seeds
     """
-    document, faults = formats.to_current_format(document, where), []
+    document, errors = formats.to_current_format(document, where), []
     for key in document:
         if key not in KEYS:
             of_search = key in {field.name for field in fields(SearchSettings)}
             hint = f"did you mean search.{key}?" if of_search else suggest(key, KEYS, f"known: {', '.join(KEYS)}")
-            faults.append(f"{key}: unknown key; {hint}")
+            errors.append(f"{key}: unknown key; {hint}")
     table = document.get("search", {})
     found, more = schema.read_section(
         "search", {**table, **(search or {})} if isinstance(table, Mapping) else table, SearchSettings
     )
-    faults += more
+    errors += more
     if scenario is None:
         scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
         if more or not scenarios:
-            named = [*(f"{where}: {fault}" for fault in faults), *(_once(where, fault) for fault in more)]
+            named = [*(f"{where}: {error}" for error in errors), *(_once(where, error) for error in more)]
             raise ScenarioError(named)
     else:
         scenarios = (scenario,) if isinstance(scenario, Scenario) else tuple(scenario)
@@ -218,21 +218,21 @@ def make_study(
     notes: list[str] = []
     if "space" in document:
         space, more = read_space(document["space"], scenarios[0])
-        faults += more
+        errors += more
     else:
         space, notes = common_space(scenarios)
     over = document.get("over_scenarios", "mean")
-    faults += joint_errors(scenarios, labels, space, over)
+    errors += joint_errors(scenarios, labels, space, over)
     objectives, more = read_objectives(document.get("objective", {}), scenarios[0], folder, trust=trust)
     kept, of_limits = read_limits({"limits": list(limits)} if limits else document.get("objective", {}), scenarios)
-    faults += more + of_limits
+    errors += more + of_limits
     if found is not None:
         # One flight has no spread, and limits are judged by the spread of flights.
         if limits and "seeds" not in (search or {}) and found.seeds < 2.0:
             found = replace(found, seeds=2.0)
-        faults += search_errors(found, objectives, space, str(over), limits=bool(kept))
-    if faults or space is None or found is None:
-        raise ScenarioError([f"{where}: {fault}" for fault in faults])
+        errors += search_errors(found, objectives, space, str(over), limits=bool(kept))
+    if errors or space is None or found is None:
+        raise ScenarioError([f"{where}: {error}" for error in errors])
     return Study(
         scenarios[0], space, objectives, found, str(document.get("title", "")), notes=tuple(notes),
         others=scenarios[1:], over_scenarios=str(over), labels=labels, limits=kept,
@@ -256,7 +256,7 @@ def combine_scenarios(values: Sequence[float | None], over_scenarios: str, maxim
 def read_scenarios(
     document: Mapping[str, Any], settings: Mapping[str, Any], folder: Path | None, trust: bool
 ) -> tuple[tuple[Scenario, ...], tuple[str, ...], list[str]]:
-    """Scenarios of a study's document, what to call each, and all faults.
+    """Scenarios of a study's document, what to call each, and all errors.
 
     settings : keys to change in all of them, as the document's table `set` does
     """
@@ -276,10 +276,10 @@ def read_scenarios(
             return (), (), [f"scenarios = {shortened(repr(entries), 80)} is not a list of presets, files or tables"]
     found: list[Scenario] = []
     labels: list[str] = []
-    faults: list[str] = []
+    errors: list[str] = []
     for i, entry in enumerate(entries):
         name, own, more = _entry(entry, i)
-        faults += more
+        errors += more
         if more:
             continue
         beside = folder / name if folder is not None else None
@@ -287,11 +287,11 @@ def read_scenarios(
             path = beside if beside is not None and is_file(beside) else name
             found.append(load(path, {**keys, **own, **settings}, trust=trust))
         except ScenarioError as error:
-            faults += error.faults
+            errors += error.errors
             continue
         detail = ", ".join(f"{key} = {value}" for key, value in own.items())
         labels.append(f"{name} with {detail}" if detail else name)
-    return tuple(found), distinct_labels(labels), faults
+    return tuple(found), distinct_labels(labels), errors
 
 
 def distinct_labels(labels: Sequence[str]) -> tuple[str, ...]:
@@ -307,11 +307,11 @@ def _entry(entry: Any, number: int) -> tuple[str, Mapping[str, Any], list[str]]:
     if not isinstance(entry, Mapping) or not isinstance(entry.get("scenario"), str):
         how = 'write a name, or { scenario = "NAME", set = { "radio.delay" = 1.0 } }'
         return "", {}, [f"{at} = {shortened(repr(entry), 80)} names no scenario; {how}"]
-    faults = [f"{at}.{key}: unknown key; known: {', '.join(ENTRY_KEYS)}" for key in entry if key not in ENTRY_KEYS]
+    errors = [f"{at}.{key}: unknown key; known: {', '.join(ENTRY_KEYS)}" for key in entry if key not in ENTRY_KEYS]
     own = entry.get("set", {})
     if not isinstance(own, Mapping):
-        faults.append(f"{at}.set = {shortened(repr(own), 80)} is not a table")
-    return str(entry["scenario"]), own if isinstance(own, Mapping) else {}, faults
+        errors.append(f"{at}.set = {shortened(repr(own), 80)} is not a table")
+    return str(entry["scenario"]), own if isinstance(own, Mapping) else {}, errors
 
 
 def common_space(scenarios: Sequence[Scenario]) -> tuple[SearchSpace, list[str]]:
@@ -335,18 +335,18 @@ def joint_errors(
     scenarios: Sequence[Scenario], labels: Sequence[str], space: SearchSpace | None, over_scenarios: Any
 ) -> list[str]:
     """Why one set of numbers cannot be searched for these scenarios, one line each."""
-    faults = []
+    errors = []
     if over_scenarios not in OVER_SCENARIOS:
-        faults.append(f"over_scenarios = {over_scenarios!r} is none of {', '.join(OVER_SCENARIOS)}")
+        errors.append(f"over_scenarios = {over_scenarios!r} is none of {', '.join(OVER_SCENARIOS)}")
     for label, scenario in zip(labels[1:], scenarios[1:], strict=True):
         first, law = scenarios[0].model.name, scenario.model.name
         if law != first:
-            faults.append(f"scenarios: {label} flies {law}, {labels[0]} {first}; one set of numbers needs one law")
+            errors.append(f"scenarios: {label} flies {law}, {labels[0]} {first}; one set of numbers needs one law")
             continue
         known = declared_numbers(scenario)
         keys = () if space is None else (*space.keys, *space.fixed, *space.tied)
-        faults += [f"space.{key}: {label} has no such number" for key in keys if key not in known]
-    return faults
+        errors += [f"space.{key}: {label} has no such number" for key in keys if key not in known]
+    return errors
 
 
 def study_summary(study: Study) -> str:

@@ -1,4 +1,4 @@
-"""The table [space] of a study file: reading it, and everything that can be wrong with it, all faults at once."""
+"""The table [space] of a study file: reading it, and everything that can be wrong with it, all errors at once."""
 
 import math
 import re
@@ -16,9 +16,9 @@ ENTRY = ("low", "high", "unit", "scale", "integer", "above", "fixed", "tied", "f
 
 
 def read_space(table: Any, scenario: Scenario) -> tuple[SearchSpace | None, list[str]]:
-    """Space from the table [space] of a study file, or None; and all faults in it. Only what is listed varies."""
+    """Space from the table [space] of a study file, or None; and all errors in it. Only what is listed varies."""
     known = declared_numbers(scenario)
-    entries, faults = _entries(table)
+    entries, errors = _entries(table)
     axes: list[SearchAxis] = []
     fixed: dict[str, float] = {}
     tied: dict[str, TiedParameter] = {}
@@ -27,10 +27,10 @@ def read_space(table: Any, scenario: Scenario) -> tuple[SearchSpace | None, list
             hint = suggest(key, known, lead="; ", prefix="space.")
             if key.startswith("aero.") and not scenario.is_aerodynamic:
                 hint = f", which has no section [aero]; --set {key}=VALUE adds drag descent to it"
-            faults.append(f"space.{key} is not a number of {scenario.name}{hint}")
+            errors.append(f"space.{key} is not a number of {scenario.name}{hint}")
             continue
         more = _entry_faults(key, entry, known[key][0], known)
-        faults += more
+        errors += more
         if more:
             continue
         if "fixed" in entry:
@@ -46,8 +46,8 @@ def read_space(table: Any, scenario: Scenario) -> tuple[SearchSpace | None, list
         if other in known and other not in {a.key for a in axes} | set(fixed) and known[other][1] is not None:
             fixed[other] = float(known[other][1] or 0.0)
     space = SearchSpace(tuple(axes), fixed, tied)
-    faults += _faults_between(space, known, bool(faults))
-    return (None if faults else space), faults
+    errors += _faults_between(space, known, bool(errors))
+    return (None if errors else space), errors
 
 
 def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> SearchAxis:
@@ -61,12 +61,12 @@ def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> SearchAxis:
 def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
     """Key → entry, from sections or dotted keys."""
     found: dict[str, Mapping[str, Any]] = {}
-    faults = []
+    errors = []
     if not isinstance(table, Mapping):
         return {}, [f"space = {table!r} is not a table of keys"]
     for section, entries in table.items():
         if not isinstance(entries, Mapping):
-            faults.append(f"space.{section} = {entries!r} is not a table; write {{ low = ..., high = ... }}")
+            errors.append(f"space.{section} = {entries!r} is not a table; write {{ low = ..., high = ... }}")
         elif "." in section or (entries and set(entries) <= set(ENTRY)):
             found[section] = entries
         else:
@@ -74,39 +74,39 @@ def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
                 if isinstance(entry, Mapping):
                     found[f"{section}.{name}"] = entry
                 else:
-                    faults.append(
+                    errors.append(
                         f"space.{section}.{name} = {entry!r} is not a table; write {{ low = ..., high = ... }}"
                     )
-    return found, faults
+    return found, errors
 
 
 def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapping[str, Any]) -> list[str]:
     """Return the errors of one entry by itself."""
-    faults = []
+    errors = []
     for name, value in entry.items():
         numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
         if name not in ENTRY:
-            faults.append(f"space.{key}.{name}: unknown key; {suggest(name, ENTRY, ', '.join(ENTRY))}")
+            errors.append(f"space.{key}.{name}: unknown key; {suggest(name, ENTRY, ', '.join(ENTRY))}")
         elif name in ("low", "high", "fixed", "factor", "offset") and not numeric:
-            faults.append(f"space.{key}.{name} = {value!r} is not a number; give {how.span}")
+            errors.append(f"space.{key}.{name} = {value!r} is not a number; give {how.span}")
         elif name in ("low", "high", "fixed") and not how.low <= value <= how.high:
-            faults.append(
+            errors.append(
                 f"space.{key}.{name} = {format_with_unit(f'{value:g}', how.unit)} lies outside the declared {how.span}"
             )
         elif name == "unit" and value != how.unit:
-            faults.append(f"space.{key}.unit = {value!r}: the unit is {how.unit}")
+            errors.append(f"space.{key}.unit = {value!r}: the unit is {how.unit}")
         elif name == "scale" and value not in ("linear", "log"):
-            faults.append(f"space.{key}.scale = {value!r} is none of linear, log")
+            errors.append(f"space.{key}.scale = {value!r} is none of linear, log")
         elif name == "integer" and not isinstance(value, bool):
-            faults.append(f"space.{key}.integer = {value!r} is none of true, false")
+            errors.append(f"space.{key}.integer = {value!r} is none of true, false")
         elif how.whole and (name == "tied" or (name == "integer" and not value)):
-            faults.append(f"space.{key}.{name} = {str(value).lower()}: only whole numbers make sense")
+            errors.append(f"space.{key}.{name} = {str(value).lower()}: only whole numbers make sense")
         elif how.whole and name == "fixed" and value != int(value):
-            faults.append(f"space.{key}.fixed = {value:g} is not a whole number")
+            errors.append(f"space.{key}.fixed = {value:g} is not a whole number")
         elif name in ("above", "tied") and not (isinstance(value, str) and value in known):
-            faults.append(f"space.{key}.{name} = {value!r} is not a number{suggest(value, known, lead='; ')}")
-    if faults or "fixed" in entry or "tied" in entry:
-        return faults
+            errors.append(f"space.{key}.{name} = {value!r} is not a number{suggest(value, known, lead='; ')}")
+    if errors or "fixed" in entry or "tied" in entry:
+        return errors
     return _range_faults(_axis(key, entry, how))
 
 
@@ -126,24 +126,24 @@ def _faults_between(
     space: SearchSpace, known: Mapping[str, tuple[Quantity, float | None]], is_reported: bool
 ) -> list[str]:
     """Ties and orders that cannot hold."""
-    faults = []
+    errors = []
     axes = {axis.key: axis for axis in space.axes}
     for axis in space.axes:
         chain = [axis.key]
         while axes.get(chain[-1]) and axes[chain[-1]].above:
             chain.append(axes[chain[-1]].above)
             if chain[-1] in chain[:-1]:
-                faults.append(f"space.{axis.key}: above runs in a circle: {' > '.join(chain)}")
+                errors.append(f"space.{axis.key}: above runs in a circle: {' > '.join(chain)}")
                 break
         if axis.above and axis.above not in axes and axis.above not in space.fixed:
-            faults.append(f"space.{axis.key}.above = {axis.above!r} neither varies nor is fixed")
+            errors.append(f"space.{axis.key}.above = {axis.above!r} neither varies nor is fixed")
         lower = axes[axis.above].high if axis.above in axes else space.fixed.get(axis.above, axis.low)
         if axis.above and lower > axis.high:
             high = format_with_unit(f"{axis.high:g}", axis.unit)
-            faults.append(f"space.{axis.key}.high = {high} lies below {axis.above} = {lower:g}")
+            errors.append(f"space.{axis.key}.high = {high} lies below {axis.above} = {lower:g}")
     for key, tie in space.tied.items():
         if tie.of not in axes and tie.of not in space.fixed:
-            faults.append(f"space.{key}.tied = {tie.of!r} neither varies nor is fixed")
+            errors.append(f"space.{key}.tied = {tie.of!r} neither varies nor is fixed")
             continue
         ends = (axes[tie.of].low, axes[tie.of].high) if tie.of in axes else (space.fixed[tie.of],)
         how = known[key][0]
@@ -151,10 +151,10 @@ def _faults_between(
             value = tie.factor * end + tie.offset
             if not how.low <= value <= how.high:
                 reached = format_with_unit(f"{value:g}", how.unit)
-                faults.append(f"space.{key} = {reached} at {tie.of} = {end:g} lies outside {how.span}")
+                errors.append(f"space.{key} = {reached} at {tie.of} = {end:g} lies outside {how.span}")
     if not space.axes and not is_reported:
-        faults.append("space: nothing varies; give at least one key low and high")
-    return faults
+        errors.append("space: nothing varies; give at least one key low and high")
+    return errors
 
 
 AROUND = 10.0  # factor about a scenario's own value, where no study is shipped

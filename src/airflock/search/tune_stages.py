@@ -306,7 +306,7 @@ def run_hardening_stage(
             folder / TUNED_FILE, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune."
         )
     except ScenarioError as error:
-        why = error.faults[0]
+        why = error.errors[0]
         law = folder / STUDY_FOLDER / str(best.document.get("model", {}).get("kind", ""))
         if law.suffix == ".py" and law.is_file():
             atomic.write_file(folder / law.name, law.read_bytes())

@@ -198,7 +198,7 @@ def make_request(
 ) -> TuneRequest:
     """Make a request. Missing values come from the plan of a resumed tuning, or are defaults.
 
-    Raises ScenarioError, all faults together.
+    Raises ScenarioError, all errors together.
     """
     errors = ErrorCollector()
     limits = list(limit) or (plan.limits if plan else []) or errors.read(default_limits, start)

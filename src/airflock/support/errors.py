@@ -24,7 +24,7 @@ def shortened_lines(lines: list[str]) -> list[str]:
     """Return the first lines, each bounded, and the number of those that are left out."""
     shown = [shortened(line) for line in lines[:MOST_LINES]]
     # The number of the rest is one more line, so that nobody takes the list for complete.
-    return shown if len(lines) <= MOST_LINES else [*shown, f"and {len(lines) - MOST_LINES} more faults"]
+    return shown if len(lines) <= MOST_LINES else [*shown, f"and {len(lines) - MOST_LINES} more errors"]
 
 
 def printable(text: str) -> str:
@@ -70,8 +70,8 @@ class ScenarioError(AirflockError):
     """A scenario file or a set of its keys cannot be used; carries all errors, one line each."""
 
     def __init__(self, errors: list[str]):
-        self.faults = [printable(error) for error in shortened_lines(errors)]
-        super().__init__("\n".join(self.faults))
+        self.errors = [printable(error) for error in shortened_lines(errors)]
+        super().__init__("\n".join(self.errors))
 
 
 class RuleError(AirflockError):
@@ -106,8 +106,8 @@ class CardError(AirflockError):
     """A flight card cannot be flown: carries all errors, one line each."""
 
     def __init__(self, errors: list[str]):
-        self.faults = [printable(error) for error in shortened_lines(errors)]
-        super().__init__("\n".join(self.faults))
+        self.errors = [printable(error) for error in shortened_lines(errors)]
+        super().__init__("\n".join(self.errors))
 
 
 class StudioError(AirflockError):
@@ -143,11 +143,11 @@ class ErrorCollector:
     A part is left out where one that it depends on is invalid, and only there. After `raise_errors` has returned, every
     part is what its reader made.
 
-    faults : errors so far, one line each
+    errors : errors so far, one line each
     """
 
     def __init__(self, errors: Iterable[str] = ()) -> None:
-        self.faults = list(errors)
+        self.errors = list(errors)
         self._raised: list[AirflockError] = []
 
     def read(self, reader: Callable[P, T], *parts: P.args, **named: P.kwargs) -> T:
@@ -171,15 +171,15 @@ class ErrorCollector:
 
     def note(self, *errors: str) -> None:
         """Add errors that no reader raises."""
-        self.faults += [error for error in errors if error not in self.faults]
+        self.errors += [error for error in errors if error not in self.errors]
 
     def raise_errors(self) -> None:
         """Raise the reader's own exception if it is the only error, or else a ScenarioError with all of them."""
         # A single error keeps its own class, which callers catch: RecordingError, StudyError, ...
-        if len(self._raised) == 1 and self.faults == str(self._raised[0]).splitlines():
+        if len(self._raised) == 1 and self.errors == str(self._raised[0]).splitlines():
             raise self._raised[0]
-        if self.faults:
-            raise ScenarioError(self.faults)
+        if self.errors:
+            raise ScenarioError(self.errors)
 
 
 # --- Words for an error line ---

@@ -43,10 +43,10 @@ def _driver_error() -> str:
     return _first_line(error) if error else "no device found"
 
 
-def _first_line(fault: BaseException | str) -> str:
+def _first_line(error: BaseException | str) -> str:
     # Messages of the driver begin with blank lines and underlines.
-    lines = [line.strip(" .:-") for line in str(fault).splitlines() if line.strip(" .:-")]
-    return lines[0] if lines else type(fault).__name__
+    lines = [line.strip(" .:-") for line in str(error).splitlines() if line.strip(" .:-")]
+    return lines[0] if lines else type(error).__name__
 
 
 def is_simulated() -> bool:

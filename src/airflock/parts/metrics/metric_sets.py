@@ -90,7 +90,8 @@ def metric_set(namespace: Any, name: str = "") -> MetricSet:
     best = str(found.get("BEST") or ("fitness" if "fitness" in reports else ""))
     record = _parameters(found.get("Parameters"), name)
     violates = dict(found.get("VIOLATES", {}))
-    return MetricSet(name, tuple(metrics), record, None, fitness, reports, best, found.get("faults"), violates)
+    errors = found.get("errors", found.get("faults"))  # as it was called before
+    return MetricSet(name, tuple(metrics), record, None, fitness, reports, best, errors, violates)
 
 
 def to_metric_set(source: Any) -> MetricSet:
@@ -153,9 +154,9 @@ def reported_values(metric_set_: MetricSet) -> dict[str, tuple[str, str]]:
 SETS: dict[str, MetricSet] = {
     **find_members("airflock.parts.metrics", ["fitness"], metric_set),
     "zapotecatl": MetricSet(
-        "zapotecatl", QUALITY, parameters.Parameters, _quality, best="quality", faults=quality.faults
+        "zapotecatl", QUALITY, parameters.Parameters, _quality, best="quality", errors=quality.errors
     ),
-    "groups": MetricSet("groups", GROUPS, parameters.Parameters, _groups, best="quality", faults=quality.faults),
+    "groups": MetricSet("groups", GROUPS, parameters.Parameters, _groups, best="quality", errors=quality.errors),
     "contacts": MetricSet(
         "contacts",
         _named("speed", "polarisation", "nearest", "collisions", "contacts", "excursion"),

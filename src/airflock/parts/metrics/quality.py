@@ -98,7 +98,7 @@ def total(over_time):
     }
 
 
-def faults(q, largest, edges):
+def errors(q, largest, edges):
     """Return the errors of the parameters of the set beyond single ranges; largest: extension of the arena, m."""
     most = q.max_e if q.max_e is not None else largest
     if not most:
