@@ -46,7 +46,7 @@ class Boids:
         real = jnp.float32 if bits == 32 else jnp.float64
         p, world = scenario.parameters, scenario.world
         assert p.form == "printed" and world.edges == "periodic" and world.side == world.height
-        self.p, self.b, self.box, self.dt = p, scenario.body, float(world.side), float(scenario.flight.dt)
+        self.p, self.b, self.box, self.dt = p, scenario.body.numbers, float(world.side), float(scenario.flight.dt)
         self.count = int(self.box / scenario.model.reach(p))
         assert self.count >= 3, "a cell must not be its own neighbour"
         self.x, self.v = jnp.asarray(x, real), jnp.asarray(v, real)

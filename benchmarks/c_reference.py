@@ -87,13 +87,13 @@ def build(source: Path, library: Path, options: Sequence[str]) -> Path:
 
 def parameters_of(scenario: Scenario, bits: int = 32) -> Any:
     """Numbers of a scenario as the struct of vasarhelyi.h."""
-    body, sensors, measured = scenario.body, scenario.sensors, scenario.resolved_metrics()
+    body, sensors, measured = scenario.body.numbers, scenario.sensors.numbers, scenario.resolved_metrics()
     numbers = {name: getattr(scenario.parameters, name) for name in PARAMETERS if hasattr(scenario.parameters, name)}
     numbers |= {
         "tau": body.tau, "a_max": body.a_max, "outer_noise": body.noise,
         "sensor_noise": sensors.noise, "damping": sensors.damping,
         "spring": (2.0 * sensors.damping * sensors.noise) ** 0.5 / sensors.scale,
-        **{name: getattr(scenario.radio, name) for name in PARAMETERS if hasattr(scenario.radio, name)},
+        **{name: getattr(scenario.radio.numbers, name) for name in PARAMETERS if hasattr(scenario.radio.numbers, name)},
          "half_side": 0.5 * scenario.world.side,
         "separation": scenario.separation(), "r_coll": measured.r_coll, "r_cluster": measured.r_cluster,
         "dt": scenario.flight.dt, "period": sensors.period,
@@ -121,7 +121,7 @@ class Reference:
         self.parameters = parameters_of(scenario, bits)
         times = step_counts(scenario)
         self.times = {name: times[name] for name in TIMES if name in times} | {"agents": scenario.agents}
-        self.times["links"] = int(scenario.transceiver.name == "links")
+        self.times["links"] = int(scenario.radio.rule.name == "links")
         self.times["delay"] = times["delay"] // times["decide_every"]
 
     def _schedule(self, seed: int, skip: bool) -> Schedule:

@@ -47,7 +47,7 @@ def logs_of(seed, **changed):
     generator, numbers = truth(seed)
     scenario = airflock.load(PRESET, {**SAME, "metrics.period": STEP, **numbers, **changed})
     logs, heard, _ = synthetic.fly_logs(scenario, seed, LOGGER, generator)
-    ground = synthetic.standing_logs(seed + 1_000_000, DRONES, GROUND, scenario.sensors, LOGGER, generator)
+    ground = synthetic.standing_logs(seed + 1_000_000, DRONES, GROUND, scenario.sensors.numbers, LOGGER, generator)
     return scenario, joined(ground, logs), heard
 
 
@@ -89,7 +89,7 @@ def silent(seed):
     walk = scenario.sensors.noise * scenario.sensors.damping
     ahead = replace(logs, velocity=logs.command + generator.normal(0.0, 0.05, logs.command.shape))
     period = scenario.sensors.period
-    short = synthetic.standing_logs(seed, 2, 10.0, scenario.sensors, LOGGER, generator)
+    short = synthetic.standing_logs(seed, 2, 10.0, scenario.sensors.numbers, LOGGER, generator)
     slow = logs_of(seed, **{"metrics.period": period})[1]
     one_way = heard[heard["receiver"] < heard["sender"]]
     near = heard[heard["distance"] < NEAR]
@@ -99,7 +99,7 @@ def silent(seed):
         "10 s of standing": (("noise", "damping", "scale"), sensors.fit_sensors(short, period).refused),
         "packets one way": (("delay",), {"delay": packets.fit_delay(one_way).reason}),
         "all pairs near": (("near", "far", "received_far"),
-                           packets.fit_links(near, period, scenario.radio).refused),
+                           packets.fit_links(near, period, scenario.radio.numbers).refused),
         "logged once a decision": (("period",), {"period": periods.decision_period(slow)[2]}),
     }  # fmt: skip
     told = [f"{state}: {name}" for state, (names, reasons) in tries.items() for name in names if not reasons.get(name)]

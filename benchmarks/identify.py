@@ -49,7 +49,7 @@ def fleet(seed, white, rate, duration, only_body):
     begin = time.process_time()
     walk = scenario.sensors.noise * scenario.sensors.damping
     if not only_body:
-        ground = synthetic.standing_logs(seed + 1_000_000, 10, 120.0, scenario.sensors, logger, generator)
+        ground = synthetic.standing_logs(seed + 1_000_000, 10, 120.0, scenario.sensors.numbers, logger, generator)
         still = sensors.fit_sensors(ground, scenario.sensors.period)
         walk = still.value["noise"] * still.value["damping"]
     middle = time.process_time()
@@ -64,7 +64,7 @@ def fleet(seed, white, rate, duration, only_body):
         rows["sensors.noise"] = still.value["noise"], still.intervals["noise"], still.refused.get("noise", "")
         late = packets.fit_delay(heard)
         rows["radio.delay"] = late.value, late.interval, late.reason
-        links = packets.fit_links(heard, scenario.sensors.period, scenario.radio)
+        links = packets.fit_links(heard, scenario.sensors.period, scenario.radio.numbers)
         rows |= {f"radio.{n}": (links.value[n], links.intervals[n], links.refused.get(n, "")) for n in CURVE_PARAMETERS}
         row["seconds"] = time.process_time() - begin
     for key, (value, (low, high), reason) in rows.items():

@@ -45,7 +45,7 @@ def own(record):
 def cases():
     """Settings by the name of a row."""
     plain = airflock.load(PRESET)
-    p, b = own(plain.parameters), own(plain.body)
+    p, b = own(plain.parameters), own(plain.body.numbers)
     due = {kind: {"kind": kind, "at": END - 1.0, "agents": [3]} for kind in KINDS}
     begun = {kind: {**due[kind], "at": 0.1} for kind in KINDS if KINDS[kind].leaves is None}
     return {

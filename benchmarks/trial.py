@@ -17,7 +17,12 @@ class Trial:
     def __init__(self, source: Path, scenario: Scenario, folder: Path, vector_bits: int):
         options = [flag for flag in flags(vector_bits) if not flag.startswith("-D")]
         self.library = ctypes.CDLL(str(build(source, folder / "trial.so", options)))
-        p, body, sensors, measured = scenario.parameters, scenario.body, scenario.sensors, scenario.resolved_metrics()
+        p, body, sensors, measured = (
+            scenario.parameters,
+            scenario.body.numbers,
+            scenario.sensors.numbers,
+            scenario.resolved_metrics(),
+        )
         spring = (2.0 * sensors.damping * sensors.noise) ** 0.5 / sensors.scale
         numbers = (
             p.r0_rep, p.p_rep, p.r0_frict, p.c_frict, p.v_frict, p.p_frict, p.a_frict, p.r0_shill, p.v_shill,

@@ -82,7 +82,7 @@ def drawn(rng: Random) -> Draw:
         try:
             own = OWN_TOPOLOGY if keys.get("topology.kind") == OWN_TOPOLOGY.name else None
             found = build_scenario(
-                {"model": {"kind": keys["model.kind"]}}, "drawn", keys, caller_parts=CallerParts(own_topology=own)
+                {"model": {"kind": keys["model.kind"]}}, "drawn", keys, caller_parts=CallerParts(topology=own)
             )
         except ScenarioError:
             continue  # a crowd without room, or a goal inside a building: the border says so, and it draws again
@@ -458,7 +458,7 @@ def notions(draw: Draw) -> set[str]:
     found, keys = draw.scenario, draw.keys
     switches: dict[str, bool] = {
         "three": found.dimensions == 3, "noisy": found.has_sensor_error, "late": found.radio.delay > 0.0,
-        "lossy": found.radio.loss > 0.0, "links": found.transceiver.name == "links", "gusts": found.wind.gust > 0.0,
+        "lossy": found.radio.loss > 0.0, "links": found.radio.rule.name == "links", "gusts": found.wind.gust > 0.0,
         "periodic": found.world.edges == "periodic", "islands": bool(found.world.obstacles),
         "scene": found.scene.kind != "none", "goals": found.goals.kind not in ("none", "own"),
         "own": found.goals.kind == "own", "sequential": found.flight.update == "sequential",
@@ -471,16 +471,16 @@ def notions(draw: Draw) -> set[str]:
     kinds = {f"faults.kind = {kind.name}" for kind in found.fault_kinds}
     names = kinds | {f"{name} {'on' if on else 'off'}" for name, on in switches.items()}
     records = {
-        "model": found.parameters, "body": found.body, "wind": found.wind, "radio": found.radio,
-        "world": found.world, "scene": found.scene, "topology": found.topology,
-        "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics,
+        "model": found.parameters, "body": found.body.numbers, "wind": found.wind, "radio": found.radio.numbers,
+        "world": found.world, "scene": found.scene, "topology": found.topology.numbers,
+        "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics.numbers,
         "flight": found.flight, "silence": found.silence,
     } | ({"aero": found.aero} if found.is_aerodynamic else {})  # fmt: skip
     kind = keys["model.kind"]
     for section, record in records.items():
         owner = kind if section == "model" else section
         names |= {f"{owner}.{name} = {value}" for name, value in choices(record).items()}
-    names |= {f"radio.kind = {found.transceiver.name}"}
+    names |= {f"radio.kind = {found.radio.rule.name}"}
     return names | {f"{section}.kind = {keys[f'{section}.kind']}" for section in ("model", "body", "sensors")}
 
 

@@ -36,7 +36,7 @@ def test_it_is_one_file_outside_the_package(beside, seed):
     with pytest.raises(ScenarioError, match="if you trust it, add --trust"):
         load(beside / "mine.toml")
     scenario = load(beside / "mine.toml", trust=True)
-    assert scenario.topology_rule.name == "beside" and scenario.topology.times == 1.5
+    assert scenario.topology.rule.name == "beside" and scenario.topology.times == 1.5
     found = fly_world(scenario, seed, record=True, device="python").frames
     np.testing.assert_allclose(found, fly_plainly(scenario, seed).frames, atol=1e-9)
     lean = load(beside / "mine.toml", {"metrics.kind": "order"}, trust=True)  # which compiles sooner

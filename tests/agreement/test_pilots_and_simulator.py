@@ -71,15 +71,15 @@ def build(name):
 
 def fly(scenario, start, seed):
     """Positions (time, agent, axis) of N pilots and their bodies; packets arrive after the delay, all of them."""
-    n, dims, dt, k = scenario.agents, scenario.dimensions, scenario.flight.dt, scenario.radio
+    n, dims, dt, k = scenario.agents, scenario.dimensions, scenario.flight.dt, scenario.radio.numbers
     every, late = max(1, round(scenario.sensors.period / dt)), round(k.delay / dt)
     period, sampled = every * dt, max(1, round(scenario.resolved_metrics().period / dt))
     hearing = PacketPolicy(extrapolate=k.kind == "links", forget=late * dt + 0.5 * period)
     pilots = [
         Pilot(
             scenario.model, scenario.parameters, place_of(scenario), index=i, period=period, hearing=hearing,
-            body=scenario.vehicle, b=scenario.body, flat=dims == 2, seed=seed, topology=scenario.topology_rule,
-            t=scenario.topology,
+            body=scenario.body.rule, b=scenario.body.numbers, flat=dims == 2, seed=seed,
+            topology=scenario.topology.rule, t=scenario.topology.numbers,
         )
         for i in range(n)
     ]  # fmt: skip
@@ -104,11 +104,11 @@ def fly(scenario, start, seed):
 
 
 def moved(scenario, s, c, dt):
-    body = scenario.vehicle
+    body = scenario.body.rule
     known = {"v": s[3:], "m": s[3:], "c": c, "g": (0.0,) * 3, "w": (0.0,) * 3}
     given = {a + axis: v[k] for a, v in known.items() for k, axis in enumerate("xyz")}
-    velocity = call_rule(body.move, "move", given | {"dt": dt, "b": scenario.body}, body.name)
-    old = choices(scenario.body).get("integration", body.integration) == "old"
+    velocity = call_rule(body.move, "move", given | {"dt": dt, "b": scenario.body.numbers}, body.name)
+    old = choices(scenario.body.numbers).get("integration", body.integration) == "old"
     vx, vy, vz = s[3:] if old else velocity
     x, y, z = s.x + vx * dt, s.y + vy * dt, s.z + vz * dt
     if scenario.world.edges == "bounce":

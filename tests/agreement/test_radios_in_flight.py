@@ -126,7 +126,7 @@ def test_a_radio_of_ones_own_is_one_file_outside_the_package(tmp_path, seed):
         with pytest.raises(ScenarioError, match="if you trust it, add --trust"):
             load(tmp_path / "mine.toml")
         scenario = load(tmp_path / "mine.toml", trust=True)
-        assert scenario.radio.delay == 0.2 and scenario.transceiver.name == name[:-3]
+        assert scenario.radio.delay == 0.2 and scenario.radio.rule.name == name[:-3]
         found = fly_world(scenario, seed, record=True, device="python").frames
         np.testing.assert_allclose(found, fly_plainly(scenario, seed).frames, atol=1e-9)
         given = load(PAPER, {"agents": 4, "duration": 2.0, "radio.delay": 0.2}, radio=tmp_path / name)
@@ -178,7 +178,7 @@ def test_a_gpu_flies_every_radio():
 def test_a_radio_given_directly_stays_through_changes_and_its_recordings_are_scored():
     scenario = load(PAPER, {**SMALL, "duration": 1.0}, radio={**WHOLE, "NAME": "whole"})
     flight = airflock.open(scenario, 2, device="python").advance(0.5).change({"model.p_rep": 0.2})
-    assert flight.scenario.transceiver.receive is everything and flight.scenario.parameters.p_rep == 0.2
+    assert flight.scenario.radio.rule.receive is everything and flight.scenario.parameters.p_rep == 0.2
     recording = airflock.simulate(scenario, 2, device="python")
     scored = float(airflock.score(recording)["phi_vel"].iloc[0])
     assert scored == pytest.approx(fly_world(scenario, 2, device="python").values["phi_vel"], rel=1e-5)

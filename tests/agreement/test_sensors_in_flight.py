@@ -128,7 +128,7 @@ def test_a_sensor_of_ones_own_is_one_file_outside_the_package(tmp_path, seed):
         with pytest.raises(ScenarioError, match="if you trust it, add --trust"):
             load(tmp_path / "mine.toml")
         scenario = load(tmp_path / "mine.toml", trust=True)
-        assert scenario.sensors.period == 0.1 and scenario.sensor.name == name[:-3]
+        assert scenario.sensors.period == 0.1 and scenario.sensors.rule.name == name[:-3]
         found = fly_world(scenario, seed, record=True, device="python").frames
         np.testing.assert_allclose(found, fly_plainly(scenario, seed).frames, atol=1e-9)
         given = load(PAPER, {"agents": 4, "duration": 2.0, "sensors.period": 0.1}, sensor=tmp_path / name)
@@ -197,7 +197,7 @@ def mirrored(x, y, z, vx, vy, vz):
 def test_a_sensor_given_directly_stays_through_changes_and_its_recordings_are_scored():
     scenario = load(PAPER, {**SMALL, "duration": 1.0}, sensor={"measure": mirrored, "NAME": "mirror"})
     flight = airflock.open(scenario, 2, device="python").advance(0.5).change({"model.p_rep": 0.2})
-    assert flight.scenario.sensor.measure is mirrored and flight.scenario.parameters.p_rep == 0.2
+    assert flight.scenario.sensors.rule.measure is mirrored and flight.scenario.parameters.p_rep == 0.2
     recording = airflock.simulate(scenario, 2, device="python")
     scored = float(airflock.score(recording)["phi_vel"].iloc[0])
     assert scored == pytest.approx(fly_world(scenario, 2, device="python").values["phi_vel"], rel=1e-5)

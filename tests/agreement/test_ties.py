@@ -90,7 +90,7 @@ def test_what_stands_between_shades_at_exactly_the_range_too(wall, seed):
 def test_two_equally_near_neighbours_weigh_the_same(seed):
     """A flock that is its own mirror image stays so: no neighbour wins by its number."""
     found = load("vasarhelyi_2018/4ms", {"agents": 3, "duration": 5.0, "sensors.noise": 0.0, "body.noise": 0.0})
-    found = replace(found, radio=replace(found.radio, delay=0.0))
+    found = replace(found, radio=found.radio.with_numbers(delay=0.0))
     start = np.array([[0.0, -6.0, 6.0], [0.0, 3.0, 3.0], [0.0, 1.0, -1.0], [4.0, 3.0, 3.0]])
     for flight in (interpreted, fly_plainly):
         frames = flight(found, seed, start).frames

@@ -417,7 +417,7 @@ def test_faults_are_checked_at_once(tmp_path):
     with pytest.raises(ScenarioError) as fault:
         read_injected_faults(path, (1, 2, 3))
     for part in ("x is not known", f"none of {', '.join(INJECTED_KINDS)}", "who = [9]", "whom is not known"):
-        assert any(part in line for line in fault.value.faults), part
+        assert any(part in line for line in fault.value.errors), part
     path.write_text("[[fault")
     with pytest.raises(ScenarioError):
         read_injected_faults(path, (1,))
@@ -431,7 +431,7 @@ def test_faults_are_checked_at_once(tmp_path):
 
 def vehicle(kind="px4"):
     found = scenario(1)
-    return SoftwareVehicle(kind, 1, FlightSite(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.vehicle, found.body)
+    return SoftwareVehicle(kind, 1, FlightSite(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.body.rule, found.body.numbers)
 
 
 @pytest.mark.parametrize(("kind", "travels"), [("px4", (6.0, 9.0)), ("ardupilot", (6.0, 9.0))])
@@ -454,7 +454,9 @@ def test_an_autopilot_holds_its_place_where_it_hovers_or_lands(kind, mode):
     def noise(step):
         return tuple(rng.standard_normal(3).tolist())
 
-    v = SoftwareVehicle(kind, 1, FlightSite(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.vehicle, found.body, noise)
+    v = SoftwareVehicle(
+        kind, 1, FlightSite(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.body.rule, found.body.numbers, noise
+    )
     v.state, v.armed, v.mode = State(0.0, 0.0, 900.0, 4.0, 0.0, 0.0), True, mode
     rows = []
     for k in range(40_000):

@@ -34,7 +34,7 @@ CARD = parse_card({**(d := document(SCENARIO)), "hash": card_hash(d)})
 def node_with_vehicle(**more):
     node = Node(CARD, 1, SOFTWARE_KEY, now=0.0, utc=START_TIME)
     vehicle = SoftwareVehicle(
-        "px4", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=START_TIME, **more
+        "px4", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.body.rule, SCENARIO.body.numbers, started=START_TIME, **more
     )
     return node, vehicle
 
@@ -256,11 +256,13 @@ def test_an_autopilot_that_is_started_anew_on_the_ground_is_asked_once_more():
 def test_another_autopilot_is_a_fault():
     node, _ = node_with_vehicle()
     other = SoftwareVehicle(
-        "ardupilot", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=START_TIME
+        "ardupilot", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.body.rule, SCENARIO.body.numbers, started=START_TIME
     )
     assert any("the card is for px4" in n for n in live(node, other, 0.0, 1.0)) and node.phase == MissionPhase.FAULT
     node, _ = node_with_vehicle()
-    other = SoftwareVehicle("px4", 4, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=START_TIME)
+    other = SoftwareVehicle(
+        "px4", 4, CARD.site, (0.0, 0.0, 0.0), SCENARIO.body.rule, SCENARIO.body.numbers, started=START_TIME
+    )
     assert any("calls itself system 4" in n for n in live(node, other, 0.0, 1.0)) and node.phase == MissionPhase.FAULT
 
 
@@ -350,7 +352,7 @@ def test_what_is_wrong_with_a_card_is_one_line(change, line):
     made = {**document(SCENARIO), **change}
     with pytest.raises(CardError, match=line) as fault:
         parse_card({**made, "hash": card_hash(made)})
-    assert all(text.startswith("card: ") for text in fault.value.faults)
+    assert all(text.startswith("card: ") for text in fault.value.errors)
 
 
 @given(st.data())

@@ -229,13 +229,13 @@ def test_a_body_of_ones_own_remembers_from_one_file(tmp_path, seed):
     (tmp_path / "slow.py").write_text(SLOW)
     keys = {"agents": 3, "duration": 3.0, "start.separation": 5.0}
     scenario = load("vasarhelyi_2018/4ms", keys, body=str(tmp_path / "slow.py"))
-    assert airflock.check_body(scenario.vehicle).broken == ()
+    assert airflock.check_body(scenario.body.rule).broken == ()
     ours = fly_world(scenario, seed, precision=64, record=True, device="python")
     np.testing.assert_array_equal(ours.frames, fly_plainly(scenario, seed).frames)
-    memory, b = scenario.vehicle.Memory(), scenario.body
+    memory, b = scenario.body.rule.Memory(), scenario.body.numbers
     for _ in range(100):
         given = {"cx": 2.0, "cy": 0.0, "cz": 0.0, "memory": memory, "dt": 0.01, "b": b}
-        *velocity, memory = call_rule(scenario.vehicle.move, "move", given)
+        *velocity, memory = call_rule(scenario.body.rule.move, "move", given)
     assert velocity[0] == pytest.approx(2.0 * (1.0 - (1.0 - 0.01 / 0.5) ** 100), rel=1e-12)
 
 

@@ -153,17 +153,18 @@ def boarded(scenario: Scenario, seed: int, place: FlightWorld, i: int, state: St
     """Agent i with its pilot, which carries the map, its own numbers, and its seed."""
     law = law_of(scenario, i)
     p = own_parameters(scenario, "model", law[1], i, seed)
-    b = own_parameters(scenario, "body", scenario.body, i, seed)
+    b = own_parameters(scenario, "body", scenario.body.numbers, i, seed)
     period = step_counts(scenario)["decide_every"] * scenario.flight.dt
     pilot = Pilot(
         law[0], p, place.seen(wall_range(law[0], p)), index=i, period=period, groups=groups_of(scenario),
-        hearing=PacketPolicy.simulated(scenario.transceiver, scenario.radio), silence=scenario.resolved_silence(),
-        body=scenario.vehicle, b=b,
+        hearing=PacketPolicy.simulated(scenario.radio.rule, scenario.radio.numbers),
+        silence=scenario.resolved_silence(), body=scenario.body.rule, b=b,
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
-        gets_flock_solution=scenario.model.flock is not None, topology=scenario.topology_rule, t=scenario.topology,
+        gets_flock_solution=scenario.model.flock is not None,
+        topology=scenario.topology.rule, t=scenario.topology.numbers,
     )  # fmt: skip
-    kept, sensed = (each() if each else None for each in (scenario.vehicle.Memory, scenario.sensor.Memory))
-    s = own_parameters(scenario, "sensors", scenario.sensors, i, seed)
+    kept, sensed = (each() if each else None for each in (scenario.body.rule.Memory, scenario.sensors.rule.Memory))
+    s = own_parameters(scenario, "sensors", scenario.sensors.numbers, i, seed)
     return Agent(state, pilot, b, s, kept, sensed)
 
 
@@ -188,7 +189,7 @@ def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any
         agent.faults = dict(sorted(agent.faults.items(), key=lambda item: order.index(item[0])))
     for number, agent in enumerate(flock if scenario.can_land else ()):
         low = agent.present and agent.state.z <= scenario.ground
-        if low and scenario.vehicle.lasts(memory=agent.remembered, b=agent.b, wing=scenario.wing) <= 0.0:
+        if low and scenario.body.rule.lasts(memory=agent.remembered, b=agent.b, wing=scenario.wing) <= 0.0:
             agent.present, left = False, True
             for other in flock:
                 other.pilot.forget(number)
@@ -202,7 +203,7 @@ def states(flock: Sequence[Agent], who: Sequence[int] | None = None) -> list[Sta
 
 def told_of(scenario: Scenario, flock: Sequence[Agent]) -> list[State]:
     """What others come to know: the true state, or that with the errors of the last measurement; seen it is true."""
-    plain = scenario.sensor.measure is None or scenario.transceiver.see is not None
+    plain = scenario.sensors.rule.measure is None or scenario.radio.rule.see is not None
     return states(flock) if plain else [plus(agent.state, agent.own) for agent in flock]
 
 
@@ -243,7 +244,7 @@ def decisions(
     kinds, dims, of_sent = scenario.fault_kinds, scenario.dimensions, (("sense", "sent"), ("tell", "told"))
     said = [
         state
-        if scenario.transceiver.see is not None
+        if scenario.radio.rule.see is not None
         else misled(agent, kinds, of_sent, sent, plus(state, agent.sent), dims)
         for state, agent in zip(past, flock, strict=True)
     ]
@@ -265,7 +266,7 @@ def decisions(
 
 def fading(scenario: Scenario, seed: int, number: int, i: int, n: int) -> dict[int, float]:
     """Normal numbers of the signals between agent i and each other one, the same both ways."""
-    if scenario.topology_rule is None or not scenario.topology_rule.asks_for("fade"):
+    if scenario.topology.rule is None or not scenario.topology.rule.asks_for("fade"):
         return {}
     pairs = {j: min(i, j) * n + max(i, j) for j in range(n) if j != i}
     words = {j: random.random_words(seed, random.FADE, 0, number, pair) for j, pair in pairs.items()}
@@ -274,20 +275,20 @@ def fading(scenario: Scenario, seed: int, number: int, i: int, n: int) -> dict[i
 
 def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time: float) -> None:
     """Advance both errors of one agent by one sensor period, or have it measure."""
-    if scenario.sensor.measure is not None:
+    if scenario.sensors.rule.measure is not None:
         agent.own, agent.sensed = sensed(scenario, seed, number, i, agent, time)
         return
     s, period = agent.s, step_counts(scenario)["decide_every"] * scenario.flight.dt
     own_x, own_y, sent_x, sent_y = normals(seed, random.SENSOR, number, i)
     own_z, sent_z = normals(seed, random.SENSOR, number, i, draw=1)[:2] if scenario.dimensions == 3 else (0.0, 0.0)
-    rule = scenario.sensor.error
+    rule = scenario.sensors.rule.error
     agent.own = swing(rule, agent.own, (own_x, own_y, own_z), period, s)
     agent.sent = swing(rule, agent.sent, (sent_x, sent_y, sent_z), period, s)
 
 
 def sensed(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time: float) -> tuple[State, Any]:
     """How far what an agent measures is off, and what its sensor remembers."""
-    sensor, period = scenario.sensor, step_counts(scenario)["decide_every"] * scenario.flight.dt
+    sensor, period = scenario.sensors.rule, step_counts(scenario)["decide_every"] * scenario.flight.dt
     drawn = [g for block in (8, 9, 10) for g in normals(seed, random.SENSOR, number, i, draw=block)]
     chances = [random.uniform(word) for word in random.random_words(seed, random.SENSOR, 0, number, i, draw=11)]
     given = agent.state._asdict() | {f"g{c}": g for c, g in enumerate(drawn)}
@@ -314,7 +315,7 @@ def hear(
     place: FlightWorld, own_believed: State,
 ) -> set[int]:  # fmt: skip
     """Hand the pilot of agent i the packets that arrive at decision `number`; returns who is in range, truly."""
-    k, late, found = scenario.radio, step_counts(scenario)["delay"] * scenario.flight.dt, set()
+    k, late, found = scenario.radio.numbers, step_counts(scenario)["delay"] * scenario.flight.dt, set()
     for j, other in enumerate(flock):
         if j == i or not other.present:
             continue
@@ -323,7 +324,7 @@ def hear(
         in_range = distance <= norm(min(k.range, LIMIT), 0.0, 0.0)  # at exactly the range it is heard
         reach = min(k.range, LIMIT)
         into, out = radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]
-        far = into if scenario.transceiver.see is not None else min(into, out)  # who is seen need not send
+        far = into if scenario.radio.rule.see is not None else min(into, out)  # who is seen need not send
         carries = distance <= norm(far, 0.0, 0.0) and far >= 0.0
         mine, theirs = ahead(flock[i], time), ahead(other, time - late)
         if in_range:
@@ -331,7 +332,7 @@ def hear(
         link = flock[i].links.setdefault(j, Link())
         if in_range and carries and arrives(scenario, seed, number, place, i, j, flock, link, time + mine):
             wait = lateness(scenario, seed, number, place, i, j, flock)
-            if scenario.transceiver.see is not None:
+            if scenario.radio.rule.see is not None:
                 then = time - late + ahead(flock[i], time - late)
                 seen = glimpsed(scenario, seed, number, place, i, j, flock, said, own_believed, then)
                 link.way = time, seen, then
@@ -356,7 +357,7 @@ def glimpsed(
     taken: float,
 ) -> State:
     """Where agent i believes agent j by a picture that was taken so long after the start by its clock, s."""
-    state, kind, pair = flock[i].state, scenario.transceiver, i * len(flock) + j
+    state, kind, pair = flock[i].state, scenario.radio.rule, i * len(flock) + j
     here = place.image_offset(*(a - b for a, b in zip(state[:3], said[i][:3], strict=True)))
     base = [a - b for a, b in zip(own[:3], here, strict=True)]
     off = place.image_offset(*(a - b for a, b in zip(said[j][:3], said[i][:3], strict=True)))
@@ -369,7 +370,9 @@ def glimpsed(
     given |= {f"u{c}": u for c, u in enumerate(chances)}
     given |= {f"g{c}": g for c, g in enumerate(normals(seed, random.AIR, number, pair, draw=1))}
     period = step_counts(scenario)["decide_every"] * scenario.flight.dt
-    found = call_rule(kind.see, "see", given | {"since": since, "period": period, "k": scenario.radio}, kind.name)
+    found = call_rule(
+        kind.see, "see", given | {"since": since, "period": period, "k": scenario.radio.numbers}, kind.name
+    )
     flat = {} if scenario.dimensions == 3 else {"z": 0.0, "vz": 0.0}
     return State(*(a + b for a, b in zip(base, found[:3], strict=True)), *found[3:])._replace(**flat)
 
@@ -386,8 +389,8 @@ def asked_of_radio(
     pair = i * n + j
     chances = [random.uniform(word) for word in random.random_words(seed, random.AIR, 0, number, pair)]
     sent = {
-        link: radio.packets(float(number), getattr(scenario.radio, rate), period)
-        for link, rate in zip(("fast", "slow"), scenario.transceiver.rates, strict=False)
+        link: radio.packets(float(number), getattr(scenario.radio.numbers, rate), period)
+        for link, rate in zip(("fast", "slow"), scenario.radio.rule.rates, strict=False)
     }
     return sent | {
         "distance": apart[j], "vx": own.vx, "vy": own.vy, "vz": own.vz,
@@ -396,7 +399,7 @@ def asked_of_radio(
         "clear": 0.0 if place.is_blocked(*own[:3], *true[:3]) else 1.0, "step": float(number), "period": period,
         **{f"u{c}": u for c, u in enumerate(chances)},
         **{f"g{c}": g for c, g in enumerate(normals(seed, random.AIR, number, pair, draw=1))},
-        "k": scenario.radio,
+        "k": scenario.radio.numbers,
     }  # fmt: skip
 
 
@@ -412,7 +415,7 @@ def arrives(
     now: float,
 ) -> bool:
     """Whether anything of what agent j sends agent i in a decision arrives; `now` by the clock of agent i."""
-    kind, k = scenario.transceiver, scenario.radio
+    kind, k = scenario.radio.rule, scenario.radio.numbers
     asked = asked_of_radio(scenario, seed, number, place, i, j, flock)
     if kind.receive is not None:
         newest = flock[i].pilot.packets.get(j)
@@ -431,7 +434,7 @@ def lateness(
     scenario: Scenario, seed: int, number: int, place: FlightWorld, i: int, j: int, flock: list[Agent]
 ) -> float:
     """How late what agent j sends agent i in a decision comes, s; 0.0 over a radio that brings all in time."""
-    kind = scenario.transceiver
+    kind = scenario.radio.rule
     if kind.late is None:
         return 0.0
     return max(0.0, call_rule(kind.late, "late", asked_of_radio(scenario, seed, number, place, i, j, flock), kind.name))
@@ -474,7 +477,7 @@ class Turbulent(tuple):
 
 def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust: Vector, place: FlightWorld) -> None:
     """One motion step: position by the old or the new velocity, velocity by the body; then the edges of the arena."""
-    s, dt, three, body = agent.state, scenario.flight.dt, scenario.dimensions == 3, scenario.vehicle
+    s, dt, three, body = agent.state, scenario.flight.dt, scenario.dimensions == 3, scenario.body.rule
     if three:
         g: Vector = normals(seed, random.OUTER, step, i)[:3]
     else:  # one draw serves two steps: four numbers are two steps of two axes
@@ -494,6 +497,6 @@ def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust
     for suffering in agent.suffers(step * dt):
         told = {f"n{axis}": velocity[c] for c, axis in enumerate("xyz")} | {"dt": dt}
         velocity = suffering.asked("motion", step * dt, **{k: given[k] for k in MOVING}, **told) or velocity
-    integration = choices(scenario.body).get("integration", body.integration)
+    integration = choices(scenario.body.numbers).get("integration", body.integration)
     vx, vy, vz = s[3:] if integration == "old" else velocity
     agent.state = place.settled(State(s.x + vx * dt, s.y + vy * dt, s.z + vz * dt, *velocity))

@@ -70,7 +70,7 @@ def test_what_the_fuzz_found_in_studies_is_one_line(tmp_path, text, words):
     (tmp_path / "a.toml").write_text('scenario = "vasarhelyi_2018/4ms"\n' + text)
     with pytest.raises(ScenarioError) as fault:
         load_study(tmp_path / "a.toml")
-    assert len(fault.value.faults) == 1 and words in fault.value.faults[0]
+    assert len(fault.value.errors) == 1 and words in fault.value.errors[0]
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_a_published_number_that_is_none_is_one_line(tmp_path, published):
     (tmp_path / "a.toml").write_text(text)
     with pytest.raises(ScenarioError) as fault:
         airflock.load(tmp_path / "a.toml")
-    assert len(fault.value.faults) == 1 and "published.phi_vel" in fault.value.faults[0]
+    assert len(fault.value.errors) == 1 and "published.phi_vel" in fault.value.errors[0]
 
 
 def test_a_byte_order_mark_is_read(tmp_path):
@@ -94,7 +94,7 @@ def test_a_flood_of_faults_is_bounded(tmp_path):
     (tmp_path / "a.toml").write_text("\n".join(f"{'k' * 150}{i} = 1" for i in range(9000)))
     with pytest.raises(ScenarioError) as fault:
         airflock.load(tmp_path / "a.toml")
-    assert len(fault.value.faults) == 51 and "more faults" in fault.value.faults[-1]
+    assert len(fault.value.errors) == 51 and "more faults" in fault.value.errors[-1]
     assert shortened("x" * 5000, 100) == "x" * 50 + " ... (4900 letters) ... " + "x" * 50
 
 

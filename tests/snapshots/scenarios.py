@@ -25,16 +25,9 @@ SEED = 44
 MUTANTS = 2000
 FILE = "mutated.toml"
 
-# Where the parts of a `Scenario` are: section of the file -> (rule, its numbers). Whoever renames or merges fields
-# changes these tables alone: the record stays as it is.
-PARTS = {
-    "model": ("model", "parameters"),
-    "body": ("vehicle", "body"),
-    "sensors": ("sensor", "sensors"),
-    "radio": ("transceiver", "radio"),
-    "metrics": ("measures", "metrics"),
-    "topology": ("own_topology", "topology"),
-}
+# Sections that are a part of a `Scenario`: a rule and its numbers. Whoever renames or merges fields changes these
+# tables alone: the record stays as it is.
+PARTS = ("body", "sensors", "radio", "metrics", "topology")
 FIELDS = (
     "name", "wind", "world", "scene", "goals", "start", "wing", "aero", "silence", "flight", "groups", "faults",
     "published", "document",
@@ -78,11 +71,15 @@ def kind(rule):
 
 def values(scenario):
     """Return all values of a scenario."""
-    covered = {*FIELDS, *TEXTS, *(name for part in PARTS.values() for name in part)}
+    covered = {*FIELDS, *TEXTS, *PARTS, "model", "parameters"}
     assert {each.name for each in fields(scenario)} == covered, "fields of a Scenario that this snapshot does not know"
     found = {name: plain(getattr(scenario, name)) for name in FIELDS}
-    for section, (rule, numbers) in PARTS.items():
-        found[section] = {"kind": kind(getattr(scenario, rule)), "numbers": plain(getattr(scenario, numbers))}
+    found["model"] = {"kind": kind(scenario.model), "numbers": plain(scenario.parameters)}
+    for section in PARTS:
+        part = getattr(scenario, section)
+        # A topology of the package is a choice among its numbers.
+        rule = scenario.own_topology if section == "topology" else part.rule
+        found[section] = {"kind": kind(rule), "numbers": plain(part.numbers)}
     return found
 
 

@@ -16,7 +16,7 @@ def script() -> None:
     """Fly, score, sweep, draw and save."""
     scenario = airflock.load("vasarhelyi_2018/4ms", {"radio.delay": 0.5})
     assert_type(scenario, airflock.Scenario)
-    assert_type(scenario.radio.delay, float)
+    assert_type(scenario.radio.numbers.delay, float)
     assert_type(scenario.notes, tuple[str, ...])
     recording = airflock.simulate(scenario, seed=7)
     assert_type(recording, xr.Dataset)

@@ -164,7 +164,7 @@ def test_measures_beside_the_law_are_tried_where_agents_collide_and_are_no_part_
 
     def score_flights(scenarios, seeds, **_):
         near = [
-            s.radio.delay if s.transceiver.name == "constant" and s.silence.rule == "fly_on" else 0.0 for s in scenarios
+            s.radio.delay if s.radio.rule.name == "constant" and s.silence.rule == "fly_on" else 0.0 for s in scenarios
         ]
         return [{"fitness": 0.9, "r_min": 9.0 - 8.0 * x, "n_coll": 1.0 * (x > 0.8), "f_coll": 0.9} for x in near]
 
@@ -175,7 +175,7 @@ def test_measures_beside_the_law_are_tried_where_agents_collide_and_are_no_part_
     assert list(tried) == [CARRIED, STOPS] and steps[-1].name == "on fresh seeds"
     assert tried[CARRIED].gain == pytest.approx((8.0,) * 3) and not tried[CARRIED].kept
     assert "0 % of flights have collisions, 100 % without it; --set radio.kind=links" in tried[CARRIED].verdict
-    assert build_scenario(harden.hardened_document(lossy, steps[-1]), "hardened").transceiver.name == "constant"
+    assert build_scenario(harden.hardened_document(lossy, steps[-1]), "hardened").radio.rule.name == "constant"
     sound = load("vasarhelyi_2018/6ms", {"radio.delay": 0.5})
     assert not any(step.name in (CARRIED, STOPS) for step in harden.harden(sound, range(5)))
     assert [step.name for step, _, _ in measures([sound])] == [CARRIED]  # nothing is lost

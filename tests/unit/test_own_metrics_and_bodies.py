@@ -97,10 +97,10 @@ def test_a_metric_of_ones_own_measures_what_its_rule_says(files):
     values = found.judged(flown.values)
     assert values["spread"] == pytest.approx(truth, rel=1e-12)
     assert values["fitness"] == pytest.approx(10.0 / (10.0 + truth), rel=1e-12)
-    assert found.measures.best == "fitness" and "phi_vel" in values  # METRICS: one of ours beside it
+    assert found.metrics.rule.best == "fitness" and "phi_vel" in values  # METRICS: one of ours beside it
     narrow = load("vasarhelyi_2018/4ms", {**SMALL, "metrics.width": 1.0}, metrics=files / "spread.py")
     assert narrow.judged(flown.values)["fitness"] == pytest.approx(1.0 / (1.0 + truth), rel=1e-12)
-    assert reported_values(found.measures)["spread"] == ("m", "mean distance to the centre, east")
+    assert reported_values(found.metrics.rule)["spread"] == ("m", "mean distance to the centre, east")
 
 
 def test_a_body_of_ones_own_flies_half_of_the_command(files):
@@ -153,11 +153,11 @@ def test_a_file_and_the_same_names_given_directly_are_one(files):
 def test_a_recording_is_scored_without_the_code_that_it_was_flown_with(files):
     named = load("vasarhelyi_2018/4ms", {**SMALL, "metrics.kind": str(files / "spread.py")}, trust=True)
     recording = airflock.simulate(named, 1, precision=64, device="python")
-    assert scenario_of_recording(recording).measures.name == "vasarhelyi"  # a recording runs no code that it names
+    assert scenario_of_recording(recording).metrics.rule.name == "vasarhelyi"  # a recording runs no code that it names
     direct = load("vasarhelyi_2018/4ms", SMALL, metrics=namespace(METRIC), body=namespace(BODY))
     recording = airflock.simulate(direct, 1, precision=64, device="python")
     again = scenario_of_recording(recording)
-    assert again.measures.name == "vasarhelyi" and again.vehicle.name == "multirotor"
+    assert again.metrics.rule.name == "vasarhelyi" and again.body.rule.name == "multirotor"
 
 
 def test_code_in_the_current_folder_is_found_and_only_its_name_is_kept(files, monkeypatch):
@@ -168,7 +168,7 @@ def test_code_in_the_current_folder_is_found_and_only_its_name_is_kept(files, mo
     kept = bare_document(load("vasarhelyi_2018/4ms", {"metrics.kind": "spread.py"}, trust=True))
     assert kept["metrics"]["kind"] == "spread"  # no place of a file
     other = load("vasarhelyi_2018/4ms", keys, trust=True)  # the preset's numbers are another body's
-    assert other.vehicle.name == "half" and any("multirotor are left out" in note for note in other.notes)
+    assert other.body.rule.name == "half" and any("multirotor are left out" in note for note in other.notes)
     with pytest.raises(ScenarioError, match="body.tau: unknown key"):
         load("vasarhelyi_2018/4ms", keys | {"body.tau": 1.0}, trust=True)
 
@@ -243,6 +243,6 @@ def test_code_that_a_recording_names_does_not_run_with_trust_in_another_file(fil
     document = json.loads(recording.attrs["airflock_scenario"])
     document["body"]["kind"] = "evil.py"
     crafted = recording.assign_attrs(airflock_scenario=json.dumps(document))
-    assert scenario_of_recording(crafted, {"metrics.kind": "spread.py"}, trust=True).vehicle.name == "multirotor"
+    assert scenario_of_recording(crafted, {"metrics.kind": "spread.py"}, trust=True).body.rule.name == "multirotor"
     with pytest.raises(AirflockError, match=r"body.kind = 'evil.py', which is not in the file"):
         replay_recording(crafted, settings={"metrics.kind": "spread.py"}, trust=True)

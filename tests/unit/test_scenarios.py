@@ -199,11 +199,15 @@ def test_a_battery_that_does_not_last_is_told():
 def test_another_kind_takes_the_place_of_one_that_is_written_with_its_source(name):
     """Also where the preset says `kind = { value = "links", source = ... }`; the kind of today leaves all as it is."""
     plain = load(name)
-    now = {"radio.kind": plain.transceiver.name, "sensors.kind": plain.sensor.name}
+    now = {"radio.kind": plain.radio.rule.name, "sensors.kind": plain.sensors.rule.name}
     again = load(name, now)
-    assert again.radio == plain.radio and again.sensors == plain.sensors
+    assert again.radio.numbers == plain.radio.numbers and again.sensors.numbers == plain.sensors.numbers
     other = load(name, {"radio.kind": "constant", "sensors.kind": "perfect"})
-    assert (other.transceiver.name, other.radio.delay, other.sensor.name) == ("constant", plain.radio.delay, "perfect")
+    assert (other.radio.rule.name, other.radio.delay, other.sensors.rule.name) == (
+        "constant",
+        plain.radio.delay,
+        "perfect",
+    )
     assert not any("{" in note for note in other.notes)
 
 

@@ -147,10 +147,16 @@ def test_notes_tell_what_is_hardly_meant_and_presets_have_none_of_them(tmp_path)
 def test_the_list_of_keys_is_that_of_the_declarations_and_of_a_loaded_scenario():
     for name in ("vasarhelyi_2018/4ms", "couzin_2002/torus", "kidger/city"):
         scenario = load(name)
-        for record, section in ((scenario.parameters, "model"), (scenario.body, "body"), (scenario.radio, "radio")):
+        for record, section in (
+            (scenario.parameters, "model"),
+            (scenario.body.numbers, "body"),
+            (scenario.radio.numbers, "radio"),
+        ):
             for key, how, _ in declarations(record):
                 (found,) = [
-                    k for k in keys.keys(f"{section}.{key}") if k.of in ("", scenario.model.name, scenario.vehicle.name)
+                    k
+                    for k in keys.keys(f"{section}.{key}")
+                    if k.of in ("", scenario.model.name, scenario.body.rule.name)
                 ]
                 value = getattr(record, key)
                 inside = found.low <= value <= found.high if isinstance(how, Quantity) else value in found.options

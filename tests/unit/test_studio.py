@@ -274,7 +274,7 @@ def test_a_tuned_scenario_is_a_file_that_loads_to_the_same_scenario(player, tmp_
     player.change("body.tau", 0.5)
     path = player.save_toml(tmp_path / "tuned.toml")
     found = airflock.load(path)
-    assert found.parameters == player.scenario.parameters and found.body == player.scenario.body
+    assert found.parameters == player.scenario.parameters and found.body.numbers == player.scenario.body.numbers
     assert found.agents == 12 and "tuned by hand" in path.read_text()
     assert (
         player.command == f"airflock watch {PRESET} --set agents=12 --set model.p_rep=0.2 --set body.tau=0.5 --seed 3"
@@ -762,7 +762,7 @@ def test_links_by_radio_join_the_pairs_in_range_and_pale_with_the_loss():
     }
     np.testing.assert_allclose(length, far[pairs[:, 0], pairs[:, 1]])
     lossy = airflock.load(PRESET, {"radio.loss": 0.5})
-    at, share = arrival_curve(lossy.transceiver, lossy.radio)
+    at, share = arrival_curve(lossy.radio.rule, lossy.radio.numbers)
     np.testing.assert_allclose(np.interp([0.0, 40.0, 80.0], at, share), [1.0, 0.875, 0.5], atol=1e-4)
 
 

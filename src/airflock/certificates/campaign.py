@@ -224,7 +224,7 @@ def used_and_unused_keys(scenario: Scenario) -> tuple[str, ...]:
 
     The latter come last: another driver has to be compiled for some of them.
     """
-    links = scenario.transceiver.keeps_packets
+    links = scenario.radio.rule.keeps_packets
     unused = {"radio.range"} if links else {"radio.far", "radio.received_far"}
     known = environment_numbers(scenario)
     used = [key for key, (_, value) in known.items() if value and key not in unused]
@@ -293,13 +293,13 @@ def with_distance_metrics(scenario: Scenario, limits: Sequence[EventLimit]) -> S
     if any(metric.name == "collisions" for metric in scenario.order_parameters):
         if any(limit.score in R_COLL_METRICS for limit in limits):
             return scenario
-        return replace(scenario, metrics=replace(scenario.metrics, r_coll=max(radii), collision_period=None))
+        return replace(scenario, metrics=scenario.metrics.with_numbers(r_coll=max(radii), collision_period=None))
     return sampled_every_step(scenario)
 
 
 def sampled_every_step(scenario: Scenario) -> Scenario:
     """Return the scenario sampled at every motion step."""
-    return replace(scenario, metrics=replace(scenario.metrics, period=0.0, collision_period=None))
+    return replace(scenario, metrics=scenario.metrics.with_numbers(period=0.0, collision_period=None))
 
 
 def limit_score_function(
@@ -392,11 +392,12 @@ def scenario_identity(scenario: Scenario) -> str:
     document["scene"] = {**document["scene"], "file": "", "stands": stands}
     if not document["start"]["wall_clearance"]:  # as in flights from before there was one
         del document["start"]["wall_clearance"]
-    document["laws"] = [scenario.model.name, scenario.vehicle.name]
-    if scenario.sensor.name != DEFAULT_SENSOR:  # so that certificates from before there were others stay what they are
-        document["laws"].append(scenario.sensor.name)
+    document["laws"] = [scenario.model.name, scenario.body.rule.name]
+    # The default is left out, so that certificates from before there were others stay what they are.
+    if scenario.sensors.rule.name != DEFAULT_SENSOR:
+        document["laws"].append(scenario.sensors.rule.name)
     if "kind" not in document["radio"]:  # which distinguishes records that are not the usual one
-        document["laws"].append(scenario.transceiver.name)
+        document["laws"].append(scenario.radio.rule.name)
     if scenario.own_topology is not None:
         document["laws"].append(scenario.own_topology.name)
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()

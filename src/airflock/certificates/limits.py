@@ -80,7 +80,7 @@ def parse_limit(text: str, scenario: Scenario) -> EventLimit:
     if found is None:
         raise ScenarioError([f"{where}: cannot be read; {EXAMPLES}"])
     score, sign, value, word, rate, percent, unit = found.groups()
-    known = scalar_names(scenario.measures, scenario.metrics, scenario.goals.kind != "none")
+    known = scalar_names(scenario.metrics.rule, scenario.metrics.numbers, scenario.goals.kind != "none")
     if score not in known:
         hint = suggest(score, known, f"known: {', '.join(known)}")
         raise ScenarioError([f"{where}: {score}: unknown order parameter; {hint}"])
@@ -100,7 +100,7 @@ def parse_limit(text: str, scenario: Scenario) -> EventLimit:
         ranges = {"in": "the share lies outside (0, 100 %)", "at": "the rate must be above 0, and below 1 per flight"}
         fault = ranges[word]
     elif unit in ("h", "drone-h") and not timed:
-        _, meaning = reported_values(scenario.measures).get(score, ("", score))
+        _, meaning = reported_values(scenario.metrics.rule).get(score, ("", score))
         fault = f"{meaning} has no rate per hour; give it /flight, or as '{score}{OPPOSITE[sign]}{value} in 99%'"
     elif score == "r_min" and sign in (">", ">="):
         fault = f"near is what is dangerous; give 'r_min<{value} at ...', or 'r_min>={value} in 99%'"

@@ -23,7 +23,7 @@ from airflock.check.truths import (
 )
 from airflock.core import Metric, MetricSet, law
 from airflock.engine import measure_frames
-from airflock.scenarios import METRIC_SET_KIND, CallerParts, Scenario, build_scenario, check_seed
+from airflock.scenarios import METRIC_SET_KIND, CallerParts, Part, Scenario, build_scenario, check_seed
 
 AGENTS, INSTANTS, FLIGHTS = 6, 5, 8
 CLOSE = 1e-9
@@ -107,7 +107,7 @@ def _scenario(found: MetricSet, dimensions: int) -> Scenario:
         "wing.tolerance": 1e-14,
     }  # fmt: skip
     return build_scenario(
-        {"model": {"kind": "vasarhelyi_2018"}}, f"check of {found.name}", keys, caller_parts=CallerParts(measures=found)
+        {"model": {"kind": "vasarhelyi_2018"}}, f"check of {found.name}", keys, caller_parts=CallerParts(metrics=found)
     )
 
 
@@ -125,11 +125,11 @@ def _turned(flock: FlockTrack, turn: NDArray[np.float64]) -> FlockTrack:
 
 def _measured(scenario: Scenario, flock: FlockTrack, q: Any = None, second: float = 1.0) -> dict[str, float]:
     """Order parameters of some instants, 0.2 s apart (or `second` as many), by the stages of a driver, uncompiled."""
-    scenario = scenario if q is None else replace(scenario, metrics=q)
+    scenario = scenario if q is None else replace(scenario, metrics=Part(scenario.metrics.rule, q))
     period, dims = 0.2 * second, scenario.dimensions
     frames = np.concatenate([flock[:, :, :dims], flock[:, :, 3 : 3 + dims]], axis=2).transpose(0, 2, 1)
     values, _ = measure_frames(scenario, frames, period, device="python")
-    return scenario.measures.judged(values, flock.shape[1], period * len(flock), scenario.resolved_metrics())
+    return scenario.metrics.rule.judged(values, flock.shape[1], period * len(flock), scenario.resolved_metrics())
 
 
 def _rules(metrics: Sequence[Metric]) -> str:
@@ -146,7 +146,7 @@ def _reports(scenario: Scenario, flock: FlockTrack) -> str:
 def _units_of(scenario: Scenario) -> dict[str, str]:
     """Name of each value → its unit."""
     units = {name: unit for m in scenario.order_parameters for name, (unit, _) in m.reports.items()}
-    units |= {name: unit for name, (unit, _) in scenario.measures.reports.items()}
+    units |= {name: unit for name, (unit, _) in scenario.metrics.rule.reports.items()}
     return {name: unit.split(" or ")[-1 if scenario.dimensions == 3 else 0] for name, unit in units.items()}
 
 

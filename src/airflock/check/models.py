@@ -221,7 +221,7 @@ def _time_step(law: TestedLaw, seed: int) -> str:
     ends = []
     for halvings in range(4):
         flight = replace(quiet.flight, dt=quiet.flight.dt / 2**halvings)
-        metrics = replace(quiet.metrics, collision_period=None)
+        metrics = quiet.metrics.with_numbers(collision_period=None)
         ends.append(_flown(replace(quiet, flight=flight, metrics=metrics), start, seed)[-1])
     dims = quiet.dimensions
     errors = [float(np.abs(a[:dims] - b[:dims]).max()) for a, b in zip(ends, ends[1:], strict=False)]
@@ -233,7 +233,7 @@ def _time_step(law: TestedLaw, seed: int) -> str:
 def _quiet(scenario: Scenario) -> Scenario:
     """The scenario without noise."""
     noise = {"noise": 0.0} if hasattr(scenario.body, "noise") else {}
-    return replace(scenario.without_sensor_errors, body=replace(scenario.body, **noise))
+    return replace(scenario.without_sensor_errors, body=scenario.body.with_numbers(**noise))
 
 
 def _units(law: TestedLaw, scenes: Sequence[Scene], seed: int) -> str:

@@ -27,7 +27,7 @@ from airflock.core import (
     number_names,
 )
 from airflock.engine import DriverSource, scratch_shapes
-from airflock.scenarios import ORDER, CallerParts, Scenario, build_scenario, schema, settings_dict
+from airflock.scenarios import CallerParts, Scenario, build_scenario, schema, settings_dict
 from airflock.support import AirflockError, RuleError, ScenarioError
 
 # name → what it says, and a check that returns what is wrong, empty if nothing is
@@ -175,8 +175,7 @@ def _points(value: Any, unit: str, units: UnitScale) -> Any:
 
 def rescaled_scenario(scenario: Scenario, units: UnitScale) -> Scenario:
     """A scenario in the other units."""
-    records = {key: rescaled(record, units) for key, record in scenario.records.items()}
-    return replace(scenario, **{section.field: records[section.key] for section in ORDER})
+    return scenario.with_records({key: rescaled(record, units) for key, record in scenario.records.items()})
 
 
 # The generated text runs on numbers that refuse integers and uncast literals: `2 * k` is detected

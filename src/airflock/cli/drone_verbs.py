@@ -201,7 +201,7 @@ def _print_runs(series: Any, as_json: bool) -> None:
         return
     flown = f"{scenario.flight.duration:g} s, {seeds} seed{'s' if seeds > 1 else ''}"
     title = f"{scenario.name}: fleet of {scenario.agents} {series.vehicle}, {flown}"
-    terminal.print_score_table(title, series.measured, {}, reported_values(scenario.measures))
+    terminal.print_score_table(title, series.measured, {}, reported_values(scenario.metrics.rule))
     for run in series.runs:
         _print_load(run.get("load"))
     for instant, member, note in series.runs[0]["notes"][:40]:
@@ -210,7 +210,7 @@ def _print_runs(series: Any, as_json: bool) -> None:
         terminal.print_message(
             "largest distance to the simulated flight, m; and of the simulation itself after a nudge of 1 cm"
         )
-        if scenario.has_sensor_error and scenario.sensor.error is not None:
+        if scenario.has_sensor_error and scenario.sensors.rule.error is not None:
             terminal.print_message(
                 "(a drone sends the position that it flies by; a simulated one has two errors: they part)"
             )

@@ -101,7 +101,7 @@ def _print_scores(
     count = f"{seeds} flights" if seeds > 1 else f"seed {numbers[0]}"
     title = f"{scenario.name}: {scenario.agents} agents, {scenario.flight.duration:g} s, {count}"
     published = {} if changed_keys else scenario.published
-    terminal.print_score_table(title, rows, published, reported_values(scenario.measures))
+    terminal.print_score_table(title, rows, published, reported_values(scenario.metrics.rule))
     for remark in rare_event_notes(rows, numbers):
         terminal.print_message(remark)
 
@@ -187,7 +187,7 @@ def _print_group_scores(
     runs = []
     for source, path in zip(sources, files, strict=True):
         recording = load_recording(source)
-        about = reported_values(scenario_of_recording(recording, changed, trust=trust).measures) | PAIR_METRICS
+        about = reported_values(scenario_of_recording(recording, changed, trust=trust).metrics.rule) | PAIR_METRICS
         table = group_scores(recording, changed, trust=trust)
         rows = {str(name): row.dropna().to_dict() for name, row in table.iterrows()}
         runs.append({"file": str(path), "groups": rows})
@@ -234,7 +234,7 @@ def _measured(source: Any, path: Path, changed: ScoreValues, trust: bool, aero: 
     scenario = scenario_of_recording(recording, settings, trust=trust)
     untold, coarse = undefined_metrics_of(recording, scenario, settings), between_frames_note(recording, scenario)
     return MeasuredRecording(
-        path, values, course, reported_values(scenario.measures), recorded_faults(recording), untold, coarse
+        path, values, course, reported_values(scenario.metrics.rule), recorded_faults(recording), untold, coarse
     )
 
 

@@ -225,7 +225,7 @@ def ground_contact(scenario: Scenario, seed: int, real: Any) -> GroundContact | 
     """Return the record of agents that can land; None where none can. real : type of the driver's numbers."""
     if not scenario.can_land or scenario.ground is None:
         return None
-    body = scenario.body
+    body = scenario.body.numbers
     same = {name: float(real(getattr(body, name) or 0.0)) for name in number_names(type(body))}
     own = {
         name: [float(real(value)) for value in scenario.agent_values("b", name, seed)]
@@ -236,4 +236,4 @@ def ground_contact(scenario: Scenario, seed: int, real: Any) -> GroundContact | 
         SimpleNamespace(**choices(body), **(same | {name: values[agent] for name, values in own.items()}))
         for agent in range(scenario.agents)
     )
-    return GroundContact(scenario.ground, scenario.vehicle, numbers, scenario.wing)
+    return GroundContact(scenario.ground, scenario.body.rule, numbers, scenario.wing)

@@ -807,7 +807,7 @@ def flight_html(flight: "Flight") -> str:
     head = f"<p><b>{escape(repr(flight).strip('<>'))}</b>{beside}</p>"
     if not flight.step:
         return f"{head}<p>nothing is flown yet</p>"
-    known = reported_values(flight.scenario.measures)
+    known = reported_values(flight.scenario.metrics.rule)
     scores = {name: value for name, value in flight.scores().items() if isinstance(value, (int, float))}
     rows = [(name, format_number(value), *known.get(name, ("", ""))) for name, value in scores.items()]
     return head + html_table(("order parameter", "value", "unit", "meaning"), rows)

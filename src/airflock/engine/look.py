@@ -76,7 +76,7 @@ def _met(scenario: Scenario, state: DriverState, own: Motion, heard: tuple[Heard
     if len(state.arrays["later"]):
         place.shapes[:] = state.arrays["shapes"].astype(float).tolist()
     beside = [other._replace(state=_beside(scenario, own, other.state)) for other in heard]
-    found = {other.who for other in met_neighbours(state.plan.topology, scenario.topology, own, beside, place)}
+    found = {other.who for other in met_neighbours(state.plan.topology, scenario.topology.numbers, own, beside, place)}
     return tuple(other.who in found for other in heard)
 
 
@@ -108,7 +108,7 @@ def _heard(
     world: int,
 ) -> Iterator[HeardNeighbour]:
     """Everybody in range whose packet agent i has and still believes: as the driver drew it, from the same counters."""
-    k, plan, n = scenario.radio, state.plan, state.agents
+    k, plan, n = scenario.radio.numbers, state.plan, state.agents
     fades = plan.topology is not None and plan.topology.asks_for("fade")
     clocks, sent_clocks = _clocks(state, "clock"), _clocks(state, "sent_clock" if plan.late else "clock")
     reach, groups = _reach(state, i), scenario.group_indices

@@ -496,8 +496,8 @@ def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None, build: Buil
         scenario.world,
         scenario.numbers,
         build=build,
-        body=scenario.vehicle,
-        body_choices=_chosen(scenario.body),
+        body=scenario.body.rule,
+        body_choices=_chosen(scenario.body.numbers),
         sequential=scenario.flight.update == "sequential",
         stop=scenario.metrics.stop == "collision",
         wing_choices=_wing_choices(scenario, metrics),
@@ -518,10 +518,10 @@ def _probe_rules(scenario: Scenario) -> None:
         _probed(law.model, tuple(choices(law.parameters).items()))
     for kind in scenario.fault_kinds:
         probe_fault(kind)
-    probe_body(scenario.vehicle, _chosen(scenario.body))
+    probe_body(scenario.body.rule, _chosen(scenario.body.numbers))
     if scenario.has_sensor_error:
-        probe_sensor(scenario.sensor)
-    probe_radio(scenario.transceiver)
+        probe_sensor(scenario.sensors.rule)
+    probe_radio(scenario.radio.rule)
     if scenario.own_topology is not None:
         probe_topology(scenario.own_topology)
 
@@ -549,14 +549,14 @@ def _surroundings(scenario: Scenario) -> dict[str, Any]:
 def _hearing(scenario: Scenario) -> dict[str, Any]:
     """Return the properties of a plan that describe the radio and the topology."""
     return {
-        "radio": scenario.transceiver,
+        "radio": scenario.radio.rule,
         # the kind of radios that share a record is none of the choices that rules can read
-        "radio_choices": tuple(pair for pair in _chosen(scenario.radio) if pair[0] != "kind"),
+        "radio_choices": tuple(pair for pair in _chosen(scenario.radio.numbers) if pair[0] != "kind"),
         "few": _few_packets(scenario),
         "delayed": step_counts(scenario)["delay"] > 0,
         "lossy": scenario.radio.loss > 0.0,
         "stops_for_lost": scenario.silence.rule == "stop",
-        "topology": scenario.topology_rule if any(law.model.neighbour is not None for law in scenario.laws) else None,
+        "topology": scenario.topology.rule if any(law.model.neighbour is not None for law in scenario.laws) else None,
         "fading": scenario.own_topology is not None or scenario.topology.fading > 0.0,
     }
 
@@ -565,12 +565,13 @@ def _sensing(scenario: Scenario) -> dict[str, Any]:
     """Return the properties of a plan that describe the sensor; a perfect one adds none, so that drivers are shared."""
     if not scenario.has_sensor_error:
         return {"has_sensor_error": False}
-    return {"has_sensor_error": True, "sensor": scenario.sensor, "sensor_choices": _chosen(scenario.sensors)}
+    sensors = scenario.sensors
+    return {"has_sensor_error": True, "sensor": sensors.rule, "sensor_choices": _chosen(sensors.numbers)}
 
 
 def _few_packets(scenario: Scenario) -> bool:
     """Return True if each rate of the radio sends at most FEW packets between two decisions; True where it has none."""
-    rates = [getattr(scenario.radio, name) for name in scenario.transceiver.rates]
+    rates = [getattr(scenario.radio.numbers, name) for name in scenario.radio.rule.rates]
     period = step_counts(scenario)["decide_every"] * scenario.flight.dt
     return max(rates, default=0.0) * period <= FEW_PACKETS - 0.1  # rounding may make it one packet more
 

@@ -25,7 +25,7 @@ def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tupl
     Raises ScenarioError where groups have fewer agents.
     """
     if not scenario.varied and len(scenario.laws) == 1:
-        return [(scenario.parameters, scenario.body)] * count
+        return [(scenario.parameters, scenario.body.numbers)] * count
     if count > scenario.agents:
         raise ScenarioError(
             [f"groups are of {scenario.agents} agents, and {count} drones are to fly; set agents = {count}"]
@@ -39,7 +39,7 @@ def agent_records(scenario: Scenario, count: int, seed: int | None) -> list[tupl
         law = resolved.law_of(agent)
         p = {name: columns["p", name][agent] for _, name in law.varied}
         b = {name: column[agent] for (of, name), column in columns.items() if of == "b"}
-        return replace(law.parameters, **p), replace(scenario.body, **b)
+        return replace(law.parameters, **p), replace(scenario.body.numbers, **b)
 
     return [own(agent) for agent in range(count)]
 
@@ -48,7 +48,7 @@ def agent_sensors(scenario: Scenario, count: int, seed: int) -> list[Any]:
     """Return the numbers of the sensor of each of the first `count` agents, with the tolerances of a seed."""
     columns = {name: scenario.agent_values("s", name, seed) for of, name in scenario.varied if of == "s"}
     own = [{name: column[agent] for name, column in columns.items()} for agent in range(count)]
-    return [replace(scenario.sensors, **numbers) for numbers in own]
+    return [replace(scenario.sensors.numbers, **numbers) for numbers in own]
 
 
 # ---- Card document
@@ -87,7 +87,7 @@ def make_card_document(
     stands = scenario.stands()
     # A radio that keeps packets lets the newest count until the next; all others let each count
     # once.
-    held = not scenario.transceiver.keeps_packets
+    held = not scenario.radio.rule.keeps_packets
     stop_for_lost = not as_simulated or scenario.silence.rule == "stop" if stop_for_lost is None else stop_for_lost
     silence = with_defaults(
         scenario.silence, _preferred_speed(scenario), scenario.radio.delay, "stop" if stop_for_lost else "fly_on"
@@ -102,19 +102,19 @@ def make_card_document(
         "operator": operator.hex(),
         "autopilot": autopilot,
         "law": {"kind": scenario.model.name, **to_json_table(scenario.parameters)},
-        "body": {"kind": scenario.vehicle.name, **to_json_table(scenario.body)},
+        "body": {"kind": scenario.body.rule.name, **to_json_table(scenario.body.numbers)},
         "own": _member_differences(scenario, agent_records(scenario, len(members), seed)),
         **_group_numbers(scenario, len(members)),
         "world": to_json_table(scenario.world),
         "shapes": {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()},
         "radio": {
             "delay": scenario.radio.delay,
-            "extrapolate": not as_simulated or scenario.transceiver.carry is forward,
+            "extrapolate": not as_simulated or scenario.radio.rule.carry is forward,
             "forget": 5.0,
             **({"once": held, "any_stamp": True} if as_simulated else {}),
         },
         "silence": to_json_table(silence),
-        **({"topology": to_json_table(scenario.topology)} if scenario.topology_rule is not None else {}),
+        **({"topology": to_json_table(scenario.topology.numbers)} if scenario.topology.rule is not None else {}),
         "safety": to_json_table(limits),
         "fence": {
             "corners": fence_corners(scenario.world, margin),
@@ -168,9 +168,9 @@ def _check_flyable(scenario: Scenario) -> None:
         fault = "world.arena = 'none': a card needs walls, and a fence around them"
     elif scenario.own_topology is not None:
         fault = f"the topology {scenario.own_topology.name} is not in the package; a card names ours"
-    elif scenario.transceiver.see is not None:
+    elif scenario.radio.rule.see is not None:
         fault = (
-            f"radio.kind = {scenario.transceiver.name!r}: nodes hear each other by radio; "
+            f"radio.kind = {scenario.radio.rule.name!r}: nodes hear each other by radio; "
             "set radio.kind = 'constant' or another one by which they send"
         )
     elif others:
@@ -181,7 +181,7 @@ def _check_flyable(scenario: Scenario) -> None:
 
 def _member_differences(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:
     """Return the numbers of law and body in which each member differs; empty where all are equal."""
-    base = {"law": to_json_table(scenario.parameters), "body": to_json_table(scenario.body)}
+    base = {"law": to_json_table(scenario.parameters), "body": to_json_table(scenario.body.numbers)}
     if not scenario.varied and len(scenario.laws) == 1:
         return []
     rows = [
@@ -206,7 +206,7 @@ def _group_numbers(scenario: Scenario, count: int) -> dict[str, list[int]]:
 
 def default_safety(scenario: Scenario) -> SafetyLimits:
     """Return the limits that follow from a scenario: 1.5 times the preferred speed, as agile as its body."""
-    body = scenario.body if isinstance(scenario.body, Multirotor) else Multirotor()
+    body = scenario.body.numbers if isinstance(scenario.body.numbers, Multirotor) else Multirotor()
     return SafetyLimits(
         speed_max=min(1.5 * _preferred_speed(scenario), 60.0),
         accel=min(body.a_max, 50.0),

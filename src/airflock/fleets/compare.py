@@ -210,7 +210,7 @@ def compare_scores(
 def with_metric_period(scenario: Scenario, period: float) -> Scenario:
     """Return the scenario with order parameters taken once per decision, as a fleet is recorded."""
     document = {**scenario.document, "metrics": {**scenario.document.get("metrics", {}), "period": period}}
-    return replace(scenario, metrics=replace(scenario.metrics, period=period), document=document)
+    return replace(scenario, metrics=scenario.metrics.with_numbers(period=period), document=document)
 
 
 def simulated_and_flown_scores(

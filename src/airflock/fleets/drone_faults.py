@@ -145,7 +145,7 @@ class DroneFaults:
         self._dt = scenario.flight.dt
         self._active: dict[tuple[int, str], ActiveFault] = {}
         self._last_states: dict[tuple[int, str, str], State] = {}  # what a rule was last given before its fault
-        self._default_range = min(scenario.radio.range, 1e8)
+        self._default_range: float = min(scenario.radio.range, 1e8)
 
     def __bool__(self) -> bool:
         return bool(self._kinds)

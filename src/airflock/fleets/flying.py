@@ -51,7 +51,7 @@ class FleetRuns:
     def table(self) -> pd.DataFrame:
         """Return order parameters, one row per flight by its seed, with units and meanings in `attrs`."""
         index = pd.Index([run["seed"] for run in self.runs], name="seed")
-        return with_units(pd.DataFrame(self.measured, index=index), dict(reported_values(self.scenario.measures)))
+        return with_units(pd.DataFrame(self.measured, index=index), dict(reported_values(self.scenario.metrics.rule)))
 
     @property
     def comparison(self) -> list[compare.MetricComparison]:

@@ -131,7 +131,7 @@ def make_vehicle(
     noisy = "noise" in number_names(body) and body.noise > 0.0
     draw = partial(noise, drone=index) if noisy else lambda step: (0.0, 0.0, 0.0)
     vehicle = SoftwareVehicle(
-        card.autopilot.name, card.members[index], card.site, at, scenario.vehicle, body, draw, started
+        card.autopilot.name, card.members[index], card.site, at, scenario.body.rule, body, draw, started
     )
     vehicle.place = index
     return vehicle
@@ -257,13 +257,13 @@ class LockstepFleet:
             )
         ]
         reach = drone_faults.reach if drone_faults else None
-        radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
+        radio, period = (scenario.radio.rule, scenario.radio.numbers), card.safety.status_period
         self.channel = RadioChannel(
             *radio, card.members, seed, period, faults, reach, partial(is_clear_between, card), card.site
         )
         words = SensorWords(seed, len(card.members))
         self._sensor_states = [
-            SensorState(scenario.sensor, own, seed, i, flat=card.flat, words=partial(words, drone=i))
+            SensorState(scenario.sensors.rule, own, seed, i, flat=card.flat, words=partial(words, drone=i))
             for i, own in enumerate(agent_sensors(scenario, len(card.members), seed))
         ]
         self._station = OperatorStation(card, operator)

@@ -217,7 +217,7 @@ class RealtimeVehicle:
         made.faults = self._faults or None
         self.notes: list[tuple[float, int, str]] = []
         self._booted = time.monotonic() - HOVER_SECONDS
-        self._sensor_state = SensorState(scenario.sensor, scenario.sensors, plan.seed, i, flat=card.flat)
+        self._sensor_state = SensorState(scenario.sensors.rule, scenario.sensors.numbers, plan.seed, i, flat=card.flat)
         self._steps_per_period = max(1, round(card.period / scenario.flight.dt))
         self._node_port, self._client_port = plan.ports.vehicles[i], plan.ports.clients[i]
         self._client_address: tuple[str, int] | None = None
@@ -312,8 +312,8 @@ def channel_task(plan: RealtimePlan) -> Generator[TaskRest, None, TaskResult]:
     drone_faults = DroneFaults(flown, plan.seed)
     reach = drone_faults.reach if drone_faults else None
     channel = RadioChannel(
-        flown.transceiver,
-        flown.radio,
+        flown.radio.rule,
+        flown.radio.numbers,
         card.members,
         plan.seed,
         period,

@@ -155,9 +155,9 @@ def undefined_metrics_of(
     """
     if scenario_document(recording) is not None:
         return {}
-    sampled = (name for metric in scenario.measures.metrics for name in metric.Sample._fields)
-    names = (*reported_values(scenario.measures), *sampled)
-    return undefined_metrics(names, scenario.measures.name, settings or {}, arena=scenario.world.arena != "none")
+    sampled = (name for metric in scenario.metrics.rule.metrics for name in metric.Sample._fields)
+    names = (*reported_values(scenario.metrics.rule), *sampled)
+    return undefined_metrics(names, scenario.metrics.rule.name, settings or {}, arena=scenario.world.arena != "none")
 
 
 def between_frames_note(recording: xr.Dataset, scenario: Scenario) -> str:
@@ -168,7 +168,7 @@ def between_frames_note(recording: xr.Dataset, scenario: Scenario) -> str:
     if scenario_document(recording) is None or recording.attrs.get("airflock_device") == "fleet":
         return ""
     q, (_, period, _) = scenario.resolved_metrics(), recording_frames(recording)
-    names = [name for each in scenario.measures.of(q) if each.clock == "collision" for name in each.reports]
+    names = [name for each in scenario.metrics.rule.of(q) if each.clock == "collision" for name in each.reports]
     looked = q.collision_period or period
     if not names or looked > 0.99 * period:
         return ""
@@ -180,8 +180,8 @@ def between_frames_note(recording: xr.Dataset, scenario: Scenario) -> str:
 
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """Add units and meanings of the columns to the attributes of a table."""
-    of_courses = {name: about for each in scenario.measures.metrics for name, about in each.courses.items()}
-    return with_units(table, of_courses | dict(reported_values(scenario.measures)))
+    of_courses = {name: about for each in scenario.metrics.rule.metrics for name, about in each.courses.items()}
+    return with_units(table, of_courses | dict(reported_values(scenario.metrics.rule)))
 
 
 def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> pd.DataFrame:

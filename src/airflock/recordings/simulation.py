@@ -286,9 +286,9 @@ def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float)
     """Return the time stamps (s) of the states that each agent knows of each other one after a decision; nan: never
     heard.
     """
-    k, n = flight.scenario.radio, flight.agents
+    k, n = flight.scenario.radio.numbers, flight.agents
     # Such a radio keeps the stamps in the flight itself; only a plain one must be drawn again.
-    if flight.scenario.transceiver.keeps_packets:
+    if flight.scenario.radio.rule.keeps_packets:
         return np.where(np.eye(n, dtype=bool), np.nan, flight.sent)
     place = flight.state[: flight.scenario.dimensions].astype(float)
     offset = place[:, None, :] - place[:, :, None]  # from receiver (first) to sender

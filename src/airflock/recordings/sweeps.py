@@ -124,7 +124,7 @@ def _columns_given_twice(points: Sequence[Mapping[str, Any]], scenarios: Sequenc
     """Return errors for swept keys whose last word is another column of the table: the seed, or an order parameter."""
     errors: list[str] = []
     for key in points[0] if points and scenarios else ():
-        if key == "seed" or any(key in reported_values(found.measures) for found in scenarios):
+        if key == "seed" or any(key in reported_values(found.metrics.rule) for found in scenarios):
             whole = " or ".join(short_keys.keys_by_last_word(scenarios[0].records).get(key, ()))
             errors.append(f"{scenarios[0].name}: {key}: is a column of the table already; write {whole}")
     return errors
@@ -139,7 +139,7 @@ def fly_points(
     flights = [found for _, found, _ in jobs]
     rows = score_scenarios(flights, [seed for _, _, seed in jobs], **options)
     table = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
-    known = {name: text for found in scenarios for name, text in reported_values(found.measures).items()}
+    known = {name: text for found in scenarios for name, text in reported_values(found.metrics.rule).items()}
     return with_units(table, known)
 
 
@@ -147,10 +147,13 @@ def metric_to_show(metric: str | None, scenarios: Sequence[Scenario]) -> str:
     """Choose the order parameter to show: `metric`, or the usual one; raise ScenarioError if a flight does not report
     it.
     """
-    each = [scalar_names(found.measures, found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
+    each = [
+        scalar_names(found.metrics.rule, found.metrics.numbers, found.goals.kind in ("points", "scene"))
+        for found in scenarios
+    ]
     known = [name for name in (each[0] if each else ()) if all(name in names for names in each)]
     if metric is None:
-        judged = (*(found.measures.best for found in scenarios), ORDER)
+        judged = (*(found.metrics.rule.best for found in scenarios), ORDER)
         usual = [name for name in judged if name in known]
         return str((usual + known + [""])[0])
     if each and metric not in known:

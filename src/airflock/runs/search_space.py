@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.core import Quantity, declarations
-from airflock.scenarios import ORDER, FaultEntry, Scenario
+from airflock.scenarios import FaultEntry, Scenario
 
 DECADES = 3.0  # a declared range at least this many decades wide is searched on a logarithmic scale
 
@@ -148,7 +148,6 @@ def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scen
     for key, value in parameters.items():
         section, _, name = key.rpartition(".")
         changed.setdefault(section, {})[name] = value
-    fields = {section.key: section.field for section in ORDER}
     records = scenario.records
     numbers_of_faults = {section: changed.pop(section) for section in list(changed) if section.startswith("faults[")}
     if numbers_of_faults:
@@ -156,7 +155,7 @@ def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scen
             _with_numbers(entry, numbers_of_faults.get(f"faults[{i}]", {})) for i, entry in enumerate(scenario.faults)
         )
         scenario = replace(scenario, faults=tuple(entries))
-    return replace(scenario, **{fields[s]: replace(records[s], **values) for s, values in changed.items()})
+    return scenario.with_records({key: replace(records[key], **values) for key, values in changed.items()})
 
 
 def _with_numbers(entry: FaultEntry, values: Mapping[str, float]) -> FaultEntry:

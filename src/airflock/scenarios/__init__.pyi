@@ -74,7 +74,13 @@ from .part_kinds import (
     CallerParts as CallerParts,
 )
 from .scaling import starting_set as starting_set
-from .scenario import Scenario as Scenario, format_number as format_number, html_table as html_table, summary as summary
+from .scenario import (
+    Part as Part,
+    Scenario as Scenario,
+    format_number as format_number,
+    html_table as html_table,
+    summary as summary,
+)
 from .scenario_builder import (
     FIXED_KEYS as FIXED_KEYS,
     build_scenario as build_scenario,

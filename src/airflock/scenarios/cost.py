@@ -48,7 +48,7 @@ def uses_all_cores(scenario: Scenario) -> bool:
         scenario.agents >= GRID_FROM
         and perfect
         and uses_cells(scenario)
-        and not scenario.transceiver.keeps_packets
+        and not scenario.radio.rule.keeps_packets
         and scenario.silence.rule == "fly_on"
         and scenario.flight.update == "synchronous"
         and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
@@ -76,7 +76,7 @@ def uses_cells(scenario: Scenario) -> bool:
     """Return True if cells as wide as a law's reach contain every agent that an agent may meet."""
     if not any(law.model.neighbour for law in scenario.laws) or not all(map(_within_reach, scenario.laws)):
         return False
-    kind = scenario.topology_rule
+    kind = scenario.topology.rule
     walls = scenario.scene.kind != "none" or bool(scenario.world.obstacles)
     return kind is None or (kind.near and not (walls and kind.asks_for("hidden")))
 

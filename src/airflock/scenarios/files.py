@@ -195,7 +195,7 @@ def _with_given(
             errors += more
             if own_part is None:
                 continue
-            rules[family.field], kind = own_part, own_part.name
+            rules[family.section], kind = own_part, own_part.name
         document[family.section] = {**family.kept(table, kind), "kind": kind}
     if errors:
         raise ScenarioError(errors)

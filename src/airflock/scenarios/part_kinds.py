@@ -47,7 +47,7 @@ T = TypeVar("T")
 class PartKind(Generic[T]):
     """A kind of part that a section may name.
 
-    section : of a document; field: of a Scenario and of `CallerParts`; noun: in messages
+    section : of a document, and field of a Scenario and of `CallerParts`; noun: in messages
     shipped : parts of the package by name; None stands for a part that needs nothing
     member  : class of such a part
     gather  : makes a part from a namespace and a name
@@ -57,7 +57,6 @@ class PartKind(Generic[T]):
     """
 
     section: str
-    field: str
     noun: str
     shipped: Mapping[str, T | None]
     member: type[T]
@@ -111,15 +110,13 @@ class PartKind(Generic[T]):
         return {key: value for key, value in table.items() if key != "kind" and (every or key in (self.shared or ()))}
 
 
-BODY_KIND = PartKind("body", "vehicle", "body", BODIES, Body, body, "multirotor")
+BODY_KIND = PartKind("body", "body", BODIES, Body, body, "multirotor")
 METRIC_SET_KIND = PartKind(
-    "metrics", "measures", "set of order parameters", SETS, MetricSet, metric_set, DEFAULT_SET, None, to_metric_set
+    "metrics", "set of order parameters", SETS, MetricSet, metric_set, DEFAULT_SET, None, to_metric_set
 )
-SENSOR_KIND = PartKind("sensors", "sensor", "sensor", SENSORS, Sensor, sensor, DEFAULT_SENSOR, ("period",))
-RADIO_KIND = PartKind(
-    "radio", "transceiver", "radio", RADIOS, Radio, radio.radio, DEFAULT_RADIO, number_names(PacketParameters)
-)
-TOPOLOGY_KIND = PartKind("topology", "own_topology", "topology", TOPOLOGIES, Topology, topology, DEFAULT_TOPOLOGY)
+SENSOR_KIND = PartKind("sensors", "sensor", SENSORS, Sensor, sensor, DEFAULT_SENSOR, ("period",))
+RADIO_KIND = PartKind("radio", "radio", RADIOS, Radio, radio.radio, DEFAULT_RADIO, number_names(PacketParameters))
+TOPOLOGY_KIND = PartKind("topology", "topology", TOPOLOGIES, Topology, topology, DEFAULT_TOPOLOGY)
 PART_KINDS: tuple[PartKind[Any], ...] = (METRIC_SET_KIND, BODY_KIND, SENSOR_KIND, RADIO_KIND, TOPOLOGY_KIND)
 
 
@@ -127,16 +124,16 @@ PART_KINDS: tuple[PartKind[Any], ...] = (METRIC_SET_KIND, BODY_KIND, SENSOR_KIND
 class CallerParts:
     """The parts that a caller gives in place of those that a document names; None and empty where it gives nothing.
 
-    own_topology : a topology that is not of the package
+    topology : a topology that is not of the package
     fault_kinds : kinds of fault that [[faults]] may name; laws : laws that [[groups]] may name
     """
 
     law: Model | None = None
-    vehicle: Body | None = None
-    measures: MetricSet | None = None
-    sensor: Sensor | None = None
-    transceiver: Radio | None = None
-    own_topology: Topology | None = None
+    body: Body | None = None
+    metrics: MetricSet | None = None
+    sensors: Sensor | None = None
+    radio: Radio | None = None
+    topology: Topology | None = None
     fault_kinds: Mapping[str, Fault] = field(default_factory=dict)
     laws: Mapping[str, Model] = field(default_factory=dict)
 
@@ -177,23 +174,23 @@ def drag_descent_errors(model: Model) -> list[str]:
 
 
 class ScenarioParts(NamedTuple):
-    """The parts that fly a scenario; law is None where it is missing, own_topology where it is one of the package."""
+    """The parts that fly a scenario; law is None where it is missing, topology where it is one of the package."""
 
     law: Model | None
-    vehicle: Body
-    measures: MetricSet
-    sensor: Sensor
-    transceiver: Radio
-    own_topology: Topology | None
+    body: Body
+    metrics: MetricSet
+    sensors: Sensor
+    radio: Radio
+    topology: Topology | None
 
     @property
     def records(self) -> dict[str, type]:
         """Section → the record of parameters that checks it, without the law's."""
         own = {
-            "body": self.vehicle.Parameters, "sensors": self.sensor.Parameters, "radio": self.transceiver.Parameters,
-            "metrics": self.measures.Parameters,
+            "body": self.body.Parameters, "sensors": self.sensors.Parameters, "radio": self.radio.Parameters,
+            "metrics": self.metrics.Parameters,
         }  # fmt: skip
-        topology = self.own_topology.Parameters if self.own_topology else None
+        topology = self.topology.Parameters if self.topology else None
         return SECTIONS | own | ({"topology": topology} if topology else {})
 
 
@@ -226,25 +223,25 @@ def collect_parts(
     # A law that commands an acceleration needs another default body than one that commands a
     # velocity.
     usual = default_body(law.command if law else "velocity")
-    vehicle, of_body = one(BODY_KIND, caller_parts.vehicle, usual)
+    body, of_body = one(BODY_KIND, caller_parts.body, usual)
     of_body = of_body or body_law_errors(
-        vehicle, law, caller_parts.vehicle.name if caller_parts.vehicle else BODY_KIND.kind(document, usual)
+        body, law, caller_parts.body.name if caller_parts.body else BODY_KIND.kind(document, usual)
     )
     # Check the rest of the document with a body that fits, so that one wrong name does not cause
     # ten more errors.
-    if of_body and caller_parts.vehicle is None:
-        vehicle = BODIES[usual]
-    measures, of_metrics = one(METRIC_SET_KIND, caller_parts.measures, METRIC_SET_KIND.default)
-    sensor, of_sensor = one(SENSOR_KIND, caller_parts.sensor, SENSOR_KIND.default)
-    transceiver, of_radio = one(RADIO_KIND, caller_parts.transceiver, RADIO_KIND.default)
+    if of_body and caller_parts.body is None:
+        body = BODIES[usual]
+    metrics, of_metrics = one(METRIC_SET_KIND, caller_parts.metrics, METRIC_SET_KIND.default)
+    sensors, of_sensor = one(SENSOR_KIND, caller_parts.sensors, SENSOR_KIND.default)
+    transmission, of_radio = one(RADIO_KIND, caller_parts.radio, RADIO_KIND.default)
     if of_radio:
-        transceiver = Radio(str(RADIO_KIND.kind(document)), PacketParameters)  # the common numbers are judged
-    own_topology, of_topology = caller_parts.own_topology, list[str]()
+        transmission = Radio(str(RADIO_KIND.kind(document)), PacketParameters)  # the common numbers are judged
+    topology, of_topology = caller_parts.topology, list[str]()
     # Topologies of the package share one record, in which the kind is a choice; a file brings its
     # own record.
-    if own_topology is None and str(kind := TOPOLOGY_KIND.kind(document)).endswith(".py"):
-        own_topology, of_topology = TOPOLOGY_KIND.named(kind, folder, trust=trust)  # ours are judged as a choice
-    parts = ScenarioParts(law, vehicle, measures, sensor, transceiver, own_topology)
+    if topology is None and str(kind := TOPOLOGY_KIND.kind(document)).endswith(".py"):
+        topology, of_topology = TOPOLOGY_KIND.named(kind, folder, trust=trust)  # ours are judged as a choice
+    parts = ScenarioParts(law, body, metrics, sensors, transmission, topology)
     errors_of = {
         "body": of_body,
         "metrics": of_metrics,

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from html import escape
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from airflock.core import (
     Body,
@@ -35,15 +35,38 @@ from airflock.scenarios.scenario_checks import largest_extension
 from airflock.scenarios.sections import ORDER, SECTIONS, Flight
 from airflock.world import Scene, arena, goals, scene_of, scenery, start, waypoints
 
+Rule = TypeVar("Rule")
+Numbers = TypeVar("Numbers")
+
+
+@dataclass(frozen=True)
+class Part(Generic[Rule, Numbers]):
+    """A part of a scenario: its rule, and the numbers that it flies with.
+
+    A number can be read of the part itself: `scenario.radio.delay` is `scenario.radio.numbers.delay`.
+    """
+
+    rule: Rule
+    numbers: Numbers
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") or name in ("rule", "numbers"):  # what copying and pickling look for
+            raise AttributeError(name)
+        return getattr(self.numbers, name)
+
+    def with_numbers(self, **numbers: Any) -> "Part[Rule, Numbers]":
+        """Return the part with some numbers changed."""
+        return replace(self, numbers=replace(self.numbers, **numbers))  # type: ignore[type-var]
+
 
 @dataclass(frozen=True)
 class Scenario:
     """Everything about a flight but the seed; `airflock.load` makes one.
 
     model and parameters : the flocking law and its numbers
-    body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, silence, metrics : records, SI units
+    body, sensors, radio, topology, metrics : parts, each a rule and its numbers; SI units
+    wind, world, scene, goals, start, wing, aero, silence : numbers of the other sections
     flight    : number of agents, duration (s), motion step (s)
-    vehicle, sensor, transceiver, measures : rules whose numbers are in `body`, `sensors`, `radio` and `metrics`
     groups    : agents that share numbers or a law; faults: faults of single agents
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
@@ -59,9 +82,9 @@ class Scenario:
     name: str
     model: Model
     parameters: Any
-    body: Any
-    sensors: Any
-    radio: PacketParameters
+    body: Part[Body, Any]
+    sensors: Part[Sensor, Any]
+    radio: Part[Radio, PacketParameters]
     wind: wind.Parameters
     world: arena.Parameters
     scene: scenery.Parameters
@@ -70,14 +93,9 @@ class Scenario:
     wing: wings.Parameters
     aero: descent.Parameters
     silence: SilenceParameters
-    metrics: metric_parameters.Parameters
-    topology: Any
+    metrics: Part[MetricSet, metric_parameters.Parameters]
+    topology: Part[Topology | None, Any]
     flight: Flight
-    vehicle: Body
-    sensor: Sensor
-    transceiver: Radio
-    measures: MetricSet
-    own_topology: Topology | None = None
     groups: tuple[Group, ...] = ()
     faults: tuple[FaultEntry, ...] = ()
     published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
@@ -118,14 +136,14 @@ class Scenario:
         """True if agents measure themselves with errors."""
         own = [{key: v for (letter, key), v in group.numbers.items() if letter == "s"} for group in self.groups]
         spread = any(letter == "s" and sd > 0.0 for group in self.groups for (letter, _), sd in group.spread.items())
-        kinds = (self.sensors, *(replace(self.sensors, **numbers) for numbers in own))
-        return spread or not all(map(self.sensor.is_exact, kinds))
+        kinds = (self.sensors.numbers, *(replace(self.sensors.numbers, **numbers) for numbers in own))
+        return spread or not all(map(self.sensors.rule.is_exact, kinds))
 
     @property
     def without_sensor_errors(self) -> "Scenario":
         """The scenario with agents that know their own states exactly."""
         exact, groups = SENSORS["perfect"], tuple(group.without("s") for group in self.groups)
-        return replace(self, sensor=exact, sensors=exact.Parameters(period=self.sensors.period), groups=groups)
+        return replace(self, sensors=Part(exact, exact.Parameters(period=self.sensors.period)), groups=groups)
 
     @property
     def is_aerodynamic(self) -> bool:
@@ -135,7 +153,17 @@ class Scenario:
     @property
     def records(self) -> dict[str, Any]:
         """Key of a section → its record of parameters; the empty key holds those at the top."""
-        return {section.key: getattr(self, section.field) for section in ORDER}
+        values = {section.key: getattr(self, section.field) for section in ORDER}
+        return {key: value.numbers if isinstance(value, Part) else value for key, value in values.items()}
+
+    def with_records(self, records: Mapping[str, Any]) -> "Scenario":
+        """Return the scenario with other records of parameters, by the keys of their sections."""
+        changed: dict[str, Any] = {}
+        for section in ORDER:
+            if section.key in records:
+                before, record = getattr(self, section.field), records[section.key]
+                changed[section.field] = replace(before, numbers=record) if isinstance(before, Part) else record
+        return replace(self, **changed)
 
     @cached_property
     def numbers(self) -> dict[str, tuple[str, ...]]:
@@ -151,12 +179,12 @@ class Scenario:
     @cached_property
     def order_parameters(self) -> tuple[Metric, ...]:
         """The metrics that measure a flight."""
-        return self.measures.of(self.metrics)
+        return self.metrics.rule.of(self.metrics.numbers)
 
     @property
-    def topology_rule(self) -> Topology | None:
-        """The topology that selects which of the agents in hearing an agent meets; None: all."""
-        return self.own_topology or TOPOLOGIES[self.topology.kind]
+    def own_topology(self) -> Topology | None:
+        """The rule that selects neighbours if it is not of the package, else None."""
+        return None if self.topology.rule in TOPOLOGIES.values() else self.topology.rule
 
     @cached_property
     def fault_kinds(self) -> tuple[Fault, ...]:
@@ -167,7 +195,7 @@ class Scenario:
     @cached_property
     def varied(self) -> tuple[tuple[str, str], ...]:
         """Numbers that differ among agents, as (letter, name); of other laws of groups: `laws`."""
-        return self.laws[0].varied + varied_numbers(self.groups, {"b": self.body, "s": self.sensors})
+        return self.laws[0].varied + varied_numbers(self.groups, {"b": self.body.numbers, "s": self.sensors.numbers})
 
     @cached_property
     def laws(self) -> tuple[FlownLaw, ...]:
@@ -198,7 +226,7 @@ class Scenario:
 
     def agent_values(self, letter: str, name: str, seed: int) -> list[float]:
         """Return one number of every agent, with its tolerance as a seed draws it."""
-        record = {"p": self.parameters, "b": self.body, "s": self.sensors}[letter]
+        record = {"p": self.parameters, "b": self.body.numbers, "s": self.sensors.numbers}[letter]
         return agent_values(self.groups, self.agents, letter, name, record, seed)
 
     def alike(self) -> "Scenario":
@@ -241,7 +269,7 @@ class Scenario:
     @property
     def uses_battery(self) -> bool:
         """True if batteries run empty."""
-        return self.vehicle.endures is not None and getattr(self.body, "battery", "") != "endless"
+        return self.body.rule.endures is not None and getattr(self.body, "battery", "") != "endless"
 
     @property
     def can_land(self) -> bool:
@@ -292,7 +320,7 @@ class Scenario:
 
     def judged(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Add the fitness of the metric set and its parts to the order parameters of a flight."""
-        return self.measures.judged(values, self.agents, self.flight.duration, self.resolved_metrics())
+        return self.metrics.rule.judged(values, self.agents, self.flight.duration, self.resolved_metrics())
 
     def resolved_silence(self) -> SilenceParameters:
         """Return the rule of silence, open numbers derived from the rest of the scenario."""
@@ -328,7 +356,7 @@ def summary(scenario: Scenario) -> str:
     arena = "no arena" if world.arena == "none" else f"{world.arena} arena{size}"
     return (
         f"{scenario.name}: {scenario.agents} agents, {scenario.flight.duration:g} s, model {scenario.model.name}, "
-        f"{scenario.vehicle.name}, {arena}"
+        f"{scenario.body.rule.name}, {arena}"
     )
 
 
@@ -363,8 +391,8 @@ def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def scenario_html(scenario: Scenario) -> str:
     """Return a table of everything that differs from the defaults, and the notes."""
-    records = {"top": scenario.flight, "model": scenario.parameters, "body": scenario.body}
-    records |= {name: getattr(scenario, name) for name in SECTIONS if name != "body"}
+    records = {"top": scenario.flight, "model": scenario.parameters}
+    records |= {name: scenario.records[name] for name in ("body", *(name for name in SECTIONS if name != "body"))}
     rows = [
         (name if section == "top" else f"{section}.{name}", value, meaning)
         for section, record in records.items()
@@ -380,7 +408,7 @@ def scenario_html(scenario: Scenario) -> str:
 
 def default_metrics(scenario: Scenario) -> MetricParameters:
     """Return the numbers of the order parameters, with open ones derived from the scenario."""
-    numbers = {name: getattr(scenario.metrics, name) for name in scenario.metrics.__dataclass_fields__}
+    numbers = dict(vars(scenario.metrics.numbers))
     p, model = scenario.parameters, scenario.model
     if numbers["v_flock"] is None:
         numbers["v_flock"] = 1.0 if model.preferred_speed is None else model.speed(p)
@@ -399,7 +427,7 @@ def default_metrics(scenario: Scenario) -> MetricParameters:
         numbers["max_e"] = largest_extension(scenario.world) or None
     if numbers["k"] is None:
         numbers["k"] = numbers["max_e"]
-    return type(scenario.metrics)(**numbers)
+    return type(scenario.metrics.numbers)(**numbers)
 
 
 def default_silence(scenario: Scenario) -> SilenceParameters:

@@ -24,7 +24,7 @@ from airflock.scenarios.part_kinds import (
     ScenarioParts,
     collect_parts,
 )
-from airflock.scenarios.scenario import Scenario, default_separation
+from airflock.scenarios.scenario import Part, Scenario, default_separation
 from airflock.scenarios.scenario_checks import (
     body_errors,
     field_file_errors,
@@ -104,11 +104,10 @@ def build_scenario(
     if errors or flown.law is None:
         raise ScenarioError([f"{where}: {error}" for error in errors])
     parts["scene"] = _find_mesh(parts["scene"], folder)
-    scenario = Scenario(
-        name=where, model=flown.law, vehicle=flown.vehicle, sensor=flown.sensor, transceiver=flown.transceiver,
-        measures=flown.measures, own_topology=flown.own_topology, published=published,
-        document=whole, **parts, **individuals,
-    )  # fmt: skip
+    rules = {"body": flown.body, "sensors": flown.sensors, "radio": flown.radio, "metrics": flown.metrics}
+    rules["topology"] = flown.topology or TOPOLOGY_KIND.shipped[parts["topology"].kind]
+    parts |= {section: Part(rule, parts[section]) for section, rule in rules.items()}
+    scenario = Scenario(name=where, model=flown.law, published=published, document=whole, **parts, **individuals)
     # These checks need a whole scenario, so they come second and never beside errors of single
     # keys.
     if errors := _derived_errors(scenario) or scene_errors(scenario, started):
@@ -159,7 +158,7 @@ def _read_groups_and_faults(
     flight, law = parts["flight"], flown.law
     if not {"groups", "faults"} & set(document) or flight is None:
         return {}, [], []
-    records = {"body": flown.vehicle.Parameters, "sensors": flown.sensor.Parameters}
+    records = {"body": flown.body.Parameters, "sensors": flown.sensors.Parameters}
     named = None
     if law is not None:
         records["model"] = law.Parameters
@@ -171,7 +170,7 @@ def _read_groups_and_faults(
     flocks, notes, errors = read_groups(document.get("groups", ()), count, records, named)
     errors += group_number_errors(flocks, law)
     if law is not None and not errors:
-        errors += group_errors(flocks, parts, law, flown.vehicle, flown.sensor)
+        errors += group_errors(flocks, parts, law, flown.body, flown.sensors)
     sequential = flight.update == "sequential"
     entries, fault_notes, more = read_fault_entries(
         document.get("faults", ()), count, flocks, sequential, folder, user_kinds=given.fault_kinds, trust=trust
@@ -215,8 +214,8 @@ def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: boo
     if flight is not None and flight.agents != int(flight.agents):
         errors.append(f"agents = {flight.agents:g} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
-    ours = parts["topology"] is not None and flown.own_topology is None
-    meets = TOPOLOGY_KIND.shipped[parts["topology"].kind] if ours else flown.own_topology
+    ours = parts["topology"] is not None and flown.topology is None
+    meets = TOPOLOGY_KIND.shipped[parts["topology"].kind] if ours else flown.topology
     errors += topology_errors(meets, world, law)
     errors += field_file_errors(world)
     if world is not None:
@@ -227,11 +226,11 @@ def _errors_between(parts: Mapping[str, Any], flown: ScenarioParts, started: boo
         errors += world_errors(world, count, separation or 0.0, begin, started=started)
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
         errors += timing_errors(flight, parts["sensors"].period, parts["metrics"])
-        errors += update_order_errors(flight, flown.sensor, parts["sensors"], flown.transceiver, parts["radio"])
+        errors += update_order_errors(flight, flown.sensors, parts["sensors"], flown.radio, parts["radio"])
         errors += silence_errors(parts["silence"].rule, flight, law) if parts["silence"] is not None else []
-        errors += metric_errors(flown.measures, parts["metrics"], world)
-        errors += wing_errors(parts, law, flown.measures, started)
-    return errors + body_errors(flown.vehicle, parts, law, started) + sensor_errors(flown.sensor, parts)
+        errors += metric_errors(flown.metrics, parts["metrics"], world)
+        errors += wing_errors(parts, law, flown.metrics, started)
+    return errors + body_errors(flown.body, parts, law, started) + sensor_errors(flown.sensors, parts)
 
 
 def _published(table: Any) -> tuple[dict[str, tuple[float, float | None]], list[str]]:
@@ -277,7 +276,7 @@ def rebuilt(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = 
     if not shipped and scenario.is_aerodynamic:
         raise ScenarioError(["aero: a law of one's own with drag descent cannot be changed in flight"])
     own = {
-        each.field: getattr(scenario, each.field)
+        each.section: getattr(scenario, each.section).rule
         for each in PART_KINDS
         if f"{each.section}.kind" not in settings
         and document.get(each.section, {}).get("kind", "") not in ("", *each.shipped)

@@ -22,10 +22,10 @@ def _after_battery(scenario: Scenario) -> str:
 def setting_notes(scenario: Scenario) -> list[str]:
     """Return notes on costs, rounded times and numbers that contradict each other."""
     cells = uses_all_cores(scenario) and metrics_use_cells(scenario)
-    notes = pair_notes(scenario.flight, scenario.metrics, scenario.order_parameters, cells)
+    notes = pair_notes(scenario.flight, scenario.metrics.numbers, scenario.order_parameters, cells)
     notes += timing_notes(scenario) + wing_notes(scenario) + cell_notes(scenario)
     p = scenario.parameters
-    body, duration = scenario.body, scenario.flight.duration
+    body, duration = scenario.body.numbers, scenario.flight.duration
     if getattr(body, "battery", "endless") == "lithium" and getattr(body, "hover_power", 0.0) > 0.0:
         lasts = body.capacity / body.hover_power
         if lasts < duration:
@@ -102,7 +102,7 @@ def _lengths(scenario: Scenario) -> str:
 
 def _about_an_edge(scenario: Scenario) -> str:
     """Note a rotation about a point that the flock cannot circle: a corner of the field, or a point outside of it."""
-    world, q = scenario.world, scenario.metrics
+    world, q = scenario.world, scenario.metrics.numbers
     measured = METRICS["rotation"] in scenario.order_parameters and hasattr(q, "centre_x")
     if world.arena != "polygon" or not measured:
         return ""
@@ -117,13 +117,13 @@ def _about_an_edge(scenario: Scenario) -> str:
 
 def _unsent(scenario: Scenario) -> str:
     """Note faults of messages where agents see each other and send none."""
-    if scenario.transceiver.see is None:
+    if scenario.radio.rule.see is None:
         return ""
     unsent = [kind for kind in scenario.fault_kinds if set(kind.rules) <= {"tell"} or kind.name == "radio_silent"]
     if not unsent:
         return ""
     return (
-        f"radio.kind = {scenario.transceiver.name!r}: agents send nothing, so these faults have no effect: "
+        f"radio.kind = {scenario.radio.rule.name!r}: agents send nothing, so these faults have no effect: "
         + ", ".join(kind.name for kind in unsent)
     )
 
@@ -142,7 +142,7 @@ def _all_met(scenario: Scenario) -> str:
     """Note numbers of a topology by which everybody is met."""
     if scenario.own_topology is not None:
         return ""
-    topology, given = scenario.topology, scenario.document.get("topology", {})
+    topology, given = scenario.topology.numbers, scenario.document.get("topology", {})
     numbers = [f"topology.{key}" for key in given if key != "kind"]
     if topology.kind == "range" and numbers:
         return (

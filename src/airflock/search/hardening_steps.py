@@ -146,7 +146,9 @@ def fly_parameters(
         [s for s in varied for _ in seeds], [s for _ in varied for s in seeds], threads=threads, on_done=on_done
     )
     if "fitness" not in rows[0] or "r_min" not in rows[0]:
-        raise ScenarioError([f"{scenario.name}: metrics.kind = '{scenario.measures.name}' has no fitness and no r_min"])
+        raise ScenarioError(
+            [f"{scenario.name}: metrics.kind = '{scenario.metrics.rule.name}' has no fitness and no r_min"]
+        )
     names = [name for name, value in rows[0].items() if isinstance(value, (int, float))]
     table = {name: np.array([row[name] for row in rows], float).reshape(len(parameters), -1) for name in names}
     return [{name: values[i] for name, values in table.items()} for i in range(len(parameters))]
@@ -218,7 +220,7 @@ def measures(scenarios: Sequence[Scenario]) -> list[tuple[HardeningStep, list[Sc
 
 def _carried(scenario: Scenario) -> dict[str, Any]:
     """Return settings by which each packet is carried forward until the next one; no further packet is lost."""
-    if scenario.transceiver.name != "constant" or scenario.radio.delay <= 0.0:
+    if scenario.radio.rule.name != "constant" or scenario.radio.delay <= 0.0:
         return {}
     rate = max(10.0, 1.0 / max(scenario.sensors.period, scenario.flight.dt))
     far = min(max(scenario.radio.range, 1.0), 1e6)
@@ -229,5 +231,5 @@ def _carried(scenario: Scenario) -> dict[str, Any]:
 def _stops(scenario: Scenario) -> dict[str, Any]:
     """Return settings by which an agent stops near a lost neighbour, if packets may be lost."""
     deaf = any(entry.fault.radio is not None for entry in scenario.faults)
-    lost = deaf or scenario.transceiver.name not in ("constant", "vision") or scenario.radio.loss > 0.0
+    lost = deaf or scenario.radio.rule.name not in ("constant", "vision") or scenario.radio.loss > 0.0
     return {"silence.rule": "stop"} if lost and scenario.silence.rule == "fly_on" else {}

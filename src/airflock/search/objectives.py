@@ -137,7 +137,7 @@ def read_objectives(
         how = (key == "maximise", str(over), float(quantile))
         found += [Objective(n, *how, own.get(n), text if n in own else "") for n in names]
     if not found:
-        name = scenario.measures.best or "fitness"
+        name = scenario.metrics.rule.best or "fitness"
         found = [Objective(name, True, str(over), float(quantile), own.get(name), text if name in own else "")]
     if text and not any(objective.own for objective in found):
         names = [

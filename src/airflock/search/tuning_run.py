@@ -143,7 +143,7 @@ def prepare_start(scenario: Scenario) -> tuple[Scenario, list[str]]:
 def measures_walls(scenario: Scenario) -> bool:
     """Return True if there are walls or obstacles and the metrics measure clearance to them."""
     stand = scenario.world.arena != "none" or bool(scenario.world.obstacles)
-    return stand and "clearance" in scalar_names(scenario.measures, scenario.metrics)
+    return stand and "clearance" in scalar_names(scenario.metrics.rule, scenario.metrics.numbers)
 
 
 def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
@@ -219,8 +219,8 @@ def default_limits(scenario: Scenario) -> list[str]:
 
     Raises ScenarioError where distances are not measured.
     """
-    if "r_min" not in scalar_names(scenario.measures, scenario.metrics):
-        kind = scenario.measures.name
+    if "r_min" not in scalar_names(scenario.metrics.rule, scenario.metrics.numbers):
+        kind = scenario.metrics.rule.name
         raise ScenarioError(
             [f"{scenario.name}: metrics.kind = {kind!r} has no r_min to limit; say what is to be shown with --limit"]
         )

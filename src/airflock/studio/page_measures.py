@@ -199,7 +199,7 @@ def score_table_html(flights: Sequence[Flight], scores: Sequence[Mapping[str, An
     side.
     """
     flight, two = flights[0], len(flights) > 1
-    about, published = reported_values(flight.scenario.measures), {} if two else flight.scenario.published
+    about, published = reported_values(flight.scenario.metrics.rule), {} if two else flight.scenario.published
     before = flight.windows[-1].scores if flight.windows and not two else {}
     heads = ["A", "B", "B − A"] if two else ["now", *(["before"] if before else []), *(["paper"] if published else [])]
     rows = [_header_row(["", *heads])]

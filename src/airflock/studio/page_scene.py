@@ -223,7 +223,7 @@ class DrawnFlock:
     def __init__(self, side: FlightPane, offset: NDArray[Any]):
         self.side, self.offset = side, offset
         measured, scenario = side.scenario.resolved_metrics(), side.scenario
-        counts = {"n_coll", "phi_coll", "collisions"} & set(scalar_names(scenario.measures, measured))
+        counts = {"n_coll", "phi_coll", "collisions"} & set(scalar_names(scenario.metrics.rule, measured))
         self.near = float(measured.r_coll) if counts else 0.0  # fish have no collisions
         self.period = measures.world_period(scenario)
         self.position, self.velocity = side.motion
@@ -243,9 +243,9 @@ class DrawnFlock:
         """Return lines between agents, and their colours: paler where a packet is more likely lost."""
         tone = np.array(agent_colours.LINE_STYLES["links"][0])
         if kind == "radio":
-            k = self.side.scenario.radio
+            k = self.side.scenario.radio.numbers
             pairs, length = self.pairs.nearest_pairs_within(min(k.range, 1e8))
-            arrives = np.interp(length, *arrival_curve(self.side.scenario.transceiver, k))
+            arrives = np.interp(length, *arrival_curve(self.side.scenario.radio.rule, k))
             points = self.position[pairs]
             tones = LOST_LINK_GREY - arrives[:, None] * (LOST_LINK_GREY - 0.8 * tone)
         else:

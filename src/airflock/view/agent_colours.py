@@ -235,7 +235,7 @@ def fault_colours(
 def varied_number_units(scenario: Scenario) -> dict[str, str]:
     """Return the units of the numbers of law and body that differ among agents, such as model.v_flock."""
     units = {}
-    records = {"model": scenario.parameters, "body": scenario.body, "sensors": scenario.sensors}
+    records = {"model": scenario.parameters, "body": scenario.body.numbers, "sensors": scenario.sensors.numbers}
     for section, record in records.items():
         for name, declared, _ in declarations(record):
             if (LETTERS[section], name) in scenario.varied and isinstance(declared, Quantity):

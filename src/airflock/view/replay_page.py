@@ -596,7 +596,7 @@ def _nearest_and_collisions(
     measured = scenario.resolved_metrics() if scenario else None
     limit = (
         float(measured.r_coll)
-        if measured and COLLISION_METRICS & set(scalar_names(scenario.measures, measured))
+        if measured and COLLISION_METRICS & set(scalar_names(scenario.metrics.rule, measured))
         else 0.0
     )
     nearest, collisions = np.full(len(position), np.nan), []

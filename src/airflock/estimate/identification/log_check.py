@@ -231,7 +231,7 @@ def fly_logs(
     )
     times, period, n = recording["time"].values.astype(float), scenario.sensors.period, place.shape[2]
     at = (times / period + 1e-6).astype(int)
-    errors = own_state_errors(seed, int(at[-1]) + 1, n, period, scenario.sensors)[at]
+    errors = own_state_errors(seed, int(at[-1]) + 1, n, period, scenario.sensors.numbers)[at]
     clocks = np.stack([generator.normal(0.0, disturbed.offset, n), generator.normal(0.0, disturbed.drift, n)], axis=1)
     rows: list[list[Any]] = []
     # Per drone: noise, rounding, missing rows and bursts, then its own clock; a row whose clock
@@ -262,7 +262,7 @@ def _packets(
     scenario: Scenario, seed: int, times: Array, place: Array, clocks: Array, disturbed: LogDisturbance, generator: Any
 ) -> pd.DataFrame:
     """Return rows of every pair and decision of a radio of two lossy links."""
-    k_, period, n = curve_parameters(scenario.radio), scenario.sensors.period, place.shape[2]
+    k_, period, n = curve_parameters(scenario.radio.numbers), scenario.sensors.period, place.shape[2]
     every = max(1, round(period / (times[1] - times[0])))
     i, j = np.nonzero(~np.eye(n, dtype=bool))
     arrives = np.vectorize(links.received, otypes=[float], excluded=[1, 2])

@@ -212,10 +212,12 @@ def identify(
     False
     """
     scenario = load_if_named(like)
-    if not isinstance(scenario.body, motion.Parameters):
+    if not isinstance(scenario.body.numbers, motion.Parameters):
         raise AirflockError(f"{scenario.name}: its body is not the multirotor that identify knows")
-    if not isinstance(scenario.sensors, langevin.Parameters):
-        raise AirflockError(f"{scenario.name}: its sensor is {scenario.sensor.name}; identify knows langevin alone")
+    if not isinstance(scenario.sensors.numbers, langevin.Parameters):
+        raise AirflockError(
+            f"{scenario.name}: its sensor is {scenario.sensors.rule.name}; identify knows langevin alone"
+        )
     findings = ImportReport(frozenset([accept] if isinstance(accept, str) else accept))
     logs, comparable, sources = _logs(
         flight_logs, options or ImportOptions(), findings, standing, same_clock, (begin, end)
@@ -232,7 +234,8 @@ def identify(
         origin = f"{still.seconds:.0f} s of standing"
         numbers.add(f"sensors.{name}", still.value[name], still.intervals[name], origin, still.refused.get(name, ""))
     sensor_numbers = {
-        n: still.value[n] if n not in still.refused else getattr(scenario.sensors, n) for n in ("noise", "damping")
+        n: still.value[n] if n not in still.refused else getattr(scenario.sensors.numbers, n)
+        for n in ("noise", "damping")
     }
     moving = body_and_sensor.fit_body(logs, scenario.flight.dt, sensor_numbers["noise"] * sensor_numbers["damping"])
     rows = f"{moving.rows} rows, {moving.saturated_rows} limited"
@@ -292,11 +295,11 @@ def _radio(heard: pd.DataFrame | None, numbers: IdentifiedParameters) -> radio_l
     late = radio_links.fit_delay(table)
     origin = f"stamps, ± {1e3 * late.scatter:.0f} ms each"
     numbers.add("radio.delay", late.value, late.interval, origin, late.reason)
-    links = radio_links.fit_links(table, scenario.sensors.period, radio_links.curve_parameters(scenario.radio))
-    if scenario.transceiver.name == "table":
+    links = radio_links.fit_links(table, scenario.sensors.period, radio_links.curve_parameters(scenario.radio.numbers))
+    if scenario.radio.rule.name == "table":
         _table(table, numbers)
         return links
-    lossy = scenario.transceiver.name == "links"
+    lossy = scenario.radio.rule.name == "links"
     for name in CURVE_PARAMETERS:
         why = links.refused.get(name, "") or (
             "" if lossy else "radio.kind of --like has no such curve: --set radio.kind=links"
@@ -307,7 +310,7 @@ def _radio(heard: pd.DataFrame | None, numbers: IdentifiedParameters) -> radio_l
 
 def _table(heard: pd.DataFrame, numbers: IdentifiedParameters) -> None:
     """Add the entries of a radio of kind "table", at the spacing that the scenario has."""
-    k: Any = numbers.like.radio
+    k: Any = numbers.like.radio.numbers
     shares, errors = radio_links.fit_table(heard, k.spacing)
     half = norm.ppf(0.975) * errors
     for n, (share, off) in enumerate(zip(shares.tolist(), half.tolist(), strict=True)):
@@ -357,8 +360,8 @@ def flight_card(like: Scenario) -> list[Flight]:
     hold = max(4.0 * tau + step / a_max, 2.0)
     repeats = max(8, round(180.0 / (2.0 * hold)))
     cruise = min(step, 10.0)
-    tabled = like.transceiver.name == "table"
-    far = 0.5 * (ENTRIES - 1) * like.radio.spacing if tabled else curve_parameters(like.radio).far  # type: ignore[attr-defined]
+    tabled = like.radio.rule.name == "table"
+    far = 0.5 * (ENTRIES - 1) * like.radio.spacing if tabled else curve_parameters(like.radio.numbers).far  # type: ignore[attr-defined]
     curve = TABLE_KEYS if tabled else tuple(f"radio.{name}" for name in CURVE_PARAMETERS)
     return [
         Flight(

@@ -166,10 +166,10 @@ def without_noise(scenario: Scenario, scale: TrackScale, axes: int) -> Scenario:
         "goals.kind": "none",
     }  # fmt: skip
     made = build_scenario(
-        document, scenario.name, settings, caller_parts=CallerParts(law=scenario.model, vehicle=scenario.vehicle)
+        document, scenario.name, settings, caller_parts=CallerParts(law=scenario.model, body=scenario.body.rule)
     )
-    names = {name for name, declared, _ in declarations(made.body) if isinstance(declared, Quantity)}
-    return replace(made, body=replace(made.body, noise=0.0)) if "noise" in names else made
+    names = {name for name, declared, _ in declarations(made.body.numbers) if isinstance(declared, Quantity)}
+    return replace(made, body=made.body.with_numbers(noise=0.0)) if "noise" in names else made
 
 
 def _unusual(scenario: Scenario) -> Any:
@@ -185,7 +185,7 @@ def _unusual(scenario: Scenario) -> Any:
 def _numbers(scenario: Scenario, plan: Plan, scale: TrackScale) -> tuple[FitParameter, ...]:
     """Return numbers of the law and of its body, with the ranges of the search."""
     found = []
-    for letter, section, record in (("p", "model", scenario.parameters), ("b", "body", scenario.body)):
+    for letter, section, record in (("p", "model", scenario.parameters), ("b", "body", scenario.body.numbers)):
         names = plan.records[letter]
         first = _first(plan, letter)
         for name, declared, _ in declarations(record):

@@ -208,7 +208,7 @@ class InferResult:
         document = self.document()
         assert self.best is not None
         own = self.best.candidate.scenario
-        given = CallerParts(law=own.model, vehicle=own.vehicle, sensor=own.sensor)
+        given = CallerParts(law=own.model, body=own.body.rule, sensors=own.sensors.rule)
         return build_scenario(document, f"{self.best.name}, inferred", caller_parts=given)
 
 
