@@ -79,7 +79,7 @@ def flown(seed):
 
 def _value(scenario, key):
     section, _, name = key.partition(".")
-    return getattr(scenario.parameters if section == "model" else getattr(scenario, section), name)
+    return getattr(scenario.records[section], name)
 
 
 def silent(seed):

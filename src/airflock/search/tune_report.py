@@ -297,8 +297,7 @@ def _row(key: str, entry: Any, unit: str) -> ReportRow:
 
 def _unit(scenario: Scenario, section: str, name: str) -> str:
     """Return the unit of a key as its record declares it; empty if it is no number."""
-    field = {"model": "parameters"}.get(section, section)
-    record = getattr(scenario, field, None) if name else scenario.flight
+    record = scenario.records.get(section) if name else scenario.flight
     if not hasattr(record, "__dataclass_fields__"):
         return ""
     units = {key: str(getattr(how, "unit", "")) for key, how, _ in declarations(record)}
@@ -328,7 +327,7 @@ def _read(scenario: Scenario) -> set[str]:
     own = {letter for letter, _ in scenario.varied}
     found = set(ALWAYS)
     for section, letter in READ_AS.items():
-        names = {name for name, _, _ in declarations(getattr(scenario, section))}
+        names = {name for name, _, _ in declarations(scenario.records[section])}
         if letter not in own:
             names &= set(re.findall(rf"\b{letter}\.(\w+)", text))
         found |= {f"{section}.{name}" for name in names}

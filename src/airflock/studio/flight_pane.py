@@ -237,7 +237,7 @@ def scenario_controls(
     part_of = {f"model.{name}": f"model: {part}" for part, names in parts.items() for name in names}
     found: dict[str, list[ParameterControl]] = {f"model: {part}": [] for part in parts}
     for section in CONTROL_SECTIONS:
-        record = scenario.parameters if section == "model" else getattr(scenario, section)
+        record = scenario.records[section]
         for name, declared, _ in declarations(record):
             value = getattr(record, name)
             key = f"{section}.{name}"
@@ -556,4 +556,4 @@ def scenario_value(scenario: Scenario, key: str) -> Any:
     section, _, name = key.partition(".")
     if not name:
         return getattr(scenario.flight, section)
-    return getattr(scenario.parameters if section == "model" else getattr(scenario, section), name)
+    return getattr(scenario.records[section], name)
