@@ -420,7 +420,8 @@ def test_every_number_that_identify_tells_has_the_unit_of_the_scenario(fleet, tm
     truth, found, _ = fleet
     for key, unit in KEY_UNITS.items():
         section, name = key.split(".")
-        declared = {name: one.unit for name, one, _ in declarations(truth.records[section]) if isinstance(one, Quantity)}
+        record = truth.records[section]
+        declared = {name: one.unit for name, one, _ in declarations(record) if isinstance(one, Quantity)}
         assert unit == declared.get(name, unit), key
     numbers = {key: replace(one, reason="", value=known) for key, one in found.numbers.items() if (known := one.like)}
     numbers = {key: replace(one, low=0.9 * one.value, high=1.1 * one.value) for key, one in numbers.items()}

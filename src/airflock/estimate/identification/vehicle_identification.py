@@ -86,8 +86,7 @@ class IdentifiedParameters:
     def reference_value(self, key: str) -> float | None:
         """Return the scenario's own number; None where it has none."""
         section, _, name = key.partition(".")
-        record = self.like.parameters if section == "model" else getattr(self.like, section)
-        value = getattr(record, name, None)
+        value = getattr(self.like.records[section], name, None)
         return None if value is None else float(value)
 
     def refuse_out_of_range(self) -> None:
