@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -192,6 +193,7 @@ def read_tracks(
     """
     tracks = _read(source, options, findings)
     findings.raise_errors()
+    tracks = track_checks.drop_rejected_rows(tracks, findings)
     tracks = track_checks.drop_incomplete_rows(tracks, findings)
     track_checks.check_columns(tracks, findings)
     track_checks.note_missing_velocities(tracks, findings)
@@ -246,9 +248,11 @@ def _read(what: Any, options: ImportOptions, findings: ImportReport) -> list[Imp
     if not files:
         raise RecordingError("no files to import")
     tracks = []
+    # A reader that has read all is not done yet: each file is reported as read once, below.
+    reading = replace(options, done=lambda share: options.done(min(share, 0.999)))
     for path in files:
         try:
-            tracks += _placed(path, read_file(path, options, findings))
+            tracks += _placed(path, read_file(path, reading, findings))
         except RecordingError as error:
             findings.errors += str(error).splitlines()
         options.done(1.0)

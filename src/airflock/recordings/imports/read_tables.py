@@ -107,6 +107,7 @@ def tracks_from_parts(
     )
     how = column_layout(where, first_individual_columns(names, wide) if wide else names, options)
     findings.notes += how.notes
+    _choose_id(where, how, parts, findings)
     timed = {
         table_columns.single_column(how.expressions[target]) for target in ("t", "utc") if target in how.expressions
     }
@@ -118,8 +119,9 @@ def tracks_from_parts(
     for at, part in parts(columns):
         rows = np.arange(at, at + len(part))
         for name, piece in split_by_individual(part, wide, how, stem):
-            numbers = {c: _numbers(piece[c], where, c, at, time=c in timed) for c in how.used if c != how.id}
-            values = how.values(numbers, len(piece))
+            read = [c for c in how.used if c != how.id and c not in how.flags]
+            numbers = {c: _numbers(piece[c], where, c, at, time=c in timed) for c in read}
+            values = how.values(numbers, len(piece)) | {f"flag {c}": _flag_values(piece[c]) for c in how.flags}
             whole = np.all([np.isfinite(values[c]) for c in PLACE_TARGETS if c in values], axis=0)
             whole &= np.isfinite(values["t" if "t" in values else "utc"])
             if how.id:
@@ -178,6 +180,58 @@ def _no_number(text: str, time: bool) -> str:
     return f"{text!r} is not a number; leave missing cells empty"
 
 
+# Words of columns that say which rows count: of Movebank and pandas, and of NMEA (A: active, V: void).
+FLAG_WORDS = {"true": 1, "t": 1, "yes": 1, "a": 1, "false": 0, "f": 0, "no": 0, "v": 0,
+              "none": 0, "no fix": 0, "no_fix": 0, "2d": 2, "3d": 3}  # fmt: skip
+
+
+def _flag_values(column: Any) -> Any:
+    """Return a column that says which rows count as float64; nan where it is empty or says nothing that is known."""
+    if pd.api.types.is_numeric_dtype(column):
+        return column.to_numpy(float, na_value=np.nan)
+    text = column.astype(str).str.strip().str.lower()
+    return pd.to_numeric(text, errors="coerce").fillna(text.map(FLAG_WORDS)).to_numpy(float)
+
+
+TAGS = ("tag", "tag_local_identifier")  # which several animals wear in turn
+
+
+def _choose_id(where: str, how: ColumnLayout, parts: Any, findings: ImportReport) -> None:
+    """Choose the column of names by its values: none that numbers the rows, and an animal before its tag.
+
+    Only the first rows are looked at: there every name of a row number is another one, and no other name is.
+    Raises RecordingError where names number the rows and these may be of several individuals.
+    """
+    clock = table_columns.column_names(how.expressions["t" if "t" in how.expressions else "utc"])[:1]
+    pieces = parts([*how.ids, *clock]) if how.ids and clock else iter(())
+    _, part = next(pieces, (0, None))
+    if part is None or part[clock[0]].nunique() < 2:  # one instant has a row for each individual
+        return
+    rows, names = part[how.ids].count(), part[how.ids].nunique()
+    numbers = [c for c in how.ids if names[c] == rows[c] > 1]
+    # Of a part of a file nobody knows whether a column has one name only.
+    single = [c for c in how.ids if names[c] < 2] if len(how.ids) > 1 and next(pieces, None) is None else []
+    order = sorted(how.ids, key=lambda c: (c in single, table_columns.split_header(c)[0] in TAGS))
+    others = [c for c in order if c not in numbers]
+    if others:
+        how.id = others[0]
+        if len(how.ids) > 1:
+            more = ", ".join(f"{c} (row number)" if c in numbers else c for c in how.ids if c != how.id)
+            hint = f'; for another write --map "id:={table_columns.quote_column(others[1])}"' if others[1:] else ""
+            findings.notes.append(f"{where}: id from {how.id}; also there: {more}{hint}")
+        return
+    column = part[numbers[0]]
+    counted = pd.api.types.is_numeric_dtype(column) and bool(column.dropna().is_monotonic_increasing)
+    line = f"{where}: column {numbers[0]} has as many names as rows ({len(part)}): a row number"
+    if not counted or part[clock[0]].duplicated().any():
+        raise RecordingError(
+            f"{line}; write --map id:=COLUMN for the column that names the individuals, or --map id:=file if all rows "
+            "are one individual's"
+        )
+    how.id = ""
+    findings.notes.append(f"{line}: all rows taken as one individual's; otherwise write --map id:=COLUMN")
+
+
 def _since_1970(column: Any) -> Any:
     when = column.dt.tz_convert("UTC").dt.tz_localize(None) if column.dt.tz is not None else column
     seconds = when.to_numpy("datetime64[us]").astype(np.int64) * 1e-6
@@ -204,10 +258,9 @@ def _track(
     """Join the pieces of one individual; shared: True if others have the same column of times."""
     columns = {target: np.concatenate([p[0][target] for p in parts]) for target in parts[0][0]}
     rows = np.concatenate([p[1] for p in parts])
-    origin, valid = table_columns.pop_origin_and_validity(columns)
-    if valid is not None and not valid.all():
-        findings.notes.append(table_columns.invalid_note(where, name, valid, rows))
-        columns, rows = {target: values[valid] for target, values in columns.items()}, rows[valid]
+    flags = {column: (flag, columns.pop(f"flag {column}")) for column, flag in how.flags.items()}
+    origin = table_columns.px4_origin(columns)
+    columns = {target: values for target, values in columns.items() if target not in table_columns.ORIGIN}
     utc = columns.pop("utc", None)
     time = columns.pop("t") if "t" in columns else utc
     assert time is not None
@@ -220,7 +273,7 @@ def _track(
     air = columns.pop("air") > 0.5 if "air" in columns else None
     found = ImportedTrack(name, where, time, columns, rows, dict(how.user_labels), clock, pair, how.datum)
     found.origin, found.datum = (origin, found.datum or "amsl") if origin is not None else (None, found.datum)
-    found.in_air, found.ground = air, how.ground
+    found.in_air, found.ground, found.flags = air, how.ground, flags
     return found
 
 

@@ -16,6 +16,7 @@ from airflock.recordings.imports.track import (
     TARGETS,
     VELOCITY_TARGETS,
     ImportOptions,
+    RowFlag,
 )
 from airflock.support import RecordingError, collect_errors, suggest
 
@@ -155,6 +156,26 @@ MARKS = {"ref_timestamp", "xy_valid", "z_valid", "v_xy_valid", "xy_reset_counter
 ORIGIN = ("ref_lat", "ref_lon", "ref_alt")
 VALID = ("xy_valid", "v_xy_valid")
 
+# Columns that say which rows count, by their plain names. Sources: MAVLink, GPS_FIX_TYPE (2: a fix in the plane); NMEA
+# 0183, GGA (quality 1: a fix) and RMC (status A or V); ROS, NavSatStatus (0: a fix); Movebank, attribute dictionary.
+FIX, QUALITY = RowFlag("without a fix of satellites", 2.0), RowFlag("without a fix of satellites")
+OUTLIER, RECEIVER, USED = RowFlag("marked as outliers or missing", 0.0, -1.0), RowFlag("receiver"), RowFlag("used")
+LIKELY = RowFlag("less likely than 0.6", 0.6)  # our choice, also that of DeepLabCut's and movement's examples
+ESTIMATED = RowFlag("that the estimator calls invalid")
+ROW_FLAGS: dict[str, RowFlag] = {
+    **dict.fromkeys(("fix_type", "gps_fix_type", "gps_fix_type_raw", "fix", "gps_fix"), FIX),
+    **dict.fromkeys(("fix_quality", "gps_quality", "gga_quality", "rmc_status"), QUALITY),
+    "status_status": QUALITY._replace(least=0.0),
+    **dict.fromkeys(("visible", "valid", "is_valid"), RowFlag("not visible or not valid")),
+    **dict.fromkeys(("outlier", "is_outlier", "missing", "import_marked_outlier"), OUTLIER),
+    **dict.fromkeys(("manually_marked_outlier", "algorithm_marked_outlier"), OUTLIER),
+    **dict.fromkeys(("likelihood", "confidence", "probability", "score"), LIKELY),
+    **dict.fromkeys(("receiver", "receiver_id", "gps_instance", "gps_id", "ekf_core", "core", "multi_id"), RECEIVER),
+}
+# Names that mean this only beside latitudes (GPS of any kind), or in a log of ArduPilot (GPS: I, Status, U; XKF1: C).
+OF_SATELLITES = {"instance": RECEIVER, "status": QUALITY, "quality": QUALITY}
+OF_ARDUPILOT = {"i": RECEIVER, "c": RECEIVER, "status": FIX, "u": USED}
+
 
 def px4_options(where: str, columns: Sequence[str], options: ImportOptions) -> tuple[ImportOptions, list[str]]:
     """Return options for a table of these columns, and notes: axes and times of PX4 where its fields are there.
@@ -184,20 +205,13 @@ def is_px4_log(columns: Sequence[str]) -> bool:
     return names >= FIELDS and bool(names & MARKS)
 
 
-def extra_columns(columns: Sequence[str], options: ImportOptions) -> list[str]:
-    """Return further columns of such a table that are read: its origin, and the validity of rows."""
-    if options.axes != "ned" or not is_px4_log(columns):
-        return []
-    return [*(ORIGIN if set(columns) >= set(ORIGIN) else ()), *(name for name in VALID if name in columns)]
-
-
-def pop_origin_and_validity(columns: dict[str, Any]) -> tuple[tuple[float, float, float] | None, Any]:
-    """Take these columns out of a track's, and return its origin, if known, and of each row whether it is valid."""
-    origin = px4_origin(columns)
-    flags = [columns.pop(name) for name in VALID if name in columns]
-    for name in ORIGIN:
-        columns.pop(name, None)
-    return origin, np.all([flag != 0.0 for flag in flags], axis=0) if flags else None
+def row_flags(columns: Sequence[str], layout: "ColumnLayout", px4: bool) -> dict[str, RowFlag]:
+    """Return the columns that say which rows count, with their meanings; none that is read as something else."""
+    plain = {column: split_header(column)[0] for column in columns if column not in layout.used}
+    known = ROW_FLAGS | (dict.fromkeys(VALID, ESTIMATED) if px4 else {})
+    known |= OF_SATELLITES if "lat" in layout.expressions else {}
+    known |= OF_ARDUPILOT if any(_plain(column) == "timeus" for column in columns) else {}
+    return {column: known[name] for column, name in plain.items() if name in known}
 
 
 def invalid_note(where: str, name: str, valid: Any, row_numbers: Any) -> str:
@@ -299,12 +313,14 @@ class ColumnLayout:
     datum: str = ""
     ground: bool = False  # whether its axes are known to point east and north
     notes: list[str] = field(default_factory=list)
+    ids: list[str] = field(default_factory=list)  # all columns of names, if none is mapped
+    flags: dict[str, RowFlag] = field(default_factory=dict)  # columns that say which rows count
 
     @property
     def used(self) -> list[str]:
         """Return the columns that are needed."""
         found = [name for tree in self.expressions.values() for name in column_names(tree)]
-        return list(dict.fromkeys(found + ([self.id] if self.id else [])))
+        return list(dict.fromkeys(found + ([self.id] if self.id else []) + [*self.flags]))
 
     def values(self, table: Mapping[str, NDArray[np.float64]], count: int) -> dict[str, NDArray[np.float64]]:
         """Return the targets in SI units."""
@@ -344,12 +360,11 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
         raise RecordingError("\n".join(errors))
     found.ground = bool(options.axes) or split_header(found.user_labels.get("x", ""))[0] in EAST_HEADERS
     _ned(found, options)
-    for name in extra_columns(columns, options):
-        found.expressions[name], found.factors[name], found.user_labels[name] = (
-            parse_expression(repr(name), name),
-            1.0,
-            name,
-        )
+    px4 = options.axes == "ned" and is_px4_log(columns)
+    for name in ORIGIN if px4 and set(columns) >= set(ORIGIN) else ():
+        found.expressions[name], found.factors[name] = parse_expression(repr(name), name), 1.0
+        found.user_labels[name] = name
+    found.flags = row_flags(columns, found, px4)
     return found
 
 
@@ -400,8 +415,9 @@ def _recognised(found: ColumnLayout, columns: Sequence[str], options: ImportOpti
         if meaning is None or meaning.target in found.expressions:
             continue
         if meaning.target == "id":
-            if not found.id and options.map.get("id", "").strip() != "file":
-                found.id = column
+            if "id" not in options.map:
+                found.ids.append(column)
+                found.id = found.id or column
             continue
         if meaning.target in options.map:
             continue

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ ACCEPTABLE_ERRORS = {
     "duplicates": "keep the first of rows with one time",
     "height": "keep heights above different levels",
     "jumps": "split a track where its position jumps",
+    "rows": "keep rows that a column of the file rejects: no fix, not visible, unlikely",
     "time": "keep a time whose unit looks wrong",
 }
 
@@ -55,6 +56,17 @@ class ImportOptions:
     done: Callable[[float], None] = ignore_progress
 
 
+class RowFlag(NamedTuple):
+    """Meaning of a column that says which rows count: those of `least` or more, also where `sign` times it is meant.
+
+    words : of rows that do not count; `receiver` and `used` name receivers or filters of one drone, of which one counts
+    """
+
+    words: str
+    least: float = 1.0
+    sign: float = 1.0
+
+
 @dataclass
 class ImportedTrack:
     """One individual. Arrays have one entry per row of the file. Readers keep rows without a time or a place (nan);
@@ -72,6 +84,7 @@ class ImportedTrack:
     ground  : whether its axes are known to point east and north
     air     : (row,) whether it was in the air; None if the file does not tell
     breaks  : rows at which the estimator was reset, so that positions before and after do not belong together
+    flags   : column → what it says of rows, and its (row,) values; `track_checks.drop_rejected_rows` takes them
     """
 
     name: str
@@ -87,6 +100,7 @@ class ImportedTrack:
     ground: bool = False
     in_air: NDArray[np.bool_] | None = None
     breaks: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    flags: dict[str, tuple["RowFlag", NDArray[np.float64]]] = field(default_factory=dict)
 
     def has(self, names: tuple[str, ...]) -> bool:
         """Return True if the first two of three components are there."""

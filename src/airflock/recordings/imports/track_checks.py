@@ -21,14 +21,92 @@ from airflock.recordings.imports.track import (
     VELOCITY_TARGETS,
     ImportedTrack,
     ImportReport,
+    RowFlag,
 )
 from airflock.support import RecordingError
 
+Array = NDArray[np.float64]
 # Rows without a time, a place or a speed: each is reported with file, column, number and first row.
 PLACE_TARGETS = (*POSITION_TARGETS[:2], *GEODETIC_TARGETS[:2])
 MissingRows = dict[
     str, list[tuple[NDArray[np.int64], int]]
 ]  # column → of each individual the rows, and how many are inf
+
+
+def drop_rejected_rows(tracks: list[ImportedTrack], findings: ImportReport) -> list[ImportedTrack]:
+    """Drop the rows that a column of the file rejects; keep one of several receivers of one drone.
+
+    Raises RecordingError for a file of which no row counts.
+    """
+    kept = []
+    for source, own in tracks_by_source(tracks).items():
+        counts = [np.ones(len(track.time), bool) for track in own]
+        for column in dict.fromkeys(column for track in own for column in track.flags):
+            flag, values = own[0].flags[column][0], [track.flags[column][1] for track in own]
+            if flag.words not in ("receiver", "used"):
+                _reject(f"{source}: column {column}", flag, own, values, counts, findings)
+        if not any(count.any() for count in counts):
+            columns = ", ".join(dict.fromkeys(column for track in own for column in track.flags))
+            raise RecordingError(f"{source}: column {columns}: no row counts; to read them all, write --accept rows")
+        for track, count in zip(own, counts, strict=True):
+            if not count.any():
+                findings.notes.append(f"{source}: {track.name}: no row of it counts: left out")
+                continue
+            _choose_receiver(track, count, findings)
+            track.flags = {}
+            if not count.all():
+                track.keep(count)
+            kept.append(track)
+    return kept
+
+
+def _reject(
+    where: str,
+    flag: RowFlag,
+    own: list[ImportedTrack],
+    values: list[Array],
+    counts: list[NDArray[np.bool_]],
+    findings: ImportReport,
+) -> None:
+    """Take the rows that a flag rejects out of `counts`, (row,) of each track, and say how many and why."""
+    every = np.concatenate(values)
+    known = every[np.isfinite(every)]
+    if flag.least == 0.6 and len(known) and not (known.min() >= 0.0 and known.max() <= 1.0):
+        findings.notes.append(f"{where}: lies outside 0 to 1, row {own[0].rows[0]} on: not read as a likelihood")
+        return
+    # A column `fix` of 0 and 1 says yes or no, and counts no dimensions.
+    least = min(flag.least, max(1.0, known.max(initial=0.0))) if flag.least == 2.0 else flag.least
+    bad = [flag.sign * each < least for each in values]  # never of nan
+    rows = np.concatenate([track.rows[out] for track, out in zip(own, bad, strict=True)])
+    if not len(rows):
+        return
+    line = f"{where}: {len(rows)} rows {flag.words}"
+    if "rows" in findings.accepted_kinds:
+        findings.notes.append(f"accepted (rows): {line} kept, first row {rows.min()}")
+        return
+    findings.notes.append(f"{line} left out, first row {rows.min()}; to keep them, write --accept rows")
+    for count, out in zip(counts, bad, strict=True):
+        count &= ~out
+
+
+def _choose_receiver(track: ImportedTrack, counts: NDArray[np.bool_], findings: ImportReport) -> None:
+    """Keep the rows of the receiver or filter that the autopilot used most, else of the first of those that work."""
+    for column, (flag, values) in track.flags.items():
+        numbers, rows = np.unique(values[counts & np.isfinite(values)], return_counts=True)
+        if flag.words != "receiver" or len(numbers) < 2:
+            continue
+        used = [on for kind, on in track.flags.values() if kind.words == "used"]
+        share = [float((on[counts & (values == number)] > 0.5).sum()) for on in used[:1] for number in numbers]
+        # One that was switched on late, or failed early, is no first choice.
+        best = int(np.argmax(share)) if any(share) else int(np.argmax(rows > 0.5 * rows.max()))
+        other = track.rows[counts & (values != numbers[best])]
+        reason = "which the autopilot used" if any(share) else "the first"
+        findings.notes.append(
+            f"{track.source}: column {column}: {track.name} has {len(numbers)} receivers or filters: "
+            f"{numbers[best]:g} is read, {reason}; {len(other)} rows of others left out, first row {other.min()}; "
+            "to read another one, take the rows of this one out of the file"
+        )
+        counts &= values == numbers[best]
 
 
 def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) -> list[ImportedTrack]:
@@ -39,6 +117,7 @@ def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) ->
     kept = []
     # By file: a thousand individuals with the same gap give one note.
     for source, own in tracks_by_source(tracks).items():
+        _drop_null_islands(source, own, findings)
         whole = [_timed(track) & _placed(track) for track in own]
         there = [track for track, sound in zip(own, whole, strict=True) if sound.any()]
         if not there:
@@ -53,6 +132,21 @@ def drop_incomplete_rows(tracks: list[ImportedTrack], findings: ImportReport) ->
                 track.keep(sound)
         kept += there
     return kept
+
+
+def _drop_null_islands(source: str, own: list[ImportedTrack], findings: ImportReport) -> None:
+    """Drop rows at latitude and longitude 0, which receivers write before a fix, of tracks that have no row near it."""
+    gone: list[tuple[NDArray[np.int64], int]] = []
+    for track in own:
+        if "lat" in track.columns and "lon" in track.columns:
+            off = np.maximum(np.abs(track.columns["lat"]), np.abs(track.columns["lon"]))
+            zero = off == 0.0
+            if zero.any() and not ((off > 0.0) & (off < 0.1)).any():  # degrees
+                gone.append((track.rows[zero], 0))
+                track.keep(~zero)
+    if gone:
+        label = ", ".join(own[0].label(name) for name in ("lat", "lon"))
+        _tell(findings, source, {label: gone}, "at 0, 0, where no fix is, taken as absent")
 
 
 def note_missing_velocities(tracks: list[ImportedTrack], findings: ImportReport) -> None:
@@ -325,7 +419,6 @@ def check_presence(tracks: list[ImportedTrack], findings: ImportReport) -> None:
         )
 
 
-Array = NDArray[np.float64]
 # Displacements against summed velocities decide axes, signs and units together; names of columns
 # cannot.
 LAG = 0.5  # s over which velocities are summed up, so that resolution does not hide the slope
