@@ -507,7 +507,7 @@ def _law_table(result: Any) -> None:
         table.add_column(name, justify="left" if name == "law" else "right", no_wrap=True)
     for law in result.laws:
         table.add_row(
-            law.name, f"{law.gain:.0f} ± {law.error:.0f}", f"{law.ahead:.0%}", f"{law.criterion:.0f}",
+            law.name, f"{law.gain:.0f} ± {law.error:.0f}", f"{law.ahead:.0%}", f"{law.aic_difference:.0f}",
             f"{law.inside:.1%}", f"{law.missed:.1%}", str(len(law.numbers)),
         )  # fmt: skip
     console = Console()

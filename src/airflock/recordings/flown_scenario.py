@@ -59,12 +59,19 @@ def scenario_of_recording(
     frames, period, _ = recording_frames(recording)
     dims = frames.shape[1] // 2
     speed = float(np.nanmean(np.linalg.norm(frames[:, dims:], axis=1)))
+    # Nothing flies: periods only say how often frames are measured. Where frames are farther apart than a flight's
+    # may be (fixes of animals are hours apart), each one is.
     document = {
         "agents": 1,
-        "dt": period,
-        "sensors": {"period": period},
+        "dt": min(period, 10.0),
+        "sensors": {"period": min(period, 60.0)},
         "start": {"separation": 0.0},
-        "metrics": {"v_flock": max(speed, 0.01), "r_cluster": 80.0, "r_comm": 80.0, "period": period},
+        "metrics": {
+            "v_flock": min(max(speed, 0.01), 1000.0),
+            "r_cluster": 80.0,
+            "r_comm": 80.0,
+            "period": min(period, 600.0),
+        },
         "world": {"dimensions": str(dims), "arena": "none"},
     }
     return build_scenario(document, "recording", settings, caller_parts=CallerParts(law=UNKNOWN), trust=trust)

@@ -160,15 +160,22 @@ def undefined_metrics_of(
     return undefined_metrics(names, scenario.metrics.rule.name, settings or {}, arena=scenario.world.arena != "none")
 
 
+SLOW = 1.0  # s between frames: our choice; an animal turns, and a drone passes another one, within less
+
+
 def between_frames_note(recording: xr.Dataset, scenario: Scenario) -> str:
-    """Return a note on order parameters that the flight measured between the recorded frames; empty if there are none.
+    """Return a note on order parameters that depend on what is between the recorded frames; empty if there are none.
 
     scenario : `scenario_of` the recording
     """
-    if scenario_document(recording) is None or recording.attrs.get("airflock_device") == "fleet":
+    if recording.attrs.get("airflock_device") == "fleet":
         return ""
     q, (_, period, _) = scenario.resolved_metrics(), recording_frames(recording)
     names = [name for each in scenario.metrics.rule.of(q) if each.clock == "collision" for name in each.reports]
+    if scenario_document(recording) is None:  # tracks: nobody looked in between
+        between = f"nothing is known in between, so {', '.join(names)} are of these instants; " if names else ""
+        straight = "speeds and headings that no log gives are those of straight lines over two frames"
+        return f"frames are {period:g} s apart: {between}{straight}" if period > SLOW else ""
     looked = q.collision_period or period
     if not names or looked > 0.99 * period:
         return ""
@@ -253,6 +260,8 @@ def measure_recording(
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
     scores |= {} if present.all() else {"present": float(present.mean())}
+    bridged = (recording["confidence"] == 0.5) if "confidence" in recording else np.zeros(())
+    scores |= {"present_measured": float(present.mean() - bridged.mean())} if bridged.any() else {}
     undefined = undefined_metrics_of(recording, scenario, settings)
     kept = {name: value for name, value in scores.items() if name not in undefined}
     return kept, course[[name for name in course if name not in undefined]]

@@ -16,6 +16,7 @@ LONGEST_GAP = 1.0  # s; an individual that is not seen for longer has left
 SETTLING = 10  # frames after an entry that are not counted
 BEGINNING = 5  # frames from which the velocity at an entry is taken
 SPAN = 12.0  # s; spans are what is held out, and what errors are taken over
+SLOWEST = 60.0  # s; the longest sensors.period of a scenario
 SPANS = (8, 400)  # least and largest number of spans
 SHORT = 30  # frames; no span is shorter
 FEW = 4 * SHORT  # frames below which nothing is inferred
@@ -91,6 +92,11 @@ def tracks_from_recording(
         raise RecordingError(f"{name}: {len(time)} frames are too few to infer a law from; {FEW} or more")
     steps = np.diff(time)
     period = float(np.median(steps))
+    if period > SLOWEST:
+        raise RecordingError(
+            f"{name}: frames are {period:g} s apart, and laws decide every {SLOWEST:g} s or faster: no law can be "
+            "inferred at that rate; score, plot and replay take it"
+        )
     if np.abs(steps - period).max() > 0.01 * period:
         raise RecordingError(f"{name}: frames are not evenly spaced; import it with --rate")
     if seen.shape[1] == 3 and not np.nanmax(seen[:, 2]) - np.nanmin(seen[:, 2]) > 1e-9:

@@ -208,8 +208,8 @@ def read_tracks(
     comparable = common_frame.align_clocks(tracks, same_clock, findings)
     if begin is not None or end is not None:
         tracks = cut_window(tracks, begin, end)
+    track_checks.check_jumps(tracks, findings)
     for track in tracks:
-        track_checks.check_jumps(track, findings)
         track_checks.note_resolution(track, findings)
     findings.raise_errors()
     return tracks, comparable
@@ -262,6 +262,7 @@ def _read(what: Any, options: ImportOptions, findings: ImportReport) -> list[Imp
 def _placed(path: Path, tracks: list[ImportedTrack]) -> list[ImportedTrack]:
     """Tracks that have a place at every time; raises RecordingError for one without."""
     for track in tracks:
+        track.fixed_units |= path.suffix.lower() in AUTOPILOT_SUFFIXES
         if not any(set(names) <= set(track.columns) for names in (POSITION_TARGETS[:2], GEODETIC_TARGETS[:2])):
             raise RecordingError(f"{path}: {track.name} has no positions")
     return tracks

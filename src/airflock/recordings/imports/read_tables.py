@@ -273,7 +273,7 @@ def _track(
     air = columns.pop("air") > 0.5 if "air" in columns else None
     found = ImportedTrack(name, where, time, columns, rows, dict(how.user_labels), clock, pair, how.datum)
     found.origin, found.datum = (origin, found.datum or "amsl") if origin is not None else (None, found.datum)
-    found.in_air, found.ground, found.flags = air, how.ground, flags
+    found.in_air, found.ground, found.flags, found.fixed_units = air, how.ground, flags, how.fixed_units
     return found
 
 

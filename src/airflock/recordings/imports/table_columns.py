@@ -313,6 +313,7 @@ class ColumnLayout:
     datum: str = ""
     ground: bool = False  # whether its axes are known to point east and north
     notes: list[str] = field(default_factory=list)
+    fixed_units: bool = False  # of PX4's fields
     ids: list[str] = field(default_factory=list)  # all columns of names, if none is mapped
     flags: dict[str, RowFlag] = field(default_factory=dict)  # columns that say which rows count
 
@@ -360,7 +361,7 @@ def column_layout(where: str, columns: Sequence[str], options: ImportOptions) ->
         raise RecordingError("\n".join(errors))
     found.ground = bool(options.axes) or split_header(found.user_labels.get("x", ""))[0] in EAST_HEADERS
     _ned(found, options)
-    px4 = options.axes == "ned" and is_px4_log(columns)
+    px4 = found.fixed_units = options.axes == "ned" and is_px4_log(columns)
     for name in ORIGIN if px4 and set(columns) >= set(ORIGIN) else ():
         found.expressions[name], found.factors[name] = parse_expression(repr(name), name), 1.0
         found.user_labels[name] = name

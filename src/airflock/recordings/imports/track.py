@@ -81,6 +81,7 @@ class ImportedTrack:
     utc     : (k, 2) own time and UTC, s, where the file has both
     datum   : what heights are above: "", "amsl", "ellipsoid" or "home"
     origin  : latitude, longitude (degrees) and height (m) of x = y = z = 0, if known
+    fixed_units : whether its units are those of an autopilot, which nobody chooses
     ground  : whether its axes are known to point east and north
     air     : (row,) whether it was in the air; None if the file does not tell
     breaks  : rows at which the estimator was reset, so that positions before and after do not belong together
@@ -97,6 +98,7 @@ class ImportedTrack:
     utc: NDArray[np.float64] | None = None
     datum: str = ""
     origin: tuple[float, float, float] | None = None
+    fixed_units: bool = False
     ground: bool = False
     in_air: NDArray[np.bool_] | None = None
     breaks: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))

@@ -526,11 +526,20 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
     wrong = [i for i in wrong if abs(r[i, i]) > 0.5]
     if wrong:
         columns, slope = ", ".join(track.label(POSITION_TARGETS[i]) for i in wrong), float(np.median(slopes[wrong]))
-        findings.add_error(
-            f"{source}: column {columns}, row {track.rows[0]} on: positions change {slope:.3g} times as fast "
-            f"as the velocities say: {_scale_reason(track, slope)}",
-            "axes",
+        reason = _scale_reason(track, slope)
+        line = (
+            f"{source}: column {columns}, row {track.rows[0]} on: positions change {slope:.3g} times as fast as the "
+            f"velocities say: {reason or 'units differ'}"
         )
+        # Noise of the velocities flattens a slope, at most to the slope times r^2 (Frisch 1934). Heights and climbs
+        # come from different sensors, and an autopilot's units are fixed: there only a factor of units is an error.
+        noisy = all(slopes[i] < 1.0 <= (1.0 + TOLERANCE) * slopes[i] / r[i, i] ** 2 for i in wrong)
+        if not reason and (noisy or wrong == [2] or track.fixed_units):
+            findings.notes.append(
+                f"{line.rpartition(': ')[0]}, which is no factor between units: both kept as they are"
+            )
+        else:
+            findings.add_error(line, "axes")
 
 
 def _swap_error(source: str, track: ImportedTrack, likeness: AxisCorrelation) -> str:
@@ -550,10 +559,10 @@ def _swap_error(source: str, track: ImportedTrack, likeness: AxisCorrelation) ->
 
 
 def _scale_reason(track: ImportedTrack, slope: float) -> str:
-    """Return the error and remedy for positions that change a multiple as fast as the velocities say."""
+    """Return cause and remedy for positions that change a multiple as fast as the velocities say; empty if unknown."""
     near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
     if abs(np.log(near / slope)) >= 0.1:
-        return "units differ"
+        return ""
     words, changes = REASONS[near]
     return f"{words}: write {', or '.join(_mapped(track, *change) for change in changes)}"
 
@@ -585,12 +594,84 @@ def _mapped(track: ImportedTrack, target: str, wrong: float) -> str:
     return f'--map "{target}:={quote_column(label)}*{own * wrong:.6g}"'
 
 
-def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
-    """Rules 5 and 6: drop a row off its track; split a track that continues elsewhere after a reset."""
-    surprise, scale = prediction_errors(track)
-    if not len(surprise):
-        return
-    place = track.stack(POSITION_TARGETS, 2)
+# A single step from rest to rest that needs more is no motion: a pike's fast start (Harper & Blake 1990:
+# 245 m/s^2) and a peregrine's stoop (Tucker 1998: 88 m/s) are the hardest and the fastest that we know of.
+HARDEST, FASTEST = 250.0, 100.0  # m/s^2, m/s
+LONE = 0.6  # share of a jump that the steps beside it leave unexplained; a burst decays over several
+
+
+class Step(NamedTuple):
+    """One step that the motion of its track does not explain.
+
+    row  : after it, in the track; number : of that row in the file; time : of that row, s
+    size : what is not explained, m; meant, place : (2,) where the track should be after it, and is, m
+    kind : "jump"; "motion" where a living thing could move so; "gap" where rows are missing in between
+    """
+
+    row: int
+    number: int
+    time: float
+    size: float
+    meant: Array
+    place: Array
+    kind: str
+
+
+def check_jumps(tracks: list[ImportedTrack], findings: ImportReport) -> None:
+    """Rules 5 and 6: leave out rows off a track and stays of the absent; split a track that continues elsewhere."""
+    steps = [_unexplained_steps(track, findings) for track in tracks]
+    every = sorted(((step.time, who, step) for who, own in enumerate(steps) for step in own), key=lambda one: one[:2])
+    times = np.array([time for time, _, _ in every])
+    for who, track in enumerate(tracks):
+        jumps, other = [], ""
+        late = 0.1 * median_period(track)
+        for step in steps[who]:
+            # Identities are exchanged where another one, who jumps away at that instant, should be.
+            first, last = np.searchsorted(times, [step.time - late, step.time + late])
+            for _, rival, old in every[first:last]:
+                if rival != who and np.linalg.norm(step.place - old.meant) < 0.3 * step.size:
+                    other = other or tracks[rival].name
+                    step = step._replace(kind="jump")
+            jumps += [step] if step.kind == "jump" else []
+        where = f"{track.source}: column {track.label('x')}, row"
+        moving = [step for step in steps[who] if step.kind == "motion" and step.row not in {one.row for one in jumps}]
+        if moving:
+            findings.notes.append(
+                f"{where} {moving[0].number}: {track.name} moves {moving[0].size:.3g} m more than the steps beside it "
+                f"explain ({len(moving)} times): taken as motion, as what lives can (up to {HARDEST:g} m/s^2); if not, "
+                "cut before or after it with --end or --begin"
+            )
+        if not jumps:
+            continue
+        reason = "than its velocity explains" if track.has(VELOCITY_TARGETS) else "than the steps beside it explain"
+        cause = f"to where {other} should be: identities exchanged" if other else "a reset of the estimator"
+        findings.add_error(
+            f"{where} {jumps[0].number}: {track.name} jumps {jumps[0].size:.3g} m more {reason} ({len(jumps)} times): "
+            f"{cause}; cut before or after it with --end or --begin; if accepted, the track is split there",
+            "jumps",
+        )
+        rows = np.array([step.row for step in jumps])
+        track.breaks = np.unique(np.concatenate([track.breaks, rows])).astype(np.int64)
+
+
+def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Step]:
+    """Return the steps that a track's motion does not explain, after rows off the track and stays are left out."""
+    error, limit = prediction_errors(track)
+    if not len(error):
+        return []
+    place, steps = track.stack(POSITION_TARGETS, 2), np.diff(track.time)
+    size, usual = np.linalg.norm(error, axis=1), steps <= 1.5 * median_period(track)
+    jumps = np.setdiff1d(np.flatnonzero(size > limit), track.breaks - 1)
+    jumps = jumps[_beyond_velocities(track, jumps, size - limit, steps)]
+    absent = _absent_rows(place, jumps)
+    if absent.size:
+        at = ", ".join(f"{axis:g}" for axis in place[absent[0]])
+        findings.notes.append(
+            f"{track.source}: column {track.label('x')}, {track.label('y')}: {len(absent)} rows of {track.name} stay "
+            f"at {at}, from or to where it jumps: taken as absent, first row {track.rows[absent].min()}"
+        )
+        track.keep(np.isin(np.arange(len(place)), absent, invert=True))
+        return _unexplained_steps(track, findings)
     next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
     # Every second row is near, the next one far: two individuals alternate.
     if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
@@ -599,64 +680,95 @@ def check_jumps(track: ImportedTrack, findings: ImportReport) -> None:
             "two individuals under one id? Map another column: --map id:=COLUMN",
             "jumps",
         )
-        return
-    size = np.linalg.norm(surprise, axis=1)
-    limit = (SIGMAS if track.has(VELOCITY_TARGETS) else WILD) * scale
-    known = np.isin(np.arange(1, len(track.time)), track.breaks)
-    jumps = np.flatnonzero((size > limit) & ~known)
-    if len(jumps) > max(20, 0.05 * len(size)):
-        row = int(track.rows[jumps[0] + 1])
+        return []
+    near = jumps[usual[jumps]]
+    undone = np.linalg.norm(error[near[1:]] + error[near[:-1]], axis=1) < 0.3 * size[near[:-1]]
+    # An animal may dart often, but two that alternate undo each jump by the next one.
+    if len(near) > max(20, 0.05 * len(size)) and (track.has(VELOCITY_TARGETS) or undone.mean() > 0.5):
         findings.add_error(
-            f"{track.source}: {track.name} jumps {len(jumps)} times, first row {row}: two individuals under one id? "
-            "Map another column: --map id:=COLUMN",
+            f"{track.source}: {track.name} jumps {len(near)} times, first row {track.rows[near[0] + 1]}: "
+            "two individuals under one id? Map another column: --map id:=COLUMN",
             "jumps",
         )
-        return
-    # A row off its track is followed by a jump back; a reset is not.
-    away = [int(k) for k in jumps if k + 1 < len(size) and _returns(surprise[k], surprise[k + 1])]
-    back = {k + 1 for k in away}
-    resets = [int(k) for k in jumps if k not in away and k not in back]
-    if resets:
-        k = resets[0]
-        findings.add_error(
-            f"{track.source}: column {track.label('x')}, row {track.rows[k + 1]}: {track.name} jumps {size[k]:.3g} m "
-            f"more than its velocity explains ({len(resets)} times): a reset of the estimator; cut before or "
-            "after it with --end or --begin; if accepted, the track is split there",
-            "jumps",
-        )
-        track.breaks = np.unique(np.concatenate([track.breaks, np.array(resets) + 1])).astype(np.int64)
+        return []
+    # A row off its track lies between two that agree: the jump to it is undone by the next step. A step is used
+    # once, so that no sound row between two bad ones is taken for bad.
+    away: list[int] = []
+    for k, back in zip(near[:-1], undone, strict=True):
+        if back and k + 1 in near and (not away or k > away[-1]):
+            away.append(int(k) + 1)
+    found = []
+    for k in np.setdiff1d(jumps, [row + side for row in away for side in (-1, 0)]):
+        alive = max(4.0 * size[k] / (HARDEST * steps[k] ** 2), size[k] / (FASTEST * steps[k])) < 1.0
+        kind = "gap" if not usual[k] else "motion" if alive and not track.has(VELOCITY_TARGETS) else "jump"
+        row, here = int(k) + 1, place[k + 1]
+        kept = row - int(np.searchsorted(away, row))
+        found.append(Step(kept, int(track.rows[row]), track.time[row], float(size[k]), here - error[k], here, kind))
     if away:
-        row = int(track.rows[away[0] + 1])
-        findings.notes.append(f"{track.source}: {track.name}: {len(away)} outliers left out, first row {row}")
-        sound = np.ones(len(track.time), bool)
-        sound[np.array(away) + 1] = False
-        track.keep(sound)
+        first = track.rows[away[0]]
+        findings.notes.append(f"{track.source}: {track.name}: {len(away)} outliers left out, first row {first}")
+        track.keep(np.isin(np.arange(len(place)), away, invert=True))
+    return found
 
 
-def _returns(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
-    return bool(np.linalg.norm(first + second) < 0.3 * np.linalg.norm(first))
+def _beyond_velocities(
+    track: ImportedTrack, jumps: NDArray[np.int64], beyond: Array, steps: Array
+) -> NDArray[np.bool_]:
+    """Return the jumps that no logged velocity near them explains; beyond : (row - 1,) what exceeds the limit, m."""
+    if not track.has(VELOCITY_TARGETS) or not jumps.size:
+        return np.ones(len(jumps), bool)
+    speed = np.nan_to_num(track.stack(VELOCITY_TARGETS, 2))
+    # A velocity that lags or changes within a step errs by a part of its change. Rows next to a bad one are left out: a
+    # velocity that was differentiated from positions shows the jump, too.
+    rows = np.clip(jumps[:, None] + np.array([-2, -1, 3, 4]), 0, len(speed) - 1)
+    change = np.linalg.norm(np.ptp(speed[rows], axis=1), axis=1)
+    within = 0.5 * np.linalg.norm(speed[jumps + 1] - speed[jumps], axis=1)
+    return np.asarray(beyond[jumps] > np.maximum(change, within) * steps[jumps])
 
 
-def prediction_errors(track: ImportedTrack) -> tuple[NDArray[np.float64], float]:
-    """Return the error of each predicted step (row - 1, 2), m, and a robust scale of it; zero across gaps."""
+def _absent_rows(place: Array, jumps: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return rows that stay at one place to the bit, at 0, 0 or between two jumps: an animal that is not there.
+
+    place : (row, 2), m; jumps : rows before a jump
+    """
+    ends = np.append(np.flatnonzero((np.diff(place, axis=0) != 0.0).any(axis=1)), len(place) - 1)
+    known, absent = set(jumps.tolist()), []
+    for before in (-1, *jumps.tolist()):
+        first, last = before + 1, int(ends[np.searchsorted(ends, before + 1)])
+        framed = before >= 0 and last in known and last >= first + 2
+        zero = not place[first].any() and (before >= 0 or last in known) and (last in known or last == len(place) - 1)
+        absent += range(first, last + 1) if framed or zero else []
+    return np.array(absent, np.int64)
+
+
+def prediction_errors(track: ImportedTrack) -> tuple[Array, Array]:
+    """Return the error of each predicted step (row - 1, 2), m, and how large it may be (row - 1,), m.
+
+    The logged velocity predicts a step. Without one it is predicted by the step before or after it, whichever fits:
+    a fast start goes on, and a turn began before.
+    """
     step = median_period(track)
     place = track.stack(POSITION_TARGETS, 2)
     moved, steps = np.diff(place, axis=0), np.diff(track.time)
     if len(moved) < 20:
-        return np.empty((0, 2)), 0.0
-    # The logged velocity predicts best; without one the last step is continued, which is noisier:
-    # hence the wider limit WILD.
+        return np.empty((0, 2)), np.empty(0)
     if track.has(VELOCITY_TARGETS):
         speed = track.stack(VELOCITY_TARGETS, 2)
-        predicted = 0.5 * (speed[1:] + speed[:-1]) * steps[:, None]
+        error = noise = np.nan_to_num(moved - 0.5 * (speed[1:] + speed[:-1]) * steps[:, None])
     else:
         rate = moved / np.maximum(steps, 1e-12)[:, None]
-        predicted = np.concatenate([moved[:1], rate[:-1] * steps[1:, None]])
-    off = np.nan_to_num(moved - predicted)
-    off[steps > 1.5 * step] = 0.0
-    near = np.abs(off[steps <= 1.5 * step])
+        noise = np.concatenate([np.zeros((1, 2)), moved[1:] - rate[:-1] * steps[1:, None]])
+        error = np.concatenate([moved[:1] - rate[2:3] * steps[0], noise[1:]])
+        after = moved - np.concatenate([rate[1:], rate[-3:-2]]) * steps[:, None]
+        fits = np.linalg.norm(after, axis=1) < np.linalg.norm(error, axis=1)
+        error[fits] = after[fits]
+        error[np.linalg.norm(error, axis=1) < LONE * np.linalg.norm(moved, axis=1)] = 0.0
+    # Rows that repeat a place, of one who is absent or of a slow camera, say nothing about noise.
+    moving = (steps <= 1.5 * step) & moved.any(axis=1)
+    if not moving.any():
+        return np.zeros_like(error), np.ones(len(error))
     # of the livelier axis: who flies along one rests in the other
-    scale = 1.4826 * float(np.median(near, axis=0).max())
-    steps_of = np.abs(moved[moved != 0.0])
-    quantum = float(steps_of.min()) if steps_of.size else 0.0  # of positions that come in steps
-    return off, max(scale, quantum, 0.1 * float(np.median(np.abs(moved), axis=0).max()), 1e-9)
+    scale = 1.4826 * float(np.median(np.abs(noise[moving]), axis=0).max())
+    quantum = float(np.abs(moved[moved != 0.0]).min())  # of positions that come in steps
+    scale = max(scale, quantum, 0.1 * float(np.median(np.abs(moved[moving]), axis=0).max()), 1e-9)
+    return error, (SIGMAS if track.has(VELOCITY_TARGETS) else WILD) * scale * np.maximum(steps / step, 1.0)
