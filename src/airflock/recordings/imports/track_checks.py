@@ -656,59 +656,78 @@ def check_jumps(tracks: list[ImportedTrack], findings: ImportReport) -> None:
 
 def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Step]:
     """Return the steps that a track's motion does not explain, after rows off the track and stays are left out."""
-    error, limit = prediction_errors(track)
-    if not len(error):
-        return []
-    place, steps = track.stack(POSITION_TARGETS, 2), np.diff(track.time)
-    size, usual = np.linalg.norm(error, axis=1), steps <= 1.5 * median_period(track)
-    jumps = np.setdiff1d(np.flatnonzero(size > limit), track.breaks - 1)
-    jumps = jumps[_beyond_velocities(track, jumps, size - limit, steps)]
-    absent = _absent_rows(place, jumps)
-    if absent.size:
-        at = ", ".join(f"{axis:g}" for axis in place[absent[0]])
-        findings.notes.append(
-            f"{track.source}: column {track.label('x')}, {track.label('y')}: {len(absent)} rows of {track.name} stay "
-            f"at {at}, from or to where it jumps: taken as absent, first row {track.rows[absent].min()}"
-        )
-        track.keep(np.isin(np.arange(len(place)), absent, invert=True))
-        return _unexplained_steps(track, findings)
-    next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
-    # Every second row is near, the next one far: two individuals alternate.
-    if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
-        findings.add_error(
-            f"{track.source}: {track.name} jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on: "
-            "two individuals under one id? Map another column: --map id:=COLUMN",
-            "jumps",
-        )
-        return []
-    near = jumps[usual[jumps]]
-    undone = np.linalg.norm(error[near[1:]] + error[near[:-1]], axis=1) < 0.3 * size[near[:-1]]
-    # An animal may dart often, but two that alternate undo each jump by the next one.
-    if len(near) > max(20, 0.05 * len(size)) and (track.has(VELOCITY_TARGETS) or undone.mean() > 0.5):
-        findings.add_error(
-            f"{track.source}: {track.name} jumps {len(near)} times, first row {track.rows[near[0] + 1]}: "
-            "two individuals under one id? Map another column: --map id:=COLUMN",
-            "jumps",
-        )
-        return []
-    # A row off its track lies between two that agree: the jump to it is undone by the next step. A step is used
-    # once, so that no sound row between two bad ones is taken for bad.
-    away: list[int] = []
-    for k, back in zip(near[:-1], undone, strict=True):
-        if back and k + 1 in near and (not away or k > away[-1]):
-            away.append(int(k) + 1)
+    outliers: list[int] = []
+    while True:
+        error, limit = prediction_errors(track)
+        place, steps = track.stack(POSITION_TARGETS, 2), np.diff(track.time)
+        moved, size = np.diff(place, axis=0), np.linalg.norm(error, axis=1)
+        usual = steps <= 1.5 * median_period(track)
+        jumps = np.setdiff1d(np.flatnonzero(size > limit), track.breaks - 1)
+        jumps = jumps[_beyond_velocities(track, jumps, size - limit, steps)]
+        off = _absent_rows(place, jumps)
+        if off.size:
+            at = ", ".join(f"{axis:g}" for axis in place[off[0]])
+            findings.notes.append(
+                f"{track.source}: column {track.label('x')}, {track.label('y')}: {len(off)} rows of {track.name} stay "
+                f"at {at}, from or to where it jumps: taken as absent, first row {track.rows[off].min()}"
+            )
+        else:
+            near = jumps[usual[jumps]]
+            if _is_several(track, place, near, error, findings):
+                return []
+            off = _outliers(near, error if track.has(VELOCITY_TARGETS) else moved)
+            outliers += track.rows[off].tolist()
+        if not off.size:
+            break
+        # What is left is judged again: an error hides the next one.
+        track.keep(np.isin(np.arange(len(place)), off, invert=True))
+    if outliers:
+        line = f"{track.name}: {len(outliers)} outliers left out, first row {min(outliers)}"
+        findings.notes.append(f"{track.source}: {line}")
     found = []
-    for k in np.setdiff1d(jumps, [row + side for row in away for side in (-1, 0)]):
+    for k in jumps:
         alive = max(4.0 * size[k] / (HARDEST * steps[k] ** 2), size[k] / (FASTEST * steps[k])) < 1.0
         kind = "gap" if not usual[k] else "motion" if alive and not track.has(VELOCITY_TARGETS) else "jump"
         row, here = int(k) + 1, place[k + 1]
-        kept = row - int(np.searchsorted(away, row))
-        found.append(Step(kept, int(track.rows[row]), track.time[row], float(size[k]), here - error[k], here, kind))
-    if away:
-        first = track.rows[away[0]]
-        findings.notes.append(f"{track.source}: {track.name}: {len(away)} outliers left out, first row {first}")
-        track.keep(np.isin(np.arange(len(place)), away, invert=True))
+        found.append(Step(row, int(track.rows[row]), track.time[row], float(size[k]), here - error[k], here, kind))
     return found
+
+
+def _is_several(
+    track: ImportedTrack, place: Array, jumps: NDArray[np.int64], error: Array, findings: ImportReport
+) -> bool:
+    """Return True, and add an error, if a track can only be of several individuals that alternate."""
+    ways = [np.linalg.norm(place[rows:] - place[:-rows], axis=1) for rows in (1, 2) if len(place) > rows]
+    # Every second row is near, the next one far.
+    next_row, second_row = (float(np.median(way)) if len(error) else 0.0 for way in (ways * 2)[:2])
+    undone = np.linalg.norm(error[jumps[1:]] + error[jumps[:-1]], axis=1) < 0.3 * np.linalg.norm(
+        error[jumps[:-1]], axis=1
+    )
+    if next_row > 3.0 * second_row:
+        what = f"jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on"
+    # An animal may dart often, but two that alternate undo each jump by the next one.
+    elif len(jumps) > max(20, 0.05 * len(error)) and (track.has(VELOCITY_TARGETS) or undone.mean() > 0.5):
+        what = f"jumps {len(jumps)} times, first row {track.rows[jumps[0] + 1]}"
+    else:
+        return False
+    findings.add_error(
+        f"{track.source}: {track.name} {what}: two individuals under one id? Map another column: --map id:=COLUMN",
+        "jumps",
+    )
+    return True
+
+
+def _outliers(jumps: NDArray[np.int64], steps: Array) -> NDArray[np.int64]:
+    """Return rows off the track: between two that agree, so that the next step undoes the jump to it.
+
+    jumps : rows before a jump; steps : (row - 1, 2) of which one undoes the other, m
+    """
+    found: list[int] = []
+    for k in jumps[jumps < len(steps) - 1].tolist():
+        back = np.linalg.norm(steps[k] + steps[k + 1]) < 0.3 * np.linalg.norm(steps[k])
+        if back and (not found or k > found[-1]):  # a step is used once, so that no sound row between two is taken
+            found.append(k + 1)
+    return np.array(found, np.int64)
 
 
 def _beyond_velocities(
