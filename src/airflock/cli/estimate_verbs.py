@@ -40,7 +40,9 @@ Begin = Annotated[float | None, typer.Option(help="First instant to keep, s.", s
 End = Annotated[float | None, typer.Option(help="Last instant to keep, s.", show_default=False)]
 Accept = Annotated[
     list[str] | None,
-    typer.Option(metavar="KIND", help="Keep what looks wrong: absent, axes, down, duplicates, height, jumps, time."),
+    typer.Option(
+        metavar="KIND", help="Keep what looks wrong: absent, axes, down, duplicates, height, jumps, rows, time."
+    ),
 ]
 Decimal = Annotated[str, typer.Option(help="Decimal point of a text file: . or ,")]
 Delimiter = Annotated[str, typer.Option(help="Separator between columns of a text file.", show_default="detected")]

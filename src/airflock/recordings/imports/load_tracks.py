@@ -93,7 +93,7 @@ def load_tracks(
     same_clock : bool
         The clocks of several files agree.
     accept : str or iterable of str
-        Kinds of errors that are intended: absent, axes, down, duplicates, height, jumps, time.
+        Kinds of errors that are intended: absent, axes, down, duplicates, height, jumps, rows, time.
     decimal, delimiter : str
         Of a text file: its decimal point, and what stands between columns, which is found out by default.
     precision : int

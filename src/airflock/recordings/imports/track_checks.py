@@ -1,7 +1,7 @@
 """Check tracks: missing rows, presence, names, times, heights, axes against velocities, and jumps."""
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from airflock.recordings.imports.track import (
     VELOCITY_TARGETS,
     ImportedTrack,
     ImportReport,
-    RowFlag,
 )
 from airflock.support import RecordingError
 
@@ -41,12 +40,11 @@ def drop_rejected_rows(tracks: list[ImportedTrack], findings: ImportReport) -> l
     kept = []
     for source, own in tracks_by_source(tracks).items():
         counts = [np.ones(len(track.time), bool) for track in own]
-        for column in dict.fromkeys(column for track in own for column in track.flags):
-            flag, values = own[0].flags[column][0], [track.flags[column][1] for track in own]
+        for column, (flag, _) in own[0].flags.items():
             if flag.words not in ("receiver", "used"):
-                _reject(f"{source}: column {column}", flag, own, values, counts, findings)
+                _reject(source, column, own, counts, findings)
         if not any(count.any() for count in counts):
-            columns = ", ".join(dict.fromkeys(column for track in own for column in track.flags))
+            columns = ", ".join(own[0].flags)
             raise RecordingError(f"{source}: column {columns}: no row counts; to read them all, write --accept rows")
         for track, count in zip(own, counts, strict=True):
             if not count.any():
@@ -60,17 +58,12 @@ def drop_rejected_rows(tracks: list[ImportedTrack], findings: ImportReport) -> l
     return kept
 
 
-def _reject(
-    where: str,
-    flag: RowFlag,
-    own: list[ImportedTrack],
-    values: list[Array],
-    counts: list[NDArray[np.bool_]],
-    findings: ImportReport,
-) -> None:
-    """Take the rows that a flag rejects out of `counts`, (row,) of each track, and say how many and why."""
-    every = np.concatenate(values)
-    known = every[np.isfinite(every)]
+def _reject(source: str, column: str, own: list[ImportedTrack], counts: list[Any], findings: ImportReport) -> None:
+    """Take the rows that a column rejects out of `counts`, (row,) of each track, and say how many and why."""
+    flag, where = own[0].flags[column][0], f"{source}: column {column}"
+    values = [track.flags[column][1] for track in own]
+    known = np.concatenate(values)
+    known = known[np.isfinite(known)]
     if flag.least == 0.6 and len(known) and not (known.min() >= 0.0 and known.max() <= 1.0):
         findings.notes.append(f"{where}: lies outside 0 to 1, row {own[0].rows[0]} on: not read as a likelihood")
         return
@@ -78,15 +71,13 @@ def _reject(
     least = min(flag.least, max(1.0, known.max(initial=0.0))) if flag.least == 2.0 else flag.least
     bad = [flag.sign * each < least for each in values]  # never of nan
     rows = np.concatenate([track.rows[out] for track, out in zip(own, bad, strict=True)])
-    if not len(rows):
-        return
-    line = f"{where}: {len(rows)} rows {flag.words}"
-    if "rows" in findings.accepted_kinds:
+    line, kept = f"{where}: {len(rows)} rows {flag.words}", "rows" in findings.accepted_kinds
+    if kept and len(rows):
         findings.notes.append(f"accepted (rows): {line} kept, first row {rows.min()}")
-        return
-    findings.notes.append(f"{line} left out, first row {rows.min()}; to keep them, write --accept rows")
-    for count, out in zip(counts, bad, strict=True):
-        count &= ~out
+    elif len(rows):
+        findings.notes.append(f"{line} left out, first row {rows.min()}; to keep them, write --accept rows")
+        for count, out in zip(counts, bad, strict=True):
+            count &= ~out
 
 
 def _choose_receiver(track: ImportedTrack, counts: NDArray[np.bool_], findings: ImportReport) -> None:
@@ -527,19 +518,15 @@ def _compare(source: str, track: ImportedTrack, moved: Array, summed: Array, fin
     if wrong:
         columns, slope = ", ".join(track.label(POSITION_TARGETS[i]) for i in wrong), float(np.median(slopes[wrong]))
         reason = _scale_reason(track, slope)
-        line = (
-            f"{source}: column {columns}, row {track.rows[0]} on: positions change {slope:.3g} times as fast as the "
-            f"velocities say: {reason or 'units differ'}"
-        )
+        line = f"{source}: column {columns}, row {track.rows[0]} on: positions change {slope:.3g} times as fast as the "
+        line += "velocities say"
         # Noise of the velocities flattens a slope, at most to the slope times r^2 (Frisch 1934). Heights and climbs
         # come from different sensors, and an autopilot's units are fixed: there only a factor of units is an error.
         noisy = all(slopes[i] < 1.0 <= (1.0 + TOLERANCE) * slopes[i] / r[i, i] ** 2 for i in wrong)
         if not reason and (noisy or wrong == [2] or track.fixed_units):
-            findings.notes.append(
-                f"{line.rpartition(': ')[0]}, which is no factor between units: both kept as they are"
-            )
+            findings.notes.append(f"{line}, which is no factor between units: both kept as they are")
         else:
-            findings.add_error(line, "axes")
+            findings.add_error(f"{line}: {reason or 'units differ'}", "axes")
 
 
 def _swap_error(source: str, track: ImportedTrack, likeness: AxisCorrelation) -> str:
@@ -622,36 +609,33 @@ def check_jumps(tracks: list[ImportedTrack], findings: ImportReport) -> None:
     steps = [_unexplained_steps(track, findings) for track in tracks]
     every = sorted(((step.time, who, step) for who, own in enumerate(steps) for step in own), key=lambda one: one[:2])
     times = np.array([time for time, _, _ in every])
-    for who, track in enumerate(tracks):
-        jumps, other = [], ""
+    for who, (track, own) in enumerate(zip(tracks, steps, strict=True)):
+        rivals: dict[int, str] = {}  # row → who should be there
         late = 0.1 * median_period(track)
-        for step in steps[who]:
+        for step in own:
             # Identities are exchanged where another one, who jumps away at that instant, should be.
-            first, last = np.searchsorted(times, [step.time - late, step.time + late])
-            for _, rival, old in every[first:last]:
-                if rival != who and np.linalg.norm(step.place - old.meant) < 0.3 * step.size:
-                    other = other or tracks[rival].name
-                    step = step._replace(kind="jump")
-            jumps += [step] if step.kind == "jump" else []
-        where = f"{track.source}: column {track.label('x')}, row"
-        moving = [step for step in steps[who] if step.kind == "motion" and step.row not in {one.row for one in jumps}]
-        if moving:
-            findings.notes.append(
-                f"{where} {moving[0].number}: {track.name} moves {moving[0].size:.3g} m more than the steps beside it "
-                f"explain ({len(moving)} times): taken as motion, as what lives can (up to {HARDEST:g} m/s^2); if not, "
-                "cut before or after it with --end or --begin"
-            )
-        if not jumps:
-            continue
+            near = every[slice(*np.searchsorted(times, [step.time - late, step.time + late]))]
+            others = [n for _, n, old in near if np.linalg.norm(step.place - old.meant) < 0.3 * step.size and n != who]
+            rivals |= {step.row: tracks[others[0]].name} if others else {}
+        jumps = [step for step in own if step.row in rivals or step.kind == "jump"]
+        motion = [step for step in own if step.row not in rivals and step.kind == "motion"]
         reason = "than its velocity explains" if track.has(VELOCITY_TARGETS) else "than the steps beside it explain"
-        cause = f"to where {other} should be: identities exchanged" if other else "a reset of the estimator"
-        findings.add_error(
-            f"{where} {jumps[0].number}: {track.name} jumps {jumps[0].size:.3g} m more {reason} ({len(jumps)} times): "
-            f"{cause}; cut before or after it with --end or --begin; if accepted, the track is split there",
-            "jumps",
-        )
-        rows = np.array([step.row for step in jumps])
-        track.breaks = np.unique(np.concatenate([track.breaks, rows])).astype(np.int64)
+        where = f"{track.source}: column {track.label('x')}, row"
+        if motion:
+            findings.notes.append(
+                f"{where} {motion[0].number}: {track.name} moves {motion[0].size:.3g} m more {reason} ({len(motion)} "
+                f"times): taken as motion, as what lives can (up to {HARDEST:g} m/s^2); if not, cut before or after it "
+                "with --end or --begin"
+            )
+        if jumps:
+            name = next(iter(rivals.values()), "")
+            cause = f"to where {name} should be: identities exchanged" if name else "a reset of the estimator"
+            findings.add_error(
+                f"{where} {jumps[0].number}: {track.name} jumps {jumps[0].size:.3g} m more {reason} ({len(jumps)} "
+                f"times): {cause}; cut before or after it with --end or --begin; if accepted, the track is split there",
+                "jumps",
+            )
+            track.breaks = np.union1d(track.breaks, [step.row for step in jumps]).astype(np.int64)
 
 
 def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Step]:
@@ -659,6 +643,8 @@ def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Ste
     outliers: list[int] = []
     while True:
         error, limit = prediction_errors(track)
+        if not len(error):
+            return []
         place, steps = track.stack(POSITION_TARGETS, 2), np.diff(track.time)
         moved, size = np.diff(place, axis=0), np.linalg.norm(error, axis=1)
         usual = steps <= 1.5 * median_period(track)
@@ -675,35 +661,31 @@ def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Ste
             near = jumps[usual[jumps]]
             if _is_several(track, place, near, error, findings):
                 return []
-            off = _outliers(near, error if track.has(VELOCITY_TARGETS) else moved)
+            alive = np.zeros(len(size)) if track.has(VELOCITY_TARGETS) else _alive(moved, steps)
+            off = _outliers(near, error if track.has(VELOCITY_TARGETS) else moved, alive)
             outliers += track.rows[off].tolist()
         if not off.size:
             break
         # What is left is judged again: an error hides the next one.
         track.keep(np.isin(np.arange(len(place)), off, invert=True))
     if outliers:
-        line = f"{track.name}: {len(outliers)} outliers left out, first row {min(outliers)}"
-        findings.notes.append(f"{track.source}: {line}")
+        count = len(outliers)
+        findings.notes.append(f"{track.source}: {track.name}: {count} outliers left out, first row {min(outliers)}")
     found = []
     for k in jumps:
-        alive = max(4.0 * size[k] / (HARDEST * steps[k] ** 2), size[k] / (FASTEST * steps[k])) < 1.0
-        kind = "gap" if not usual[k] else "motion" if alive and not track.has(VELOCITY_TARGETS) else "jump"
+        kind = "gap" if not usual[k] else "motion" if alive[k] else "jump"
         row, here = int(k) + 1, place[k + 1]
         found.append(Step(row, int(track.rows[row]), track.time[row], float(size[k]), here - error[k], here, kind))
     return found
 
 
-def _is_several(
-    track: ImportedTrack, place: Array, jumps: NDArray[np.int64], error: Array, findings: ImportReport
-) -> bool:
+def _is_several(track: ImportedTrack, place: Array, jumps: Any, error: Array, findings: ImportReport) -> bool:
     """Return True, and add an error, if a track can only be of several individuals that alternate."""
-    ways = [np.linalg.norm(place[rows:] - place[:-rows], axis=1) for rows in (1, 2) if len(place) > rows]
-    # Every second row is near, the next one far.
-    next_row, second_row = (float(np.median(way)) if len(error) else 0.0 for way in (ways * 2)[:2])
+    next_row, second_row = (float(np.median(np.linalg.norm(place[rows:] - place[:-rows], axis=1))) for rows in (1, 2))
     undone = np.linalg.norm(error[jumps[1:]] + error[jumps[:-1]], axis=1) < 0.3 * np.linalg.norm(
-        error[jumps[:-1]], axis=1
+        error[jumps[1:]], axis=1
     )
-    if next_row > 3.0 * second_row:
+    if next_row > 3.0 * second_row:  # every second row is near, the next one far
         what = f"jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on"
     # An animal may dart often, but two that alternate undo each jump by the next one.
     elif len(jumps) > max(20, 0.05 * len(error)) and (track.has(VELOCITY_TARGETS) or undone.mean() > 0.5):
@@ -717,22 +699,30 @@ def _is_several(
     return True
 
 
-def _outliers(jumps: NDArray[np.int64], steps: Array) -> NDArray[np.int64]:
+def _alive(moved: Array, steps: Array) -> Array:
+    """Return the speed of steps, m/s, of which a living thing is capable; 0 of others; moved : m in steps of s."""
+    size = np.linalg.norm(moved, axis=1)
+    able = (4.0 * size < HARDEST * steps**2) & (size < FASTEST * steps)
+    return np.where(able, size / steps, 0.0)
+
+
+def _outliers(jumps: NDArray[np.int64], moved: Array, speed: Array) -> NDArray[np.int64]:
     """Return rows off the track: between two that agree, so that the next step undoes the jump to it.
 
-    jumps : rows before a jump; steps : (row - 1, 2) of which one undoes the other, m
+    jumps : rows before a jump; moved : (row - 1, 2) of which one undoes the other, m; speed : as in `_alive`
     """
+    size = np.linalg.norm(moved, axis=1)
+    back = np.append(np.linalg.norm(moved[:-1] + moved[1:], axis=1) < 0.3 * size[:-1], False)
+    # Who moves as fast elsewhere may have been there and come back.
+    own = np.max(speed, initial=0.0, where=~back & ~np.append(False, back[:-1]))
     found: list[int] = []
-    for k in jumps[jumps < len(steps) - 1].tolist():
-        back = np.linalg.norm(steps[k] + steps[k + 1]) < 0.3 * np.linalg.norm(steps[k])
-        if back and (not found or k > found[-1]):  # a step is used once, so that no sound row between two is taken
+    for k in jumps[back[jumps] & ~((speed[jumps] > 0.0) & (speed[jumps] < 2.0 * own))].tolist():
+        if not found or k > found[-1]:  # a step is used once, so that no sound row between two is taken
             found.append(k + 1)
     return np.array(found, np.int64)
 
 
-def _beyond_velocities(
-    track: ImportedTrack, jumps: NDArray[np.int64], beyond: Array, steps: Array
-) -> NDArray[np.bool_]:
+def _beyond_velocities(track: ImportedTrack, jumps: Any, beyond: Array, steps: Array) -> NDArray[np.bool_]:
     """Return the jumps that no logged velocity near them explains; beyond : (row - 1,) what exceeds the limit, m."""
     if not track.has(VELOCITY_TARGETS) or not jumps.size:
         return np.ones(len(jumps), bool)
@@ -763,8 +753,8 @@ def _absent_rows(place: Array, jumps: NDArray[np.int64]) -> NDArray[np.int64]:
 def prediction_errors(track: ImportedTrack) -> tuple[Array, Array]:
     """Return the error of each predicted step (row - 1, 2), m, and how large it may be (row - 1,), m.
 
-    The logged velocity predicts a step. Without one it is predicted by the step before or after it, whichever fits:
-    a fast start goes on, and a turn began before.
+    The logged velocity predicts a step. Without one anything between the step before and the step after it does: a
+    fast start goes on, and a turn began before.
     """
     step = median_period(track)
     place = track.stack(POSITION_TARGETS, 2)
@@ -777,10 +767,10 @@ def prediction_errors(track: ImportedTrack) -> tuple[Array, Array]:
     else:
         rate = moved / np.maximum(steps, 1e-12)[:, None]
         noise = np.concatenate([np.zeros((1, 2)), moved[1:] - rate[:-1] * steps[1:, None]])
-        error = np.concatenate([moved[:1] - rate[2:3] * steps[0], noise[1:]])
-        after = moved - np.concatenate([rate[1:], rate[-3:-2]]) * steps[:, None]
-        fits = np.linalg.norm(after, axis=1) < np.linalg.norm(error, axis=1)
-        error[fits] = after[fits]
+        before = np.concatenate([rate[2:3], rate[:-1]]) * steps[:, None]
+        change = np.concatenate([rate[1:], rate[-3:-2]]) * steps[:, None] - before
+        share = np.sum((moved - before) * change, axis=1) / np.maximum(np.sum(change**2, axis=1), 1e-300)
+        error = moved - before - np.clip(share, 0.0, 1.0)[:, None] * change
         error[np.linalg.norm(error, axis=1) < LONE * np.linalg.norm(moved, axis=1)] = 0.0
     # Rows that repeat a place, of one who is absent or of a slow camera, say nothing about noise.
     moving = (steps <= 1.5 * step) & moved.any(axis=1)
