@@ -741,7 +741,8 @@ def _absent_rows(place: Array, jumps: NDArray[np.int64]) -> NDArray[np.int64]:
     place : (row, 2), m; jumps : rows before a jump
     """
     ends = np.append(np.flatnonzero((np.diff(place, axis=0) != 0.0).any(axis=1)), len(place) - 1)
-    known, absent = set(jumps.tolist()), []
+    known: set[int] = set(jumps.tolist())
+    absent: list[int] = []
     for before in (-1, *jumps.tolist()):
         first, last = before + 1, int(ends[np.searchsorted(ends, before + 1)])
         framed = before >= 0 and last in known and last >= first + 2
