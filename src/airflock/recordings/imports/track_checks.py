@@ -711,6 +711,8 @@ def _outliers(jumps: NDArray[np.int64], moved: Array, speed: Array) -> NDArray[n
 
     jumps : rows before a jump; moved : (row - 1, 2) of which one undoes the other, m; speed : as in `_alive`
     """
+    if not jumps.size:
+        return jumps
     size = np.linalg.norm(moved, axis=1)
     back = np.append(np.linalg.norm(moved[:-1] + moved[1:], axis=1) < 0.3 * size[:-1], False)
     # Who moves as fast elsewhere may have been there and come back.
@@ -740,6 +742,8 @@ def _absent_rows(place: Array, jumps: NDArray[np.int64]) -> NDArray[np.int64]:
 
     place : (row, 2), m; jumps : rows before a jump
     """
+    if not jumps.size:
+        return jumps
     ends = np.append(np.flatnonzero((np.diff(place, axis=0) != 0.0).any(axis=1)), len(place) - 1)
     known: set[int] = set(jumps.tolist())
     absent: list[int] = []
