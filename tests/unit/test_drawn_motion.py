@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 import airflock
 from airflock.recordings import between_frames_note, scenario_of_recording
@@ -96,11 +97,16 @@ def test_a_step_that_stays_is_asked_about_and_takes_no_row_away(rng):
     angle, size = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(1.0, 10.0)
     place[at:] += size * np.array([np.cos(angle), np.sin(angle)])
     table = pd.DataFrame({"t": np.arange(rows) / rate, "x": place[:, 0], "y": place[:, 1]})
+    if rng.random() < 0.3:  # in a gap, which would be bridged
+        table = table.drop(index=range(at, min(at + 3, rows - 1))).reset_index(drop=True)
     with pytest.raises(RecordingError, match=f"row {at}: individual jumps .* than the steps beside it explain"):
         airflock.load_tracks(table)
     recording = airflock.load_tracks(table, accept="jumps", precision=64)
-    assert np.array_equal(places(recording)[0], place) and (recording["confidence"] == 1.0).all()
-    assert np.linalg.norm(recording["velocity"].values, axis=1).max() < 2.0 * speed
+    there = recording["confidence"].values[:, 0, 0] == 1.0
+    assert (
+        np.array_equal(places(recording)[0][there], table[["x", "y"]]) and np.isnan(places(recording)[0][~there]).all()
+    )
+    assert np.nanmax(np.linalg.norm(recording["velocity"].values, axis=1)) < 2.0 * speed
 
 
 def test_outliers_are_left_out_and_no_sound_row_with_them(rng):
@@ -378,3 +384,44 @@ def test_rows_that_are_rejected_can_be_kept(tmp_path):
     assert recording.sizes["time"] == 40 and any(
         "40 rows less likely than 0.6 kept" in line for line in notes(recording)
     )
+
+
+def test_rows_alone_between_gaps_are_counted():
+    t = np.r_[np.arange(30) * 10.0, 300.0 + 37.3 * np.arange(1, 6), 530.0 + np.arange(30) * 10.0]
+    table = pd.DataFrame({"t [s]": t, "x [m]": t, "y [m]": 0.0})
+    alone = int(((np.diff(t[:-1]) > 15.0) & (np.diff(t[1:]) > 15.0)).sum())
+    assert alone == 5 and any(
+        "5 rows stand alone" in note and "--bridge 38" in note for note in notes(airflock.load_tracks(table))
+    )
+    recording = airflock.load_tracks(table, bridge=38.0)  # as the note says
+    assert not any("stand alone" in note for note in notes(recording))
+    there = recording["confidence"].values[:, 0, 0] > 0.0
+    np.testing.assert_allclose(places(recording)[0][there, 0], recording["time"][there], atol=1e-3)
+
+
+def test_confidence_of_poses_rejects_rows_and_that_of_airflock_does_not():
+    dims, t = ("time", "space", "individual"), np.arange(50) * 0.1
+    sure = np.where(np.arange(50) % 10 == 5, 0.2, 0.9)[:, None]
+    place = np.stack([t, 0.0 * t], axis=1)[:, :, None]
+    place[sure[:, 0] < 0.5] += 7.0
+    coordinates = {"time": t, "space": ["x", "y"], "individual": ["mouse"]}
+    variables = {"position": (dims, place, {"units": "m"}), "confidence": (("time", "individual"), sure)}
+    poses = xr.Dataset(variables, coordinates, {"time_unit": "seconds", "source_software": "DeepLabCut"})
+    recording = airflock.load_tracks(poses, precision=64)
+    assert any(
+        "column confidence: 5 rows less likely than 0.6 left out, first row 5" in note for note in notes(recording)
+    )
+    np.testing.assert_allclose(places(recording)[0][:, 0], t, atol=1e-9)
+    again = airflock.load_tracks(recording, precision=64)  # the frames that were bridged have a confidence of 0.5
+    assert np.array_equal(places(again), places(recording))
+
+
+def test_the_first_of_several_filters_is_read(tmp_path):
+    t = np.arange(100) * 0.1
+    own = pd.DataFrame({"TimeUS": (t * 1e6).astype(int), "C": 0, "PN": 3.0 * t, "PE": 0.5 * t, "PD": -10.0})
+    pd.concat([own, own.assign(C=1, PN=own["PN"] + 4.0)]).sort_values("TimeUS").to_csv(
+        tmp_path / "xkf1.csv", index=False
+    )
+    recording = airflock.load_tracks(tmp_path / "xkf1.csv", precision=64)
+    np.testing.assert_allclose(places(recording)[0], np.stack([0.5 * t, 3.0 * t, 0.0 * t + 10.0], axis=1), atol=1e-9)
+    assert any("column C" in note and "0 is read, the first" in note for note in notes(recording))

@@ -172,7 +172,11 @@ def read_dataset(dataset: xr.Dataset, options: ImportOptions, where: str = "data
                     continue  # of unknown unit (frames, pixels) or no velocity: differentiated instead
                 values = own[variable].transpose("time", "space").values.astype(float) * table_columns.SPEED_UNITS[unit]
                 columns |= {names[c]: values[:, c] for c in range(len(axes))}
-        tracks.append(ImportedTrack(str(name), where, seconds, columns, rows))
+        track = ImportedTrack(str(name), where, seconds, columns, rows)
+        # Airflock's own confidence says which frames were bridged, and no likelihood.
+        if "confidence" in own and not str(found.attrs.get("source_software", "")).startswith("airflock"):
+            track.flags = {"confidence": (table_columns.LIKELY, own["confidence"].values.astype(float))}
+        tracks.append(track)
     return tracks
 
 

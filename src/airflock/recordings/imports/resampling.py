@@ -89,6 +89,8 @@ def resample(
 ) -> tuple[xr.Dataset, dict[str, float]]:
     """Resample tracks to the given times; return the dataset, and the shares that are present and bridged.
 
+    Beside these: `lost`, the number of rows in no frame, and `apart`, the longest time to the next row of one (s).
+
     bridge : longest gap (s) that is bridged, by cubic Hermite with the velocities at its ends
     """
     axes = 3 if any("z" in track.columns for track in tracks) else 2
@@ -97,7 +99,9 @@ def resample(
     # one individual after another, so that memory is taken for each as its rows are given back
     filled = {name: np.empty((len(tracks), axes, len(times)), kind) for name in names}
     sure = np.empty((len(times), len(tracks)), np.float32)
+    lost = []
     for who, track in enumerate(tracks):
+        lost += _lonely_rows(track, times, period, bridge).tolist()
         _fill(track, who, times, period, bridge, {name: array[who].T for name, array in filled.items()}, sure)
         if len(tracks) > 1:
             track.columns, track.time, track.rows = {}, track.time[:0], track.rows[:0]  # a long log is in memory once
@@ -115,7 +119,17 @@ def resample(
     }
     attributes = {"ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds", "airflock_begin": float(times[0])}
     shares = {"present": float((sure > 0.0).mean()), "bridged": float((sure == 0.5).mean())}
+    shares |= {"lost": float(len(lost)), "apart": max(lost, default=0.0)}
     return xr.Dataset(variables, coordinates, attributes), shares
+
+
+def _lonely_rows(track: ImportedTrack, times: Any, period: float, bridge: float) -> Any:
+    """Return the time to the nearer neighbour (s) of each row that no frame shows: alone between gaps, off the grid."""
+    usual = median_period(track) or period
+    steps = np.concatenate([[np.inf], np.diff(track.time), [np.inf]])
+    near, at = np.minimum(steps[1:], steps[:-1]), (track.time - times[0]) / period
+    off = np.abs(at - np.clip(np.round(at), 0, len(times) - 1)) * period >= 1e-3 * min(period, usual)
+    return near[off & (near > max(bridge, NORMAL * usual)) & (near < np.inf)]
 
 
 def _fill(

@@ -673,7 +673,9 @@ def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Ste
         findings.notes.append(f"{track.source}: {track.name}: {count} outliers left out, first row {min(outliers)}")
     found = []
     for k in jumps:
-        kind = "gap" if not usual[k] else "motion" if alive[k] else "jump"
+        # In a gap a logged velocity may have changed.
+        flown = alive[k] or (track.has(VELOCITY_TARGETS) and not usual[k])
+        kind = "jump" if not flown else "motion" if usual[k] else "gap"
         row, here = int(k) + 1, place[k + 1]
         found.append(Step(row, int(track.rows[row]), track.time[row], float(size[k]), here - error[k], here, kind))
     return found
@@ -685,7 +687,9 @@ def _is_several(track: ImportedTrack, place: Array, jumps: Any, error: Array, fi
     undone = np.linalg.norm(error[jumps[1:]] + error[jumps[:-1]], axis=1) < 0.3 * np.linalg.norm(
         error[jumps[1:]], axis=1
     )
-    if next_row > 3.0 * second_row:  # every second row is near, the next one far
+    flown = np.linalg.norm(track.stack(VELOCITY_TARGETS, 2), axis=1) if track.has(VELOCITY_TARGETS) else np.zeros(1)
+    # Every second row is near, the next one far; by more than the velocity that an estimate of a drone at rest shows.
+    if next_row > 3.0 * max(second_row, float(np.nanmedian(flown)) * median_period(track)):
         what = f"jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on"
     # An animal may dart often, but two that alternate undo each jump by the next one.
     elif len(jumps) > max(20, 0.05 * len(error)) and (track.has(VELOCITY_TARGETS) or undone.mean() > 0.5):
