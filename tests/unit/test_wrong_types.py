@@ -43,7 +43,7 @@ def test_an_option_of_an_import_that_is_none_is_named(name, wrong):
 def test_one_kind_of_fault_may_stand_without_a_list():
     assert tracks(accept="jumps").identical(tracks(accept=["jumps"]))
     assert told(lambda: tracks(accept="jump")) == [
-        "accept = jump is none of absent, axes, down, duplicates, height, jumps, time"
+        "accept = jump is none of absent, axes, down, duplicates, height, jumps, rows, time"
     ]
     assert len(told(lambda: tracks(accept=None))) == 1
 

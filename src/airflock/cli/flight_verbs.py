@@ -219,6 +219,7 @@ def _measured(source: Any, path: Path, changed: ScoreValues, trust: bool, aero: 
     """Measure a recording; source : its path, or the Opening that reads it; changed : keys of how it is measured."""
     from airflock.parts.metrics import reported_values
     from airflock.recordings import (
+        PRESENCE_METRICS,
         between_frames_note,
         load_recording,
         measure_recording,
@@ -234,7 +235,13 @@ def _measured(source: Any, path: Path, changed: ScoreValues, trust: bool, aero: 
     scenario = scenario_of_recording(recording, settings, trust=trust)
     untold, coarse = undefined_metrics_of(recording, scenario, settings), between_frames_note(recording, scenario)
     return MeasuredRecording(
-        path, values, course, reported_values(scenario.metrics.rule), recorded_faults(recording), untold, coarse
+        path,
+        values,
+        course,
+        reported_values(scenario.metrics.rule) | PRESENCE_METRICS,
+        recorded_faults(recording),
+        untold,
+        coarse,
     )
 
 

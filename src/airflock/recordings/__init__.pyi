@@ -52,6 +52,7 @@ from .recording_files import (
 )
 from .scores import (
     PAIR_METRICS as PAIR_METRICS,
+    PRESENCE_METRICS as PRESENCE_METRICS,
     between_frames_note as between_frames_note,
     body_length_settings as body_length_settings,
     group_scores as group_scores,

@@ -160,6 +160,7 @@ def undefined_metrics_of(
     return undefined_metrics(names, scenario.metrics.rule.name, settings or {}, arena=scenario.world.arena != "none")
 
 
+PRESENCE_METRICS = {"present_measured": ("", "share that is present, without gaps that the import bridged")}
 SLOW = 1.0  # s between frames: our choice; an animal turns, and a drone passes another one, within less
 
 
@@ -188,7 +189,7 @@ def between_frames_note(recording: xr.Dataset, scenario: Scenario) -> str:
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """Add units and meanings of the columns to the attributes of a table."""
     of_courses = {name: about for each in scenario.metrics.rule.metrics for name, about in each.courses.items()}
-    return with_units(table, of_courses | dict(reported_values(scenario.metrics.rule)))
+    return with_units(table, of_courses | dict(reported_values(scenario.metrics.rule)) | PRESENCE_METRICS)
 
 
 def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> pd.DataFrame:

@@ -142,10 +142,7 @@ def scalar_names(metric_set_: MetricSet, q: Any, goals: bool = False) -> tuple[s
     return tuple(dict.fromkeys((*own, *metric_set_.reports)))
 
 
-PRESENCE = {
-    "present": ("", "share of all individuals and instants for which the recording has data"),
-    "present_measured": ("", "share of them with data of the file, without gaps that the import bridged"),
-}
+PRESENCE = {"present": ("", "share of all individuals and instants for which the recording has data")}
 
 
 def reported_values(metric_set_: MetricSet) -> dict[str, tuple[str, str]]:
