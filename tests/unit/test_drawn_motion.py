@@ -1,4 +1,4 @@
-"""Tracks drawn at random, fifty of each kind: an import is right, or it asks; sound motion is read to the last row."""
+"""Tracks drawn at random, fifty of each kind: an import is right or refused; sound motion is read to the last row."""
 
 import json
 from itertools import combinations
@@ -60,7 +60,7 @@ def least_distance(place):
     return np.nanmin(apart)
 
 
-def test_exchanged_identities_are_asked_about_and_split_if_accepted(rng):
+def test_exchanged_identities_are_refused_and_split_if_accepted(rng):
     count = int(rng.integers(2, 6))
     apart = rng.uniform(0.05, 5.0)
     table, period = school(rng, count, apart)
@@ -89,7 +89,7 @@ def test_exchanged_identities_are_asked_about_and_split_if_accepted(rng):
     assert speed < 3.0 * np.linalg.norm(np.diff(truth(table), axis=1), axis=2).max() / period
 
 
-def test_a_step_that_stays_is_asked_about_and_takes_no_row_away(rng):
+def test_a_step_that_stays_is_refused_and_takes_no_row_away(rng):
     rate, rows = rng.choice([25.0, 50.0]), 160
     speed = rng.uniform(0.02, 1.0)
     place = wander(rng, rows, 1.0 / rate, speed, 0.02 * speed / rate)
@@ -136,10 +136,10 @@ def test_an_absent_animal_that_is_parked_is_absent(rng):
     spoilt = table.assign(x=table["x"].mask(parked, spot[0]), y=table["y"].mask(parked, spot[1]))
     recording = airflock.load_tracks(spoilt, bridge=0.0, accept="absent", precision=64)
     assert any("taken as absent" in note and f"row {spoilt.index[parked][0]}" in note for note in notes(recording))
-    found = places(recording)
-    assert np.isnan(found[0][begin:end]).all() and np.array_equal(found[1], truth(table)[1])
+    seen = places(recording)
+    assert np.isnan(seen[0][begin:end]).all() and np.array_equal(seen[1], truth(table)[1])
     there = np.setdiff1d(np.arange(rows), np.arange(begin, end))
-    assert np.array_equal(found[0][there], truth(table)[0][there])
+    assert np.array_equal(seen[0][there], truth(table)[0][there])
 
 
 def geodetic(rng, rows, rate=5.0):
@@ -242,7 +242,7 @@ def test_names_are_those_of_individuals_not_of_rows_or_tags(rng, tmp_path):
     assert all(name in note for name in extra) and ("id" in extra) == ("id (row number)" in note)
 
 
-def test_rows_that_are_numbered_are_one_individual_s_or_are_asked_about(rng, tmp_path):
+def test_rows_that_are_numbered_are_of_one_individual_or_refused(rng, tmp_path):
     table, _ = school(rng, int(rng.integers(1, 3)), 1.0)
     count = table["id"].nunique()
     numbered = table.assign(id=np.arange(len(table)) + int(rng.integers(0, 1000)))
@@ -308,8 +308,8 @@ def test_sound_motion_is_read_to_the_last_row_and_keeps_its_peaks(rng, motion):
     for accept in ((), "jumps"):
         recording = airflock.load_tracks(table, accept=accept, precision=64)
         assert np.array_equal(places(recording)[0], place) and (recording["confidence"] == 1.0).all()
-        found = recording["velocity"].transpose("individual", "time", "space", "keypoint").values[0, ..., 0]
-        np.testing.assert_allclose(found, speeds, rtol=1e-6, atol=1e-6 * np.abs(speeds).max())
+        seen = recording["velocity"].transpose("individual", "time", "space", "keypoint").values[0, ..., 0]
+        np.testing.assert_allclose(seen, speeds, rtol=1e-6, atol=1e-6 * np.abs(speeds).max())
 
 
 def test_drones_that_hop_with_a_lagging_estimate_are_read(rng):

@@ -624,8 +624,8 @@ def check_jumps(tracks: list[ImportedTrack], findings: ImportReport) -> None:
         if motion:
             findings.notes.append(
                 f"{where} {motion[0].number}: {track.name} moves {motion[0].size:.3g} m more {reason} ({len(motion)} "
-                f"times): taken as motion, as what lives can (up to {HARDEST:g} m/s^2); if not, cut before or after it "
-                "with --end or --begin"
+                f"times): taken as motion, no harder than its own or an animal's ({HARDEST:g} m/s^2); if it is none, "
+                "cut before or after it with --end or --begin"
             )
         if jumps:
             name = next(iter(rivals.values()), "")
@@ -671,14 +671,19 @@ def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Ste
     if outliers:
         count = len(outliers)
         findings.notes.append(f"{track.source}: {track.name}: {count} outliers left out, first row {min(outliers)}")
-    found = []
+    own = np.max(
+        np.linalg.norm(moved, axis=1) / steps, initial=0.0, where=np.isin(np.arange(len(steps)), jumps, invert=True)
+    )
+    unexplained = []
     for k in jumps:
-        # In a gap a logged velocity may have changed.
-        flown = alive[k] or (track.has(VELOCITY_TARGETS) and not usual[k])
+        # Who moves nearly as fast elsewhere may do so once more; and in a gap a logged velocity may have changed.
+        flown = not usual[k] if track.has(VELOCITY_TARGETS) else alive[k] or size[k] < 2.0 * own * steps[k]
         kind = "jump" if not flown else "motion" if usual[k] else "gap"
         row, here = int(k) + 1, place[k + 1]
-        found.append(Step(row, int(track.rows[row]), track.time[row], float(size[k]), here - error[k], here, kind))
-    return found
+        unexplained.append(
+            Step(row, int(track.rows[row]), track.time[row], float(size[k]), here - error[k], here, kind)
+        )
+    return unexplained
 
 
 def _is_several(track: ImportedTrack, place: Array, jumps: Any, error: Array, findings: ImportReport) -> bool:
@@ -721,11 +726,11 @@ def _outliers(jumps: NDArray[np.int64], moved: Array, speed: Array) -> NDArray[n
     back = np.append(np.linalg.norm(moved[:-1] + moved[1:], axis=1) < 0.3 * size[:-1], False)
     # Who moves as fast elsewhere may have been there and come back.
     own = np.max(speed, initial=0.0, where=~back & ~np.append(False, back[:-1]))
-    found: list[int] = []
+    rows: list[int] = []
     for k in jumps[back[jumps] & ~((speed[jumps] > 0.0) & (speed[jumps] < 2.0 * own))].tolist():
-        if not found or k > found[-1]:  # a step is used once, so that no sound row between two is taken
-            found.append(k + 1)
-    return np.array(found, np.int64)
+        if not rows or k > rows[-1]:  # a step is used once, so that no sound row between two is taken
+            rows.append(k + 1)
+    return np.array(rows, np.int64)
 
 
 def _beyond_velocities(track: ImportedTrack, jumps: Any, beyond: Array, steps: Array) -> NDArray[np.bool_]:
