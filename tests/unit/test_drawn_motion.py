@@ -76,14 +76,14 @@ def test_exchanged_identities_are_refused_and_split_if_accepted(rng):
         hidden = swapped["t"].between((at - rng.integers(1, 5) - 0.5) * period, (at - 0.5) * period)
         swapped = swapped[~(hidden & swapped["id"].isin(names))].reset_index(drop=True)
     with pytest.raises(RecordingError) as error:
-        airflock.load_tracks(swapped)
+        airflock.load_tracks(swapped, unit="m")
     lines = str(error.value).splitlines()
     assert len(lines) == len(names) and all("identities exchanged" in line for line in lines)
     assert all(
         f"row {n}" in "\n".join(lines)
         for n in swapped.index[swapped["id"].isin(names) & (swapped["t"] > (at - 0.5) * period)][: len(names)]
     )
-    recording = airflock.load_tracks(swapped, accept="jumps", precision=64)
+    recording = airflock.load_tracks(swapped, unit="m", accept="jumps", precision=64)
     assert least_distance(places(recording)) == pytest.approx(least_distance(truth(table)), rel=0.05)
     speed = np.nanmax(np.linalg.norm(recording["velocity"].values, axis=1))
     assert speed < 3.0 * np.linalg.norm(np.diff(truth(table), axis=1), axis=2).max() / period
@@ -100,8 +100,8 @@ def test_a_step_that_stays_is_refused_and_takes_no_row_away(rng):
     if rng.random() < 0.3:  # in a gap, which would be bridged
         table = table.drop(index=range(at, min(at + 3, rows - 1))).reset_index(drop=True)
     with pytest.raises(RecordingError, match=f"row {at}: individual jumps .* than the steps beside it explain"):
-        airflock.load_tracks(table)
-    recording = airflock.load_tracks(table, accept="jumps", precision=64)
+        airflock.load_tracks(table, unit="m")
+    recording = airflock.load_tracks(table, unit="m", accept="jumps", precision=64)
     there = recording["confidence"].values[:, 0, 0] == 1.0
     assert (
         np.array_equal(places(recording)[0][there], table[["x", "y"]]) and np.isnan(places(recording)[0][~there]).all()
@@ -118,7 +118,7 @@ def test_outliers_are_left_out_and_no_sound_row_with_them(rng):
     for row in bad:
         angle = rng.uniform(0.0, 2.0 * np.pi)
         spoilt.loc[row, ["x", "y"]] += rng.uniform(30.0, 300.0) * step * np.array([np.cos(angle), np.sin(angle)])
-    recording = airflock.load_tracks(spoilt, precision=64)
+    recording = airflock.load_tracks(spoilt, unit="m", precision=64)
     assert any(f"{len(bad)} outliers left out, first row {bad[0]}" in note for note in notes(recording))
     sound = np.setdiff1d(np.arange(rows), bad)
     assert np.array_equal(places(recording)[0][sound], truth(table)[0][sound])
@@ -134,7 +134,7 @@ def test_an_absent_animal_that_is_parked_is_absent(rng):
     parked = table["id"].eq("fish_0") & table["t"].between((begin - 0.5) * period, (end - 0.5) * period)
     spot = (0.0, 0.0) if begin == 0 or end == rows or rng.random() < 0.5 else (-1.0, -1.0)
     spoilt = table.assign(x=table["x"].mask(parked, spot[0]), y=table["y"].mask(parked, spot[1]))
-    recording = airflock.load_tracks(spoilt, bridge=0.0, accept="absent", precision=64)
+    recording = airflock.load_tracks(spoilt, unit="m", bridge=0.0, accept="absent", precision=64)
     assert any("taken as absent" in note and f"row {spoilt.index[parked][0]}" in note for note in notes(recording))
     seen = places(recording)
     assert np.isnan(seen[0][begin:end]).all() and np.array_equal(seen[1], truth(table)[1])
@@ -236,7 +236,7 @@ def test_names_are_those_of_individuals_not_of_rows_or_tags(rng, tmp_path):
     own = table.drop(columns="id").assign(**{real: table["id"]}, **extra)
     own = own[rng.permutation(own.columns)]
     own.to_csv(tmp_path / "own.csv", index=False)
-    recording = airflock.load_tracks(tmp_path / "own.csv", precision=64)
+    recording = airflock.load_tracks(tmp_path / "own.csv", unit="m", precision=64)
     assert set(recording["individual"].values) == set(table["id"])
     (note,) = (note for note in notes(recording) if f"id from {real}; also there: " in note)
     assert all(name in note for name in extra) and ("id" in extra) == ("id (row number)" in note)
@@ -249,11 +249,11 @@ def test_rows_that_are_numbered_are_of_one_individual_or_refused(rng, tmp_path):
     path = tmp_path / "own.csv"
     numbered.to_csv(path, index=False)
     if count == 1:
-        recording = airflock.load_tracks(path, precision=64)
+        recording = airflock.load_tracks(path, unit="m", precision=64)
         assert recording.sizes["individual"] == 1 and np.array_equal(places(recording), truth(table))
     else:
         with pytest.raises(RecordingError, match="column id has as many names as rows .* write --map id:=COLUMN"):
-            airflock.load_tracks(path)
+            airflock.load_tracks(path, unit="m")
 
 
 # Sound motion that looks odd.
@@ -303,8 +303,7 @@ def test_sound_motion_is_read_to_the_last_row_and_keeps_its_peaks(rng, motion):
     place = place + rng.normal(0.0, noise, place.shape) + rng.uniform(-3.0, 3.0, 2)
     table = pd.DataFrame({"t": np.arange(rows) * period, "x": place[:, 0], "y": place[:, 1]})
     speeds = np.gradient(place, period, axis=0)
-    if motion is rest:
-        table = table.rename(columns={"t": "t [s]", "x": "x [m]", "y": "y [m]"})
+    table = table.rename(columns={"t": "t [s]", "x": "x [m]", "y": "y [m]"})
     for accept in ((), "jumps"):
         recording = airflock.load_tracks(table, accept=accept, precision=64)
         assert np.array_equal(places(recording)[0], place) and (recording["confidence"] == 1.0).all()
