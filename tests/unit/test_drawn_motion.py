@@ -119,7 +119,8 @@ def test_outliers_are_left_out_and_no_sound_row_with_them(rng):
         angle = rng.uniform(0.0, 2.0 * np.pi)
         spoilt.loc[row, ["x", "y"]] += rng.uniform(30.0, 300.0) * step * np.array([np.cos(angle), np.sin(angle)])
     recording = airflock.load_tracks(spoilt, unit="m", precision=64)
-    assert any(f"{len(bad)} outliers left out, first row {bad[0]}" in note for note in notes(recording))
+    line = f"DataFrame: column x, y: fish_0: {len(bad)} outliers left out, first row {bad[0]}"
+    assert line in notes(recording)
     sound = np.setdiff1d(np.arange(rows), bad)
     assert np.array_equal(places(recording)[0][sound], truth(table)[0][sound])
     assert np.linalg.norm(places(recording)[0] - truth(table)[0], axis=1).max() < 3.0 * step
@@ -390,10 +391,11 @@ def test_rows_alone_between_gaps_are_counted():
     table = pd.DataFrame({"t [s]": t, "x [m]": t, "y [m]": 0.0})
     alone = int(((np.diff(t[:-1]) > 15.0) & (np.diff(t[1:]) > 15.0)).sum())
     assert alone == 5 and any(
-        "5 rows stand alone" in note and "--bridge 38" in note for note in notes(airflock.load_tracks(table))
+        "row 30: individual has rows alone" in note and "(5 in all)" in note and "--bridge 38" in note
+        for note in notes(airflock.load_tracks(table))
     )
     recording = airflock.load_tracks(table, bridge=38.0)  # as the note says
-    assert not any("stand alone" in note for note in notes(recording))
+    assert not any("rows alone" in note for note in notes(recording))
     there = recording["confidence"].values[:, 0, 0] > 0.0
     np.testing.assert_allclose(places(recording)[0][there, 0], recording["time"][there], atol=1e-3)
 

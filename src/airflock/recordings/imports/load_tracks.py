@@ -155,10 +155,10 @@ def load_tracks(
         f"{found.sizes['individual']} individuals, {times[-1] - times[0]:.4g} s at {1 / period:.4g} Hz; "
         f"{gone:.1%} absent, {shares['bridged']:.1%} bridged (gaps up to {bridge:g} s)"
     )
-    if shares["lost"]:
+    if "lost" in shares:
         findings.notes.append(
-            f"{shares['lost']:.0f} rows stand alone between gaps and are in no frame; to use them, write "
-            f"--bridge {np.ceil(shares['apart']):g}"
+            f"{shares['lost_at']} has rows alone between gaps, which are in no frame ({shares['lost']} in all); "
+            f"to use them, write --bridge {np.ceil(shares['apart']):g}"
         )
     if found.sizes["individual"] > 1 and period > 0.05:
         findings.notes.append(f"nearest distances between frames {period:.3g} s apart are upper bounds")

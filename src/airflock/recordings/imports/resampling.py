@@ -86,10 +86,10 @@ def needed_bits(tracks: list[ImportedTrack], min_bits: int) -> tuple[int, float]
 
 def resample(
     tracks: list[ImportedTrack], times: NDArray[np.float64], period: float, bridge: float, precision: int
-) -> tuple[xr.Dataset, dict[str, float]]:
+) -> tuple[xr.Dataset, dict[str, Any]]:
     """Resample tracks to the given times; return the dataset, and the shares that are present and bridged.
 
-    Beside these: `lost`, the number of rows in no frame, and `apart`, the longest time to the next row of one (s).
+    If rows are in no frame: their number `lost`, the first, `lost_at`, and the longest time to a next row, `apart`, s.
 
     bridge : longest gap (s) that is bridged, by cubic Hermite with the velocities at its ends
     """
@@ -99,9 +99,9 @@ def resample(
     # one individual after another, so that memory is taken for each as its rows are given back
     filled = {name: np.empty((len(tracks), axes, len(times)), kind) for name in names}
     sure = np.empty((len(times), len(tracks)), np.float32)
-    lost = []
+    lost: list[tuple[float, str]] = []  # time to the nearer neighbour, s, and where it is
     for who, track in enumerate(tracks):
-        lost += _lonely_rows(track, times, period, bridge).tolist()
+        lost += _lonely_rows(track, times, period, bridge)
         _fill(track, who, times, period, bridge, {name: array[who].T for name, array in filled.items()}, sure)
         if len(tracks) > 1:
             track.columns, track.time, track.rows = {}, track.time[:0], track.rows[:0]  # a long log is in memory once
@@ -118,18 +118,21 @@ def resample(
         "individual": [track.name for track in tracks],
     }
     attributes = {"ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds", "airflock_begin": float(times[0])}
-    shares = {"present": float((sure > 0.0).mean()), "bridged": float((sure == 0.5).mean())}
-    shares |= {"lost": float(len(lost)), "apart": max(lost, default=0.0)}
+    shares: dict[str, Any] = {"present": float((sure > 0.0).mean()), "bridged": float((sure == 0.5).mean())}
+    if lost:
+        shares |= {"lost": len(lost), "lost_at": lost[0][1], "apart": max(lost)[0]}
     return xr.Dataset(variables, coordinates, attributes), shares
 
 
-def _lonely_rows(track: ImportedTrack, times: Any, period: float, bridge: float) -> Any:
-    """Return the time to the nearer neighbour (s) of each row that no frame shows: alone between gaps, off the grid."""
+def _lonely_rows(track: ImportedTrack, times: Any, period: float, bridge: float) -> list[tuple[float, str]]:
+    """Return each row that no frame shows, alone between gaps and off the grid: time to the nearer row (s), place."""
     usual = median_period(track) or period
     steps = np.concatenate([[np.inf], np.diff(track.time), [np.inf]])
     near, at = np.minimum(steps[1:], steps[:-1]), (track.time - times[0]) / period
     off = np.abs(at - np.clip(np.round(at), 0, len(times) - 1)) * period >= 1e-3 * min(period, usual)
-    return near[off & (near > max(bridge, NORMAL * usual)) & (near < np.inf)]
+    alone = np.flatnonzero(off & (near > max(bridge, NORMAL * usual)) & (near < np.inf))
+    where = f"{track.source}: column {track.label('t')}, row"
+    return [(float(near[k]), f"{where} {track.rows[k]}: {track.name}") for k in alone]
 
 
 def _fill(

@@ -669,8 +669,8 @@ def _unexplained_steps(track: ImportedTrack, findings: ImportReport) -> list[Ste
         # What is left is judged again: an error hides the next one.
         track.keep(np.isin(np.arange(len(place)), off, invert=True))
     if outliers:
-        count = len(outliers)
-        findings.notes.append(f"{track.source}: {track.name}: {count} outliers left out, first row {min(outliers)}")
+        where, count = f"{track.source}: column {track.label('x')}, {track.label('y')}", len(outliers)
+        findings.notes.append(f"{where}: {track.name}: {count} outliers left out, first row {min(outliers)}")
     own = np.max(
         np.linalg.norm(moved, axis=1) / steps, initial=0.0, where=np.isin(np.arange(len(steps)), jumps, invert=True)
     )
@@ -694,7 +694,7 @@ def _is_several(track: ImportedTrack, place: Array, jumps: Any, error: Array, fi
     )
     flown = np.linalg.norm(track.stack(VELOCITY_TARGETS, 2), axis=1) if track.has(VELOCITY_TARGETS) else np.zeros(1)
     # Every second row is near, the next one far; by more than the velocity that an estimate of a drone at rest shows.
-    if next_row > 3.0 * max(second_row, float(np.nanmedian(flown)) * median_period(track)):
+    if next_row > 3.0 * max(second_row, float(np.median(np.nan_to_num(flown))) * median_period(track)):
         what = f"jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on"
     # An animal may dart often, but two that alternate undo each jump by the next one.
     elif len(jumps) > max(20, 0.05 * len(error)) and (track.has(VELOCITY_TARGETS) or undone.mean() > 0.5):
