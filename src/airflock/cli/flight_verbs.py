@@ -234,15 +234,8 @@ def _measured(source: Any, path: Path, changed: ScoreValues, trust: bool, aero: 
     values, course = measure_recording(recording, settings, trust=trust)
     scenario = scenario_of_recording(recording, settings, trust=trust)
     untold, coarse = undefined_metrics_of(recording, scenario, settings), between_frames_note(recording, scenario)
-    return MeasuredRecording(
-        path,
-        values,
-        course,
-        reported_values(scenario.metrics.rule) | PRESENCE_METRICS,
-        recorded_faults(recording),
-        untold,
-        coarse,
-    )
+    about = reported_values(scenario.metrics.rule) | PRESENCE_METRICS
+    return MeasuredRecording(path, values, course, about, recorded_faults(recording), untold, coarse)
 
 
 def _save_series(measured: Sequence[MeasuredRecording], path: Path) -> None:
